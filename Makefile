@@ -1,0 +1,47 @@
+# make demo   runs the demo, make test   passes the tests; both set up what they need in .venv.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# Rebuilt when the lock or the project's own description changes.
+READY := $(VENV)/.ready
+
+.PHONY: demo test check lint types layers lock benchmark clean
+
+demo: $(READY)
+	$(BIN)/nearfar demo nearfar-demo --force
+
+test: $(READY)
+	$(BIN)/python -m pytest
+
+check: lint types layers test
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(READY)
+	$(BIN)/mypy
+
+layers: $(READY)
+	$(BIN)/lint-imports
+
+benchmark: $(READY)
+	$(BIN)/python benchmarks/reconstruction.py
+	$(BIN)/python benchmarks/accuracy.py
+
+$(READY): requirements.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "nearfar needs Python 3.11 or newer: make PYTHON=python3.12")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	touch $(READY)
+
+# Needs uv on the path; hashes are of what PyPI holds.
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+		--no-annotate --custom-compile-command 'make lock' --quiet \
+		--group dev --group build pyproject.toml -o requirements.lock
+
+clean:
+	rm -rf $(VENV) nearfar-demo .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,0 +1,70 @@
+"""Array types, sizes and the walk over camera pixels in blocks.
+
+Everywhere: images are [y, x] or [y, x, channel], a size AxB is height x width, and camera or
+projector pixels are flattened row by row.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.errors import InputError
+
+Floats = NDArray[np.floating[Any]]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+Integers = NDArray[np.integer[Any]]
+Booleans = NDArray[np.bool_]
+
+
+class Size(NamedTuple):
+    """Height and width of a grid of pixels."""
+
+    height: int
+    width: int
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.height * self.width
+
+    def __str__(self) -> str:
+        return f"{self.height}x{self.width}"
+
+
+def parse_size(text: str, *, name: str = "size") -> Size:
+    """Read a size written as ``HxW``.
+
+    Parameters
+    ----------
+    text : str
+        Height and width in pixels, for instance ``"68x100"`` (68 rows).
+    name : str
+        What the size is of, for the message.
+
+    Returns
+    -------
+    Size
+
+    Raises
+    ------
+    InputError
+        If the text is no size or a side is under 1.
+    """
+    parts = text.lower().replace("×", "x").split("x")
+    try:
+        height, width = (int(part) for part in parts)
+    except ValueError:
+        raise InputError(
+            f"{name} {text!r} is not a size: write height x width, for instance 68x100."
+        ) from None
+    if height < 1 or width < 1:
+        raise InputError(f"{name} {text!r} has a side under 1: both must be at least 1.")
+    return Size(height, width)
+
+
+def blocks(count: int, length: int) -> Iterator[slice]:
+    """Cut ``range(count)`` into slices of at most `length`."""
+    for start in range(0, count, max(1, length)):
+        yield slice(start, min(count, start + max(1, length)))

@@ -1,0 +1,34 @@
+"""What can go wrong, in one place.
+
+Every fault a user can cause or meet is a `NearfarError` joined with the standard type that a
+Python programmer would expect, so that ``except FileNotFoundError`` keeps working. A message
+names the thing, says what is wrong with it, and gives the cure, in one sentence.
+"""
+
+
+class NearfarError(Exception):
+    """Base of all faults that nearfar reports in a sentence."""
+
+
+class InputError(NearfarError, ValueError):
+    """A value, an array or an option that cannot be used."""
+
+
+class PlanError(InputError):
+    """A plan that cannot be made, read or used for what was asked."""
+
+
+class MissingFileError(NearfarError, FileNotFoundError):
+    """A file or folder that is not there."""
+
+
+class ExistingOutputError(NearfarError, FileExistsError):
+    """An output that is there already and was not to be overwritten."""
+
+
+class UnreadableFileError(NearfarError, OSError):
+    """A file that is damaged, truncated or of another kind."""
+
+
+class StorageError(NearfarError, OSError):
+    """An output that could not be written: full disk, no permission."""

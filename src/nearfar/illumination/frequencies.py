@@ -1,0 +1,129 @@
+"""The frequencies that the method measures: exact rationals in cycles per projector pixel.
+
+A frequency is a pair (fy, fx). Patterns live on whole pixels, so frequencies that differ by a
+whole number of cycles per pixel are one and the same; each is kept in [-1/2, 1/2). A real
+transport answers -k by the complex conjugate of its answer to k, so +-k share their photos and
+stand under one representative.
+"""
+
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Size
+
+
+class Frequency(NamedTuple):
+    """Cycles per projector pixel down and across."""
+
+    fy: Fraction
+    fx: Fraction
+
+    def __neg__(self) -> "Frequency":
+        return wrap(-self.fy, -self.fx)
+
+    @property
+    def is_own_negative(self) -> bool:
+        """Whether k and -k are one: DC, the checkerboard, (0, 1/2), (1/2, 0)."""
+        return self == -self
+
+
+def wrap(fy: Fraction, fx: Fraction) -> Frequency:
+    """Bring a frequency into [-1/2, 1/2) on both axes."""
+    half = Fraction(1, 2)
+    return Frequency((fy + half) % 1 - half, (fx + half) % 1 - half)
+
+
+DC = Frequency(Fraction(0), Fraction(0))
+CHECKERBOARD = wrap(Fraction(1, 2), Fraction(1, 2))
+
+
+def frequency_from_text(parts: Iterable[str]) -> Frequency:
+    """Read a frequency written as two fractions, such as ``["-1/19", "0"]``.
+
+    Raises
+    ------
+    ValueError
+        If the parts are no two fractions in [-1/2, 1/2).
+    """
+    try:
+        fy, fx = (Fraction(part) for part in parts)
+    except (TypeError, ZeroDivisionError) as error:
+        raise ValueError(f"{parts!r} is no frequency: {error}") from None
+    if wrap(fy, fx) != (fy, fx):
+        raise ValueError("a frequency lies in [-1/2, 1/2) cycles per pixel on both axes")
+    return Frequency(fy, fx)
+
+
+def frequency_to_text(frequency: Frequency) -> list[str]:
+    """Write a frequency as two fractions; see `frequency_from_text`."""
+    return [str(frequency.fy), str(frequency.fx)]
+
+
+def representative(frequency: Frequency) -> Frequency:
+    """Of k and -k, the one that comes last in order; it stands for both."""
+    return max(frequency, -frequency)
+
+
+def band(count: int) -> range:
+    """Whole frequencies of a DFT of `count` points: -N/2 ... N/2 - 1, or -(N-1)/2 ... (N-1)/2."""
+    return range(-(count // 2), count - count // 2)
+
+
+def grid(size: Size, period: Size) -> list[Frequency]:
+    """Frequencies of a `size` band at multiples of one cycle per `period` pixels."""
+    return [
+        wrap(Fraction(y, period.height), Fraction(x, period.width))
+        for y in band(size.height)
+        for x in band(size.width)
+    ]
+
+
+def far_frequencies(far: Size, projector: Size) -> list[Frequency]:
+    """List the low DFT frequencies k/P of the far band, |K_far| of them (section 4.3)."""
+    return grid(far, projector)
+
+
+def near_frequencies(window: int, dropped: Size) -> list[Frequency]:
+    """List the uniform near set j/W less its lowest frequencies (section 4.2).
+
+    The checkerboard, which an even W holds, is left out: it is the direct measurement.
+
+    Parameters
+    ----------
+    window : int
+        W.
+    dropped : Size
+        Odd height and width of the block of lowest frequencies to leave out.
+
+    Returns
+    -------
+    list of Frequency
+        W^2 less the dropped, less the checkerboard for even W.
+    """
+    square = Size(window, window)
+    low = set(grid(dropped, square))
+    return [k for k in grid(square, square) if k not in low and k != CHECKERBOARD]
+
+
+def default_dropped(window: int, far: Size, projector: Size) -> Size:
+    """Block of near frequencies with both |k| <= k_far: at least DC (section 4.2)."""
+
+    def side(far_side: int, projector_side: int) -> int:
+        highest = int(window * Fraction(far_side // 2, projector_side))
+        return min(2 * highest + 1, window - 1 + window % 2)
+
+    return Size(side(far.height, projector.height), side(far.width, projector.width))
+
+
+def representatives(frequencies: Iterable[Frequency]) -> list[Frequency]:
+    """One of each +-k, in the order of first appearance."""
+    return list(dict.fromkeys(representative(k) for k in frequencies))
+
+
+def as_array(frequencies: Iterable[Frequency]) -> NDArray[np.float64]:
+    """Frequencies as an array, shape (K, 2), in cycles per pixel."""
+    return np.array([[float(k.fy), float(k.fx)] for k in frequencies]).reshape(-1, 2)

@@ -1,0 +1,65 @@
+"""Patterns: sinusoids with offset, stripes, and their 8-bit form.
+
+A pattern is (Py, Px), values in [0, 1], 1 = full white.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Size
+from nearfar.illumination.frequencies import Frequency
+
+
+def phase(frequency: Frequency, size: Size) -> NDArray[np.float64]:
+    """Return k . p modulo one cycle at every projector pixel, in cycles, shape (Py, Px).
+
+    Reduced in whole numbers, so that a pattern of a thousand pixels is as exact as its first.
+    """
+
+    def axis(cycles: Fraction, length: int) -> NDArray[np.float64]:
+        steps = (np.arange(length, dtype=np.int64) * cycles.numerator) % cycles.denominator
+        return np.asarray(steps / cycles.denominator)
+
+    total = axis(frequency.fy, size.height)[:, None] + axis(frequency.fx, size.width)[None, :]
+    return np.asarray(total % 1.0)
+
+
+def cosine(frequency: Frequency, size: Size) -> NDArray[np.float64]:
+    """0.5 + 0.5 cos(2 pi k.p) (section 5.1)."""
+    return np.asarray(0.5 + 0.5 * np.cos(2 * np.pi * phase(frequency, size)))
+
+
+def sine(frequency: Frequency, size: Size) -> NDArray[np.float64]:
+    """0.5 + 0.5 sin(2 pi k.p) (section 5.1)."""
+    return np.asarray(0.5 + 0.5 * np.sin(2 * np.pi * phase(frequency, size)))
+
+
+def exponential(frequency: Frequency, size: Size) -> NDArray[np.complex128]:
+    """exp(-j 2 pi k.p), the DFT basis of equation (2), which no projector can show."""
+    return np.asarray(np.exp(-2j * np.pi * phase(frequency, size)))
+
+
+def black_row(index: int, size: Size) -> NDArray[np.float64]:
+    """White with row `index` black."""
+    pattern = np.ones(size)
+    pattern[index, :] = 0.0
+    return pattern
+
+
+def black_column(index: int, size: Size) -> NDArray[np.float64]:
+    """White with column `index` black."""
+    pattern = np.ones(size)
+    pattern[:, index] = 0.0
+    return pattern
+
+
+def quantise(pattern: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Turn values in [0, 1] into the 8 bits that are shown."""
+    return np.rint(255.0 * pattern).astype(np.uint8)
+
+
+def invert(pattern: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return 255 less the 8-bit pattern, so that a pair sums exactly to white."""
+    return np.asarray(255 - pattern, dtype=np.uint8)

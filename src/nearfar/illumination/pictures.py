@@ -1,0 +1,115 @@
+"""Lights to relight under: natural pictures, fine detail, noise.
+
+The natural pictures are dead leaves (Lee, Mumford and Huang 2001): discs with a power law of
+sizes, each hiding what lies under it, which share edges, flat parts and 1/f spectra with
+photographs. They are made here, so they come with no licence and in any size.
+"""
+
+import numpy as np
+
+from nearfar.arrays import Floats, Size
+
+# Drawn this much finer than shown, then averaged: edges fall between pixels as in photographs.
+FINER = 4
+LEAVES = 2000
+SMALLEST = 0.035
+LARGEST = 0.6
+
+
+def white(size: Size) -> Floats:
+    """Full white, (Py, Px), float32."""
+    return np.ones((size.height, size.width), dtype=np.float32)
+
+
+def natural_picture(size: Size, seed: int, *, colour: bool = False) -> Floats:
+    """Draw dead leaves in linear light, float32, (Py, Px) or (Py, Px, 3), values in [0, 1].
+
+    Parameters
+    ----------
+    size : Size
+    seed : int
+        Which picture.
+    colour : bool
+        Three channels instead of one.
+    """
+    generator = np.random.default_rng([seed, 2001])
+    height, width = size.height * FINER, size.width * FINER
+    longest = max(height, width)
+    drawn = np.zeros((height, width, 3 if colour else 1))
+    empty = np.ones((height, width), dtype=bool)
+    # Areas fall off as 1/r^3.
+    low, high = LARGEST**-2, SMALLEST**-2
+    for _ in range(LEAVES):
+        radius = longest * generator.uniform(low, high) ** -0.5
+        middle = generator.uniform(0, [height, width])
+        # Reflectances of natural scenes are skewed to the dark.
+        shade = generator.uniform(0.05, 1.0) ** 1.8
+        tint = shade * generator.uniform(0.6, 1.0, size=3)[: drawn.shape[2]]
+        slope = generator.normal(0.0, 0.4, size=2)
+        box = tuple(
+            slice(max(0, int(m - radius)), min(side, int(m + radius) + 2))
+            for m, side in zip(middle, (height, width), strict=True)
+        )
+        down = (np.arange(height)[box[0], None] - middle[0]) / radius
+        across = (np.arange(width)[None, box[1]] - middle[1]) / radius
+        # Front to back: a leaf only fills what is still empty.
+        leaf = empty[box] & (down**2 + across**2 <= 1.0)
+        shading = 1.0 + slope[0] * down + slope[1] * across
+        drawn[box][leaf] = np.clip(tint * shading[leaf][:, None], 0.0, 1.0)
+        empty[box] &= ~leaf
+    drawn[empty] = 0.2
+    shown = drawn.reshape(size.height, FINER, size.width, FINER, -1).mean(axis=(1, 3))
+    picture: Floats = shown.astype(np.float32)
+    return picture if colour else picture[..., 0]
+
+
+# Parts of the penguin, back to front: (y, x, half height, half width, tilt, colour) in a unit
+# square, colours in linear light.
+_PENGUIN = (
+    (0.93, 0.50, 0.16, 0.90, 0.0, (0.80, 0.88, 0.95)),
+    (0.60, 0.27, 0.25, 0.07, 0.35, (0.03, 0.03, 0.05)),
+    (0.60, 0.73, 0.25, 0.07, -0.35, (0.03, 0.03, 0.05)),
+    (0.58, 0.50, 0.36, 0.24, 0.0, (0.03, 0.03, 0.05)),
+    (0.63, 0.50, 0.30, 0.17, 0.0, (0.95, 0.95, 0.90)),
+    (0.25, 0.50, 0.17, 0.16, 0.0, (0.03, 0.03, 0.05)),
+    (0.29, 0.43, 0.10, 0.07, 0.0, (0.95, 0.95, 0.90)),
+    (0.29, 0.57, 0.10, 0.07, 0.0, (0.95, 0.95, 0.90)),
+    (0.25, 0.44, 0.030, 0.024, 0.0, (0.02, 0.02, 0.02)),
+    (0.25, 0.56, 0.030, 0.024, 0.0, (0.02, 0.02, 0.02)),
+    (0.325, 0.50, 0.035, 0.055, 0.0, (0.95, 0.45, 0.03)),
+    (0.93, 0.40, 0.035, 0.09, 0.0, (0.95, 0.40, 0.02)),
+    (0.93, 0.60, 0.035, 0.09, 0.0, (0.95, 0.40, 0.02)),
+)
+
+
+def penguin(size: Size) -> Floats:
+    """Draw a penguin on ice under a sky, after the paper's figure 2: (Py, Px, 3), float32."""
+    height, width = size.height * FINER, size.width * FINER
+    side = min(height, width)
+    y = (np.arange(height)[:, None] + 0.5 - height / 2) / side + 0.5
+    x = (np.arange(width)[None, :] + 0.5 - width / 2) / side + 0.5
+    sky = np.array([0.10, 0.30, 0.75]) + np.clip(y, 0, 1)[..., None] * [0.45, 0.40, 0.15]
+    drawn = np.broadcast_to(sky, (height, width, 3)).copy()
+    for centre_y, centre_x, half_y, half_x, tilt, colour in _PENGUIN:
+        down, across = y - centre_y, x - centre_x
+        along = down * np.cos(tilt) - across * np.sin(tilt)
+        beside = down * np.sin(tilt) + across * np.cos(tilt)
+        drawn[(along / half_y) ** 2 + (beside / half_x) ** 2 <= 1.0] = colour
+    shown = drawn.reshape(size.height, FINER, size.width, FINER, 3).mean(axis=(1, 3))
+    picture: Floats = shown.astype(np.float32)
+    return picture
+
+
+def random_pattern(size: Size, seed: int) -> Floats:
+    """Draw independent values between 0 and 1 at every pixel, float32, (Py, Px)."""
+    generator = np.random.default_rng([seed, 1])
+    return np.asarray(generator.random((size.height, size.width), dtype=np.float32))
+
+
+def standard_lights(size: Size) -> dict[str, Floats]:
+    """Return the lights that relighting is judged under: white, five pictures, random."""
+    return {
+        "white": white(size),
+        **{f"picture-{i}": natural_picture(size, i) for i in range(1, 6)},
+        "random": random_pattern(size, 0),
+    }

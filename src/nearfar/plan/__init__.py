@@ -1,0 +1,6 @@
+"""What to project, and why."""
+
+from nearfar.plan.model import Plan, Sinusoid, Stripe, parse_plan, read_plan
+from nearfar.plan.paper import paper_plan
+
+__all__ = ["Plan", "Sinusoid", "Stripe", "paper_plan", "parse_plan", "read_plan"]

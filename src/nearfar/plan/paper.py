@@ -1,0 +1,112 @@
+"""The paper's plan: checkerboard, uniform near set, low far set (sections 4.1 to 4.3, 5.1)."""
+
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+from nearfar.arrays import Size
+from nearfar.errors import PlanError
+from nearfar.illumination.frequencies import (
+    CHECKERBOARD,
+    Frequency,
+    default_dropped,
+    far_frequencies,
+    near_frequencies,
+    representatives,
+)
+from nearfar.plan.model import Exponential, Plan, Purpose, Sinusoid, Stripe
+
+Offset = Literal["inverse", "none"]
+Correspondence = Literal["stripes", "none"]
+
+
+def paper_plan(
+    projector: Size,
+    window: int,
+    far: Size,
+    *,
+    dropped: Size | None = None,
+    offset: Offset = "inverse",
+    correspondence: Correspondence = "stripes",
+) -> Plan:
+    """Plan the patterns of the paper.
+
+    Parameters
+    ----------
+    projector : Size
+        Pattern grid Py x Px.
+    window : int
+        W; the near set is W x W.
+    far : Size
+        Far band, in DFT frequencies of the pattern grid.
+    dropped : Size, optional
+        Block of lowest near frequencies to leave out, odd by odd. By default those with both
+        |k| <= k_far, at least DC.
+    offset : {"inverse", "none"}
+        Each pattern with its inverse, or the theory's complex patterns (simulation only).
+    correspondence : {"stripes", "none"}
+
+    Returns
+    -------
+    Plan
+        With inverse pairs, 2 (1 + W^2 - dropped + |K_far|) photos of transport for odd bands.
+
+    Raises
+    ------
+    PlanError
+        If W or the far band is larger than the projector, or the dropped block is even or
+        larger than W.
+    """
+    if not 1 <= window <= min(projector):
+        raise PlanError(
+            f"W = {window} does not fit a projector of {projector}: choose --near between 1 and "
+            f"{min(projector)}."
+        )
+    if far.height > projector.height or far.width > projector.width:
+        raise PlanError(
+            f"the far band {far} is larger than the projector {projector}: choose --far at most "
+            f"{projector}."
+        )
+    if dropped is None:
+        dropped = default_dropped(window, far, projector)
+    if dropped.height % 2 == 0 or dropped.width % 2 == 0 or max(dropped) > window:
+        raise PlanError(
+            f"--drop {dropped} is not a block of near frequencies around DC: both sides must be "
+            f"odd, from 1 to W = {window}."
+        )
+    sinusoids = _exponentials if offset == "none" else _inverse_pairs
+    patterns = (
+        *sinusoids([CHECKERBOARD], "direct"),
+        *sinusoids(far_frequencies(far, projector), "far"),
+        *sinusoids(near_frequencies(window, dropped), "near"),
+    )
+    return Plan(
+        projector=projector,
+        window=window,
+        far=far,
+        dropped=dropped,
+        offset=offset,
+        correspondence=correspondence,
+        patterns=patterns + (stripes(projector) if correspondence == "stripes" else ()),
+    )
+
+
+def _exponentials(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Exponential]:
+    for frequency in frequencies:
+        yield Exponential(frequency=frequency, purpose=purpose)
+
+
+def _inverse_pairs(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
+    # A pair stands together, so that a drifting lamp leaves its difference alone.
+    for frequency in representatives(frequencies):
+        kinds: tuple[Literal["cosine", "sine"], ...] = ("cosine", "sine")
+        for kind in kinds[:1] if frequency.is_own_negative else kinds:
+            for inverse in (False, True):
+                yield Sinusoid(kind=kind, frequency=frequency, inverse=inverse, purpose=purpose)
+
+
+def stripes(projector: Size) -> tuple[Stripe, ...]:
+    """Return a black stripe on each row, then on each column: Py + Px patterns (section 5.1)."""
+    return (
+        *(Stripe(kind="black row", index=y) for y in range(projector.height)),
+        *(Stripe(kind="black column", index=x) for x in range(projector.width)),
+    )

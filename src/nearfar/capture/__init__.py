@@ -1,0 +1,17 @@
+"""Captures: raw photos on the disk, and photos taken elsewhere."""
+
+from nearfar.capture.importing import ImportSummary, Pairing, import_photos, pair, pairing
+from nearfar.capture.store import KIND, Capture, open_capture, white_and_black, write_capture
+
+__all__ = [
+    "KIND",
+    "Capture",
+    "ImportSummary",
+    "Pairing",
+    "import_photos",
+    "open_capture",
+    "pair",
+    "pairing",
+    "white_and_black",
+    "write_capture",
+]

@@ -1,0 +1,174 @@
+"""Photos that were taken elsewhere: pair them with the patterns of a plan."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from nearfar.capture.store import Capture, write_capture
+from nearfar.errors import InputError, MissingFileError, UnreadableFileError
+from nearfar.files import list_pictures, read_picture
+from nearfar.plan.model import Plan, Stripe
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """A photo and the pattern that it shows."""
+
+    index: int
+    pattern: str
+    path: Path
+
+    def __str__(self) -> str:
+        """Say it in a line."""
+        return f"pattern {self.index} ({self.pattern}) <- {self.path.name}"
+
+
+@dataclass(frozen=True)
+class ImportSummary:
+    """What was imported: the capture, and the first and the last pairing to look over."""
+
+    capture: Capture
+    first: Pairing
+    last: Pairing
+
+
+def pair(plan: Plan, folder: Path, list_file: Path | None = None) -> list[Path]:
+    """Find the photo of each pattern: all pictures of a folder in natural order, or a list.
+
+    Parameters
+    ----------
+    plan : Plan
+    folder : Path
+        Folder of the photos; img9 comes before img10.
+    list_file : Path, optional
+        Text file that names the photos instead, one per line relative to `folder`, in the order
+        of the plan. Blank lines and lines that begin with # are skipped.
+
+    Returns
+    -------
+    list of Path
+        A photo for each pattern.
+
+    Raises
+    ------
+    MissingFileError
+        If the folder, the list or a listed photo is not there.
+    UnreadableFileError
+        If the folder or the list cannot be read.
+    InputError
+        If the number of photos is not that of the patterns.
+    """
+    plan.require_real("import")
+    photos = list_pictures(folder) if list_file is None else _listed(folder, list_file)
+    count = len(plan.patterns)
+    if len(photos) != count:
+        source = folder if list_file is None else list_file
+        ends = f" (first {photos[0].name}, last {photos[-1].name})" if photos else ""
+        raise InputError(
+            f"{source} has {len(photos)} photos{ends}, but the plan has {count} patterns: give "
+            f"one photo for each pattern{_hint(folder, photos) if list_file is None else ''}."
+        )
+    return photos
+
+
+def _hint(folder: Path, photos: Sequence[Path]) -> str:
+    endings = Counter(p.suffix.lower() for p in folder.iterdir() if p not in photos and p.suffix)
+    if photos or not endings:
+        return ", or name them with --list"
+    (ending, number), *_ = endings.most_common(1)
+    return f" as PNG, TIFF, EXR or NPY (the folder has {number} files that end in {ending})"
+
+
+def _listed(folder: Path, list_file: Path) -> list[Path]:
+    try:
+        lines = list_file.read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        raise MissingFileError(f"{list_file} is not there: check the name of the list.") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UnreadableFileError(
+            f"{list_file} cannot be read as a list ({error}): give a text file with a photo's "
+            f"name on each line."
+        ) from error
+    photos = []
+    for number, line in enumerate(lines, start=1):
+        name = line.strip()
+        if name and not name.startswith("#"):
+            photo = folder / name
+            if not photo.is_file():
+                raise MissingFileError(
+                    f"{photo} is not there, which line {number} of {list_file} names: correct "
+                    f"the line."
+                )
+            photos.append(photo)
+    return photos
+
+
+def pairing(plan: Plan, index: int, path: Path) -> Pairing:
+    """Say in words which pattern a photo is taken to show."""
+    pattern = plan.patterns[index]
+    if isinstance(pattern, Stripe):
+        return Pairing(index, f"{pattern.kind} {pattern.index}", path)
+    fy, fx = pattern.frequency
+    inverse = ", inverse" if getattr(pattern, "inverse", False) else ""
+    return Pairing(index, f"{pattern.kind} of frequency ({fy}, {fx}){inverse}", path)
+
+
+def import_photos(
+    plan: Plan,
+    photos: Sequence[Path],
+    path: Path,
+    *,
+    full_scale: float | None = None,
+    rig: Mapping[str, Any] | None = None,
+    exposure: float | None = None,
+    force: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> ImportSummary:
+    """Import photos into a capture.
+
+    Parameters
+    ----------
+    plan : Plan
+    photos : sequence of Path
+        A photo for each pattern, as `pair` gives them.
+    path : Path
+        Capture to make.
+    full_scale, rig, exposure, force, progress
+        As `nearfar.capture.write_capture`.
+
+    Returns
+    -------
+    ImportSummary
+
+    Raises
+    ------
+    NearfarError
+        As `nearfar.files.read_picture` and `nearfar.capture.write_capture`; a message names the
+        photo, and nothing is left behind.
+    """
+    capture = write_capture(
+        path,
+        plan,
+        _read(photos),
+        full_scale=full_scale,
+        rig={"description": "imported photos", **(rig or {})},
+        exposure=exposure,
+        names=[photo.name for photo in photos],
+        force=force,
+        progress=progress,
+    )
+    last = len(photos) - 1
+    return ImportSummary(
+        capture=capture,
+        first=pairing(plan, 0, photos[0]),
+        last=pairing(plan, last, photos[last]),
+    )
+
+
+def _read(photos: Sequence[Path]) -> Iterator[NDArray[Any]]:
+    for photo in photos:
+        yield read_picture(photo)

@@ -1,0 +1,52 @@
+"""Files: pictures, Zarr stores, and outputs that appear whole or not at all."""
+
+from nearfar.files.codecs import encode_png
+from nearfar.files.colour import from_srgb, luminance, to_srgb
+from nearfar.files.images import (
+    check_picture_ending,
+    full_scale_of,
+    list_pictures,
+    natural_key,
+    read_light,
+    read_linear,
+    read_picture,
+    require_finite,
+    write_picture,
+)
+from nearfar.files.kinds import kind_of_store
+from nearfar.files.output import check_output, new_output
+from nearfar.files.stores import (
+    add_array,
+    create_durable_store,
+    create_store,
+    open_array,
+    open_store,
+    read_array,
+    read_selection,
+)
+
+__all__ = [
+    "add_array",
+    "check_output",
+    "check_picture_ending",
+    "create_durable_store",
+    "create_store",
+    "encode_png",
+    "from_srgb",
+    "full_scale_of",
+    "kind_of_store",
+    "list_pictures",
+    "luminance",
+    "natural_key",
+    "new_output",
+    "open_array",
+    "open_store",
+    "read_array",
+    "read_light",
+    "read_linear",
+    "read_picture",
+    "read_selection",
+    "require_finite",
+    "to_srgb",
+    "write_picture",
+]

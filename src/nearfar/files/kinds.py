@@ -1,0 +1,13 @@
+"""What a file or folder is, told from its first lines."""
+
+import json
+from pathlib import Path
+
+
+def kind_of_store(path: Path) -> str | None:
+    """Return what a Zarr says it holds, such as ``"nearfar capture"``; None if it is none."""
+    try:
+        metadata = json.loads((path / "zarr.json").read_bytes())
+        return str(metadata["attributes"]["format"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

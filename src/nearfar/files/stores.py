@@ -1,0 +1,260 @@
+"""Zarr groups (version 3) in which a missing or damaged chunk is an error, never zeros."""
+
+import asyncio
+import contextlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+from zarr.abc.store import ByteRequest, Store
+from zarr.codecs import Crc32cCodec, ZstdCodec
+from zarr.core.buffer import Buffer, BufferPrototype
+from zarr.errors import NodeNotFoundError
+from zarr.storage import LocalStore
+
+from nearfar.errors import InputError, MissingFileError, NearfarError, UnreadableFileError
+from nearfar.files.output import synchronise_entry
+
+_METADATA = "zarr.json"
+
+# What zarr was seen to raise on metadata and chunks cut or changed at every byte.
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    RuntimeError,
+    ArithmeticError,
+    NodeNotFoundError,
+)
+
+
+class _FolderStore(LocalStore):
+    """A folder store for writing.
+
+    A chunk makes no folder of its own: what zarr's threads still write after one of them has
+    failed must not bring a removed folder back.
+    """
+
+    async def set(self, key: str, value: Buffer) -> None:
+        """Write a file whole or not at all."""
+        await asyncio.to_thread(_write, self.root / key, value)
+
+
+class _DurableStore(LocalStore):
+    """A folder store for writing, in which what is set is on the disk when the call returns."""
+
+    async def set(self, key: str, value: Buffer) -> None:
+        """Write a file whole or not at all, and wait for the disk."""
+        await asyncio.to_thread(_write_durably, self.root / key, value)
+
+
+def _write(path: Path, value: Buffer) -> None:
+    _write_partial(path, value).replace(path)
+
+
+def _write_durably(path: Path, value: Buffer) -> None:
+    partial = _write_partial(path, value)
+    synchronise_entry(partial)
+    partial.replace(path)
+    synchronise_entry(path.parent)
+
+
+def _write_partial(path: Path, value: Buffer) -> Path:
+    if path.name == _METADATA:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.partial")
+    partial.write_bytes(value.as_buffer_like())
+    return partial
+
+
+class _WholeStore(LocalStore):
+    """A folder store for reading, in which every chunk must be there."""
+
+    async def get(
+        self,
+        key: str,
+        prototype: BufferPrototype | None = None,
+        byte_range: ByteRequest | None = None,
+    ) -> Buffer | None:
+        """Read a file; only metadata may be missing."""
+        path = self.root / key
+        try:
+            value = await super().get(key, prototype, byte_range)
+        except OSError as error:
+            raise UnreadableFileError(
+                f"{path} cannot be read ({error.strerror}): check the disk and its permissions."
+            ) from error
+        if value is None and path.name != _METADATA:
+            raise UnreadableFileError(
+                f"{self.root} is damaged: {key} is missing; copy or make it again."
+            )
+        return value
+
+
+def create_store(
+    path: Path, kind: str, version: int, attributes: Mapping[str, Any] | None = None
+) -> zarr.Group:
+    """Make a Zarr group of ours; use it within `nearfar.files.output.new_output`.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to make.
+    kind : str
+        What it holds, for instance ``"nearfar capture"``.
+    version : int
+        Version of the format.
+    attributes : mapping, optional
+        JSON values to keep with it.
+    """
+    return _create(_FolderStore(path), kind, version, attributes)
+
+
+def create_durable_store(
+    path: Path, kind: str, version: int, attributes: Mapping[str, Any] | None = None
+) -> zarr.Group:
+    """Make a Zarr group as `create_store`, whose chunks are on the disk once written."""
+    return _create(_DurableStore(path), kind, version, attributes)
+
+
+def _create(
+    store: LocalStore, kind: str, version: int, attributes: Mapping[str, Any] | None
+) -> zarr.Group:
+    return zarr.create_group(
+        store,
+        zarr_format=3,
+        attributes={"format": kind, "version": version, **(attributes or {})},
+    )
+
+
+def add_array(
+    group: zarr.Group,
+    name: str,
+    shape: tuple[int, ...],
+    dtype: np.dtype[Any] | type[np.generic] | str,
+    chunks: tuple[int, ...],
+) -> zarr.Array[Any]:
+    """Add an array of checksummed chunks, all of which are written, zeros too."""
+    return group.create_array(
+        name,
+        shape=shape,
+        dtype=np.dtype(dtype),
+        chunks=chunks,
+        compressors=[ZstdCodec(level=1), Crc32cCodec()],
+        # One flat folder per array: a new chunk is durable with one folder to wait for.
+        chunk_key_encoding={"name": "default", "separator": "."},
+        fill_value=0,
+        config={"write_empty_chunks": True},
+    )
+
+
+def open_store(path: Path, kind: str, version: int) -> zarr.Group:
+    """Open a Zarr group of ours for reading.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        What it must hold.
+    version : int
+        The version of the format that is read.
+
+    Raises
+    ------
+    MissingFileError
+        If there is nothing.
+    UnreadableFileError
+        If it is no Zarr group, of another kind or version, or damaged.
+    """
+    article = "an" if kind[0] in "aeiou" else "a"
+    try:
+        if not path.exists():
+            raise MissingFileError(f"{path} is not there: check the name.")
+        if not (path / _METADATA).is_file():
+            raise UnreadableFileError(
+                f"{path} is not {article} {kind}: it is no Zarr folder with a zarr.json."
+            )
+        with _sentences(path, "its zarr.json"):
+            store = _WholeStore(path, read_only=True)
+            group = zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
+            found, found_version = group.attrs.get("format"), group.attrs.get("version")
+    except PermissionError as error:
+        raise UnreadableFileError(
+            f"{path} cannot be read ({error.strerror}): check its permissions."
+        ) from error
+    if found != kind:
+        other = f"a {found}" if str(found).startswith("nearfar ") else "of another kind"
+        raise UnreadableFileError(f"{path} is not {article} {kind} but {other}: check the name.")
+    if found_version != version:
+        raise UnreadableFileError(
+            f"{path} is {article} {kind} of version {found_version!r}, this nearfar reads version "
+            f"{version}: make it again, or use the nearfar that made it."
+        )
+    return group
+
+
+def open_array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+    """Open an array of a group for reading.
+
+    Raises
+    ------
+    UnreadableFileError
+        If it is missing or its metadata damaged.
+    """
+    path = _root(group.store)
+    with _sentences(path, f"array {name}"):
+        array = group[name]
+    if not isinstance(array, zarr.Array):
+        raise UnreadableFileError(f"{path} is damaged: {name} is no array; make it again.")
+    return array
+
+
+def read_array(group: zarr.Group, name: str, selection: Any = ...) -> NDArray[Any]:
+    """Read an array of a group, or a part of it.
+
+    Parameters
+    ----------
+    group : zarr.Group
+    name : str
+    selection : slices, integers and lists of integers, a dimension each
+        By default all.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the array or a chunk is missing or damaged.
+    InputError
+        If the selection is not in the array.
+    """
+    return read_selection(open_array(group, name), selection)
+
+
+def read_selection(array: zarr.Array[Any], selection: Any = ...) -> NDArray[Any]:
+    """Read a part of an open array; raises as `read_array`."""
+    path = _root(array.store)
+    with _sentences(path, f"array {array.basename}"):
+        try:
+            return np.asarray(array.oindex[selection])
+        except IndexError as error:
+            raise InputError(f"{path} has no such part of {array.basename}: {error}.") from error
+
+
+def _root(store: Store) -> Path:
+    return store.root if isinstance(store, LocalStore) else Path(str(store))
+
+
+@contextlib.contextmanager
+def _sentences(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
+    except NearfarError:
+        raise
+    except _DAMAGE as error:
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".")[:120]
+        raise UnreadableFileError(
+            f"{path} is damaged: {what} cannot be read ({reason}); copy or make it again."
+        ) from error

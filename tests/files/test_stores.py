@@ -1,0 +1,162 @@
+"""A damaged store gives a sentence, never zeros."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zarr
+
+from nearfar.errors import InputError, MissingFileError, UnreadableFileError
+from nearfar.files import (
+    add_array,
+    create_durable_store,
+    create_store,
+    kind_of_store,
+    open_array,
+    open_store,
+    read_array,
+    read_selection,
+)
+
+KIND = "nearfar test"
+VALUES = np.random.default_rng(0).integers(0, 9, (5, 6, 7)).astype(np.uint16)
+VALUES[2] = 0
+
+
+@pytest.fixture(params=[create_store, create_durable_store])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    path = tmp_path / "a.zarr"
+    group = request.param(path, KIND, 1, {"note": [1, "two"]})
+    add_array(group, "a", VALUES.shape, VALUES.dtype, (1, 6, 7))[:] = VALUES
+    add_array(group, "b", (3,), np.float32, (3,))[:] = [0, -1.5, 2]
+    return path
+
+
+def chunk(path: Path, index: int) -> Path:
+    return path / "a" / f"c.{index}.0.0"
+
+
+def test_what_is_written_is_read(store: Path) -> None:
+    group = open_store(store, KIND, 1)
+    assert dict(group.attrs) == {"format": KIND, "version": 1, "note": [1, "two"]}
+    np.testing.assert_array_equal(read_array(group, "a"), VALUES)
+    np.testing.assert_array_equal(read_array(group, "b"), [0, -1.5, 2])
+    np.testing.assert_array_equal(
+        read_array(group, "a", ([4, 0], slice(1, 3))), VALUES[[4, 0], 1:3]
+    )
+    np.testing.assert_array_equal(read_array(group, "a", (3, slice(None), -1)), VALUES[3, :, -1])
+    np.testing.assert_array_equal(read_selection(open_array(group, "a"), slice(2)), VALUES[:2])
+    assert sorted(p.name for p in (store / "a").iterdir()) == [
+        *(f"c.{i}.0.0" for i in range(5)),
+        "zarr.json",
+    ]
+
+
+def test_a_selection_outside_is_refused(store: Path) -> None:
+    group = open_store(store, KIND, 1)
+    for selection in (5, [0, 9], (0, 0, 0, 0)):
+        with pytest.raises(InputError, match="no such part of a"):
+            read_array(group, "a", selection)
+
+
+@pytest.mark.parametrize("index", [0, 2, 4])
+def test_a_missing_chunk_is_an_error(store: Path, index: int) -> None:
+    chunk(store, index).unlink()
+    group = open_store(store, KIND, 1)
+    with pytest.raises(UnreadableFileError, match=rf"a\.zarr is damaged: a/c\.{index}\.0\.0 is"):
+        read_array(group, "a")
+    np.testing.assert_array_equal(read_array(group, "a", [1, 3]), VALUES[[1, 3]])
+
+
+def test_a_chunk_cut_or_changed_anywhere_is_an_error(store: Path) -> None:
+    whole = chunk(store, 1).read_bytes()
+    group = open_store(store, KIND, 1)
+    bad = [whole[:length] for length in range(0, len(whole), 2)]
+    bad += [
+        bytes(b ^ (16 if i == position else 0) for i, b in enumerate(whole))
+        for position in range(0, len(whole), 3)
+    ]
+    for data in bad:
+        chunk(store, 1).write_bytes(data)
+        with pytest.raises(UnreadableFileError, match=r"a\.zarr is damaged: array a") as caught:
+            read_array(group, "a")
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "a/zarr.json"])
+def test_metadata_cut_or_changed_anywhere_is_an_error_or_harmless(store: Path, name: str) -> None:
+    whole = (store / name).read_bytes()
+    bad = [whole[:length] for length in range(0, len(whole) - 2, 19)]
+    bad += [
+        bytes(b ^ (bit if i == position else 0) for i, b in enumerate(whole))
+        for position in range(0, len(whole), 7)
+        for bit in (1, 16)
+    ]
+    for data in bad:
+        (store / name).write_bytes(data)
+        try:
+            read = read_array(open_store(store, KIND, 1), "a")
+        except UnreadableFileError as error:
+            assert "a.zarr" in str(error)
+        else:
+            # Other metadata that make sense cannot be told from the true; the chunks still can.
+            same_kind = (read.shape, read.dtype) == (VALUES.shape, VALUES.dtype)
+            assert not same_kind or np.array_equal(read, VALUES)
+
+
+def test_a_missing_array_is_an_error(store: Path) -> None:
+    group = open_store(store, KIND, 1)
+    with pytest.raises(UnreadableFileError, match=r"a\.zarr is damaged: array nothing"):
+        read_array(group, "nothing")
+    create_store(store / "inner", KIND, 1)
+    with pytest.raises(UnreadableFileError, match="inner is no array"):
+        read_array(group, "inner")
+
+
+def test_other_things_get_a_sentence(store: Path, tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match=r"no\.zarr is not there"):
+        open_store(tmp_path / "no.zarr", KIND, 1)
+    (tmp_path / "file.zarr").write_text("text")
+    (tmp_path / "empty.zarr").mkdir()
+    zarr.create_group(tmp_path / "two.zarr", zarr_format=2)
+    for name in ("file.zarr", "empty.zarr", "two.zarr"):
+        with pytest.raises(UnreadableFileError, match=f"{name} is not a {KIND}: it is no Zarr"):
+            open_store(tmp_path / name, KIND, 1)
+    with pytest.raises(UnreadableFileError, match="is not a nearfar capture but a nearfar test"):
+        open_store(store, "nearfar capture", 1)
+    with pytest.raises(UnreadableFileError, match="of version 1, this nearfar reads version 2"):
+        open_store(store, KIND, 2)
+    zarr.create_group(tmp_path / "other.zarr", zarr_format=3)
+    with pytest.raises(UnreadableFileError, match="is not a nearfar test but of another kind"):
+        open_store(tmp_path / "other.zarr", KIND, 1)
+    zarr.create_array(tmp_path / "array.zarr", shape=(3,), dtype="u1", zarr_format=3)
+    with pytest.raises(UnreadableFileError, match=r"array\.zarr"):
+        open_store(tmp_path / "array.zarr", KIND, 1)
+
+
+def test_metadata_that_is_no_table_is_an_error(store: Path) -> None:
+    tables: tuple[Any, ...] = (
+        [],
+        3,
+        {},
+        {"attributes": 3},
+        {"zarr_format": 3, "node_type": "tree"},
+    )
+    for data in tables:
+        (store / "zarr.json").write_text(json.dumps(data))
+        with pytest.raises(UnreadableFileError, match=r"a\.zarr"):
+            open_store(store, KIND, 1)
+
+
+def test_a_store_says_its_kind(store: Path, tmp_path: Path) -> None:
+    assert kind_of_store(store) == KIND
+    assert kind_of_store(tmp_path) is None
+    assert kind_of_store(tmp_path / "no") is None
+
+
+def test_a_store_is_read_only(store: Path) -> None:
+    array = open_array(open_store(store, KIND, 1), "a")
+    with pytest.raises(ValueError, match="read-only"):
+        array[0] = 1

@@ -1,0 +1,1 @@
+"""Transport as a linear operator: exact, or measured factors."""

@@ -1,0 +1,71 @@
+"""Direct transport: each camera pixel answers the 2 x 2 projector pixels around q.
+
+A fractional q is the centroid of the direct light, so bilinear weights around it are exact
+wherever a camera pixel's direct light stays within two projector pixels on each axis.
+
+Index convention: c runs over camera pixels, row by row; a corner is one of the 2 x 2.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Size
+
+# q closer than this to a whole pixel is taken as that pixel.
+WHOLE = 1e-4
+
+
+class Footprint(NamedTuple):
+    """Where direct light comes from: flat projector pixels and their weights, both (C, 4)."""
+
+    pixels: NDArray[np.int64]
+    weights: NDArray[np.float32]
+
+
+def footprint(correspondence: Floats, projector: Size) -> Footprint:
+    """Spread each q over the 2 x 2 projector pixels around it.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (..., 2)
+        q as (y, x), NaN where there is no direct light; those get weight 0.
+    projector : Size
+
+    Returns
+    -------
+    Footprint
+        Weights of a lit pixel sum to 1.
+    """
+    q = np.asarray(correspondence, dtype=np.float64).reshape(-1, 2)
+    lit: Booleans = np.asarray(np.isfinite(q).all(axis=1))
+    limit = np.array(projector, dtype=np.float64) - 1
+    q = np.clip(np.where(lit[:, None], q, 0.0), 0.0, limit)
+    nearest = np.rint(q)
+    q = np.where(np.abs(q - nearest) < WHOLE, nearest, q)
+    low = np.floor(q).astype(np.int64)
+    high = np.minimum(low + 1, limit.astype(np.int64))
+    part = q - low
+    pixels = np.empty((len(q), 4), dtype=np.int64)
+    weights = np.empty((len(q), 4), dtype=np.float32)
+    for corner, (down, across) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+        y = high[:, 0] if down else low[:, 0]
+        x = high[:, 1] if across else low[:, 1]
+        pixels[:, corner] = y * projector.width + x
+        weight_y = part[:, 0] if down else 1 - part[:, 0]
+        weight_x = part[:, 1] if across else 1 - part[:, 1]
+        weights[:, corner] = weight_y * weight_x * lit
+    return Footprint(pixels, weights)
+
+
+def look_up(light: Floats, where: Footprint) -> Floats:
+    """Read a light (..., P) at each camera pixel's footprint: shape (..., C)."""
+    return np.asarray(np.einsum("...ck,ck->...c", light[..., where.pixels], where.weights))
+
+
+def spread(image: Floats, where: Footprint, projector: Size) -> Floats:
+    """Adjoint of `look_up`: scatter an image (C,) over the projector, shape (P,)."""
+    values = (where.weights * image[:, None]).ravel()
+    summed = np.bincount(where.pixels.ravel(), weights=values, minlength=projector.pixels)
+    return np.asarray(summed, dtype=np.float64)

@@ -1,0 +1,185 @@
+"""Exact transports on the disk: what ``nearfar render`` writes, and plain arrays."""
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from nearfar.arrays import Floats, Size
+from nearfar.errors import InputError, MissingFileError, UnreadableFileError
+from nearfar.files import add_array, create_store, new_output, open_store, read_array
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.store import listed, write_in_rows
+
+KIND = "nearfar exact transport"
+FORMAT_VERSION = 1
+# A last axis of at most this is channels, not projector pixels.
+MOST_CHANNELS = 4
+
+
+def save_exact(path: Path, transport: ExactTransport, *, force: bool = False) -> None:
+    """Write an exact transport, components apart, as a Zarr group.
+
+    Raises
+    ------
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`.
+    """
+    attributes = {
+        "name": transport.name,
+        "projector": list(transport.projector),
+        "camera": list(transport.camera),
+        "apart": transport.is_apart,
+    }
+    with new_output(path, force=force) as partial:
+        group = create_store(partial, KIND, FORMAT_VERSION, attributes)
+        for i in range(transport.channels):
+            write_in_rows(group, f"far-{i}", transport.far[i])
+            if transport.is_apart:
+                for name, part in (("direct", transport.direct[i]), ("near", transport.near[i])):
+                    _write_sparse(group, f"{name}-{i}", part)
+
+
+def _write_sparse(group: Any, name: str, matrix: sparse.csr_array) -> None:
+    for suffix, values in (
+        ("data", matrix.data.astype(np.float32)),
+        ("indices", matrix.indices.astype(np.int64)),
+        ("starts", matrix.indptr.astype(np.int64)),
+    ):
+        # Zarr keeps no empty array: one value more that nobody reads.
+        padded = np.append(values, values.dtype.type(0))
+        add_array(group, f"{name}-{suffix}", padded.shape, padded.dtype, padded.shape)[:] = padded
+
+
+def _read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_array:
+    parts = [read_array(group, f"{name}-{suffix}")[:-1] for suffix in ("data", "indices")]
+    starts = read_array(group, f"{name}-starts")[:-1]
+    matrix = sparse.csr_array((*parts, starts), shape=shape)
+    matrix.check_format()
+    return matrix
+
+
+def load_exact(
+    path: Path, *, projector: Size | None = None, camera: Size | None = None
+) -> ExactTransport:
+    """Read an exact transport: a Zarr of `save_exact`, or a dense .npy or .npz.
+
+    Parameters
+    ----------
+    path : Path
+        A dense T is (C, P) or (C, P, channels), or with its axes apart (Cy, Cx, Py, Px) or
+        (Cy, Cx, Py, Px, channels). An .npz holds it as ``T``, or as ``direct``, ``near`` and
+        ``far``, and may hold ``projector`` and ``camera`` as (height, width).
+    projector, camera : Size, optional
+        Sizes for a dense T that does not tell them. A camera that is left out is as large as the
+        projector, or a whole number of times finer on both axes.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        If it is not there, damaged or of another kind.
+    InputError
+        If its sizes cannot be told or do not fit.
+    """
+    if path.suffix.lower() in {".npy", ".npz"}:
+        return _load_dense(path, projector, camera)
+    group = open_store(path, KIND, FORMAT_VERSION)
+    try:
+        attributes = dict(group.attrs)
+        stored_projector, stored_camera = (
+            Size(*(int(side) for side in listed(attributes[name])))
+            for name in ("projector", "camera")
+        )
+        shape = (stored_camera.pixels, stored_projector.pixels)
+        channels = len([name for name in group.array_keys() if name.startswith("far-")])
+        apart = range(channels if attributes["apart"] else 0)
+        direct = tuple(_read_sparse(group, f"direct-{i}", shape) for i in apart)
+        near = tuple(_read_sparse(group, f"near-{i}", shape) for i in apart)
+        far = np.empty((channels, *shape), dtype=np.float32)
+        for i in range(channels):
+            far[i] = read_array(group, f"far-{i}")
+        return ExactTransport(
+            stored_projector, stored_camera, direct, near, far, str(attributes["name"])
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise UnreadableFileError(
+            f"{path} is a damaged exact transport ({error}): render it again."
+        ) from error
+
+
+def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> ExactTransport:
+    try:
+        loaded = np.load(path, allow_pickle=False)
+        arrays = {"T": loaded} if isinstance(loaded, np.ndarray) else dict(loaded.items())
+    except FileNotFoundError:
+        raise MissingFileError(f"{path} is not there: check the name.") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise UnreadableFileError(
+            f"{path} cannot be read as a stored transport ({error}): save it with numpy.save."
+        ) from None
+    if "projector" in arrays:
+        projector = Size(*(int(side) for side in arrays["projector"]))
+    if "camera" in arrays:
+        camera = Size(*(int(side) for side in arrays["camera"]))
+    names = ("direct", "near", "far") if "far" in arrays else ("T",)
+    missing = [name for name in names if name not in arrays]
+    if missing:
+        raise InputError(
+            f"{path} holds {', '.join(arrays)} but no {missing[0]}: save the dense transport as "
+            f"T, or its components as direct, near and far."
+        )
+    parts: list[Floats] = []
+    for name in names:
+        matrix, projector, camera = _as_matrices(
+            arrays[name], projector, camera, f"{path} ({name})"
+        )
+        parts.append(matrix)
+    assert projector is not None
+    assert camera is not None
+    *apart, far = parts
+    sparse_parts = [tuple(sparse.csr_array(channel) for channel in part) for part in apart]
+    direct, near = sparse_parts or ((), ())
+    return ExactTransport(projector, camera, direct, near, far, path.name)
+
+
+def _as_matrices(
+    dense: Floats, projector: Size | None, camera: Size | None, source: str
+) -> tuple[Floats, Size, Size]:
+    """Bring a dense T to (channels, C, P) and tell its sizes."""
+    dense = np.asarray(dense)
+    if dense.dtype.kind not in "fiu":
+        raise InputError(f"{source} holds {dense.dtype}, not numbers: save T as floats.")
+    if not np.isfinite(dense).all():
+        raise InputError(f"{source} holds NaN or infinite values: mend them first.")
+    if dense.ndim in (4, 5):
+        camera, projector = Size(*dense.shape[:2]), Size(*dense.shape[2:4])
+        dense = dense.reshape(camera.pixels, projector.pixels, *dense.shape[4:])
+    if dense.ndim == 2:
+        dense = dense[..., None]
+    if dense.ndim != 3 or dense.shape[2] > MOST_CHANNELS:
+        raise InputError(
+            f"{source} has shape {dense.shape}: a dense transport is (C, P) or (C, P, channels)."
+        )
+    rows, columns = dense.shape[:2]
+    if projector is None or projector.pixels != columns:
+        raise InputError(
+            f"{source} has {columns} columns"
+            + (f", the projector of {projector} has {projector.pixels}" if projector else "")
+            + ": make the plan for its projector."
+        )
+    camera = camera or _finer(projector, rows)
+    if camera is None or camera.pixels != rows:
+        raise InputError(
+            f"{source} has {rows} rows, which tell no camera size for a projector of {projector}: "
+            f"give it as camera in an .npz, or under [scene] in RIG.toml."
+        )
+    return np.ascontiguousarray(np.moveaxis(dense, 2, 0), dtype=np.float32), projector, camera
+
+
+def _finer(projector: Size, rows: int) -> Size | None:
+    """Return the projector's size times the whole number that gives `rows` camera pixels."""
+    factor = round((rows / projector.pixels) ** 0.5)
+    size = Size(projector.height * factor, projector.width * factor)
+    return size if factor >= 1 and size.pixels == rows else None

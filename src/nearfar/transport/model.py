@@ -1,0 +1,291 @@
+"""The transport that was measured: T = D + N + F as factors, a linear operator."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator
+
+from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.errors import InputError
+from nearfar.transport import direct as footprints
+from nearfar.transport import near as windows
+from nearfar.transport.far import RealBasis
+
+# Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
+BLOCK = 8192
+
+
+class Components(NamedTuple):
+    """Pictures under one light, each (Cy, Cx) or (Cy, Cx, channels)."""
+
+    direct: Floats
+    near: Floats
+    far: Floats
+
+
+@dataclass(frozen=True)
+class Transport:
+    """Light transport between a projector and a camera, in photo units.
+
+    ``transport @ light`` is the photo under `light` less the photo under black. Index
+    convention: camera pixels are [y, x]; a light is (Py, Px) for all channels, or
+    (Py, Px, channels) channel by channel.
+
+    Attributes
+    ----------
+    projector : Size
+        Pattern grid.
+    correspondence : ndarray, shape (Cy, Cx, 2), float32
+        q as (y, x); NaN at camera pixels without direct light, where D = N = 0.
+    direct : ndarray, shape (Cy, Cx, channels), float32
+        d, spread over the 2 x 2 projector pixels around q.
+    near : ndarray, shape (Cy, Cx, channels, W, W), float32
+        n over the window around the rounded q; 0 beyond the projector's border.
+    far : ndarray, shape (Cy, Cx, channels, M), float32
+        Answers of F to the cosines and sines of `far_basis`.
+    far_basis : RealBasis
+    black : ndarray, shape (Cy, Cx, channels), float32
+        The photo under black: ambient light and black level.
+    noise : ndarray, shape (Cy, Cx, channels), float32
+        Standard deviation of one real measurement (a cosine's or sine's answer).
+    provenance : mapping
+        Plan, estimator, exposure and version: whatever JSON holds.
+    """
+
+    projector: Size
+    correspondence: Floats
+    direct: Floats
+    near: Floats
+    far: Floats
+    far_basis: RealBasis
+    black: Floats
+    noise: Floats
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        return Size(*self.direct.shape[:2])
+
+    @property
+    def channels(self) -> int:
+        """Number of camera channels."""
+        return int(self.direct.shape[2])
+
+    @property
+    def window(self) -> int:
+        """W."""
+        return int(self.near.shape[-1])
+
+    @property
+    def lit(self) -> Booleans:
+        """Camera pixels with direct light, shape (Cy, Cx)."""
+        return np.isfinite(self.correspondence[..., 0])
+
+    @cached_property
+    def _footprint(self) -> footprints.Footprint:
+        return footprints.footprint(self.correspondence, self.projector)
+
+    @cached_property
+    def _centres(self) -> NDArray[np.int64]:
+        return windows.centre(self.correspondence, self.projector)
+
+    def __matmul__(self, light: Floats) -> Floats:
+        return np.asarray(sum(self.components(light)))
+
+    def components(self, light: Floats) -> Components:
+        """Relight each component apart.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+
+        Returns
+        -------
+        Components
+            Three pictures in photo units, (Cy, Cx) for one channel, else (Cy, Cx, channels).
+
+        Raises
+        ------
+        InputError
+            If the light has another size than the pattern grid, or other channels.
+        """
+        lights = self._lights(light)
+        pictures = (
+            self._direct_pictures(lights),
+            self._near_pictures(lights),
+            self._far_pictures(lights),
+        )
+        return Components(*(self._picture(flat) for flat in pictures))
+
+    def relight(
+        self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+    ) -> Floats:
+        """Relight with a gain for each component; see `components`."""
+        parts = self.components(light)
+        return np.asarray(direct * parts.direct + near * parts.near + far * parts.far)
+
+    def with_gains(
+        self, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+    ) -> "Transport":
+        """Return the transport with its components scaled."""
+        return replace(
+            self,
+            direct=self.direct * np.float32(direct),
+            near=self.near * np.float32(near),
+            far=self.far * np.float32(far),
+        )
+
+    def pictures(self, lights: Floats) -> Floats:
+        """Relight under many lights (n, Py, Px): (n, Cy, Cx, channels)."""
+        return np.stack([(self @ light).reshape(*self.camera, self.channels) for light in lights])
+
+    def adjoint(self, image: Floats) -> Floats:
+        """Send an image back: T^T per channel.
+
+        Parameters
+        ----------
+        image : ndarray, shape (Cy, Cx) for one channel or (Cy, Cx, channels)
+
+        Returns
+        -------
+        ndarray, shape (Py, Px) or (Py, Px, channels)
+        """
+        expected = (*self.camera, self.channels)
+        if image.shape != expected and not (self.channels == 1 and image.shape == self.camera):
+            raise InputError(f"the image is {image.shape}, this transport's photos are {expected}.")
+        flat = image.reshape(-1, self.channels)
+        back = [self._adjoint_channel(flat[:, i], i) for i in range(self.channels)]
+        stacked = np.stack(back, axis=-1)
+        return stacked[..., 0] if self.channels == 1 else stacked
+
+    def rows(self, pixels: slice) -> Floats:
+        """Return dense rows t of chosen camera pixels.
+
+        Parameters
+        ----------
+        pixels : slice
+            Camera pixels, flattened row by row.
+
+        Returns
+        -------
+        ndarray, shape (n, channels, P), float32
+        """
+        return np.asarray(sum(self.component_rows(pixels)))
+
+    def component_rows(self, pixels: slice) -> Components:
+        """Return dense rows of D, N and F of chosen camera pixels; see `rows`."""
+        flat_far = self.far.reshape(-1, self.channels, self.far_basis.count)[pixels]
+        f = self.far_basis.synthesise(flat_far).astype(np.float32, copy=False)
+        number = np.arange(len(f))[:, None]
+        corners = self._footprint.pixels[pixels]
+        weights = self._footprint.weights[pixels]
+        centres = self._centres[pixels]
+        inside = windows.inside(centres, self.window, self.projector)
+        # Entries beyond the border go to a column of their own, which is cut off.
+        beyond = self.projector.pixels
+        flat = np.where(inside, windows.places_on(centres, self.window, self.projector), beyond)
+        direct_values = self.direct.reshape(-1, self.channels)[pixels]
+        near_values = self.near.reshape(-1, self.channels, self.window**2)[pixels]
+        d = np.zeros_like(f)
+        n = np.zeros((*f.shape[:2], beyond + 1), dtype=np.float32)
+        for i in range(self.channels):
+            # Corners may coincide at the border: add each on its own.
+            np.add.at(d[:, i], (number, corners), weights * direct_values[:, i, None])
+            n[number, i, flat] = near_values[:, i]
+        return Components(d, n[..., :beyond], f)
+
+    def dense(self) -> Floats:
+        """Return all of T, shape (C, channels, P), float32: for small transports."""
+        return self.rows(slice(None))
+
+    def column(self, y: int, x: int) -> Floats:
+        """Return the picture under one projector pixel at full white."""
+        light = np.zeros(self.projector, dtype=np.float32)
+        light[y, x] = 1.0
+        return self @ light
+
+    def as_linear_operator(self, channel: int = 0) -> LinearOperator:
+        """Return one channel of T as a SciPy operator of shape (C, P)."""
+        if not 0 <= channel < self.channels:
+            raise InputError(f"channel {channel} is not one of this transport's {self.channels}.")
+
+        def matvec(light: Floats) -> Floats:
+            lights = np.reshape(light, (1, -1))
+            parts = (
+                self._direct_pictures(lights, (channel,)),
+                self._near_pictures(lights, (channel,)),
+                self._far_pictures(lights, (channel,)),
+            )
+            return np.asarray(parts[0] + parts[1] + parts[2])[:, 0]
+
+        def rmatvec(image: Floats) -> Floats:
+            return self._adjoint_channel(np.ravel(image), channel).ravel()
+
+        shape = (self.camera.pixels, self.projector.pixels)
+        return LinearOperator(shape, matvec=matvec, rmatvec=rmatvec, dtype=np.float64)
+
+    # Lights below are flat: (1, P) for all channels or (channels, P); pictures are (C, channels).
+
+    def _lights(self, light: Floats) -> Floats:
+        light = np.asarray(light)
+        if light.shape[:2] != self.projector or light.ndim not in (2, 3):
+            raise InputError(
+                f"the light is {'x'.join(map(str, light.shape))}, this transport's projector is "
+                f"{self.projector}: resize the light to {self.projector}."
+            )
+        if light.ndim == 2:
+            return light.reshape(1, -1)
+        if light.shape[2] not in (1, self.channels):
+            raise InputError(
+                f"the light has {light.shape[2]} channels, this transport {self.channels}: "
+                f"give a grey light, or one with {self.channels} channels."
+            )
+        return np.moveaxis(light, 2, 0).reshape(light.shape[2], -1)
+
+    def _picture(self, flat: Floats) -> Floats:
+        picture = flat.reshape(*self.camera, self.channels)
+        return picture[..., 0] if self.channels == 1 else picture
+
+    def _direct_pictures(self, lights: Floats, channels: tuple[int, ...] | None = None) -> Floats:
+        d = self.direct.reshape(-1, self.channels)
+        chosen = d if channels is None else d[:, list(channels)]
+        return np.asarray(chosen * footprints.look_up(lights, self._footprint).T)
+
+    def _near_pictures(self, lights: Floats, channels: tuple[int, ...] | None = None) -> Floats:
+        chosen = range(self.channels) if channels is None else channels
+        n = self.near.reshape(-1, self.channels, self.window**2)
+        kind = np.result_type(lights, self.near)
+        pictures = np.empty((self.camera.pixels, len(chosen)), dtype=kind)
+        for block in blocks(self.camera.pixels, BLOCK):
+            for number, light in enumerate(lights):
+                seen = windows.look_up(
+                    light.reshape(self.projector), self._centres[block], self.window, self.projector
+                )
+                for i, channel in enumerate(chosen):
+                    if len(lights) == 1 or i == number:
+                        pictures[block, i] = np.einsum("cw,cw->c", n[block, channel], seen)
+        return pictures
+
+    def _far_pictures(self, lights: Floats, channels: tuple[int, ...] | None = None) -> Floats:
+        chosen = range(self.channels) if channels is None else channels
+        f = self.far.reshape(-1, self.channels, self.far_basis.count)
+        overlaps = self.far_basis.analyse(lights)
+        overlaps = np.broadcast_to(overlaps, (len(chosen), self.far_basis.count))
+        pictures = [f[:, channel] @ overlaps[i] for i, channel in enumerate(chosen)]
+        return np.stack(pictures, axis=1).astype(np.result_type(lights, self.far), copy=False)
+
+    def _adjoint_channel(self, image: Floats, channel: int) -> Floats:
+        d = self.direct.reshape(-1, self.channels)[:, channel]
+        n = self.near.reshape(-1, self.channels, self.window**2)[:, channel]
+        f = self.far.reshape(-1, self.channels, self.far_basis.count)[:, channel]
+        back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
+        back = back + self.far_basis.synthesise(image @ f).reshape(self.projector)
+        for block in blocks(self.camera.pixels, BLOCK):
+            values = n[block] * image[block, None]
+            back += windows.spread(values, self._centres[block], self.window, self.projector)
+        return np.asarray(back)

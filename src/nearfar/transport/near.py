@@ -1,0 +1,63 @@
+"""Near-range transport: a W x W window of projector pixels around the rounded q.
+
+Index convention: c runs over camera pixels, w over the W x W window offsets row by row. The
+window of an odd W reaches (W-1)/2 to each side, that of an even W from -W/2 to W/2 - 1.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Size
+
+
+def offsets(window: int) -> NDArray[np.int64]:
+    """Window offsets w = (y, x) from the rounded q, shape (W^2, 2)."""
+    side = np.arange(window) - window // 2
+    y, x = np.meshgrid(side, side, indexing="ij")
+    return np.stack([y.ravel(), x.ravel()], axis=1)
+
+
+def centre(correspondence: Floats, projector: Size) -> NDArray[np.int64]:
+    """Round q to whole projector pixels, shape (C, 2); (0, 0) where there is no direct light."""
+    q = np.nan_to_num(np.asarray(correspondence).reshape(-1, 2), nan=0.0)
+    return np.clip(np.rint(q), 0, np.array(projector) - 1).astype(np.int64)
+
+
+def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans:
+    """Tell which window entries lie on the projector, shape (C, W^2)."""
+    side = np.arange(window) - window // 2
+    rows = centres[:, 0, None] + side
+    columns = centres[:, 1, None] + side
+    rows_in = (rows >= 0) & (rows < projector.height)
+    columns_in = (columns >= 0) & (columns < projector.width)
+    return np.asarray((rows_in[:, :, None] & columns_in[:, None, :]).reshape(len(centres), -1))
+
+
+def places_on(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
+    """Flat projector pixels (C, W^2) of the window entries; 0 for those beyond the border."""
+    places = centres[:, None, :] + offsets(window)
+    flat = places[..., 0] * projector.width + places[..., 1]
+    return np.asarray(np.where(inside(centres, window, projector), flat, 0))
+
+
+def _places(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
+    """Flat places (C, W^2) of the window entries on a projector with a border of W."""
+    y, x = (centres + window).T
+    dy, dx = offsets(window).T
+    width = projector.width + 2 * window
+    return np.asarray((y * width + x)[:, None] + (dy * width + dx)[None, :])
+
+
+def look_up(light: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:
+    """Read a light (Py, Px) over every window, shape (C, W^2); 0 beyond the border."""
+    padded = np.pad(light, window)
+    return np.asarray(padded.ravel()[_places(centres, window, projector)])
+
+
+def spread(values: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:
+    """Adjoint of `look_up`: scatter window values (C, W^2) over the projector, (Py, Px)."""
+    height, width = projector.height + 2 * window, projector.width + 2 * window
+    places = _places(centres, window, projector).ravel()
+    padded = np.bincount(places, weights=values.ravel(), minlength=height * width)
+    on_projector = padded.reshape(height, width)[window:-window, window:-window]
+    return np.asarray(on_projector, dtype=np.float64)

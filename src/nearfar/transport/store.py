@@ -1,0 +1,100 @@
+"""Transports on the disk: factors in chunks of camera rows."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nearfar.arrays import Floats, Size
+from nearfar.errors import UnreadableFileError
+from nearfar.files import add_array, create_store, new_output, open_store, read_array
+from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
+from nearfar.transport.far import real_basis
+from nearfar.transport.model import Transport
+
+KIND = "nearfar transport"
+FORMAT_VERSION = 1
+# Bytes of a chunk: large enough for the disk, small enough to read a few rows.
+CHUNK_BYTES = 8 * 2**20
+
+FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
+
+
+def save_transport(path: Path, transport: Transport, *, force: bool = False) -> None:
+    """Write a transport as a Zarr group, whole or not at all.
+
+    Raises
+    ------
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`.
+    """
+    attributes = {
+        "projector": list(transport.projector),
+        "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
+        "provenance": json.loads(json.dumps(dict(transport.provenance))),
+    }
+    with new_output(path, force=force) as partial:
+        group = create_store(partial, KIND, FORMAT_VERSION, attributes)
+        for name in FACTORS:
+            values = np.asarray(getattr(transport, name), dtype=np.float32)
+            write_in_rows(group, name, values)
+
+
+def write_in_rows(group: Any, name: str, values: Floats) -> None:
+    """Write an array in chunks of rows of some megabytes."""
+    row = max(1, values[:1].nbytes)
+    rows = max(1, min(len(values), CHUNK_BYTES // row))
+    add_array(group, name, values.shape, values.dtype, (rows, *values.shape[1:]))[:] = values
+
+
+def load_transport(path: Path) -> Transport:
+    """Read a transport.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        If it is not there, damaged, of another kind or of another version.
+    """
+    group = open_store(path, KIND, FORMAT_VERSION)
+    factors = {name: read_array(group, name) for name in FACTORS}
+    try:
+        height, width = (int(side) for side in listed(group.attrs["projector"]))
+        frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
+        provenance = dict(_mapped(group.attrs["provenance"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise UnreadableFileError(
+            f"{path} is damaged: its zarr.json does not describe a transport ({error}); "
+            f"reconstruct it again."
+        ) from None
+    projector = Size(height, width)
+    basis = real_basis(frequencies, projector)
+    camera_and_channels = factors["direct"].shape
+    window = factors["near"].shape[-1]
+    shapes = {
+        "correspondence": (*camera_and_channels[:2], 2),
+        "near": (*camera_and_channels, window, window),
+        "far": (*camera_and_channels, basis.count),
+        "black": camera_and_channels,
+        "noise": camera_and_channels,
+    }
+    for name, shape in shapes.items():
+        if len(camera_and_channels) != 3 or factors[name].shape != shape:
+            raise UnreadableFileError(
+                f"{path} is damaged: its {name} has shape {factors[name].shape}, not {shape}; "
+                f"reconstruct it again."
+            )
+    return Transport(projector=projector, far_basis=basis, provenance=provenance, **factors)
+
+
+def listed(value: Any) -> list[Any]:
+    """Return a JSON list; TypeError if it is none."""
+    if not isinstance(value, list):
+        raise TypeError(f"{value!r} is no list")
+    return value
+
+
+def _mapped(value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise TypeError(f"{value!r} is no mapping")
+    return value

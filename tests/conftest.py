@@ -1,0 +1,54 @@
+"""Scenes small enough for tests, and a camera without faults."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.plan import Plan
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from tests.worlds import Photographed, model_transport
+
+QUIET = SimulatedCamera(full_well=1e9, read_noise=0.0, bits=16, shot_noise=False)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _scene_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keep the scenes that tests compute away from the user's own cache."""
+    os.environ.setdefault("NEARFAR_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture
+def shoot() -> Callable[..., Photographed]:
+    """Photograph a plan on a world in memory."""
+
+    def photograph(
+        plan: Plan,
+        world: object,
+        camera: SimulatedCamera = QUIET,
+        projector: SimulatedProjector | None = None,
+        seed: int = 0,
+    ) -> Photographed:
+        optics = projector or SimulatedProjector()
+        rig = SimulatedRig(world, "test", optics, camera, 1.0, seed)
+        photos = np.stack(list(rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))))
+        return Photographed(plan, photos, rig.full_scale)
+
+    return photograph
+
+
+@pytest.fixture
+def small_world() -> object:
+    """A transport that obeys the model: 16x20 projector, 8x9 camera, 2 channels."""
+    return model_transport(Size(16, 20), Size(8, 9), window=5, far=Size(3, 3), channels=2)
+
+
+@pytest.fixture
+def folder_listing(tmp_path: Path) -> Callable[[], list[str]]:
+    """List what lies in the test's folder, to see that nothing was left behind."""
+    return lambda: sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*"))

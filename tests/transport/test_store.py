@@ -1,0 +1,179 @@
+"""Transports on the disk: round trips, and every damage a sentence."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.errors import (
+    ExistingOutputError,
+    InputError,
+    MissingFileError,
+    NearfarError,
+    UnreadableFileError,
+)
+from nearfar.transport.exact_store import load_exact, save_exact
+from nearfar.transport.store import FACTORS, load_transport, save_transport
+from tests.transport.test_operators import CAMERA, PROJECTOR, _exact, _transport
+
+
+@pytest.fixture
+def generator():
+    return np.random.default_rng(5)
+
+
+@pytest.fixture
+def stored(tmp_path, generator) -> Path:
+    path = tmp_path / "t.zarr"
+    save_transport(path, _transport(generator))
+    return path
+
+
+def test_a_transport_comes_back(tmp_path, generator):
+    transport = _transport(generator)
+    save_transport(tmp_path / "t.zarr", transport)
+    loaded = load_transport(tmp_path / "t.zarr")
+    for name in FACTORS:
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(transport, name))
+    light = generator.random(PROJECTOR)
+    np.testing.assert_array_equal(loaded @ light, transport @ light)
+
+
+def test_nothing_is_overwritten_without_force(stored, generator):
+    before = load_transport(stored)
+    with pytest.raises(ExistingOutputError, match="--force"):
+        save_transport(stored, _transport(generator))
+    np.testing.assert_array_equal(load_transport(stored).near, before.near)
+    save_transport(stored, before.with_gains(near=2.0), force=True)
+    np.testing.assert_allclose(load_transport(stored).near, 2 * before.near)
+
+
+def _change_attributes(path: Path, **changes: object) -> None:
+    metadata = json.loads((path / "zarr.json").read_text())
+    metadata["attributes"].update(changes)
+    (path / "zarr.json").write_text(json.dumps(metadata))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"version": 9}, "version 9, this nearfar reads version 1"),
+        ({"format": "nearfar capture"}, "not a nearfar transport but a nearfar capture"),
+        ({"projector": None}, "does not describe a transport"),
+        ({"projector": [3]}, "does not describe a transport"),
+        ({"far_frequencies": [["1/7"]]}, "does not describe a transport"),
+        ({"far_frequencies": [["0", "0"]]}, "its far has shape"),
+        ({"provenance": 3}, "does not describe a transport"),
+    ],
+)
+def test_damaged_attributes_get_a_sentence(stored, changes, message):
+    _change_attributes(stored, **changes)
+    with pytest.raises(UnreadableFileError, match=message):
+        load_transport(stored)
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_a_missing_or_damaged_factor_gets_a_sentence(stored, name):
+    chunk = next(path for path in (stored / name).iterdir() if path.name != "zarr.json")
+    data = chunk.read_bytes()
+    for damaged in (None, data[: len(data) // 2], data[:-9] + bytes(9)):
+        if damaged is None:
+            chunk.unlink()
+        else:
+            chunk.write_bytes(damaged)
+        with pytest.raises(UnreadableFileError, match=r"t\.zarr"):
+            load_transport(stored)
+
+
+def test_what_is_not_there_or_something_else_gets_a_sentence(tmp_path):
+    with pytest.raises(MissingFileError, match="is not there"):
+        load_transport(tmp_path / "t.zarr")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(UnreadableFileError, match="not a nearfar transport"):
+        load_transport(tmp_path / "folder")
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(UnreadableFileError):
+        load_transport(tmp_path / "file")
+
+
+def test_an_exact_transport_comes_back(tmp_path, generator):
+    exact = _exact(generator, channels=2)
+    save_exact(tmp_path / "e.zarr", exact)
+    loaded = load_exact(tmp_path / "e.zarr")
+    assert (loaded.projector, loaded.camera, loaded.name) == (PROJECTOR, CAMERA, exact.name)
+    np.testing.assert_array_equal(loaded.far, exact.far)
+    for mine, theirs in zip(
+        (*loaded.direct, *loaded.near), (*exact.direct, *exact.near), strict=True
+    ):
+        np.testing.assert_allclose(mine.toarray(), theirs.toarray(), rtol=1e-6)
+
+
+def _dense(exact):
+    return np.moveaxis(exact.rows(slice(None)), 1, 2)
+
+
+@pytest.mark.parametrize("layout", ["C P channels", "C P", "apart", "npz", "npz components"])
+def test_dense_arrays_are_transports(tmp_path, generator, layout):
+    exact = _exact(generator, channels=1 if layout == "C P" else 2)
+    dense = _dense(exact)
+    path = tmp_path / ("t.npz" if layout.startswith("npz") else "t.npy")
+    given = {"projector": PROJECTOR, "camera": CAMERA}
+    if layout == "C P":
+        np.save(path, dense[..., 0])
+    elif layout == "C P channels":
+        np.save(path, dense)
+    elif layout == "apart":
+        np.save(path, dense.reshape(*CAMERA, *PROJECTOR, 2))
+        given = {}
+    elif layout == "npz":
+        np.savez(path, T=dense, projector=PROJECTOR, camera=CAMERA)
+        given = {}
+    else:
+        parts = [np.moveaxis(part, 1, 2) for part in exact.component_rows(slice(None))]
+        np.savez(
+            path,
+            direct=parts[0],
+            near=parts[1],
+            far=parts[2],
+            projector=PROJECTOR,
+            camera=CAMERA,
+        )
+        given = {}
+    loaded = load_exact(path, **given)
+    light = generator.random(PROJECTOR, dtype=np.float32)
+    np.testing.assert_allclose(loaded @ light, exact @ light, rtol=1e-4)
+    assert loaded.is_apart == (layout == "npz components")
+
+
+def test_the_camera_of_a_dense_transport_is_told_by_its_rows(tmp_path):
+    np.save(tmp_path / "t.npy", np.ones((4 * 12, 12), np.float32))
+    assert load_exact(tmp_path / "t.npy", projector=Size(3, 4)).camera == Size(6, 8)
+
+
+@pytest.mark.parametrize(
+    ("array", "message"),
+    [
+        (np.ones((12, 13)), "13 columns"),
+        (np.ones((13, 12)), "13 rows, which tell no camera size"),
+        (np.ones((12, 12, 5)), "a dense transport is"),
+        (np.full((12, 12), np.nan), "NaN"),
+        (np.ones(12), "a dense transport is"),
+        (np.array(["a"]), "not numbers"),
+    ],
+)
+def test_a_dense_array_that_is_no_transport_gets_a_sentence(tmp_path, array, message):
+    np.save(tmp_path / "t.npy", array)
+    with pytest.raises(InputError, match=message):
+        load_exact(tmp_path / "t.npy", projector=Size(3, 4))
+
+
+def test_pickles_and_garbage_are_not_read(tmp_path):
+    np.save(tmp_path / "t.npy", np.array([{}], dtype=object), allow_pickle=True)
+    (tmp_path / "u.npy").write_bytes(b"not numpy")
+    (tmp_path / "v.npz").write_bytes(b"PK not a zip")
+    np.savez(tmp_path / "w.npz", other=np.ones(3))
+    for name in ("t.npy", "u.npy", "v.npz", "w.npz", "missing.npy"):
+        with pytest.raises(NearfarError, match=name):
+            load_exact(tmp_path / name, projector=Size(3, 4))

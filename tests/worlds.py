@@ -1,0 +1,114 @@
+"""Transports that obey the model exactly, and photos in memory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats, Size
+from nearfar.illumination.frequencies import (
+    CHECKERBOARD,
+    DC,
+    far_frequencies,
+    near_frequencies,
+    representatives,
+)
+from nearfar.photometry.measurements import Measurements
+from nearfar.plan import Plan
+from nearfar.transport import near
+from nearfar.transport.far import real_basis
+from nearfar.transport.model import Transport
+
+
+@dataclass(frozen=True)
+class Photographed:
+    """Photos in memory, read as from a capture."""
+
+    plan: Plan
+    photos: np.ndarray
+    full_scale: float
+
+    @property
+    def camera(self) -> Size:
+        return Size(*self.photos.shape[1:3])
+
+    @property
+    def channels(self) -> int:
+        return int(self.photos.shape[3])
+
+    def read(self, photos: Sequence[int], rows: slice) -> Floats:
+        return self.photos[list(photos)][:, rows].astype(np.float32) / np.float32(self.full_scale)
+
+
+def model_transport(
+    projector: Size,
+    camera: Size,
+    *,
+    window: int,
+    far: Size,
+    channels: int = 1,
+    seed: int = 0,
+    fractional: bool = False,
+    entries: int = 5,
+) -> Transport:
+    """Draw a transport that obeys the model.
+
+    n is sparse in its window and has no answer to the checkerboard, f is band-limited, and no
+    picture under a light in [0, 1] leaves [0, 1].
+    """
+    generator = np.random.default_rng(seed)
+    pixels = camera.pixels
+    y, x = np.meshgrid(
+        np.linspace(0, projector.height - 1, camera.height),
+        np.linspace(0, projector.width - 1, camera.width),
+        indexing="ij",
+    )
+    q = np.stack([y, x], axis=-1)
+    if not fractional:
+        q = np.rint(q)
+    shape = (*camera, channels)
+    windows = np.zeros((pixels, channels, window**2))
+    inside = near.inside(near.centre(q, projector), window, projector)
+    parity = 1 - 2 * (near.offsets(window).sum(axis=1) % 2)
+    for c in range(pixels):
+        for i in range(channels):
+            # One more entry of the other parity silences the checkerboard.
+            even = np.flatnonzero(inside[c] & (parity > 0))
+            odd = np.flatnonzero(inside[c] & (parity < 0))
+            chosen = generator.choice(even, size=min(entries, len(even)), replace=False)
+            windows[c, i, chosen] = generator.uniform(0.005, 0.02, size=len(chosen))
+            windows[c, i, generator.choice(odd)] = windows[c, i].sum()
+    basis = real_basis(representatives(far_frequencies(far, projector)), projector)
+    coefficients = 0.01 * generator.normal(size=(*shape, basis.count))
+    coefficients[..., [basis.frequencies[i] == DC for i in basis.index]] = 0.2
+    return Transport(
+        projector=projector,
+        correspondence=q.astype(np.float32),
+        direct=generator.uniform(0.1, 0.4, size=shape).astype(np.float32),
+        near=windows.reshape(*shape, window, window).astype(np.float32),
+        far=coefficients.astype(np.float32),
+        far_basis=basis,
+        black=np.zeros(shape, dtype=np.float32),
+        noise=np.zeros(shape, dtype=np.float32),
+    )
+
+
+def ideal_measurements(transport: Transport, window: int, far: Size, dropped: Size) -> Measurements:
+    """Measure by theory: no offset, no noise, no 8 bits."""
+    frequencies = [
+        CHECKERBOARD,
+        *far_frequencies(far, transport.projector),
+        *near_frequencies(window, dropped),
+    ]
+    basis = real_basis(representatives(frequencies), transport.projector)
+    patterns = basis.patterns.astype(np.float64).T
+    answers = transport.dense().astype(np.float64) @ patterns
+    nothing = np.zeros(answers.shape[:2], dtype=np.float32)
+    return Measurements(
+        camera=transport.camera,
+        basis=basis,
+        answers=answers.astype(np.float32),
+        noise=nothing,
+        black=nothing,
+        shown_error=np.zeros((basis.count, transport.projector.pixels), dtype=np.float32),
+    )

@@ -1,0 +1,35 @@
+"""The corner of a room: two walls and a wooden floor, seen along the diagonal."""
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.scenes.geometry import Material, Scene, View, quadrilateral
+
+
+def _planks(position: Floats) -> Floats:
+    """Boards of 11 cm, each of its own tone."""
+    board = np.floor(position[..., 0] / 0.11)
+    return np.asarray(1 + 0.16 * np.sin(12.9898 * board + 1.0))
+
+
+SIDE = 1.35
+CREAM = Material((0.74, 0.71, 0.62))
+SKY = Material((0.58, 0.66, 0.74))
+WOOD = Material((0.68, 0.42, 0.22), texture=_planks)
+VIEW = View((1.75, 1.78, 1.75), (0.02, 0.05, 0.02), 0.175)
+
+
+def corner() -> Scene:
+    """Describe the corner, under a coaxial camera."""
+    x, y, z = (SIDE, 0.0, 0.0), (0.0, SIDE, 0.0), (0.0, 0.0, SIDE)
+    origin = (0.0, 0.0, 0.0)
+    return Scene(
+        name="corner",
+        parts=(
+            quadrilateral("floor", origin, z, x, WOOD),
+            quadrilateral("left wall", origin, y, z, CREAM),
+            quadrilateral("right wall", origin, x, y, SKY),
+        ),
+        projector_view=VIEW,
+        camera_view=None,
+    )

@@ -1,0 +1,116 @@
+"""Light under a translucent surface: the dipole of Jensen, Marschner, Levoy and Hanrahan (2001).
+
+"A Practical Model for Subsurface Light Transport", SIGGRAPH 2001, section 2.2, used as a
+patch-to-patch matrix over straight distances. All lengths in metres.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats, blocks
+from nearfar.scenes.geometry import Medium
+from nearfar.scenes.patches import Patches
+
+ROWS = 16
+
+
+@dataclass(frozen=True)
+class Dipole:
+    """The two sources of one colour channel.
+
+    Attributes
+    ----------
+    reduced_albedo : float
+        alpha' = sigma_s' / (sigma_s' + sigma_a).
+    attenuation : float
+        sigma_tr, effective, per metre.
+    real, virtual : float
+        Depth of the real and height of the virtual source, in metres.
+    """
+
+    reduced_albedo: float
+    attenuation: float
+    real: float
+    virtual: float
+
+
+def dipole(medium: Medium, channel: int) -> Dipole:
+    """Place the two sources of a medium in one channel."""
+    scattering, absorption = medium.scattering[channel], medium.absorption[channel]
+    extinction = scattering + absorption
+    eta = medium.index
+    # Diffuse Fresnel reflectance inside, Egan and Hilgeman's fit as quoted by Jensen et al.
+    fresnel = -1.440 / eta**2 + 0.710 / eta + 0.668 + 0.0636 * eta
+    mismatch = (1 + fresnel) / (1 - fresnel)
+    return Dipole(
+        reduced_albedo=scattering / extinction,
+        attenuation=float(np.sqrt(3 * absorption * extinction)),
+        real=1 / extinction,
+        virtual=(1 + 4 * mismatch / 3) / extinction,
+    )
+
+
+def diffuse_reflectance(source: Dipole, radius: Floats | float = np.inf) -> Floats:
+    """Share of light that leaves within `radius` (metres) of where it entered a flat surface.
+
+    The integral of R_d(r) 2 pi r up to the radius, in closed form.
+    """
+    radius = np.asarray(radius, dtype=float)
+    total = np.zeros_like(radius)
+    for depth in (source.real, source.virtual):
+        far = np.hypot(radius, depth)
+        total += np.exp(-source.attenuation * depth)
+        total -= depth / far * np.exp(-source.attenuation * far)
+    return source.reduced_albedo / 2 * total
+
+
+def diffuse_profile(source: Dipole, square: Floats) -> Floats:
+    """R_d at squared distances, per square metre (Jensen et al., equation 4)."""
+    total = np.zeros_like(square)
+    for depth in (source.real, source.virtual):
+        far = np.sqrt(square + depth**2)
+        total += depth * (source.attenuation * far + 1) / far**3 * np.exp(-source.attenuation * far)
+    return source.reduced_albedo / (4 * np.pi) * total
+
+
+def subsurface(patches: Patches, source: Dipole) -> Floats:
+    """Mean of R_d between the samples of all pairs of patches.
+
+    Parameters
+    ----------
+    patches : Patches
+        The n patches of one translucent body.
+    source : Dipole
+
+    Returns
+    -------
+    ndarray, shape (n, n), float64
+        Symmetric, per square metre; times the area of j, it takes irradiance at j to exitance
+        at i. A sample meets itself as a disc of its own area, where R_d is integrated.
+    """
+    # Relative to the body's middle, so that float32 will do for the distances.
+    position = patches.positions.reshape(-1, 3) - patches.centre.mean(axis=0)
+    area = patches.areas.ravel()
+    true = area > 0
+    owner = np.repeat(np.arange(len(patches)), patches.areas.shape[1])[true]
+    position, area = position[true], area[true]
+    weight = (area / patches.area[owner]).astype(np.float32)
+    starts = np.flatnonzero(np.diff(owner, prepend=-1))
+    bounds = np.append(starts, len(owner))
+    own = diffuse_reflectance(source, np.sqrt(area / np.pi)) / area
+    result = np.zeros((len(patches), len(patches)))
+    for rows in blocks(len(patches), ROWS):
+        # Only pairs j >= the block's first row; the rest by symmetry.
+        begin, end = bounds[rows.start], bounds[rows.stop]
+        square = np.zeros((end - begin, len(owner) - begin), dtype=np.float32)
+        for axis in position.T.astype(np.float32):
+            square += (axis[begin:end, None] - axis[begin:]) ** 2
+        kernel = diffuse_profile(source, square)
+        here = np.arange(end - begin)
+        kernel[here, here] = own[begin:end]
+        kernel *= weight[begin:]
+        kernel = np.add.reduceat(kernel, starts[rows.start :] - begin, axis=1)
+        kernel *= weight[begin:end, None]
+        result[rows, rows.start :] = np.add.reduceat(kernel, starts[rows] - begin, axis=0)
+    return np.triu(result) + np.triu(result, 1).T

@@ -1,0 +1,279 @@
+"""Exchange of light between patches: G = A_i F_ij, symmetric, with what stands between.
+
+Index convention: i, j are patches, a, b their samples. F_ij is the share of the light that leaves
+i and arrives at j; the irradiance at i under radiosities B is sum_j F_ij B_j.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.scenes.geometry import Part
+from nearfar.scenes.patches import Patches
+from nearfar.scenes.rays import OFFSET, Surface, blocked
+
+# Pairs nearer than this many of their radii are summed over their samples.
+NEAR = 3.0
+# Samples nearer than this many of their sides are taken as parallelograms.
+NEAR_SAMPLES = 1.5
+# Row sums of form factors are at most this.
+MOST = 0.999
+# Rays between two patches that something may hide from each other.
+RAYS = 4
+ROWS = 256
+PAIRS = 4096
+
+
+def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Floats:
+    """Form factors of all pairs of patches, times the area.
+
+    Parameters
+    ----------
+    patches : Patches
+    parts : sequence of Part
+    occluders : Surface
+        Triangles that can hide patches from each other.
+
+    Returns
+    -------
+    ndarray, shape (n, n), float32
+        G_ij = A_i F_ij = A_j F_ji, in square metres; exactly symmetric.
+    """
+    count = len(patches)
+    result = np.zeros((count, count), dtype=np.float32)
+    flat = np.array([not part.occludes for part in parts])[patches.part]
+    boxes = occluder_boxes(parts)
+    for rows in blocks(count, ROWS):
+        # Only pairs j >= the block's first row; the rest by symmetry.
+        columns = slice(rows.start, count)
+        block, square = point_exchange(
+            patches.centre[rows],
+            patches.normal[rows],
+            patches.area[rows],
+            other_position=patches.centre[columns],
+            other_normal=patches.normal[columns],
+            other_area=patches.area[columns],
+        )
+        reach = NEAR * (patches.radius[rows, None] + patches.radius[columns])
+        apart = ~(flat[rows, None] & (patches.part[rows, None] == patches.part[columns]))
+        i, j = np.nonzero((square < reach**2) & apart)
+        block[i, j] = refined(i + rows.start, j + columns.start, patches)
+        if boxes:
+            shadowed = block > 0
+            shadowed &= crosses_any(patches.centre[rows], patches.centre[columns], boxes)
+            i, j = np.nonzero(shadowed)
+            block[i, j] *= visible_share(i + rows.start, j + columns.start, patches, occluders)
+        # Inside the block both halves were computed: keep one.
+        inner = block[:, : len(block)]
+        block[:, : len(block)] = np.triu(inner) + np.triu(inner, 1).T
+        result[rows, columns] = block
+        result[columns, rows] = block.T
+    return _at_most_all(result, patches.area)
+
+
+def _at_most_all(form: Floats, area: Floats) -> Floats:
+    """Scale down, symmetrically and in place, what would send out more than all light.
+
+    Where parts run into each other a sliver may be counted with more than its true area.
+    """
+    total = form.sum(axis=1) / area
+    limit = (MOST / np.maximum(total, MOST)).astype(np.float32)
+    for rows in blocks(len(form), ROWS):
+        form[rows] *= np.minimum(limit[rows, None], limit)
+    return form
+
+
+def point_exchange(
+    position: Floats,
+    normal: Floats,
+    area: Floats,
+    *,
+    other_position: Floats,
+    other_normal: Floats,
+    other_area: Floats,
+) -> tuple[Floats, Floats]:
+    """Compute the exchange between small areas: cos cos' / (pi r^2) times both areas.
+
+    Parameters
+    ----------
+    position, normal : ndarray, shape (..., a, 3)
+    area : ndarray, shape (..., a)
+    other_position, other_normal, other_area : ndarray, shapes (..., b, 3) and (..., b)
+
+    Returns
+    -------
+    exchange : ndarray, shape (..., a, b), float64
+        A_a F_ab without occlusion.
+    square : ndarray, shape (..., a, b), float64
+        Squared distances.
+    """
+
+    def product(first: Floats, second: Floats) -> Floats:
+        return np.asarray(first @ np.swapaxes(second, -1, -2))
+
+    def own(first: Floats, second: Floats) -> Floats:
+        return np.asarray(np.einsum("...x,...x->...", first, second))
+
+    square = product(-2 * position, other_position)
+    square += own(position, position)[..., :, None]
+    square += own(other_position, other_position)[..., None, :]
+    np.maximum(square, 0, out=square)
+    leaving = product(normal, other_position)
+    leaving -= own(normal, position)[..., :, None]
+    arriving = product(position, other_normal)
+    arriving -= own(other_normal, other_position)[..., None, :]
+    result = np.maximum(leaving, 0, out=leaving)
+    result *= np.maximum(arriving, 0, out=arriving)
+    result *= area[..., :, None]
+    result *= other_area[..., None, :]
+    result /= np.pi * square**2 + 1e-30
+    return result, square
+
+
+def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
+    """Exchange of pairs of patches, summed over their samples; shape (pairs,).
+
+    Samples too near for points are taken as parallelograms.
+    """
+    result = np.empty(len(i))
+    order = np.argsort(patches.counts[i] * patches.counts[j], kind="stable")
+    for chunk in blocks(len(i), PAIRS):
+        pairs = order[chunk]
+        a, b = i[pairs], j[pairs]
+        left, right = slice(patches.counts[a].max()), slice(patches.counts[b].max())
+        area, other_area = patches.areas[a, left], patches.areas[b, right]
+        value, square = point_exchange(
+            patches.positions[a, left],
+            patches.normals[a, left],
+            area,
+            other_position=patches.positions[b, right],
+            other_normal=patches.normals[b, right],
+            other_area=other_area,
+        )
+        size = np.linalg.norm(patches.edges[a, left], axis=-1).max(axis=-1)
+        other_size = np.linalg.norm(patches.edges[b, right], axis=-1).max(axis=-1)
+        reach = NEAR_SAMPLES * (size[:, :, None] + other_size[:, None, :])
+        true = (area > 0)[:, :, None] & (other_area > 0)[:, None, :]
+        pair, s, t = np.nonzero(true & (square < reach**2))
+        value[pair, s, t] = touching_exchange((a[pair], s), (b[pair], t), patches)
+        result[pairs] = value.sum(axis=(-1, -2))
+    return result
+
+
+def touching_exchange(
+    first: tuple[Integers, Integers], second: tuple[Integers, Integers], patches: Patches
+) -> Floats:
+    """Exchange of samples that may touch, from the smaller's middle to the larger's parallelogram.
+
+    Parameters
+    ----------
+    first, second : tuple of ndarray of int, shape (pairs,)
+        Patch and sample.
+    patches : Patches
+
+    Returns
+    -------
+    ndarray, shape (pairs,)
+    """
+    swap = patches.areas[first] > patches.areas[second]
+    point = (np.where(swap, second[0], first[0]), np.where(swap, second[1], first[1]))
+    shape = (np.where(swap, first[0], second[0]), np.where(swap, first[1], second[1]))
+    return patches.areas[point] * point_to_parallelogram(point, shape, patches)
+
+
+def point_to_parallelogram(
+    point: tuple[Integers, Integers], shape: tuple[Integers, Integers], patches: Patches
+) -> Floats:
+    """Form factor from the middle of a sample to the parallelogram of another (Lambert 1760).
+
+    One over 2 pi times the sum over the edges of the angle they subtend, times the cosine
+    between the point's normal and the normal of the plane through edge and point, after the
+    shape is cut off at the point's horizon.
+    """
+    position, normal = patches.positions[point], patches.normals[point]
+    along, up = np.moveaxis(patches.edges[shape], 1, 0) / 2
+    way = patches.positions[shape] - position
+    corners = np.stack([way - along - up, way + along - up, way + along + up, way - along + up])
+    heights = np.einsum("knx,nx->kn", corners, normal)
+    total = np.zeros(len(way))
+    leaves, enters = np.zeros_like(way), np.zeros_like(way)
+    for this, following in zip(range(4), (1, 2, 3, 0), strict=True):
+        start, end = corners[this], corners[following]
+        low, high = heights[this], heights[following]
+        slope = np.where(low == high, 1.0, low - high)
+        crossing = start + (low / slope)[:, None] * (end - start)
+        down, rising = (low >= 0) & (high < 0), (low < 0) & (high >= 0)
+        leaves[down], enters[rising] = crossing[down], crossing[rising]
+        start = np.where(rising[:, None], crossing, start)
+        end = np.where(down[:, None], crossing, end)
+        total += np.where((low >= 0) | (high >= 0), _edge(start, end, normal), 0)
+    total += _edge(leaves, enters, normal)
+    facing = np.einsum("nx,nx->n", way, patches.normals[shape]) < 0
+    return np.where(facing, np.maximum(total, 0), 0) / (2 * np.pi)
+
+
+def _edge(start: Floats, end: Floats, normal: Floats) -> Floats:
+    """Angle between two points seen from the origin, times the cosine to the edge's plane."""
+    crossed = np.cross(end, start)
+    sine = np.linalg.norm(crossed, axis=-1)
+    angle = np.arctan2(sine, np.einsum("nx,nx->n", start, end))
+    return np.asarray(angle * np.einsum("nx,nx->n", crossed, normal) / np.maximum(sine, 1e-30))
+
+
+def visible_share(i: Integers, j: Integers, patches: Patches, occluders: Surface) -> Floats:
+    """Share of a few rays between pairs of patches that nothing blocks; shape (pairs,)."""
+    facing, visible = np.zeros(len(i)), np.zeros(len(i))
+    for turn in range(RAYS):
+        # Samples in opposite order, so that the rays differ from parallel ones.
+        a = (2 * turn + 1) * patches.counts[i] // (2 * RAYS)
+        b = (2 * ((turn * 3 + 1) % RAYS) + 1) * patches.counts[j] // (2 * RAYS)
+        start = patches.positions[i, a] + OFFSET * patches.normals[i, a]
+        end = patches.positions[j, b] + OFFSET * patches.normals[j, b]
+        way = end - start
+        # What lies below a horizon is left out of the exchange already.
+        above = (np.einsum("nx,nx->n", way, patches.normals[i, a]) > 0) & (
+            np.einsum("nx,nx->n", way, patches.normals[j, b]) < 0
+        )
+        facing += above
+        visible[above] += ~blocked(occluders, start[above], end[above])
+    return visible / np.maximum(facing, 1)
+
+
+def occluder_boxes(parts: Sequence[Part]) -> list[tuple[Floats, Floats]]:
+    """Boxes (lowest, highest corner) around the parts that occlude, overlapping ones joined."""
+    boxes: list[tuple[Floats, Floats]] = []
+    for part in parts:
+        if not part.occludes:
+            continue
+        low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
+        apart = []
+        for box in boxes:
+            if np.all(low <= box[1]) and np.all(box[0] <= high):
+                low, high = np.minimum(low, box[0]), np.maximum(high, box[1])
+            else:
+                apart.append(box)
+        boxes = [*apart, (low, high)]
+    return boxes
+
+
+def crosses_any(start: Floats, end: Floats, boxes: Sequence[tuple[Floats, Floats]]) -> Booleans:
+    """Whether the segments between points (a, 3) and (b, 3) meet a box, shape (a, b)."""
+    origin, target = start.astype(np.float32), end.astype(np.float32)
+    hits = np.zeros((len(start), len(end)), dtype=bool)
+    inverse = []
+    for axis in range(3):
+        way = target[None, :, axis] - origin[:, None, axis]
+        # A segment within a plane of the box: any tiny slope will do.
+        inverse.append(1 / np.where(np.abs(way) < 1e-7, np.float32(1e-7), way))
+    for low, high in boxes:
+        enter = np.zeros(hits.shape, dtype=np.float32)
+        leave = np.ones(hits.shape, dtype=np.float32)
+        for axis in range(3):
+            first = np.float32(low[axis] - OFFSET) - origin[:, None, axis]
+            last = np.float32(high[axis] + OFFSET) - origin[:, None, axis]
+            one, two = first * inverse[axis], last * inverse[axis]
+            np.maximum(enter, np.minimum(one, two), out=enter)
+            np.minimum(leave, np.maximum(one, two), out=leave)
+        hits |= enter <= leave
+    return hits

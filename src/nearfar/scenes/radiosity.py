@@ -1,0 +1,165 @@
+"""Exact transport between patches, split into direct, near-range and far-range light.
+
+Index convention: c is a camera pixel, p a projector pixel, i and j patches. With the flux phi that
+falls on the patches, the reflection R (albedos on the diagonal, the dipole between the patches
+of a translucent body), areas A and form factors F, radiosities are
+
+    B = (I - R F)^-1 R (phi / A).
+
+R / A is symmetric, positive definite: R / A = L L^T with L diagonal but for the translucent body,
+and so, with G = A F symmetric,
+
+    B = L K L^T phi,   K = (I - L^T G L)^-1,
+
+a Cholesky factorisation. L L^T phi is what leaves after one reflection (direct and near-range);
+L (K - I) L^T phi is all the rest, far-range.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy import linalg, sparse
+
+from nearfar.arrays import Floats, Integers, blocks
+from nearfar.errors import NearfarError
+from nearfar.scenes.camera import Gather
+from nearfar.scenes.patches import Patches
+
+ROWS = 1024
+
+
+def resolvent_less_one(form: Floats, factor: sparse.csr_array) -> Floats:
+    """K - I of the module's equations.
+
+    Parameters
+    ----------
+    form : ndarray, shape (n, n), float32
+        G, symmetric.
+    factor : scipy.sparse.csr_array, shape (n, n)
+        L.
+
+    Returns
+    -------
+    ndarray, shape (n, n), float32, symmetric
+    """
+    turned = sparse.csr_array(factor.T)
+    matrix = np.empty_like(form)
+    for rows in blocks(len(form), ROWS):
+        # In strips: a transposed copy of the whole would take longer than the factorisation.
+        strip = np.ascontiguousarray((turned[rows] @ form).T)
+        matrix[rows] = -(turned @ strip).T
+    diagonal = np.einsum("ii->i", matrix)
+    diagonal += 1
+    # The transpose of a symmetric row-major array is what LAPACK wants, without a copy.
+    lower, info = linalg.lapack.spotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
+    if info == 0:
+        lower, info = linalg.lapack.spotri(lower, lower=1, overwrite_c=1)
+    if info != 0:
+        raise NearfarError("The scene reflects more light than falls on it: lower its albedos.")
+    inverse = lower.T
+    for rows in blocks(len(inverse), ROWS):
+        square = inverse[rows, rows]
+        inverse[rows, rows] = np.triu(square) + np.triu(square, 1).T
+        inverse[rows.stop :, rows] = inverse[rows, rows.stop :].T
+    diagonal = np.einsum("ii->i", inverse)
+    diagonal -= 1
+    return np.asarray(inverse)
+
+
+def reflection_factor(
+    albedo: Floats, patches: Patches, translucent: Integers, inside: Floats | None
+) -> sparse.csr_array:
+    """L with L L^T = R / A, in one channel.
+
+    Parameters
+    ----------
+    albedo : ndarray, shape (n,)
+    patches : Patches
+    translucent : ndarray of int, shape (m,)
+        The patches of the translucent body.
+    inside : ndarray, shape (m, m) or None
+        Its dipole, per square metre.
+
+    Returns
+    -------
+    scipy.sparse.csr_array, shape (n, n), float32
+    """
+    values = np.sqrt(albedo / patches.area)
+    if inside is None:
+        return sparse.csr_array(sparse.diags_array(values.astype(np.float32)))
+    values[translucent] = 0
+    block = linalg.cholesky(np.diag((albedo / patches.area)[translucent]) + inside, lower=True)
+    lower = sparse.coo_array(np.tril(block))
+    i, j = translucent[lower.coords[0]], translucent[lower.coords[1]]
+    dense = sparse.csr_array((lower.data, (i, j)), shape=(len(patches),) * 2)
+    return sparse.csr_array((sparse.diags_array(values) + dense).astype(np.float32))
+
+
+def components(
+    gathered: Gather,
+    patches: Patches,
+    projector_pixels: int,
+    form: Floats,
+    *,
+    albedo: Floats,
+    translucent: Integers,
+    inside: tuple[Floats, ...],
+    progress: Callable[[float], None],
+) -> tuple[list[sparse.csr_array], list[sparse.csr_array], Floats]:
+    """D, N and F of every channel.
+
+    Parameters
+    ----------
+    gathered : Gather
+    patches : Patches
+    projector_pixels : int
+        P.
+    form : ndarray, shape (n, n), float32
+        G.
+    albedo : ndarray, shape (n, channels)
+    translucent : ndarray of int, shape (m,)
+    inside : tuple of ndarray, shape (m, m)
+        The dipole per channel; empty where nothing is translucent.
+    progress : callable
+        Called with the share done, 0 to 1.
+
+    Returns
+    -------
+    direct, near : list of scipy.sparse.csr_array, shape (C, P), float32
+    far : ndarray, shape (channels, C, P), float32
+    """
+    lit = np.flatnonzero(patches.pixel >= 0)
+    flux = sparse.csr_array(
+        (patches.flux[lit].astype(np.float32), (lit, patches.pixel[lit])),
+        shape=(len(patches), projector_pixels),
+    )
+    see = sparse.csr_array(gathered.radiosity.astype(np.float32))
+    channels = albedo.shape[1]
+    camera_pixels = see.shape[0]
+    direct, near = [], []
+    far = np.empty((channels, camera_pixels, projector_pixels), dtype=np.float32)
+    for channel in range(channels):
+        diffuse = sparse.diags_array(albedo[:, channel] / patches.area)
+        shine = sparse.diags_array(1 / patches.area)
+        once = gathered.radiosity @ diffuse + gathered.gloss @ shine
+        direct.append(sparse.csr_array((once @ flux).astype(np.float32)))
+        if inside:
+            within = sparse.csr_array(inside[channel])
+            light = within @ flux[translucent]
+            near.append(
+                sparse.csr_array((gathered.radiosity[:, translucent] @ light).astype(np.float32))
+            )
+        else:
+            near.append(sparse.csr_array((camera_pixels, projector_pixels), dtype=np.float32))
+        factor = reflection_factor(
+            albedo[:, channel], patches, translucent, inside[channel] if inside else None
+        )
+        rest = resolvent_less_one(form, factor)
+        # L (K - I) L^T phi, read by the camera; K is symmetric.
+        right, left = sparse.csr_array(flux.T @ factor), sparse.csr_array(see @ factor)
+        for rows in blocks(camera_pixels, ROWS):
+            strip = np.ascontiguousarray((left[rows] @ rest).T)
+            far[channel, rows] = (right @ strip).T
+        del rest
+        progress((channel + 1) / channels)
+    return direct, near, far

@@ -1,0 +1,110 @@
+"""From a scene's description to its exact transport."""
+
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers, Size
+from nearfar.scenes.camera import gather
+from nearfar.scenes.dipole import dipole, subsurface
+from nearfar.scenes.form_factors import exchange
+from nearfar.scenes.geometry import Scene
+from nearfar.scenes.optics import pinhole
+from nearfar.scenes.patches import Patches, albedo, build_patches, with_medium
+from nearfar.scenes.radiosity import components
+from nearfar.scenes.rays import surface
+from nearfar.transport.exact import ExactTransport
+
+# Sub-rays along each side of a projector pixel.
+SAMPLES = 4
+# The brightest camera pixel under full white.
+EXPOSURE = 0.9
+
+
+def render(
+    scene: Scene,
+    projector: Size,
+    camera: Size,
+    *,
+    progress: Callable[[str, float], None],
+) -> ExactTransport:
+    """Compute the transport of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    projector, camera : Size
+    progress : callable
+        Called with what is being done and the share done, 0 to 1.
+
+    Returns
+    -------
+    ExactTransport
+        In photo units: the brightest camera pixel and channel is 0.9 under full white.
+    """
+    progress("patches", 0.0)
+    everything = surface(scene.parts, range(len(scene.parts)))
+    occluders = surface(scene.parts, [i for i, part in enumerate(scene.parts) if part.occludes])
+    eye = pinhole(scene.projector_view, projector)
+    lens = pinhole(scene.camera_view or scene.projector_view, projector)
+    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES)
+    finest = min(camera.height / projector.height, camera.width / projector.width)
+    seen = gather(
+        everything,
+        scene.parts,
+        patches,
+        (eye, projector),
+        (lens, camera),
+        samples=max(1, int(np.ceil(SAMPLES / finest))),
+    )
+    progress("form factors", 0.1)
+    form = exchange(patches, scene.parts, occluders)
+    progress("subsurface", 0.3)
+    translucent = np.flatnonzero(with_medium(patches, scene.parts))
+    inside = _subsurface(patches, scene, translucent)
+    direct, near, far = components(
+        seen,
+        patches,
+        projector.pixels,
+        form,
+        albedo=albedo(patches, scene.parts),
+        translucent=translucent,
+        inside=inside,
+        progress=lambda share: progress("inter-reflections", 0.4 + 0.6 * share),
+    )
+    brightest = max(
+        float((d.sum(axis=1) + n.sum(axis=1) + f.sum(axis=1)).max())
+        for d, n, f in zip(direct, near, far, strict=True)
+    )
+    scale = np.float32(EXPOSURE / brightest)
+    far *= scale
+    return ExactTransport(
+        projector=projector,
+        camera=camera,
+        direct=tuple(d * scale for d in direct),
+        near=tuple(n * scale for n in near),
+        far=far,
+        name=scene.name,
+    )
+
+
+def body_of(patches: Patches, chosen: Integers) -> Patches:
+    """Take some of the patches."""
+    return Patches(
+        **{field.name: getattr(patches, field.name)[chosen] for field in fields(Patches)}
+    )
+
+
+def _subsurface(patches: Patches, scene: Scene, translucent: Integers) -> tuple[Floats, ...]:
+    """Compute the dipole of the translucent body per channel; empty where there is none."""
+    if not len(translucent):
+        return ()
+    body = body_of(patches, translucent)
+    material = scene.parts[body.part[0]].material
+    assert material.medium is not None
+    # What the surface does not reflect enters.
+    return tuple(
+        (1 - material.albedo[channel]) * subsurface(body, dipole(material.medium, channel))
+        for channel in range(len(material.albedo))
+    )

@@ -1,0 +1,168 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from nearfar import scenes
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.scenes.cornell import cornell
+from nearfar.scenes.dipole import dipole, subsurface
+from nearfar.scenes.form_factors import exchange
+from nearfar.scenes.library import describe
+from nearfar.scenes.optics import pinhole, sub_rays
+from nearfar.scenes.patches import albedo, build_patches, with_medium
+from nearfar.scenes.radiosity import reflection_factor, resolvent_less_one
+from nearfar.scenes.rays import surface
+from nearfar.scenes.render import body_of
+
+TINY = Size(16, 16)
+
+
+def total(transport):
+    """T as a dense array (channels, C, P), in float64."""
+    return np.stack(
+        [
+            d.toarray().astype(float) + n.toarray() + f
+            for d, n, f in zip(transport.direct, transport.near, transport.far, strict=True)
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def box():
+    return scenes.build("cornell", TINY)
+
+
+@pytest.fixture(scope="module")
+def beside():
+    return scenes.build("cornell-aside", TINY)
+
+
+def test_names_are_light_to_import_and_a_wrong_one_is_told():
+    with pytest.raises(InputError, match="cornell, cornell-aside, wedge, corner"):
+        scenes.build("teapot")
+    code = "import nearfar.scenes, sys; sys.exit('trimesh' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "projector", "camera"),
+    [
+        ("cornell", Size(13, 17), None),
+        ("cornell-aside", Size(12, 9), Size(15, 20)),
+        ("wedge", Size(12, 20), None),
+        ("wedge", Size(9, 8), Size(5, 31)),
+        ("corner", Size(16, 16), Size(32, 32)),
+        ("corner", Size(1, 2), Size(3, 1)),
+    ],
+)
+def test_any_size_is_whole_exposed_and_not_negative(name, projector, camera):
+    seen = []
+    transport = scenes.build(
+        name, projector, camera, progress=lambda what, share: seen.append((what, share))
+    )
+    assert transport.projector == projector
+    if camera is not None:
+        assert transport.camera == camera
+    values = total(transport)
+    assert np.isfinite(values).all()
+    assert values.min() > -1e-6
+    assert values.sum(axis=2).max() == pytest.approx(0.9, rel=1e-4)
+    assert seen[-1][1] == 1.0
+
+
+def test_the_same_again(box):
+    again = scenes.build("cornell", TINY)
+    np.testing.assert_array_equal(again.far, box.far)
+    assert (again.direct[0] != box.direct[0]).nnz == 0
+
+
+def test_components_have_their_place(box):
+    """Direct light on the diagonal, near-range on the candle alone, far-range everywhere."""
+    lit = sparse.coo_array(box.direct[0])
+    shares = [sum(part.sum() for part in parts) for parts in (box.direct, box.near)]
+    direct, near, far = np.array([*shares, box.far.sum()]) / (sum(shares) + box.far.sum())
+    assert 0.6 < direct < 0.85
+    assert 0.03 < near < 0.15
+    assert 0.1 < far < 0.3
+    np.testing.assert_array_equal(lit.coords[0], lit.coords[1])
+    y, x = np.indices(TINY)
+    np.testing.assert_allclose(box.correspondence[box.lit], np.stack([y, x], -1)[box.lit])
+    assert box.lit.all()
+    candle = box.near[0].sum(axis=1) > 0
+    assert 0.05 < candle.mean() < 0.4
+    assert (box.far.sum(axis=2) > 0).all()
+
+
+@pytest.mark.parametrize("name", ["cornell", "corner"])
+def test_coaxial_transport_is_reciprocal(name, box):
+    """T(c, p) / T(p, c) is the ratio of the fluxes of p and c, solid angles in the image plane."""
+    transport = box if name == "cornell" else scenes.build(name, TINY)
+    _, solid_angle, pixel = sub_rays(pinhole(describe(name).projector_view, TINY), TINY, 4)
+    even = total(transport) / np.bincount(pixel, solid_angle)
+    np.testing.assert_allclose(even, np.swapaxes(even, 1, 2), atol=1e-6 * even.max())
+
+
+def test_shadows_hold_only_indirect_light(beside):
+    dark = ~beside.lit
+    assert 0.005 < dark.mean() < 0.12
+    rows = dark.ravel()
+    assert all(part[rows].nnz == 0 for part in beside.direct)
+    far = beside.far.sum(axis=(0, 2))[rows]
+    assert (far > 0).mean() > 0.98
+
+
+def test_camera_aside_sees_each_point_lit_by_its_own_pixel(beside):
+    """The correspondence of the back wall is a projective map, to a fraction of a pixel."""
+    height, width = beside.camera
+    y, x = np.indices(beside.camera).reshape(2, -1).astype(float)
+    q = beside.correspondence.reshape(-1, 2)
+    wall = (y > 0.1 * height) & (y < 0.4 * height) & (x > 0.25 * width) & (x < 0.9 * width)
+    wall &= np.isfinite(q[:, 0])
+    design = np.stack([np.ones_like(x), x, y, x * y, x**2, y**2], axis=-1)[wall]
+    fit, *_ = np.linalg.lstsq(design, q[wall], rcond=None)
+    assert np.abs(design @ fit - q[wall]).mean() < 0.3
+
+
+@pytest.mark.parametrize("name", ["cornell", "corner"])
+def test_finer_camera_averages_to_the_coarser(name):
+    coarse = scenes.build(name, TINY, TINY)
+    fine = scenes.build(name, TINY, Size(32, 32))
+    mean = total(fine).reshape(3, 16, 2, 16, 2, -1).mean(axis=(2, 4)).reshape(3, 256, 256)
+    expected = total(coarse)
+    # One exposure each: compare up to that number.
+    mean *= expected.sum() / mean.sum()
+    np.testing.assert_allclose(mean, expected, atol=1e-5)
+
+
+def test_transport_is_the_sum_of_all_bounces():
+    """Against the Neumann series, bounce by bounce, in float64 and with R and F themselves."""
+    scene = cornell()
+    parts = scene.parts
+    everything = surface(parts, range(len(parts)))
+    occluders = surface(parts, [i for i, part in enumerate(parts) if part.occludes])
+    size = Size(10, 10)
+    patches = build_patches(everything, parts, pinhole(scene.projector_view, size), size)
+    form = exchange(patches, parts, occluders)
+    candle = np.flatnonzero(with_medium(patches, parts))
+    medium = parts[patches.part[candle[0]]].material.medium
+    assert medium is not None
+    inside = 0.8 * subsurface(body_of(patches, candle), dipole(medium, 0))
+    values = albedo(patches, parts)[:, 0]
+
+    reflection = np.diag(values)
+    reflection[np.ix_(candle, candle)] += inside * patches.area[candle]
+    transfer = form.astype(float) / patches.area[:, None]
+    once = reflection @ (patches.flux / patches.area)
+    bounce, known = once, np.zeros(len(patches))
+    for _ in range(200):
+        bounce = reflection @ (transfer @ bounce)
+        known += bounce
+
+    factor = reflection_factor(values, patches, candle, inside)
+    rest = resolvent_less_one(form, factor)
+    far = factor @ (rest @ (factor.T @ patches.flux.astype(np.float32)))
+    np.testing.assert_allclose(far, known, rtol=1e-4, atol=1e-5 * known.max())

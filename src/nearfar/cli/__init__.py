@@ -1,0 +1,5 @@
+"""The command line."""
+
+from nearfar.cli.main import main
+
+__all__ = ["main"]

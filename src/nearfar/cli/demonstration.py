@@ -1,0 +1,35 @@
+"""``nearfar demo``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nearfar.cli.options import Force, Quiet
+from nearfar.cli.progress import progress_bar, say
+from nearfar.files import check_output
+
+
+def demo(
+    output: Annotated[Path, typer.Argument(metavar="[OUT]", help="Folder to make.")] = Path(
+        "nearfar-demo"
+    ),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run the whole job on the built-in scene; OUT/report.html shows it.
+
+    Example: nearfar demo
+    """
+    # The demo needs everything; other commands start without it.
+    from nearfar.report.demo import is_demo, run_demo
+
+    check_output(output, force=force, replaceable=is_demo)
+    with progress_bar(quiet=quiet) as report:
+        found = run_demo(output, force=force, progress=report)
+    say(
+        f"SNR_b {found['snr_b']['white']:.1f} dB under white, {found['snr_b_pictures']:.1f} dB "
+        f"under pictures (mean of five); SNR_t {found['snr_t']['p50']:.1f} dB (median)\n"
+        f"open {output / 'report.html'}",
+        quiet=quiet,
+    )

@@ -1,0 +1,27 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nearfar.arrays import Size, parse_size
+from nearfar.errors import InputError
+
+
+def size(text: str | Size) -> Size:
+    """Read a size written HxW; a bad one is wrong usage."""
+    if isinstance(text, Size):
+        return text
+    try:
+        return parse_size(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but faults.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdout.")]
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
+CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
+TransportPath = Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport.")]

@@ -1,0 +1,148 @@
+"""``nearfar reconstruct``, ``nearfar relight`` and ``nearfar convert``."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from nearfar.capture import open_capture
+from nearfar.cli.options import CapturePath, Force, Quiet, TransportPath
+from nearfar.cli.progress import progress_bar, say
+from nearfar.correspondence import read_correspondence
+from nearfar.errors import InputError
+from nearfar.files import (
+    check_output,
+    check_picture_ending,
+    luminance,
+    new_output,
+    read_light,
+    write_picture,
+)
+from nearfar.transport.store import load_transport, save_transport
+from nearfar.workflow.reconstruct import reconstruct as rebuild
+
+
+class Method(StrEnum):
+    """How the transport is estimated."""
+
+    PAPER = "paper"
+
+
+def reconstruct(
+    capture: CapturePath,
+    output: Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport to make.")],
+    method: Annotated[Method, typer.Option(help="Estimator.")] = Method.PAPER,
+    correspondence: Annotated[
+        Path | None,
+        typer.Option(
+            help="q as a .npy of H x W x 2, (y, x), NaN without direct light; stripes otherwise.",
+            metavar="Q.npy",
+        ),
+    ] = None,
+    square: Annotated[
+        bool,
+        typer.Option(
+            "--square", help="Average the camera pixels of each projector pixel: the paper's T."
+        ),
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Reconstruct direct, near-range and far-range transport from a capture.
+
+    Example: nearfar reconstruct capture.zarr transport.zarr
+    """
+    check_output(output, force=force)
+    opened = open_capture(capture)
+    given = None
+    if correspondence is not None:
+        given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
+    with progress_bar(quiet=quiet) as report:
+        transport, found = rebuild(opened, given, square=square, progress=report)
+    save_transport(output, transport, force=force)
+    say(
+        f"transport of {transport.camera} camera pixels with {transport.channels} channels, "
+        f"{found.lit.mean():.1%} of the camera's directly lit, written to {output}",
+        quiet=quiet,
+    )
+
+
+COMPONENTS = ("direct", "near", "far")
+
+
+def _gains(texts: list[str]) -> dict[str, float]:
+    gains = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if name not in COMPONENTS or not np.isfinite(number):
+            raise typer.BadParameter(
+                f"{text!r} is no gain: write direct=1, near=2 or far=0, one per --gain.",
+                param_hint="--gain",
+            )
+        gains[name] = number
+    return gains
+
+
+def relight(
+    transport: TransportPath,
+    light: Annotated[Path, typer.Argument(metavar="LIGHT", help="Light, the projector's size.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=".npy, .exr, .tiff or .png.")],
+    gain: Annotated[
+        list[str] | None,
+        typer.Option(help="Gain of a component: direct=1, near=2, far=0.", metavar="NAME=VALUE"),
+    ] = None,
+    srgb: Annotated[
+        bool, typer.Option("--srgb", help="LIGHT is an ordinary sRGB picture.")
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Relight the scene under a light: what the camera would see, ambient light apart.
+
+    Example: nearfar relight transport.zarr light.png relit.exr --srgb --gain near=2
+    """
+    gains = _gains(gain or [])
+    check_picture_ending(output)
+    check_output(output, force=force)
+    opened = load_transport(transport)
+    shown = read_light(light, opened.projector, srgb=srgb)
+    if shown.ndim == 3 and opened.channels == 1:
+        shown = luminance(shown)
+    picture = opened.relight(shown, **gains)
+    write_picture(output, picture.astype(np.float32), force=force)
+    say(f"relit picture of {opened.camera} written to {output}", quiet=quiet)
+
+
+def convert(
+    transport: TransportPath,
+    output: Annotated[Path, typer.Argument(metavar="OUT.npy", help="Array to write.")],
+    correspondence: Annotated[
+        bool,
+        typer.Option("--correspondence", help="Write q, H x W x 2, instead of the dense T."),
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a transport as a dense array T, (C, P) or (C, P, channels), or its correspondence.
+
+    Example: nearfar convert transport.zarr T.npy
+    """
+    if output.suffix.lower() != ".npy":
+        raise InputError(f"{output} does not end in .npy: convert writes NumPy arrays.")
+    check_output(output, force=force)
+    opened = load_transport(transport)
+    if correspondence:
+        array, what = opened.correspondence, "correspondence"
+    else:
+        array, what = np.moveaxis(opened.dense(), 1, 2), "dense transport"
+        array = array[..., 0] if opened.channels == 1 else array
+    with new_output(output, force=force) as partial, partial.open("wb") as file:
+        np.save(file, np.ascontiguousarray(array), allow_pickle=False)
+    shape = " x ".join(map(str, array.shape))
+    say(f"{what}, {shape} {array.dtype}, written to {output}", quiet=quiet)

@@ -1,0 +1,18 @@
+"""Which projector pixel lights each camera pixel directly."""
+
+from nearfar.correspondence.result import (
+    Correspondence,
+    given_correspondence,
+    read_correspondence,
+)
+from nearfar.correspondence.square import onto_projector
+from nearfar.correspondence.stripes import correspond_by_stripes, has_stripes
+
+__all__ = [
+    "Correspondence",
+    "correspond_by_stripes",
+    "given_correspondence",
+    "has_stripes",
+    "onto_projector",
+    "read_correspondence",
+]

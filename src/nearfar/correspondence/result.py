@@ -1,0 +1,95 @@
+"""Correspondence: where each camera pixel's direct light comes from."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Size
+from nearfar.errors import InputError, MissingFileError, UnreadableFileError
+
+
+@dataclass(frozen=True)
+class Correspondence:
+    """The projector pixel q(c) that lights each camera pixel directly.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (Cy, Cx, 2), float32
+        q as (y, x), the centroid of the direct light; NaN where there is none.
+    confidence : ndarray, shape (Cy, Cx), float32
+        Between 0 and 1: how sure it is that direct light was seen, or, at unlit camera pixels,
+        what speaks for direct light after all.
+    """
+
+    pixels: Floats
+    confidence: Floats
+
+    @property
+    def lit(self) -> Booleans:
+        """Camera pixels with direct light, shape (Cy, Cx)."""
+        return np.isfinite(self.pixels[..., 0])
+
+
+def given_correspondence(
+    pixels: Floats, camera: Size, projector: Size, *, source: str = "correspondence"
+) -> Correspondence:
+    """Take correspondence from outside.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (Cy, Cx, 2)
+        q as (y, x) in projector pixels; NaN where there is no direct light.
+    camera, projector : Size
+    source : str
+        For the message.
+
+    Returns
+    -------
+    Correspondence
+        With confidence 1 at lit camera pixels.
+
+    Raises
+    ------
+    InputError
+        If the shape does not fit the photos, or q lies off the projector.
+    """
+    if pixels.shape != (*camera, 2) or not np.issubdtype(pixels.dtype, np.number):
+        raise InputError(
+            f"{source} is an array of {'x'.join(map(str, pixels.shape))}, the photos need "
+            f"{camera}x2: give (y, x) for each camera pixel, NaN where there is no direct light."
+        )
+    q: Floats = np.array(pixels, dtype=np.float32)
+    lit = np.isfinite(q).all(axis=-1)
+    if not lit.any():
+        raise InputError(f"{source} has no camera pixel with direct light: all of it is NaN.")
+    limit = np.array(projector, dtype=np.float32) - 1
+    if np.any((q[lit] < -0.5) | (q[lit] > limit + 0.5)):
+        raise InputError(
+            f"{source} points off the projector of {projector}: q is (y, x) from (0, 0) to "
+            f"({projector.height - 1}, {projector.width - 1})."
+        )
+    on_projector: Floats = np.asarray(np.clip(q, 0, limit))
+    on_projector[~lit] = np.nan
+    return Correspondence(on_projector, np.where(lit, np.float32(1), np.float32(0)))
+
+
+def read_correspondence(path: Path, camera: Size, projector: Size) -> Correspondence:
+    """Read correspondence from a .npy file; see `given_correspondence`.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError, InputError
+    """
+    try:
+        pixels = np.load(path, allow_pickle=False)
+    except FileNotFoundError:
+        raise MissingFileError(f"{path} is not there: name a .npy of H x W x 2.") from None
+    except (OSError, ValueError, EOFError) as error:
+        raise UnreadableFileError(
+            f"{path} cannot be read as correspondence ({error}): save an H x W x 2 array with "
+            f"numpy.save."
+        ) from None
+    if not isinstance(pixels, np.ndarray):
+        raise UnreadableFileError(f"{path} is no .npy array: save q with numpy.save.")
+    return given_correspondence(pixels, camera, projector, source=str(path))

@@ -1,0 +1,56 @@
+"""The paper's square T: one row per projector pixel, the mean of the camera pixels it lights."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.correspondence.result import Correspondence
+from nearfar.photometry.measurements import Measurements
+
+
+def onto_projector(
+    parts: Sequence[Measurements], correspondence: Correspondence
+) -> tuple[Measurements, Floats]:
+    """Average measurements over the camera pixels of each projector pixel (section 5.1).
+
+    Parameters
+    ----------
+    parts : sequence of Measurements
+        Blocks of camera rows, in order.
+    correspondence : Correspondence
+        q of every camera pixel.
+
+    Returns
+    -------
+    measurements : Measurements
+        As of a camera with the projector's size; zero where no camera pixel is lit by it.
+    pixels : ndarray, shape (Py, Px, 2), float32
+        Each projector pixel's own place, NaN where no camera pixel is lit by it.
+    """
+    projector = parts[0].projector
+    q = np.rint(correspondence.pixels).reshape(-1, 2)
+    lit = np.isfinite(q[:, 0])
+    place = (q[lit, 0] * projector.width + q[lit, 1]).astype(np.int64)
+    count = np.bincount(place, minlength=projector.pixels)
+    share = (1.0 / np.maximum(count, 1)).astype(np.float32)[:, None]
+
+    def mean(values: Sequence[Floats]) -> Floats:
+        together = np.concatenate(list(values))[lit]
+        total = np.zeros((projector.pixels, *together.shape[1:]), dtype=np.float32)
+        np.add.at(total, place, together)
+        return total * share.reshape(-1, *(1,) * (together.ndim - 1))
+
+    measurements = replace(
+        parts[0],
+        camera=projector,
+        answers=mean([part.answers for part in parts]),
+        # Independent noise: the mean's variance is the variances' mean over their number.
+        noise=np.sqrt(mean([part.noise**2 for part in parts]) * share),
+        black=mean([part.black for part in parts]),
+    )
+    y, x = np.divmod(np.arange(projector.pixels), projector.width)
+    pixels = np.stack([y, x], axis=-1).astype(np.float32)
+    pixels[count == 0] = np.nan
+    return measurements, pixels.reshape(*projector, 2)

@@ -1,0 +1,158 @@
+"""Correspondence by black stripes (section 5.1), robust under global illumination.
+
+A black stripe takes away what its row or column of projector pixels gave: the photos tell the
+marginals of every row t. Direct light is a peak of one or two pixels on that marginal; near- and
+far-range light are smooth under it and fall out of a second difference.
+
+Index convention: c runs over camera pixels, s over the stripes of one axis.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from nearfar.arrays import Floats, Size
+from nearfar.correspondence.result import Correspondence
+from nearfar.errors import InputError
+from nearfar.photometry.measure import BATCH, Photos
+from nearfar.plan import Plan, Stripe
+
+# A peak has no background closer than this to it.
+REACH = 2
+# Confidence at which direct light is taken as seen: a false alarm of noise in a million.
+SURE = 1 - 1e-6
+# A second pixel shares the direct light only if it stands out by as many deviations.
+SHARED = 3.0
+# Direct light under this share of a camera pixel's white is near-range light's own peak.
+LEAST_SHARE = 0.04
+# The two axes see the same direct light; they may differ by this factor.
+AGREEMENT = 3.0
+
+
+class _Axis(NamedTuple):
+    """One axis's answer for every camera pixel, each of shape (C,)."""
+
+    place: Floats
+    strength: Floats
+    deviations: Floats
+    share: Floats
+
+
+def has_stripes(plan: Plan) -> bool:
+    """Tell whether a plan holds stripes on both axes."""
+    kinds = {pattern.kind for pattern in plan.patterns if isinstance(pattern, Stripe)}
+    return kinds == {"black row", "black column"}
+
+
+def correspond_by_stripes(
+    photos: Photos, rows: slice | None = None, progress: Callable[[int], None] | None = None
+) -> Correspondence:
+    """Find q(c) from photos of black stripes.
+
+    Parameters
+    ----------
+    photos : Photos
+        A capture whose plan holds stripes.
+    rows : slice, optional
+        Rows of the camera; all by default.
+    progress : callable, optional
+        Called with the number of photos read so far.
+
+    Returns
+    -------
+    Correspondence
+
+    Raises
+    ------
+    InputError
+        If the plan holds no stripes.
+    """
+    plan = photos.plan
+    if not has_stripes(plan):
+        raise InputError(
+            "the plan of this capture has no stripes: give the correspondence with "
+            "--correspondence Q.npy, or plan with --correspondence stripes."
+        )
+    rows = slice(0, photos.camera.height) if rows is None else rows
+    height = len(range(*rows.indices(photos.camera.height)))
+    camera = Size(height, photos.camera.width)
+    down = _axis(photos, "black row", rows, progress)
+    across = _axis(photos, "black column", rows, progress)
+
+    false_alarm: Floats = np.zeros(camera.pixels)
+    for axis, length in ((down, plan.projector.height), (across, plan.projector.width)):
+        false_alarm = false_alarm + length * ndtr(-axis.deviations)
+    confidence = 1.0 - np.minimum(1.0, false_alarm)
+    strong, weak = (
+        np.maximum(down.strength, across.strength),
+        np.minimum(down.strength, across.strength),
+    )
+    lit = (
+        (confidence >= SURE)
+        & (strong <= AGREEMENT * weak)
+        & (np.minimum(down.share, across.share) >= LEAST_SHARE)
+    )
+    q = np.stack([down.place, across.place], axis=-1)
+    q[~lit] = np.nan
+    return Correspondence(
+        q.reshape(*camera, 2).astype(np.float32),
+        np.asarray(confidence, dtype=np.float32).reshape(camera),
+    )
+
+
+def _axis(photos: Photos, kind: str, rows: slice, progress: Callable[[int], None] | None) -> _Axis:
+    numbers = {
+        pattern.index: i
+        for i, pattern in enumerate(photos.plan.patterns)
+        if isinstance(pattern, Stripe) and pattern.kind == kind
+    }
+    taken, white = _marginal(photos, [numbers[s] for s in sorted(numbers)], rows)
+    if progress is not None:
+        progress(len(numbers))
+    return _peak(taken, white)
+
+
+def _marginal(photos: Photos, numbers: Sequence[int], rows: slice) -> tuple[Floats, Floats]:
+    """Light that each stripe takes away, (C, s), and the photo without stripes, (C,).
+
+    Channels are weighed by their light: where shot noise rules, that is the best sum.
+    """
+    stack = [
+        photos.read(numbers[start : start + BATCH], rows) for start in range(0, len(numbers), BATCH)
+    ]
+    shown = np.concatenate(stack).sum(axis=-1).reshape(len(numbers), -1).T
+    # Most stripes leave a pixel's direct light alone: the median is the photo without stripes.
+    white = np.median(shown, axis=1) if len(numbers) > 2 else shown.max(axis=1)
+    return white[:, None] - shown, white
+
+
+def _peak(taken: Floats, white: Floats) -> _Axis:
+    pixels, length = taken.shape
+    number = np.arange(pixels)
+    padded = np.pad(taken, ((0, 0), (REACH, REACH)), mode="reflect" if length > REACH else "edge")
+    curvature = taken - 0.5 * (padded[:, : -2 * REACH] + padded[:, 2 * REACH :])
+    peak = np.argmax(curvature, axis=1)
+    # Scatter of what is no peak: the noise as this pixel's own stripes show it.
+    spread = np.abs(curvature - np.median(curvature, axis=1)[:, None])
+    deviation = 1.4826 * np.median(spread, axis=1) + 1e-12
+    noise = deviation / np.sqrt(1.5)
+
+    before = np.where(peak > 0, taken[number, np.maximum(peak - 1, 0)], -np.inf)
+    after = np.where(peak < length - 1, taken[number, np.minimum(peak + 1, length - 1)], -np.inf)
+    # Near-range light is the same to both sides, so the difference is direct light's own.
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    second = np.where(np.isfinite(low), high - np.maximum(low, -np.inf), 0.0)
+    second = np.where(np.isfinite(second), second, 0.0)
+    second = np.where(second > SHARED * np.sqrt(2.0) * noise, second, 0.0)
+    first = curvature[number, peak]
+    side = np.where(after > before, 1.0, -1.0)
+    total = first + second
+    place = peak + side * second / np.maximum(total, 1e-12)
+    return _Axis(
+        place=np.where(total > 0, place, peak),
+        strength=total,
+        deviations=first / deviation,
+        share=total / np.maximum(white, 1e-12),
+    )

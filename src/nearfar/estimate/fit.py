@@ -1,0 +1,135 @@
+"""The best that the model can do: D, a window and a band fitted to a transport that is known.
+
+What this leaves is the ceiling of any estimate with the same W and far band, and its factors are
+the model's truth: d at q, n in the window, f in the band.
+
+Index convention: arrays are (n, channels, ...); m runs over far coefficients, w over the window.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.estimate.matrices import Band, band_of
+from nearfar.transport import direct, near
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.far import RealBasis
+from nearfar.transport.model import Transport
+
+# Inside the window n takes whatever f leaves, so f is fitted to what lies outside; this weight
+# inside says where a part that both could hold belongs: to f.
+INSIDE = 0.001
+ITERATIONS = 60
+SETTLED = 1e-5
+BLOCK = 256
+
+
+def fit_model(
+    truth: ExactTransport, window: int, far_basis: RealBasis, correspondence: Floats | None = None
+) -> Transport:
+    """Fit D + N + F to a known transport by least squares.
+
+    Parameters
+    ----------
+    truth : ExactTransport
+        Where its components are not known apart, d is what stands out at q.
+    window : int
+        W.
+    far_basis : RealBasis
+    correspondence : ndarray, shape (Cy, Cx, 2), optional
+        q; the truth's own by default.
+
+    Returns
+    -------
+    Transport
+    """
+    q = truth.correspondence if correspondence is None else correspondence
+    where = direct.footprint(q, truth.projector)
+    centres = near.centre(q, truth.projector)
+    lit = np.isfinite(q[..., 0]).ravel()
+    band = band_of(far_basis, near.offsets(window))
+    pixels, channels = truth.camera.pixels, truth.channels
+    d = np.zeros((pixels, channels), dtype=np.float32)
+    n = np.zeros((pixels, channels, window**2), dtype=np.float32)
+    f = np.zeros((pixels, channels, far_basis.count), dtype=np.float32)
+    for block in blocks(pixels, BLOCK):
+        rows = truth.rows(block)
+        corners = direct.Footprint(where.pixels[block], where.weights[block])
+        d[block] = _direct(truth, rows, block, corners)
+        number = np.arange(len(rows))[:, None]
+        for i in range(channels):
+            # At the border two corners may be one pixel: subtract each on its own.
+            taken = corners.weights * d[block, i, None]
+            np.subtract.at(rows[:, i], (number, corners.pixels), taken)
+        inside = near.inside(centres[block], window, truth.projector) & lit[block, None]
+        places = near.places_on(centres[block], window, truth.projector)
+        within = rows[number[:, :, None], np.arange(channels)[:, None], places[:, None]]
+        within = within * inside[:, None]
+        f[block] = _far(rows, within, inside, band, centres[block])
+        seen: Floats = band.recentre(f[block] * far_basis.weights, centres[block]) @ band.on_window
+        n[block] = (within - seen) * inside[:, None]
+        # The paper's own far step: what D and N leave at the far frequencies is f's.
+        answers = band.uncentre(n[block] @ band.on_window.T, centres[block])
+        f[block] = rows @ far_basis.patterns.T - answers
+    shape = (*truth.camera, channels)
+    return Transport(
+        projector=truth.projector,
+        correspondence=q.astype(np.float32),
+        direct=d.reshape(shape),
+        near=n.reshape(*shape, window, window),
+        far=f.reshape(*shape, -1),
+        far_basis=far_basis,
+        black=np.zeros(shape, dtype=np.float32),
+        noise=np.zeros(shape, dtype=np.float32),
+    )
+
+
+def _direct(truth: ExactTransport, rows: Floats, block: slice, corners: direct.Footprint) -> Floats:
+    """Known d, or the row's own values at q."""
+    if truth.is_apart:
+        return np.stack([part[block].sum(axis=1) for part in truth.direct], axis=1)
+    number = np.arange(len(rows))[:, None]
+    return np.stack(
+        [
+            np.sum(rows[number, i, corners.pixels] * (corners.weights > 0), axis=1)
+            for i in range(truth.channels)
+        ],
+        axis=1,
+    )
+
+
+def _far(
+    rows: Floats,
+    within: Floats,
+    inside: Booleans,
+    band: Band,
+    centres: NDArray[np.int64],
+) -> Floats:
+    """Weighted least squares for f by conjugate gradients, all rows at once."""
+    weights = band.basis.weights.astype(np.float32)
+    less: Floats = np.float32(1.0 - INSIDE) * inside[:, None]
+
+    def normal(f: Floats) -> Floats:
+        seen = (band.recentre(f * weights, centres) @ band.on_window) * less
+        return np.asarray(f * weights - weights * band.uncentre(seen @ band.on_window.T, centres))
+
+    right = weights * (rows @ band.basis.patterns.T)
+    right -= weights * band.uncentre((within * less) @ band.on_window.T, centres)
+    f = np.zeros_like(right)
+    residual = right.copy()
+    # Preconditioned by the diagonal without a window.
+    step = residual / weights
+    power = np.sum(residual * step, axis=-1, keepdims=True)
+    first = power.max(initial=0.0)
+    for _ in range(ITERATIONS):
+        image = normal(step)
+        along = power / np.maximum(np.sum(step * image, axis=-1, keepdims=True), 1e-30)
+        f += along * step
+        residual -= along * image
+        scaled = residual / weights
+        new_power = np.sum(residual * scaled, axis=-1, keepdims=True)
+        if new_power.max(initial=0.0) <= SETTLED**2 * first:
+            break
+        step = scaled + step * (new_power / np.maximum(power, 1e-30))
+        power = new_power
+    return f

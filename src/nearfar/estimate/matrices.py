@@ -1,0 +1,144 @@
+"""What every camera pixel shares: patterns over the window, their inverse, what no photo sees."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Size
+from nearfar.illumination.frequencies import (
+    CHECKERBOARD,
+    Frequency,
+    as_array,
+    far_frequencies,
+    grid,
+    near_frequencies,
+    representatives,
+)
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport import near
+from nearfar.transport.far import RealBasis, real_basis
+
+# Window offsets that the direct light's 2 x 2 footprint can touch.
+CORNERS = np.array([(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1)])
+
+
+@dataclass(frozen=True)
+class Band:
+    """A set of measured frequencies and its patterns in re-centred coordinates.
+
+    Attributes
+    ----------
+    basis : RealBasis
+    places : ndarray, shape (R,)
+        Where its answers stand among the measurements.
+    on_window : ndarray, shape (R, W^2), float32
+    on_corners : ndarray, shape (R, 9), float32
+        Over `CORNERS`.
+    """
+
+    basis: RealBasis
+    places: NDArray[np.int64]
+    on_window: Floats
+    on_corners: Floats
+
+    def recentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
+        """Turn answers (n, channels, R) about each pixel's centre (n, 2)."""
+        return self._turn(answers, centres, +1)
+
+    def uncentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
+        """Inverse of `recentre`."""
+        return self._turn(answers, centres, -1)
+
+    def _turn(self, answers: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
+        cosine = np.flatnonzero(~self.basis.is_sine)
+        paired = np.flatnonzero(self.basis.is_sine)
+        partner = paired - 1
+        angle = 2 * np.pi * (centres @ as_array(self.basis.frequencies).T % 1.0)
+        c = np.cos(angle).astype(np.float32)[:, None, :]
+        s = (sign * np.sin(angle)).astype(np.float32)[:, None, self.basis.index[paired]]
+        turned = np.empty_like(answers)
+        turned[..., cosine] = answers[..., cosine] * c
+        turned[..., partner] += answers[..., paired] * s
+        turned[..., paired] = answers[..., paired] * c[..., self.basis.index[paired]]
+        turned[..., paired] -= answers[..., partner] * s
+        return turned
+
+
+def _band(measurements: Measurements, frequencies: Sequence[Frequency], window: int) -> Band:
+    basis = real_basis(representatives(frequencies), measurements.projector)
+    return replace(
+        band_of(basis, near.offsets(window)), places=measurements.places(basis.frequencies)
+    )
+
+
+def band_of(basis: RealBasis, window_offsets: NDArray[np.int64]) -> Band:
+    """Return a basis with its patterns about q; its answers stand in its own order."""
+    return Band(basis, np.arange(basis.count), drawn(basis, window_offsets), drawn(basis, CORNERS))
+
+
+def drawn(basis: RealBasis, offsets: NDArray[np.int64]) -> Floats:
+    """Cosines and sines at chosen offsets from q, shape (R, len(offsets)), float32."""
+    angle = 2 * np.pi * (as_array(basis.frequencies) @ offsets.T)[basis.index]
+    return np.where(basis.is_sine[:, None], np.sin(angle), np.cos(angle)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """One set of matrices for every camera pixel.
+
+    Attributes
+    ----------
+    window : int
+    checkerboard, near, far : Band
+    near_inverse : ndarray, shape (R_near, W^2), float32
+        From near answers to the part of a window that they see.
+    unseen : ndarray, shape (W^2, m), float32
+        Orthonormal directions that no near photo sees: the dropped frequencies.
+    near_leak : ndarray, shape (M, R_near), float32
+        Answers of each far coefficient to the near patterns; 0 where W divides P.
+    checkerboard_leak : ndarray, shape (M, 1), float32
+        The same for the checkerboard; 0 where P is even.
+    """
+
+    window: int
+    checkerboard: Band
+    near: Band
+    far: Band
+    near_inverse: Floats
+    unseen: Floats
+    near_leak: Floats
+    checkerboard_leak: Floats
+
+
+def build_matrices(measurements: Measurements, window: int, far: Size, dropped: Size) -> Matrices:
+    """Build the paper's matrices.
+
+    The patterns of the full near set are orthogonal over a window (equation 5), so the inverse
+    is a scaled transpose, and what the dropped frequencies leave unseen is their own patterns.
+    """
+    far_band = _band(measurements, far_frequencies(far, measurements.projector), window)
+    near_band = _band(measurements, near_frequencies(window, dropped), window)
+    checkerboard = _band(measurements, [CHECKERBOARD], window)
+    lowest = real_basis(
+        representatives(grid(dropped, Size(window, window))), measurements.projector
+    )
+    unseen = drawn(lowest, near.offsets(window)).T.astype(np.float64)
+    energy = np.sum(near_band.on_window.astype(np.float64) ** 2, axis=1)
+    return Matrices(
+        window,
+        checkerboard,
+        near_band,
+        far_band,
+        (near_band.on_window / energy[:, None]).astype(np.float32),
+        (unseen / np.linalg.norm(unseen, axis=0)).astype(np.float32),
+        _leak(far_band.basis, near_band.basis),
+        _leak(far_band.basis, checkerboard.basis),
+    )
+
+
+def _leak(far: RealBasis, shown: RealBasis) -> Floats:
+    """Answers of each far coefficient to the patterns of another basis, (M, R), float32."""
+    overlap = far.patterns.astype(np.float64) @ shown.patterns.T.astype(np.float64)
+    return np.asarray((far.weights[:, None] * overlap).astype(np.float32))

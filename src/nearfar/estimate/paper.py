@@ -1,0 +1,266 @@
+"""The paper's estimation: direct, then near-range, then far-range (sections 4.1 to 4.3).
+
+All camera pixels go through the same few matrix products: answers re-centred on q meet one
+matrix for every pixel. What the far estimate answers at near frequencies off the DFT grid is
+taken out of them, and near and far are estimated again.
+
+Index convention: arrays are (n, channels, ...) with n camera pixels; r runs over real answers,
+w over window entries, m over far coefficients.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.estimate.matrices import CORNERS, Band, Matrices, build_matrices
+from nearfar.estimate.sparse import solve
+from nearfar.illumination.frequencies import as_array
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport import near
+from nearfar.transport.direct import Footprint, footprint
+from nearfar.transport.model import Transport
+
+# Rounds of near and far at most, and when they agree: as a share of the noise, and of the light.
+ROUNDS = 60
+AGREED_NOISE = 0.02
+AGREED = 2e-7
+# lambda of equation (10) as a share of a window entry's noise. At 1 or less an entry leaves at
+# most its own share of epsilon as residual; chosen in docs/decisions/0003.
+THRESHOLD = 0.75
+# Camera pixels at once: keeps a block's windows near the processor.
+BLOCK = 512
+# Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
+HIGH = 0.3
+
+
+def estimate(
+    measurements: Measurements,
+    correspondence: Floats,
+    window: int,
+    far: Size,
+    dropped: Size,
+    *,
+    rounds: int = ROUNDS,
+    progress: Callable[[int], None] | None = None,
+) -> Transport:
+    """Estimate D, N and F as in the paper.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    correspondence : ndarray, shape (Cy, Cx, 2)
+        q as (y, x), NaN where there is no direct light.
+    window : int
+        W.
+    far, dropped : Size
+        Far band and the block of near frequencies that were not shot.
+    rounds : int
+        Rounds of near and far.
+    progress : callable, optional
+        Called with the number of camera pixels done after each block.
+
+    Returns
+    -------
+    Transport
+    """
+    matrices = build_matrices(measurements, window, far, dropped)
+    where = footprint(correspondence, measurements.projector)
+    centres = near.centre(correspondence, measurements.projector)
+    lit = np.isfinite(correspondence[..., 0]).ravel()
+    number, channels = measurements.answers.shape[:2]
+    direct = np.empty((number, channels), dtype=np.float32)
+    windows = np.empty((number, channels, window**2), dtype=np.float32)
+    low = np.empty((number, channels, matrices.far.basis.count), dtype=np.float32)
+    for block in blocks(number, BLOCK):
+        pixels = _pixels(measurements, where, lit, centres, block, matrices)
+        found = _estimate_block(pixels, matrices, rounds)
+        direct[block], windows[block], low[block] = found.direct, found.near, found.far
+        if progress is not None:
+            progress(block.stop)
+    shape = (*measurements.camera, channels)
+    return Transport(
+        projector=measurements.projector,
+        correspondence=correspondence.astype(np.float32),
+        direct=direct.reshape(shape),
+        near=windows.reshape(*shape, window, window),
+        far=low.reshape(*shape, -1),
+        far_basis=matrices.far.basis,
+        black=measurements.black.reshape(shape),
+        noise=measurements.noise.reshape(shape),
+    )
+
+
+class _Pixels(NamedTuple):
+    """A block of camera pixels; each field's first axis runs over them."""
+
+    centres: NDArray[np.int64]
+    lit: Booleans
+    inside: Booleans
+    corners: Floats  # weights of the direct light over CORNERS, (n, 9)
+    noise: Floats
+    light: Floats  # largest answer, (n,)
+    checkerboard: Floats  # answers, re-centred
+    near: Floats  # answers, re-centred
+    far: Floats  # answers, as measured
+    near_of_direct: Floats  # answers of unit direct light, 8 bits included
+    far_of_direct: Floats
+
+    def only(self, pixels: Booleans) -> "_Pixels":
+        return _Pixels._make(values[pixels] for values in self)
+
+
+class _Estimate(NamedTuple):
+    """What a round finds; each field's first axis runs over camera pixels."""
+
+    direct: Floats
+    near: Floats
+    far: Floats
+    unseen: Floats  # z of equation (10)
+
+
+def _estimate_block(pixels: _Pixels, matrices: Matrices, rounds: int) -> _Estimate:
+    """Alternate near and far; each camera pixel stops when its own leaks have settled."""
+    found = _round(pixels, None, _no_leaks(pixels), matrices)
+    moving = np.arange(len(pixels.lit))
+    latest, leaks = found, _no_leaks(pixels)
+    for _ in range(rounds - 1):
+        previous, leaks = leaks, _leaks(latest.far, pixels, matrices)
+        limit = AGREED_NOISE * pixels.noise.mean(axis=1) + AGREED * pixels.light
+        going = np.zeros(len(moving), dtype=bool)
+        for old, new in zip(previous, leaks, strict=True):
+            if new.size:
+                going |= np.sqrt(np.mean((new - old) ** 2, axis=(1, 2))) > limit
+        if not going.any():
+            break
+        moving, pixels = moving[going], pixels.only(going)
+        leaks = _Leaks(*(leak[going] for leak in leaks))
+        latest = _round(pixels, latest.unseen[going], leaks, matrices)
+        for values, new in zip(found, latest, strict=True):
+            values[moving] = new
+    return found
+
+
+class _Leaks(NamedTuple):
+    """What f answers where the model has it silent: off the DFT grid."""
+
+    checkerboard: Floats
+    near: Floats
+
+
+def _no_leaks(pixels: _Pixels) -> _Leaks:
+    return _Leaks(np.zeros_like(pixels.checkerboard), np.zeros_like(pixels.near))
+
+
+def _leaks(far: Floats, pixels: _Pixels, matrices: Matrices) -> _Leaks:
+    return _Leaks(
+        matrices.checkerboard.recentre(far @ matrices.checkerboard_leak, pixels.centres),
+        matrices.near.recentre(far @ matrices.near_leak, pixels.centres),
+    )
+
+
+def _round(pixels: _Pixels, start: Floats | None, leaks: _Leaks, matrices: Matrices) -> _Estimate:
+    """Sections 4.1, 4.2 and 4.3 once."""
+    near_answers = pixels.near - leaks.near
+    direct = _direct(pixels.checkerboard - leaks.checkerboard, near_answers, pixels, matrices)
+    near_answers -= direct[..., None] * pixels.near_of_direct
+    windows, unseen = _near(near_answers, pixels, matrices, start)
+    far = pixels.far - direct[..., None] * pixels.far_of_direct
+    far -= matrices.far.uncentre(windows @ matrices.far.on_window.T, pixels.centres)
+    return _Estimate(direct, windows, far, unseen)
+
+
+def _corner_weights(where: Footprint, centres: NDArray[np.int64], width: int) -> Floats:
+    """Weights of the footprint over `CORNERS`, shape (n, 9)."""
+    y, x = np.divmod(where.pixels, width)
+    place = (y - centres[:, 0, None] + 1) * 3 + (x - centres[:, 1, None] + 1)
+    weights = np.zeros((len(centres), len(CORNERS)), dtype=np.float32)
+    # Weightless corners of unlit or whole pixels may lie anywhere: clip, they add nothing.
+    np.add.at(
+        weights,
+        (np.arange(len(weights))[:, None], np.clip(place, 0, len(CORNERS) - 1)),
+        where.weights,
+    )
+    return weights
+
+
+def _pixels(
+    measurements: Measurements,
+    where: Footprint,
+    lit: Booleans,
+    centres: NDArray[np.int64],
+    block: slice,
+    matrices: Matrices,
+) -> _Pixels:
+    """Gather what a block's rounds need."""
+    projector = measurements.projector
+    where = Footprint(where.pixels[block], where.weights[block])
+    centres = centres[block]
+    corners = _corner_weights(where, centres, projector.width)
+    answers = measurements.answers[block]
+
+    def shown_error(band: Band) -> Floats:
+        """Answers (n, 1, R) of unit direct light to what 8 bits got wrong."""
+        error = measurements.shown_error[band.places][:, where.pixels]
+        return np.asarray(np.einsum("rnk,nk->nr", error, where.weights))[:, None]
+
+    def of_direct(band: Band) -> Floats:
+        return np.asarray((corners @ band.on_corners.T)[:, None])
+
+    checkerboard, near_band, far_band = matrices.checkerboard, matrices.near, matrices.far
+    near_error = near_band.recentre(shown_error(near_band), centres)
+    return _Pixels(
+        centres=centres,
+        lit=lit[block],
+        inside=near.inside(centres, matrices.window, projector),
+        corners=corners,
+        noise=measurements.noise[block],
+        light=np.abs(answers).max(axis=(1, 2)),
+        checkerboard=checkerboard.recentre(answers[..., checkerboard.places], centres),
+        near=near_band.recentre(answers[..., near_band.places], centres),
+        far=answers[..., far_band.places],
+        near_of_direct=of_direct(near_band) + near_error,
+        far_of_direct=far_band.uncentre(of_direct(far_band), centres) + shown_error(far_band),
+    )
+
+
+def _direct(
+    checkerboard: Floats, near_answers: Floats, pixels: _Pixels, matrices: Matrices
+) -> Floats:
+    """Return d, shape (n, channels): section 4.1, and more where q falls between pixels.
+
+    There the checkerboard's answer fades, d (1 - 2a)(1 - 2b) for an offset (a, b), so the
+    highest near frequencies are weighed in as far as it does.
+    """
+    answer = pixels.corners @ matrices.checkerboard.on_corners.T
+    frequencies = np.abs(as_array(matrices.near.basis.frequencies)).max(axis=1, initial=0.0)
+    high = frequencies[matrices.near.basis.index] > HIGH
+    high_answer = pixels.corners @ matrices.near.on_corners[high].T
+    faded = 1.0 - answer[:, 0] ** 2
+    energy = answer[:, 0] ** 2 + faded * np.sum(high_answer**2, axis=1)
+    total = checkerboard[..., 0] * answer + faded[:, None] * np.einsum(
+        "ncr,nr->nc", near_answers[..., high], high_answer
+    )
+    d = total / np.maximum(energy, 1e-6)[:, None] * pixels.lit[:, None]
+    return np.asarray(d, dtype=np.float32)
+
+
+def _near(
+    answers: Floats, pixels: _Pixels, matrices: Matrices, start: Floats | None
+) -> tuple[Floats, Floats]:
+    """Equation (10): windows n, shape (n, channels, W^2), and the unseen part z."""
+    number, channels = answers.shape[:2]
+    n0 = (answers @ matrices.near_inverse).reshape(-1, matrices.window**2)
+    # A window entry is a mean of W^2 answers, cosine and sine of each pair.
+    threshold = THRESHOLD * np.sqrt(2.0) / matrices.window * pixels.noise.reshape(-1)
+    windows, unseen = solve(
+        n0,
+        matrices.unseen,
+        np.repeat(pixels.inside, channels, axis=0),
+        threshold.astype(n0.dtype),
+        None if start is None else start.reshape(len(n0), -1),
+    )
+    shape = (number, channels, -1)
+    return windows.reshape(shape) * pixels.lit[:, None, None], unseen.reshape(shape)

@@ -1,0 +1,121 @@
+"""Equation (10) for all camera pixels at once.
+
+With the uniform near set the rows of the measurement matrix are orthogonal, so the measured part
+of a window n is n0, the part that no photo saw is Z z with few unknowns z, and the Lagrangian of
+equation (10),
+
+    minimise over n   1/2 |n0 - (1 - Z Z^T) n|^2 + lambda |n|_1,
+
+becomes, after n is minimised out, a Huber regression in z alone: the sum over the window of
+huber_lambda(v), v = n0 + Z z. Entries beyond the projector's border are known to be zero and
+count 1/2 v^2. Then n = soft_lambda(v), and lambda is set where the residual, the sum of
+min(|v|, lambda)^2, meets the noise epsilon.
+
+Index convention: rows i run over camera pixels and channels, w over the W^2 window entries.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats
+
+# Reweighting steps at most, and when a row is settled: relative to lambda, and to its size.
+STEPS = 60
+SETTLED_NOISE = 0.01
+SETTLED = 1e-6
+# The noise-free corner of |.|_1 is reached under a floor that shrinks by this at each step.
+FLOOR = 0.3
+SHRINK = 0.6
+# A window of zeros weighs its entries alike.
+TINY = 1e-30
+
+
+def solve(
+    n0: Floats,
+    unseen: Floats,
+    inside: Booleans,
+    threshold: Floats,
+    start: Floats | None = None,
+) -> tuple[Floats, Floats]:
+    """Minimise the Lagrangian of equation (10) with a given lambda for each row.
+
+    Parameters
+    ----------
+    n0 : ndarray, shape (I, W^2), float32
+        Measured part of each window, orthogonal to `unseen`.
+    unseen : ndarray, shape (W^2, m)
+        Z.
+    inside : ndarray of bool, shape (I, W^2)
+        Window entries on the projector.
+    threshold : ndarray, shape (I,)
+        lambda >= 0; 0 asks for the noise-free problem, min |n|_1 with the data met.
+    start : ndarray, shape (I, m), optional
+        Where to start z.
+
+    Returns
+    -------
+    n : ndarray, shape (I, W^2), float32
+    z : ndarray, shape (I, m)
+    """
+    rows, unknowns = len(n0), unseen.shape[1]
+    z = np.zeros((rows, unknowns), dtype=n0.dtype) if start is None else start.copy()
+    if unknowns:
+        scale = np.abs(n0).max(axis=1, initial=0.0)
+        # Rows stop on their own, so that no row's answer depends on its company.
+        moving = np.arange(rows)
+        problem = _Problem(n0, inside, threshold, scale, FLOOR * scale)
+        for _ in range(STEPS):
+            change = _step(problem, z[moving], unseen)
+            z[moving] -= change
+            problem = problem.with_lower_floor()
+            going = ~problem.settled(np.abs(unseen).max() * np.abs(change).max(axis=1))
+            if not going.all():
+                moving, problem = moving[going], problem.only(going)
+            if not len(moving):
+                break
+    v = n0 + z @ unseen.T
+    n = np.sign(v) * np.maximum(np.abs(v) - threshold[:, None], 0.0) * inside
+    return n.astype(n0.dtype, copy=False), z
+
+
+class _Problem(NamedTuple):
+    """Rows that have not settled yet; each field's first axis runs over them."""
+
+    n0: Floats
+    inside: Booleans
+    threshold: Floats
+    scale: Floats
+    floor: Floats
+
+    def with_lower_floor(self) -> "_Problem":
+        return self._replace(floor=self.floor * SHRINK)
+
+    def only(self, rows: Booleans) -> "_Problem":
+        return _Problem._make(values[rows] for values in self)
+
+    def settled(self, moved: Floats) -> Booleans:
+        """Tell which rows moved no more, under a floor that no longer matters."""
+        least = SETTLED * self.scale
+        still = moved <= SETTLED_NOISE * self.threshold + least
+        return np.asarray(still & (self.floor <= self.threshold + least))
+
+
+def _step(problem: _Problem, z: Floats, unseen: Floats) -> Floats:
+    """Return what reweighted least squares takes off z."""
+    width = np.maximum(problem.threshold, problem.floor + SETTLED * problem.scale + TINY)[:, None]
+    v = problem.n0 + z @ unseen.T
+    weight = width / np.maximum(np.abs(v), width)
+    np.copyto(weight, 1.0, where=~problem.inside)
+    return _weighted_step(v, weight, unseen)
+
+
+def _weighted_step(v: Floats, weight: Floats, unseen: Floats) -> Floats:
+    """(Z^T diag(weight) Z)^-1 Z^T diag(weight) v for each row."""
+    unknowns = unseen.shape[1]
+    pairs = (unseen[:, :, None] * unseen[:, None, :]).reshape(len(unseen), -1)
+    normal = (weight @ pairs).reshape(-1, unknowns, unknowns).astype(np.float64)
+    right = ((weight * v) @ unseen).astype(np.float64)
+    # A window with no weight at all has nothing to say; the ridge keeps it still.
+    ridge = 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(unknowns)
+    return np.linalg.solve(normal + ridge, right[..., None])[..., 0].astype(v.dtype)

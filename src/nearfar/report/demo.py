@@ -1,0 +1,100 @@
+"""The demo: plan, noisy capture, correspondence, reconstruction, relighting, a page."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from nearfar.arrays import Size
+from nearfar.files import new_output
+from nearfar.illumination.pictures import natural_picture, penguin, white
+from nearfar.plan import paper_plan
+from nearfar.report.demonstration import demonstration_page
+from nearfar.rigs.config import open_rig
+from nearfar.scenes.cache import cached_scene
+from nearfar.transport.store import save_transport
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.evaluate import row_snr
+from nearfar.workflow.judge import judge_by_truth
+from nearfar.workflow.reconstruct import reconstruct
+
+SCENE = "cornell"
+PROJECTOR = Size(64, 64)
+WINDOW = 11
+FAR = Size(7, 7)
+
+PLAN, CAPTURE, TRANSPORT, REPORT = "plan.json", "capture.zarr", "transport.zarr", "report.html"
+NUMBERS = "numbers.json"
+
+
+def is_demo(folder: Path) -> bool:
+    """Tell whether a folder holds a demo's outputs and nothing else."""
+    names = {PLAN, CAPTURE, TRANSPORT, REPORT, NUMBERS}
+    return all(entry.name in names for entry in folder.iterdir())
+
+
+def run_demo(
+    output: Path, *, force: bool = False, progress: Callable[[str, float], None] | None = None
+) -> dict[str, Any]:
+    """Run the whole job on the built-in Cornell scene and write its report.
+
+    Parameters
+    ----------
+    output : Path
+        Folder to make: the plan, the capture, the transport, ``report.html``, and the figures
+        as ``numbers.json``.
+    force : bool
+        Replace the folder of an earlier demo.
+    progress : callable, optional
+        Told what is being done and the share done.
+
+    Returns
+    -------
+    dict
+        As `nearfar.workflow.judge.judge_by_truth`.
+
+    Raises
+    ------
+    NearfarError
+        As `nearfar.files.new_output`.
+    """
+    report = progress or (lambda _what, _share: None)
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def timed(what: str) -> Iterator[None]:
+        started = time.monotonic()
+        yield
+        seconds[what] = time.monotonic() - started
+
+    with new_output(output, force=force, replaceable=is_demo) as partial:
+        partial.mkdir()
+        plan = paper_plan(PROJECTOR, WINDOW, FAR)
+        (partial / PLAN).write_text(plan.to_json(), encoding="utf-8")
+        with timed("scene"):
+            truth = cached_scene(SCENE, PROJECTOR, progress=report)
+        with timed("photos"):
+            rig = open_rig(SCENE, PROJECTOR)
+            count = len(plan.patterns)
+            capture = acquire(
+                plan, partial / CAPTURE, rig, progress=lambda n: report("photos", n / count)
+            )
+        with timed("reconstruction"):
+            transport, correspondence = reconstruct(capture, progress=report)
+        save_transport(partial / TRANSPORT, transport)
+        with timed("evaluation"):
+            judgement = judge_by_truth(transport, truth, progress=report)
+            rows = row_snr(transport, truth)
+        (partial / NUMBERS).write_text(json.dumps(judgement, indent=2), encoding="utf-8")
+        lights = {
+            "floodlight": white(PROJECTOR),
+            "penguin": penguin(PROJECTOR),
+            "leaves": natural_picture(PROJECTOR, 1, colour=True),
+        }
+        text = demonstration_page(
+            plan, transport, truth, correspondence, lights, judgement, rows, seconds
+        )
+        (partial / REPORT).write_text(text, encoding="utf-8")
+    return judgement

@@ -1,0 +1,132 @@
+"""The demo's report, laid out like the paper's figure 2."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.correspondence import Correspondence
+from nearfar.plan import Plan
+from nearfar.report.page import colour_map, facts, gallery, numbers, page, picture
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.model import Transport
+from nearfar.workflow.evaluate import Rows
+
+# Small differences are shown this much brighter.
+MAGNIFIED = 20
+
+
+def demonstration_page(
+    plan: Plan,
+    transport: Transport,
+    truth: ExactTransport,
+    correspondence: Correspondence,
+    lights: Mapping[str, Floats],
+    judgement: Mapping[str, Any],
+    rows: Rows,
+    seconds: Mapping[str, float],
+) -> str:
+    """Return the report of a demo as one self-contained HTML page.
+
+    Parameters
+    ----------
+    plan : Plan
+    transport : Transport
+        What was reconstructed.
+    truth : ExactTransport
+        The scene's.
+    correspondence : Correspondence
+    lights : mapping of str to ndarray
+        Lights to show, by name.
+    judgement : mapping
+        As `nearfar.workflow.judge.judge_by_truth` gives it.
+    rows : Rows
+    seconds : mapping of str to float
+        How long each step took.
+    """
+    found = judgement["snr_b"]
+    cards = facts(
+        [
+            (str(plan.transport_photos), "photos of transport"),
+            (f"{plan.savings:.1f}×", f"fewer than {plan.projector.pixels} by brute force"),
+            (str(plan.counts["correspondence"]), "photos of stripes for correspondence"),
+            (f"{found['white']:.1f} dB", "SNR_b under floodlight"),
+            (f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of five pictures"),
+            (f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"),
+        ]
+    )
+    columns = ["light", "direct", "near-range", "far-range", "sum: relit", "photo (exact)"]
+    columns.append(f"difference × {MAGNIFIED}")
+    galleries = gallery(
+        columns, [(name, _row(name, light, transport, truth)) for name, light in lights.items()]
+    )
+    ceiling = judgement["ceiling"]["snr_b"]
+    table = numbers(
+        ["light", "SNR_b", "ceiling of the model, no noise"],
+        [[name, f"{value:.1f} dB", f"{ceiling[name]:.1f} dB"] for name, value in found.items()],
+    )
+    split = judgement["snr"]
+    parts = numbers(
+        ["component", "against the scene's physics", "against the model's split"],
+        [
+            [name, f"{split['physical'][key]:.1f} dB", f"{split['model'][key]:.1f} dB"]
+            for name, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
+        ]
+        + [["transport, all together", f"{split['T']:.1f} dB", ""]],
+    )
+    times = ", ".join(f"{name} {value:.1f} s" for name, value in seconds.items())
+    body = f"""
+<h1>A scene's light transport, taken apart</h1>
+<p>A projector of {plan.projector} pixels and a camera of {transport.camera} look at a box with red
+and green walls, a glossy cup and a translucent candle. The photos are simulated with shot and read
+noise. Every camera pixel's transport was reconstructed from {len(plan.patterns)} of them, and the
+scene relit under light that was never projected.</p>
+{cards}
+<h2>Relighting, components apart</h2>
+<p>Direct light holds the highlights; light under the candle's skin is near-range; the walls' red
+and green on candle and cup are far-range. Near-range is shown twice as bright. The exact picture
+stands beside the sum.</p>
+{galleries}
+<h2>How close</h2>
+<p>SNR_b compares relit pictures with exact ones. The ceiling is the best that direct light, a
+window of {plan.window} × {plan.window} and a far band of {plan.far} could do on this scene.</p>
+{table}
+<p></p>
+{parts}
+<h2>Where it is good, and where less</h2>
+<div class="maps">{_maps(transport, correspondence, rows)}</div>
+<p></p>
+<p>{times}. Made by nearfar after Reddy, Ramamoorthi and Curless, ECCV 2012.</p>
+"""
+    return page("nearfar: light transport, taken apart", body)
+
+
+def _row(name: str, light: Floats, transport: Transport, truth: ExactTransport) -> list[str]:
+    parts = transport.components(light)
+    relit, exact = parts.direct + parts.near + parts.far, truth @ light
+    difference = MAGNIFIED * np.abs(relit - exact)
+    shown = [light, parts.direct, 2 * parts.near, parts.far, relit, exact, difference]
+    what = ["light", "direct", "near-range", "far-range", "relit", "exact", "difference"]
+    return [picture(image, f"{part} under {name}") for image, part in zip(shown, what, strict=True)]
+
+
+def _maps(transport: Transport, correspondence: Correspondence, rows: Rows) -> str:
+    q = correspondence.pixels
+    height, width = transport.projector
+    low, high = np.percentile(rows.snr_b_of_frequency, [1, 99])
+    low_t, high_t = np.percentile(rows.snr_t, [1, 99])
+    return "".join(
+        [
+            colour_map(rows.snr_t, low_t, high_t, "dB", "SNR_t of every camera pixel"),
+            colour_map(
+                rows.snr_b_of_frequency,
+                low,
+                high,
+                "dB",
+                "SNR_b under every frequency (kx, ky), DC in the middle",
+            ),
+            colour_map(q[..., 1], 0, width - 1, "px", "Correspondence: projector column"),
+            colour_map(q[..., 0], 0, height - 1, "px", "Correspondence: projector row"),
+        ]
+    )

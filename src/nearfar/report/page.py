@@ -1,0 +1,134 @@
+"""Self-contained HTML pages: pictures inside, no script, nothing fetched."""
+
+import base64
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats
+from nearfar.files import encode_png, to_srgb
+
+STYLE = """
+:root { --ink: #1d2129; --soft: #5b6472; --line: #dfe3e8; --back: #f7f8fa; --card: #ffffff; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e8eaed; --soft: #a0a8b4; --line: #343a44; --back: #14171c; --card: #1d2128; }
+}
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--back); color: var(--ink);
+  font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
+main { max-width: 1180px; margin: 0 auto; padding: 2.5rem 1.25rem 4rem; }
+h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .4rem; letter-spacing: -.01em; }
+h2 { font-size: 1.2rem; margin: 2.6rem 0 .3rem; }
+p { margin: .3rem 0 1rem; max-width: 46rem; color: var(--soft); }
+.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: .75rem;
+  margin: 1.4rem 0; }
+.fact { background: var(--card); border: 1px solid var(--line); border-radius: 10px;
+  padding: .8rem 1rem; }
+.fact b { display: block; font-size: 1.5rem; font-variant-numeric: tabular-nums; }
+.fact span { color: var(--soft); font-size: .85rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; }
+.gallery td, .gallery th { padding: 4px; text-align: center; font-weight: 500;
+  font-size: .85rem; color: var(--soft); }
+.gallery th.row { text-align: right; padding-right: .7rem; white-space: nowrap; }
+img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
+  border-radius: 4px; }
+.numbers { background: var(--card); border: 1px solid var(--line); border-radius: 10px;
+  max-width: 46rem; }
+.numbers td, .numbers th { padding: .45rem .9rem; border-bottom: 1px solid var(--line);
+  text-align: right; font-variant-numeric: tabular-nums; }
+.numbers td:first-child, .numbers th:first-child { text-align: left; }
+.numbers tr:last-child td { border-bottom: 0; }
+.numbers th { color: var(--soft); font-weight: 500; font-size: .85rem; }
+.maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }
+figure { margin: 0; }
+figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
+.scale { display: flex; justify-content: space-between; font-size: .75rem; color: var(--soft); }
+.bar { height: 8px; border-radius: 4px; margin-top: .5rem; }
+"""
+
+# Dark blue to yellow by way of teal, of even steps in lightness: read in grey as in colour.
+_SCALE = np.array(
+    [[38, 20, 72], [52, 70, 140], [36, 120, 148], [50, 168, 130], [138, 205, 88], [248, 228, 60]],
+    dtype=np.float64,
+)
+
+
+def page(title: str, body: str) -> str:
+    """Return a whole HTML page."""
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
+        f"{body}\n</main>\n</body>\n</html>\n"
+    )
+
+
+def picture(image: Floats, description: str) -> str:
+    """Return an <img> of linear light, clipped to [0, 1] and shown as sRGB.
+
+    Parameters
+    ----------
+    image : ndarray, shape (y, x) or (y, x, 3)
+    description : str
+        For those who cannot see it.
+    """
+    return _img(np.rint(255 * to_srgb(np.clip(image, 0, 1))).astype(np.uint8), description)
+
+
+def _img(pixels: NDArray[np.uint8], description: str) -> str:
+    data = base64.b64encode(encode_png(np.ascontiguousarray(pixels))).decode("ascii")
+    return f'<img alt="{escape(description)}" src="data:image/png;base64,{data}">'
+
+
+def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
+    """Colour values between `low` and `high`, uint8 (y, x, 3); grey where there is none (NaN)."""
+    share = np.clip((np.nan_to_num(values, nan=low) - low) / max(high - low, 1e-12), 0, 1)
+    place = share * (len(_SCALE) - 1)
+    below = np.minimum(place.astype(np.int64), len(_SCALE) - 2)
+    part = (place - below)[..., None]
+    colours = _SCALE[below] * (1 - part) + _SCALE[below + 1] * part
+    colours[~np.isfinite(values)] = 128
+    return np.asarray(np.rint(colours).astype(np.uint8))
+
+
+def colour_map(values: Floats, low: float, high: float, unit: str, caption: str) -> str:
+    """Return a <figure> of values in false colour with its scale."""
+    stops = ", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in _SCALE)
+    return (
+        f"<figure>{_img(false_colour(values, low, high), caption)}"
+        f'<div class="bar" style="background: linear-gradient(to right, {stops})"></div>'
+        f'<div class="scale"><span>{low:.0f} {unit}</span><span>{high:.0f} {unit}</span></div>'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def gallery(columns: list[str], rows: list[tuple[str, list[str]]]) -> str:
+    """Return a table of pictures with named rows and columns."""
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
+    body = "".join(
+        f'<tr><th class="row" scope="row">{escape(name)}</th>'
+        + "".join(f"<td>{cell}</td>" for cell in cells)
+        + "</tr>"
+        for name, cells in rows
+    )
+    return f'<div class="wide"><table class="gallery"><tr><th></th>{head}</tr>{body}</table></div>'
+
+
+def facts(pairs: list[tuple[str, str]]) -> str:
+    """Return cards, each a figure and what it is."""
+    cards = "".join(
+        f'<div class="fact"><b>{escape(value)}</b><span>{escape(name)}</span></div>'
+        for value, name in pairs
+    )
+    return f'<div class="facts">{cards}</div>'
+
+
+def numbers(head: list[str], rows: list[list[str]]) -> str:
+    """Return a table of figures."""
+    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f'<div class="wide"><table class="numbers"><tr>{top}</tr>{body}</table></div>'

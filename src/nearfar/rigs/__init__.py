@@ -1,0 +1,1 @@
+"""The outside world: what shows patterns and takes photos."""

@@ -1,0 +1,33 @@
+"""What a rig is: something that shows patterns and takes photos."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Size
+
+Photo = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
+
+
+class Rig(Protocol):
+    """A projector and a camera before a scene; a rig knows nothing of transport."""
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        ...
+
+    @property
+    def full_scale(self) -> float:
+        """Value of a photo that stands for 1 in photo units."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """Tell what the capture should remember of the rig, as JSON."""
+        ...
+
+    def shoot(self, patterns: Iterable[NDArray[np.uint8]]) -> Iterator[Photo]:
+        """Show each 8-bit pattern and yield its photo, (Cy, Cx, channels), in order."""
+        ...

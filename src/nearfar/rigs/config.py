@@ -1,0 +1,141 @@
+"""Which rig: a scene by name, a stored transport, or a RIG.toml that says more."""
+
+import tomllib
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from nearfar.arrays import Size, parse_size
+from nearfar.errors import InputError, MissingFileError, UnreadableFileError
+from nearfar.files import kind_of_store
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig, World, brightest
+from nearfar.scenes import NAMES
+from nearfar.scenes.cache import Progress, cached_scene
+from nearfar.transport.exact_store import load_exact
+from nearfar.transport.store import KIND as TRANSPORT_KIND
+from nearfar.transport.store import load_transport
+
+# Full white reaches this share of the range.
+WHITE = 0.9
+# A stored transport whose floodlit picture peaks in here is in photo units already.
+PHOTO_UNITS = (0.1, 0.95)
+
+
+class SceneTable(BaseModel):
+    """[scene] of a RIG.toml: a built-in scene's name or a stored transport's path."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str | None = None
+    transport: str | None = None
+    camera: str | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.name is None) == (self.transport is None):
+            raise ValueError("give either name, a built-in scene, or transport, a file")
+        return self
+
+
+class RigTable(BaseModel):
+    """A RIG.toml."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    scene: SceneTable
+    projector: SimulatedProjector = SimulatedProjector()
+    camera: SimulatedCamera = SimulatedCamera()
+    exposure: float | Literal["auto"] | None = Field(default=None)
+    seed: int = Field(default=0, ge=0)
+
+
+def open_rig(rig: str, projector: Size, *, progress: Progress | None = None) -> SimulatedRig:
+    """Open the rig that a command names.
+
+    Parameters
+    ----------
+    rig : str
+        Name of a built-in scene; path of a stored transport (.npy, .npz, or a Zarr that
+        ``render`` or ``reconstruct`` wrote); or path of a RIG.toml.
+    projector : Size
+        Pattern grid of the plan; a built-in scene is made for it.
+    progress : callable, optional
+        Told what a scene's computation does and the share done.
+
+    Returns
+    -------
+    SimulatedRig
+
+    Raises
+    ------
+    InputError, MissingFileError, UnreadableFileError
+    """
+    if rig in NAMES:
+        return _rig(RigTable(scene=SceneTable(name=rig)), Path(), projector, progress)
+    path = Path(rig)
+    if path.suffix.lower() == ".toml":
+        return _rig(read_rig_table(path), path.parent, projector, progress)
+    if not path.exists():
+        raise MissingFileError(
+            f"{rig} is no rig: name a scene ({', '.join(NAMES)}), a stored transport or a RIG.toml."
+        )
+    table = RigTable(scene=SceneTable(transport=path.name))
+    return _rig(table, path.parent, projector, progress)
+
+
+def read_rig_table(path: Path) -> RigTable:
+    """Read a RIG.toml.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+    """
+    try:
+        return RigTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path} is not there: check the name of the rig.") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise UnreadableFileError(f"{path} is no rig: {where}: {first['msg']}.") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UnreadableFileError(f"{path} cannot be read as a rig: {error}.") from None
+
+
+def _rig(table: RigTable, folder: Path, projector: Size, progress: Progress | None) -> SimulatedRig:
+    camera = parse_size(table.scene.camera, name="camera") if table.scene.camera else None
+    world: World
+    if table.scene.name is not None:
+        name = table.scene.name
+        world = cached_scene(name, projector, camera, progress=progress)
+    else:
+        path = folder / str(table.scene.transport)
+        name = path.name
+        world = load_world(path, projector, camera)
+    if world.projector != projector:
+        raise InputError(
+            f"{name} has a projector of {world.projector}, the plan one of {projector}: make the "
+            f"plan with --projector {world.projector}."
+        )
+    return SimulatedRig(
+        world, name, table.projector, table.camera, _exposure(table.exposure, world), table.seed
+    )
+
+
+def load_world(path: Path, projector: Size | None, camera: Size | None) -> World:
+    """Load a stored transport: a measured one, an exact one, or a dense array."""
+    if kind_of_store(path) == TRANSPORT_KIND:
+        return load_transport(path)
+    return load_exact(path, projector=projector, camera=camera)
+
+
+def _exposure(wanted: float | Literal["auto"] | None, world: World) -> float:
+    if isinstance(wanted, float):
+        return wanted
+    peak = brightest(world)
+    if wanted is None and PHOTO_UNITS[0] <= peak <= PHOTO_UNITS[1]:
+        return 1.0
+    return WHITE / peak

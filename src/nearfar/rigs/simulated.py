@@ -1,0 +1,110 @@
+"""A simulated rig: photo = sensor(noise(T l)) on a transport that is known."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Size
+from nearfar.errors import InputError
+from nearfar.rigs.base import Photo
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+
+# Patterns lit at once: a matrix product, not a pass over T for each.
+BATCH = 32
+
+
+class World(Protocol):
+    """Whatever turns lights into pictures: an exact or a measured transport."""
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        ...
+
+    def pictures(self, lights: Floats) -> Floats:
+        """Pictures (n, Cy, Cx, channels) of lights (n, Py, Px)."""
+        ...
+
+
+@dataclass(frozen=True)
+class SimulatedRig:
+    """A simulated projector and camera before a known transport.
+
+    Attributes
+    ----------
+    world : World
+    name : str
+        What the scene or transport is called.
+    optics : SimulatedProjector
+    sensor : SimulatedCamera
+    exposure : float
+        Photo units per unit of the world's transport.
+    seed : int
+        Each photo's noise follows from the seed and its number alone.
+    """
+
+    world: World
+    name: str
+    optics: SimulatedProjector
+    sensor: SimulatedCamera
+    exposure: float
+    seed: int
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        return self.world.projector
+
+    @property
+    def full_scale(self) -> float:
+        """Highest level of the sensor."""
+        return float(self.sensor.full_scale)
+
+    def describe(self) -> dict[str, Any]:
+        """Tell what the capture remembers: scene, settings, exposure."""
+        return {
+            "kind": "simulated",
+            "scene": self.name,
+            "projector": self.optics.model_dump(),
+            "camera": self.sensor.model_dump(),
+            "transport_exposure": self.exposure,
+            "seed": self.seed,
+        }
+
+    def shoot(self, patterns: Iterable[NDArray[np.uint8]]) -> Iterator[Photo]:
+        """Yield a photo for each pattern, in order."""
+        number = 0
+        for batch in _batches(patterns, BATCH):
+            lights = np.stack([self.optics.emit(pattern) for pattern in batch])
+            for picture in self.world.pictures(lights):
+                generator = np.random.default_rng([self.seed, number])
+                yield self.sensor.photograph(self.exposure * picture, generator)
+                number += 1
+
+
+def _batches(
+    patterns: Iterable[NDArray[np.uint8]], length: int
+) -> Iterator[list[NDArray[np.uint8]]]:
+    remaining = iter(patterns)
+    while batch := list(islice(remaining, length)):
+        yield batch
+
+
+def brightest(world: World) -> float:
+    """Return the brightest camera pixel under full white.
+
+    Raises
+    ------
+    InputError
+        If there is no light at all.
+    """
+    floodlit = world.pictures(np.ones((1, *world.projector), dtype=np.float32))
+    highest = float(floodlit.max())
+    if not highest > 0:
+        raise InputError("the transport is black under full white: there is nothing to expose for.")
+    return highest

@@ -1,0 +1,1 @@
+"""Whole jobs: acquire, reconstruct, evaluate."""

@@ -1,0 +1,61 @@
+"""Show a plan's patterns on a rig and keep the photos."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from nearfar.capture import Capture, write_capture
+from nearfar.errors import InputError
+from nearfar.plan import Plan
+from nearfar.rigs.base import Rig
+
+
+def acquire(
+    plan: Plan,
+    path: Path,
+    rig: Rig,
+    *,
+    force: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Capture:
+    """Shoot a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+    path : Path
+        Capture to make.
+    rig : Rig
+    force : bool
+        Replace a capture that is there.
+    progress : callable, optional
+        Told the number of photos taken after each.
+
+    Returns
+    -------
+    Capture
+
+    Raises
+    ------
+    PlanError
+        If the plan's patterns are complex.
+    InputError
+        If the rig's projector is not the plan's.
+    NearfarError
+        As `nearfar.capture.write_capture`.
+    """
+    plan.require_real("shoot")
+    if rig.projector != plan.projector:
+        raise InputError(
+            f"the plan is for a projector of {plan.projector}, the rig has {rig.projector}: make "
+            f"the plan with --projector {rig.projector}."
+        )
+    patterns = (plan.draw(i) for i in range(len(plan.patterns)))
+    return write_capture(
+        path,
+        plan,
+        rig.shoot(patterns),
+        full_scale=rig.full_scale,
+        rig=rig.describe(),
+        force=force,
+        progress=progress,
+    )

@@ -1,0 +1,199 @@
+"""How good a transport is: SNR_b of relighting, SNR_t of rows, and the components (section 5.1).
+
+Index convention: rows are (n, channels, P), n camera pixels in a block.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats, blocks
+from nearfar.errors import InputError
+from nearfar.estimate.fit import fit_model
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.model import Transport
+
+BLOCK = 256
+# An exact match has no finite SNR; JSON needs a number.
+HIGHEST = 300.0
+PERCENTILES = (0, 5, 25, 50, 75, 95, 100)
+
+
+def snr(truth: Floats, estimate: Floats) -> float:
+    """20 log10 |truth| / |truth - estimate|, in dB, between -HIGHEST and HIGHEST.
+
+    Parameters
+    ----------
+    truth, estimate : ndarray
+        Of one shape.
+    """
+    signal = float(np.linalg.norm(truth.astype(np.float64).ravel()))
+    error = float(np.linalg.norm((truth.astype(np.float64) - estimate).ravel()))
+    return _decibels(signal**2, error**2)
+
+
+def _decibels(signal: float, error: float) -> float:
+    if signal <= 0.0:
+        return -HIGHEST if error > 0.0 else HIGHEST
+    return float(np.clip(10 * np.log10(signal / max(error, 1e-300)), -HIGHEST, HIGHEST))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """How rows and frequencies fare.
+
+    Attributes
+    ----------
+    snr_t : ndarray, shape (Cy, Cx)
+        SNR_t of each camera pixel, channels together, dB.
+    snr_b_of_frequency : ndarray, shape (Py, Px)
+        SNR_b under exp(-j 2 pi k.p) for every DFT frequency k, DC in the middle, dB.
+    components : mapping
+        SNR of ``T``, and of ``D``, ``N`` and ``F`` where they are known, dB.
+    """
+
+    snr_t: Floats
+    snr_b_of_frequency: Floats
+    components: Mapping[str, float]
+
+
+def require_same_kind(transport: Transport, truth: ExactTransport) -> None:
+    """Refuse a truth of another size.
+
+    Raises
+    ------
+    InputError
+    """
+    ours = (transport.projector, transport.camera, transport.channels)
+    theirs = (truth.projector, truth.camera, truth.channels)
+    if ours != theirs:
+        raise InputError(
+            f"the transport is of a projector {ours[0]}, a camera {ours[1]} and {ours[2]} "
+            f"channels, the truth of {theirs[0]}, {theirs[1]} and {theirs[2]}: compare two of the "
+            f"same scene and sizes."
+        )
+
+
+def transport_exposure(transport: Transport) -> float:
+    """Photo units per unit of the truth, as the capture's rig recorded it; 1 if it did not."""
+    rig = transport.provenance.get("rig")
+    value = rig.get("transport_exposure", 1.0) if isinstance(rig, Mapping) else 1.0
+    return float(value)
+
+
+def relighting_snr(
+    transport: Transport, truth: ExactTransport, lights: Mapping[str, Floats]
+) -> dict[str, float]:
+    """SNR_b for each light, dB.
+
+    Raises
+    ------
+    InputError
+        If sizes differ.
+    """
+    require_same_kind(transport, truth)
+    exposure = np.float32(transport_exposure(transport))
+    found = {}
+    for name, light in lights.items():
+        picture = exposure * (truth @ light)
+        found[name] = snr(picture, (transport @ light).reshape(picture.shape))
+    return found
+
+
+def row_snr(
+    transport: Transport,
+    truth: ExactTransport,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> Rows:
+    """Compare every row of T with the truth.
+
+    Parameters
+    ----------
+    transport : Transport
+    truth : ExactTransport
+        Where its components are apart, D, N and F are compared as the scene's physics has them.
+    progress : callable, optional
+        Told the share done.
+
+    Raises
+    ------
+    InputError
+        If sizes differ.
+    """
+    require_same_kind(transport, truth)
+    exposure = np.float32(transport_exposure(transport))
+    pixels, projector = transport.camera.pixels, transport.projector
+    signal, error = np.zeros(pixels), np.zeros(pixels)
+    signal_k, error_k = np.zeros(projector), np.zeros(projector)
+    parts = dict.fromkeys("DNF" if truth.is_apart else "", (0.0, 0.0))
+    for block in blocks(pixels, BLOCK):
+        rows = exposure * truth.rows(block)
+        off = rows - transport.rows(block)
+        signal[block] = np.einsum("ncp,ncp->n", rows, rows, dtype=np.float64)
+        error[block] = np.einsum("ncp,ncp->n", off, off, dtype=np.float64)
+        signal_k += _energy_of_frequencies(rows.reshape(-1, *projector))
+        error_k += _energy_of_frequencies(off.reshape(-1, *projector))
+        if truth.is_apart:
+            known = truth.component_rows(block)
+            for name, values, mine in zip(
+                parts, known, transport.component_rows(block), strict=True
+            ):
+                one, other = energies(exposure * values, mine)
+                parts[name] = (parts[name][0] + one, parts[name][1] + other)
+        if progress is not None:
+            progress(block.stop / pixels)
+    components = {"T": _decibels(float(signal.sum()), float(error.sum()))}
+    components |= {name: _decibels(*pair) for name, pair in parts.items()}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        snr_t = 10 * np.log10(signal / np.maximum(error, 1e-300))
+        snr_k = 10 * np.log10(signal_k / np.maximum(error_k, 1e-300))
+    return Rows(
+        np.clip(np.nan_to_num(snr_t, nan=0.0), -HIGHEST, HIGHEST).reshape(transport.camera),
+        np.fft.fftshift(np.clip(snr_k, -HIGHEST, HIGHEST)),
+        components,
+    )
+
+
+def energies(truth: Floats, estimate: Floats) -> tuple[float, float]:
+    """Return the energy of the truth and of the error."""
+    error = (truth - estimate).astype(np.float64)
+    return float(np.sum(truth.astype(np.float64) ** 2)), float(np.sum(error**2))
+
+
+def _energy_of_frequencies(rows: Floats) -> Floats:
+    """Sum |DFT|^2 over rows (n, Py, Px): (Py, Px)."""
+    half = np.sum(np.abs(np.fft.rfft2(rows)) ** 2, axis=0)
+    # Rows are real: k and -k have the same energy.
+    width = rows.shape[2]
+    rest = np.arange(half.shape[1], width)
+    mirrored = half[-np.arange(half.shape[0])][:, width - rest]
+    return np.concatenate([half, mirrored], axis=1)
+
+
+def model_truth(transport: Transport, truth: ExactTransport) -> Transport:
+    """Fit the transport's own W and far band to the truth, in the transport's photo units."""
+    require_same_kind(transport, truth)
+    fitted = fit_model(truth, transport.window, transport.far_basis)
+    gain = transport_exposure(transport)
+    return fitted.with_gains(direct=gain, near=gain, far=gain)
+
+
+def split_snr(transport: Transport, model: Transport) -> dict[str, float]:
+    """SNR of D, N and F against the model's truth, dB: see `model_truth`."""
+    totals = dict.fromkeys("DNF", (0.0, 0.0))
+    for block in blocks(transport.camera.pixels, BLOCK):
+        pairs = zip(
+            totals, model.component_rows(block), transport.component_rows(block), strict=True
+        )
+        for name, values, mine in pairs:
+            one, other = energies(values, mine)
+            totals[name] = (totals[name][0] + one, totals[name][1] + other)
+    return {name: _decibels(*pair) for name, pair in totals.items()}
+
+
+def percentiles(values: Floats) -> dict[str, float]:
+    """Mean and percentiles, ready for JSON."""
+    found = {f"p{p}": float(np.percentile(values, p)) for p in PERCENTILES}
+    return {"mean": float(np.mean(values)), **found}

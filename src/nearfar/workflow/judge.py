@@ -1,0 +1,151 @@
+"""Judge a transport by the truth, or by photos that it never saw."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.errors import InputError, MissingFileError
+from nearfar.files import list_pictures, luminance, read_light, read_linear
+from nearfar.illumination.pictures import standard_lights
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.model import Transport
+from nearfar.workflow.evaluate import (
+    model_truth,
+    percentiles,
+    relighting_snr,
+    row_snr,
+    snr,
+    split_snr,
+)
+
+
+def judge_by_truth(
+    transport: Transport,
+    truth: ExactTransport,
+    *,
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]:
+    """Compare a transport with the truth.
+
+    Parameters
+    ----------
+    transport : Transport
+    truth : ExactTransport
+    progress : callable, optional
+        Told what is done and the share done.
+
+    Returns
+    -------
+    dict
+        SNR in dB, ready for JSON: ``snr_b`` per light and ``snr_b_pictures`` their mean over
+        natural pictures; ``snr_b_frequency`` and ``snr_t`` as percentiles; ``snr`` of T, D, N
+        and F with the physical and the model's split; ``ceiling``, the same lights with the
+        model fitted to the truth.
+
+    Raises
+    ------
+    InputError
+        If the truth is of other sizes.
+    """
+    report = progress or (lambda _what, _share: None)
+    lights = standard_lights(transport.projector)
+    found = relighting_snr(transport, truth, lights)
+    rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
+    components = dict(rows.components)
+    answer: dict[str, Any] = {
+        "snr_b": found,
+        "snr_b_pictures": _mean_of_pictures(found),
+        "snr_b_frequency": percentiles(rows.snr_b_of_frequency),
+        "snr_t": percentiles(rows.snr_t),
+        "snr": {"T": components.pop("T")},
+    }
+    if truth.is_apart:
+        report("model's truth", 0.0)
+        fitted = model_truth(transport, truth)
+        ceiling = relighting_snr(fitted_as(transport, fitted), truth, lights)
+        answer["snr"] |= {
+            "physical": components,
+            "model": split_snr(transport, fitted),
+        }
+        answer["ceiling"] = {"snr_b": ceiling, "snr_b_pictures": _mean_of_pictures(ceiling)}
+        report("model's truth", 1.0)
+    return answer
+
+
+def fitted_as(transport: Transport, fitted: Transport) -> Transport:
+    """Give a fitted transport the provenance of the measured one, exposure and all."""
+    return replace(fitted, provenance=transport.provenance)
+
+
+def _mean_of_pictures(found: dict[str, float]) -> float:
+    return float(np.mean([value for name, value in found.items() if name.startswith("picture")]))
+
+
+def judge_by_photos(
+    transport: Transport, folder: Path, *, full_scale: float | None = None
+) -> dict[str, Any]:
+    """Compare relighting with photos under lights: pairs NAME.light.*, NAME.photo.*.
+
+    Parameters
+    ----------
+    transport : Transport
+    folder : Path
+        A pair whose light is all black gives the photo under black; without one the black that
+        was measured with the transport is taken.
+    full_scale : float, optional
+        Value of full scale of the photos.
+
+    Returns
+    -------
+    dict
+        ``snr_b`` per light, dB.
+
+    Raises
+    ------
+    MissingFileError, InputError
+        If there are no pairs, one is incomplete, or sizes differ.
+    """
+    pairs = _pairs(folder)
+    photos, lights = {}, {}
+    for name, (light_path, photo_path) in pairs.items():
+        light = read_light(light_path, transport.projector)
+        if light.ndim == 3 and transport.channels == 1:
+            light = luminance(light)
+        photo = read_linear(photo_path, full_scale=full_scale)
+        expected = (*transport.camera, *((transport.channels,) if transport.channels > 1 else ()))
+        if photo.shape != expected:
+            raise InputError(
+                f"{photo_path} has the shape {photo.shape}, this transport's photos {expected}: "
+                f"take it with the camera of the capture."
+            )
+        lights[name], photos[name] = light, photo
+    dark = [name for name, light in lights.items() if not light.any()]
+    black: Floats = transport.black[..., 0] if transport.channels == 1 else transport.black
+    if dark:
+        black = np.mean([photos[name] for name in dark], axis=0)
+    judged = [name for name in lights if name not in dark]
+    if not judged:
+        raise InputError(f"{folder} has a black light only: add pairs under other lights.")
+    found = {name: snr(photos[name] - black, transport @ lights[name]) for name in judged}
+    return {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
+
+
+def _pairs(folder: Path) -> dict[str, tuple[Path, Path]]:
+    halves: dict[str, dict[str, Path]] = {}
+    for path in list_pictures(folder):
+        name, _, half = path.name.removesuffix(path.suffix).rpartition(".")
+        if half in {"light", "photo"}:
+            halves.setdefault(name, {})[half] = path
+    if not halves:
+        raise MissingFileError(
+            f"{folder} holds no pairs: name them NAME.light.png and NAME.photo.tiff."
+        )
+    for name, both in halves.items():
+        for half in ("light", "photo"):
+            if half not in both:
+                raise MissingFileError(f"{folder} has no {name}.{half}.*: give both of each pair.")
+    return {name: (both["light"], both["photo"]) for name, both in halves.items()}

@@ -1,0 +1,142 @@
+"""The paper's estimation: exact where the model holds, and unmoved by what must not matter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.estimate.paper import estimate
+from nearfar.illumination.frequencies import default_dropped
+from tests.worlds import ideal_measurements, model_transport
+
+
+def _snr(truth, found):
+    return 20 * np.log10(np.linalg.norm(truth) / np.linalg.norm(truth - found))
+
+
+CASES = [
+    # W divides P on both axes, on one, on none; odd and even W and far bands; more dropped.
+    (Size(24, 24), 8, Size(5, 5), None),
+    (Size(27, 27), 9, Size(3, 3), None),
+    (Size(24, 30), 8, Size(3, 3), None),
+    (Size(25, 19), 7, Size(3, 3), None),
+    (Size(32, 32), 11, Size(5, 5), None),
+    (Size(30, 44), 9, Size(4, 6), None),
+    (Size(34, 50), 11, Size(3, 5), Size(3, 3)),
+    (Size(40, 40), 13, Size(5, 5), Size(3, 3)),
+]
+
+
+@pytest.mark.parametrize(("projector", "window", "far", "dropped"), CASES)
+def test_a_transport_that_obeys_the_model_is_recovered_exactly(projector, window, far, dropped):
+    dropped = dropped or default_dropped(window, far, projector)
+    world = model_transport(projector, Size(8, 9), window=window, far=far, channels=2, entries=4)
+    measurements = ideal_measurements(world, window, far, dropped)
+    found = estimate(measurements, world.correspondence, window, far, dropped)
+    truth = world.dense()
+    assert _snr(truth, found.dense()) > 100
+    # And its parts, not their sum alone.
+    assert _snr(world.direct, found.direct) > 90
+    assert _snr(world.near, found.near) > 80
+    assert _snr(world.far, found.far) > 80
+
+
+def test_the_leak_matters_where_the_window_does_not_divide_the_projector():
+    projector, window, far = Size(32, 32), 11, Size(5, 5)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(8, 9), window=window, far=far)
+    measurements = ideal_measurements(world, window, far, dropped)
+    once = estimate(measurements, world.correspondence, window, far, dropped, rounds=1)
+    assert _snr(world.dense(), once.dense()) < 60
+
+
+def test_low_frequency_relighting_is_what_was_measured():
+    # The far step ends the estimate: whatever n does, T answers the far frequencies as the
+    # photos did, a world beyond the model's included.
+    projector, window, far = Size(24, 30), 7, Size(3, 5)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(6, 6), window=window, far=far)
+    measurements = ideal_measurements(world, window, far, dropped)
+    generator = np.random.default_rng(2)
+    shaken = replace(
+        measurements,
+        answers=measurements.answers
+        + generator.normal(0, 0.01, measurements.answers.shape).astype(np.float32),
+        noise=np.full_like(measurements.noise, 0.01),
+    )
+    found = estimate(shaken, world.correspondence, window, far, dropped)
+    places = shaken.places(found.far_basis.frequencies)
+    answers = found.dense() @ found.far_basis.patterns.T
+    np.testing.assert_allclose(answers, shaken.answers[..., places], atol=2e-5)
+
+
+def test_noise_is_honoured():
+    # With the noise known, the zeros of n are kept near zero: closer than without.
+    projector, window, far = Size(32, 32), 11, Size(5, 5)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(12, 12), window=window, far=far, entries=3)
+    measurements = ideal_measurements(world, window, far, dropped)
+    noise = 0.01
+    shaken = measurements.answers + np.random.default_rng(0).normal(
+        0, noise, measurements.answers.shape
+    ).astype(np.float32)
+    errors = []
+    for known in (0.0, noise):
+        told = replace(measurements, answers=shaken, noise=np.full_like(measurements.noise, known))
+        found = estimate(told, world.correspondence, window, far, dropped)
+        errors.append(np.linalg.norm(found.near - world.near))
+    assert errors[1] < 0.75 * errors[0]
+
+
+def test_unlit_camera_pixels_keep_f_alone():
+    projector, window, far = Size(24, 24), 8, Size(3, 3)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(6, 6), window=window, far=far)
+    measurements = ideal_measurements(world, window, far, dropped)
+    q = world.correspondence.copy()
+    q[2, 3] = np.nan
+    found = estimate(measurements, q, window, far, dropped)
+    assert np.all(found.direct[2, 3] == 0)
+    assert np.all(found.near[2, 3] == 0)
+    assert np.all(np.isfinite(found.far))
+    place = measurements.places(found.far_basis.frequencies)
+    np.testing.assert_allclose(
+        found.far[2, 3], measurements.answers.reshape(6, 6, 1, -1)[2, 3][:, place], atol=1e-6
+    )
+
+
+def test_direct_light_between_pixels_is_spread():
+    projector, window, far = Size(24, 24), 9, Size(3, 3)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(
+        projector, Size(17, 17), window=window, far=far, fractional=True, entries=0
+    )
+    world = replace(world, near=np.zeros_like(world.near))
+    measurements = ideal_measurements(world, window, far, dropped)
+    found = estimate(measurements, world.correspondence, window, far, dropped)
+    assert _snr(world.direct, found.direct) > 60
+    assert _snr(world.dense(), found.dense()) > 80
+
+
+def test_camera_pixels_do_not_know_each_other():
+    projector, window, far = Size(24, 30), 7, Size(3, 3)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(30, 31), window=window, far=far)
+    measurements = ideal_measurements(world, window, far, dropped)
+    everything = estimate(measurements, world.correspondence, window, far, dropped)
+    rows = slice(4, 9)
+    part = measurements.of_pixels(Size(5, 31), slice(4 * 31, 9 * 31))
+    alone = estimate(part, world.correspondence[rows], window, far, dropped)
+    np.testing.assert_allclose(alone.near, everything.near[rows], atol=1e-5)
+    np.testing.assert_allclose(alone.far, everything.far[rows], atol=1e-5)
+
+
+def test_windows_are_clipped_at_the_projectors_border():
+    projector, window, far = Size(24, 24), 9, Size(3, 3)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(24, 24), window=window, far=far)
+    measurements = ideal_measurements(world, window, far, dropped)
+    found = estimate(measurements, world.correspondence, window, far, dropped)
+    assert np.all(found.near[0, 0, 0, :4] == 0)
+    assert np.all(found.near[23, 23, 0, :, 5:] == 0)

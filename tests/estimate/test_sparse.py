@@ -8,7 +8,7 @@ from sklearn.linear_model import ARDRegression, Lasso
 from nearfar.arrays import Size
 from nearfar.estimate.bayesian import solve_bayesian
 from nearfar.estimate.matrices import build_matrices
-from nearfar.estimate.sparse import solve
+from nearfar.estimate.sparse import least_risk, solve
 from tests.worlds import ideal_measurements, model_transport
 
 
@@ -142,3 +142,31 @@ def test_a_window_of_zeros_stays_zero():
     found, z = solve(0 * n0, unseen, inside, np.zeros(len(n0), np.float32))
     assert np.all(found == 0)
     assert np.all(np.isfinite(z))
+
+
+def test_lambda_suits_the_window():
+    generator = np.random.default_rng(6)
+    noise = np.full(400, 0.1, dtype=np.float32)
+    empty = 0.1 * generator.normal(size=(400, 121)).astype(np.float32)
+    full = empty + generator.uniform(0.05, 0.5, size=empty.shape).astype(np.float32)
+    inside = np.ones(empty.shape, dtype=bool)
+    cleared = least_risk(empty, inside, noise)
+    kept = least_risk(full, inside, noise)
+    assert np.median(cleared) >= 0.15
+    assert np.median(kept) <= 0.025
+
+    def error(v, truth, threshold):
+        n = np.sign(v) * np.maximum(np.abs(v) - threshold[:, None], 0)
+        return np.mean((n - truth) ** 2)
+
+    # No one share serves both.
+    assert error(full, full - empty, kept) < 1.05 * error(full, full - empty, 0.125 * noise)
+    assert error(full, full - empty, kept) < 0.5 * error(full, full - empty, 2 * noise)
+    assert error(empty, 0, cleared) < 0.1 * error(empty, 0, 0.125 * noise)
+    # What lies beyond the border has no say.
+    half = inside.copy()
+    half[:, 60:] = False
+    spoiled = np.where(half, empty, 5.0).astype(np.float32)
+    np.testing.assert_array_equal(
+        least_risk(spoiled, half, noise), least_risk(np.where(half, empty, 0), half, noise)
+    )

@@ -131,27 +131,30 @@ def _marginal(photos: Photos, numbers: Sequence[int], rows: slice) -> tuple[Floa
 def _peak(taken: Floats, white: Floats) -> _Axis:
     pixels, length = taken.shape
     number = np.arange(pixels)
-    padded = np.pad(taken, ((0, 0), (REACH, REACH)), mode="reflect" if length > REACH else "edge")
-    curvature = taken - 0.5 * (padded[:, : -2 * REACH] + padded[:, 2 * REACH :])
+    # At the border the one neighbour there is stands for both.
+    place = np.arange(length)
+    left = np.where(place >= REACH, place - REACH, np.minimum(place + REACH, length - 1))
+    right = np.where(place < length - REACH, place + REACH, np.maximum(place - REACH, 0))
+    curvature = taken - 0.5 * (taken[:, left] + taken[:, right])
     peak = np.argmax(curvature, axis=1)
     # Scatter of what is no peak: the noise as this pixel's own stripes show it.
     spread = np.abs(curvature - np.median(curvature, axis=1)[:, None])
     deviation = 1.4826 * np.median(spread, axis=1) + 1e-12
     noise = deviation / np.sqrt(1.5)
 
-    before = np.where(peak > 0, taken[number, np.maximum(peak - 1, 0)], -np.inf)
-    after = np.where(peak < length - 1, taken[number, np.minimum(peak + 1, length - 1)], -np.inf)
+    # Beyond the border stands what lies past the neighbour on the other side: no direct light.
+    before = taken[number, np.where(peak > 0, peak - 1, np.minimum(REACH, length - 1))]
+    last = length - 1
+    after = taken[number, np.where(peak < last, peak + 1, np.maximum(last - REACH, 0))]
     # Near-range light is the same to both sides, so the difference is direct light's own.
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    second = np.where(np.isfinite(low), high - np.maximum(low, -np.inf), 0.0)
-    second = np.where(np.isfinite(second), second, 0.0)
+    second = np.abs(after - before)
     second = np.where(second > SHARED * np.sqrt(2.0) * noise, second, 0.0)
     first = curvature[number, peak]
     side = np.where(after > before, 1.0, -1.0)
     total = first + second
-    place = peak + side * second / np.maximum(total, 1e-12)
+    between = peak + side * second / np.maximum(total, 1e-12)
     return _Axis(
-        place=np.where(total > 0, place, peak),
+        place=np.clip(np.where(total > 0, between, peak), 0, last),
         strength=total,
         deviations=first / deviation,
         share=total / np.maximum(white, 1e-12),

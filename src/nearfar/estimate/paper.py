@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.estimate.matrices import CORNERS, Band, Matrices, build_matrices
-from nearfar.estimate.sparse import solve
+from nearfar.estimate.sparse import least_risk, solve
 from nearfar.illumination.frequencies import as_array
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
@@ -27,9 +27,8 @@ from nearfar.transport.model import Transport
 ROUNDS = 60
 AGREED_NOISE = 0.02
 AGREED = 2e-7
-# lambda of equation (10) as a share of a window entry's noise. At 1 or less an entry leaves at
-# most its own share of epsilon as residual; chosen in docs/decisions/0003.
-THRESHOLD = 0.75
+# lambda of equation (10) before each window has its own, as a share of an entry's noise.
+FIRST = np.float32(0.75)
 # Camera pixels at once: keeps a block's windows near the processor.
 BLOCK = 512
 # Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
@@ -254,13 +253,13 @@ def _near(
     number, channels = answers.shape[:2]
     n0 = (answers @ matrices.near_inverse).reshape(-1, matrices.window**2)
     # A window entry is a mean of W^2 answers, cosine and sine of each pair.
-    threshold = THRESHOLD * np.sqrt(2.0) / matrices.window * pixels.noise.reshape(-1)
-    windows, unseen = solve(
-        n0,
-        matrices.unseen,
-        np.repeat(pixels.inside, channels, axis=0),
-        threshold.astype(n0.dtype),
-        None if start is None else start.reshape(len(n0), -1),
-    )
+    entry_noise = pixels.noise.reshape(-1) * np.float32(np.sqrt(2.0) / matrices.window)
+    inside = np.repeat(pixels.inside, channels, axis=0)
+    if start is None:
+        _, z = solve(n0, matrices.unseen, inside, FIRST * entry_noise)
+    else:
+        z = start.reshape(len(n0), -1)
+    threshold = least_risk(n0 + z @ matrices.unseen.T, inside, entry_noise)
+    windows, unseen = solve(n0, matrices.unseen, inside, threshold, z)
     shape = (number, channels, -1)
     return windows.reshape(shape) * pixels.lit[:, None, None], unseen.reshape(shape)

@@ -8,8 +8,9 @@ equation (10),
 
 becomes, after n is minimised out, a Huber regression in z alone: the sum over the window of
 huber_lambda(v), v = n0 + Z z. Entries beyond the projector's border are known to be zero and
-count 1/2 v^2. Then n = soft_lambda(v), and lambda is set where the residual, the sum of
-min(|v|, lambda)^2, meets the noise epsilon.
+count 1/2 v^2. Then n = soft_lambda(v), and the residual is the sum of min(|v|, lambda)^2. Each
+row's lambda, which stands for its epsilon, is the one of least expected error at the noise that
+its photos show (Stein's unbiased risk estimate).
 
 Index convention: rows i run over camera pixels and channels, w over the W^2 window entries.
 """
@@ -27,6 +28,8 @@ SETTLED = 1e-6
 # The noise-free corner of |.|_1 is reached under a floor that shrinks by this at each step.
 FLOOR = 0.3
 SHRINK = 0.6
+# lambda is looked for among these shares of an entry's noise.
+SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
 # A window of zeros weighs its entries alike.
 TINY = 1e-30
 
@@ -77,6 +80,36 @@ def solve(
     v = n0 + z @ unseen.T
     n = np.sign(v) * np.maximum(np.abs(v) - threshold[:, None], 0.0) * inside
     return n.astype(n0.dtype, copy=False), z
+
+
+def least_risk(v: Floats, inside: Booleans, noise: Floats) -> Floats:
+    """Choose lambda for each row by Stein's unbiased estimate of the error of soft_lambda(v).
+
+    A window that is mostly empty gets a lambda that clears the noise away; one that light under a
+    surface fills gets a small lambda that leaves it alone (Donoho and Johnstone 1995).
+
+    Parameters
+    ----------
+    v : ndarray, shape (I, W^2)
+        Windows with noise.
+    inside : ndarray of bool, shape (I, W^2)
+        Window entries on the projector.
+    noise : ndarray, shape (I,)
+        Standard deviation of an entry.
+
+    Returns
+    -------
+    ndarray, shape (I,)
+        One of `SHARES` of the noise.
+    """
+    size = np.where(inside, np.abs(v), 0.0)
+    risks = []
+    for share in SHARES:
+        threshold = (share * noise)[:, None]
+        zeroed = np.sum((size <= threshold) & inside, axis=1)
+        risks.append(np.sum(np.minimum(size, threshold) ** 2, axis=1) - 2 * noise**2 * zeroed)
+    best = np.argmin(np.stack(risks, axis=1), axis=1)
+    return np.asarray(np.array(SHARES, dtype=v.dtype)[best] * noise)
 
 
 class _Problem(NamedTuple):

@@ -141,12 +141,15 @@ def measure(
     strays -= pair_mean.astype(np.float32)
     pair_variance = np.einsum("kci,kci->ci", strays, strays, dtype=np.float64)
     pair_variance /= max(len(pairs) - 1, 1)
-    models = [fit_noise(pair_mean[:, i], pair_variance[:, i]) for i in range(photos.channels)]
+    white, black = _reference_photos(pairs, differences, strays, pair_mean)
+    models = [
+        fit_noise(pair_mean[:, i], pair_variance[:, i], float(np.median(black[:, i])))
+        for i in range(photos.channels)
+    ]
 
     def variance(photo: Floats) -> Floats:
         return np.stack([m.variance(photo[:, i]) for i, m in enumerate(models)], axis=1)
 
-    white, black = _reference_photos(pairs, differences, strays, pair_mean)
     dark, light = _two_levels(
         [
             (pair_mean, 2.0, 1.0, pair_variance / len(pairs)),

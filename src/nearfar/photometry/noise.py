@@ -19,7 +19,7 @@ class NoiseModel(NamedTuple):
         return np.asarray(np.maximum(self.gain * photo + self.floor, least))
 
 
-def fit_noise(sum_mean: Floats, sum_variance: Floats) -> NoiseModel:
+def fit_noise(sum_mean: Floats, sum_variance: Floats, dark: float = 0.0) -> NoiseModel:
     """Fit shot and read noise to pair sums.
 
     A pattern and its inverse sum to the same picture in every pair, so the scatter of the sums
@@ -30,6 +30,10 @@ def fit_noise(sum_mean: Floats, sum_variance: Floats) -> NoiseModel:
     ----------
     sum_mean, sum_variance : ndarray
         Mean and variance of the pair sums at each camera pixel, photo units.
+    dark : float
+        What a photo under black reads. Part of it may be a black level, which has no noise, so
+        the floor may be as low as that much less shot noise, and no lower: a flickering lamp,
+        whose variance grows with the square of the light, would ask for less.
 
     Returns
     -------
@@ -46,4 +50,4 @@ def fit_noise(sum_mean: Floats, sum_variance: Floats) -> NoiseModel:
     gain, offset = np.polyfit(level, variance, 1, w=weight)
     if gain < 0:
         return NoiseModel(0.0, float(np.median(variance)) / 2)
-    return NoiseModel(float(gain), float(offset) / 2)
+    return NoiseModel(float(gain), max(float(offset) / 2, -float(gain) * dark))

@@ -68,12 +68,12 @@ def demonstration_page(
     )
     split = judgement["snr"]
     parts = numbers(
-        ["component", "against the scene's physics", "against the model's split"],
+        ["component", "its floodlit picture", "its rows, by physics", "its rows, by the model"],
         [
-            [name, f"{split['physical'][key]:.1f} dB", f"{split['model'][key]:.1f} dB"]
+            [name, *(f"{split[how][key]:.1f} dB" for how in ("floodlit", "physical", "model"))]
             for name, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
         ]
-        + [["transport, all together", f"{split['T']:.1f} dB", ""]],
+        + [["all together", f"{found['white']:.1f} dB", f"{split['T']:.1f} dB", ""]],
     )
     times = ", ".join(f"{name} {value:.1f} s" for name, value in seconds.items())
     body = f"""

@@ -6,6 +6,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from nearfar.arrays import Floats
 
+# Far above any full well, below what a generator of counts takes.
+MOST_ELECTRONS = 1e18
+
 
 class SimulatedCamera(BaseModel):
     """A linear camera with shot noise, read noise and a finite number of levels.
@@ -26,7 +29,7 @@ class SimulatedCamera(BaseModel):
         Whether electrons are counted with Poisson noise.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     full_well: float = Field(default=30_000.0, gt=0.0)
     read_noise: float = Field(default=4.0, ge=0.0)
@@ -42,11 +45,14 @@ class SimulatedCamera(BaseModel):
 
     def expose(self, light: Floats) -> Floats:
         """Return electrons from light in photo units, ambient light added."""
-        return np.asarray((light + self.ambient) * self.full_well)
+        # A transport that was measured may answer a dark light with a little less than nothing.
+        return np.asarray(np.maximum(light + self.ambient, 0.0) * self.full_well)
 
     def noise(self, electrons: Floats, generator: np.random.Generator) -> Floats:
         """Return the electrons that are read: counted by chance, read with an error."""
-        counted = generator.poisson(electrons) if self.shot_noise else electrons
+        # A measured transport may answer a little below zero, and a generator counts only so far.
+        expected = np.clip(electrons, 0.0, MOST_ELECTRONS)
+        counted = generator.poisson(expected) if self.shot_noise else electrons
         if self.read_noise == 0.0:
             return np.asarray(counted, dtype=np.float64)
         error = generator.normal(0.0, self.read_noise, size=electrons.shape)

@@ -193,6 +193,16 @@ def split_snr(transport: Transport, model: Transport) -> dict[str, float]:
     return {name: _decibels(*pair) for name, pair in totals.items()}
 
 
+def floodlit_snr(transport: Transport, truth: ExactTransport) -> dict[str, float]:
+    """SNR of the direct, near and far pictures under full white, as physics has them, dB."""
+    light = np.ones(transport.projector, dtype=np.float32)
+    exposure = np.float32(transport_exposure(transport))
+    pairs = zip("DNF", truth.component_pictures(light), transport.components(light), strict=True)
+    return {
+        name: snr(exposure * values, mine.reshape(values.shape)) for name, values, mine in pairs
+    }
+
+
 def percentiles(values: Floats) -> dict[str, float]:
     """Mean and percentiles, ready for JSON."""
     found = {f"p{p}": float(np.percentile(values, p)) for p in PERCENTILES}

@@ -14,6 +14,7 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import (
+    floodlit_snr,
     model_truth,
     percentiles,
     relighting_snr,
@@ -43,8 +44,8 @@ def judge_by_truth(
     dict
         SNR in dB, ready for JSON: ``snr_b`` per light and ``snr_b_pictures`` their mean over
         natural pictures; ``snr_b_frequency`` and ``snr_t`` as percentiles; ``snr`` of T, D, N
-        and F with the physical and the model's split; ``ceiling``, the same lights with the
-        model fitted to the truth.
+        and F with the physical and the model's split, and of their pictures under full white;
+        ``ceiling``, the same lights with the model fitted to the truth.
 
     Raises
     ------
@@ -70,6 +71,7 @@ def judge_by_truth(
         answer["snr"] |= {
             "physical": components,
             "model": split_snr(transport, fitted),
+            "floodlit": floodlit_snr(transport, truth),
         }
         answer["ceiling"] = {"snr_b": ceiling, "snr_b_pictures": _mean_of_pictures(ceiling)}
         report("model's truth", 1.0)
@@ -107,8 +109,10 @@ def judge_by_photos(
     Raises
     ------
     MissingFileError, InputError
-        If there are no pairs, one is incomplete, or sizes differ.
+        If there are no pairs, one is incomplete or twice there, or sizes differ.
     """
+    if full_scale is not None and not 0 < full_scale < np.inf:
+        raise InputError(f"the full scale {full_scale} is not a positive number: give one above 0.")
     pairs = _pairs(folder)
     photos, lights = {}, {}
     for name, (light_path, photo_path) in pairs.items():
@@ -139,7 +143,12 @@ def _pairs(folder: Path) -> dict[str, tuple[Path, Path]]:
     for path in list_pictures(folder):
         name, _, half = path.name.removesuffix(path.suffix).rpartition(".")
         if half in {"light", "photo"}:
-            halves.setdefault(name, {})[half] = path
+            both = halves.setdefault(name, {})
+            if half in both:
+                raise InputError(
+                    f"{folder} has both {both[half].name} and {path.name}: leave one of them."
+                )
+            both[half] = path
     if not halves:
         raise MissingFileError(
             f"{folder} holds no pairs: name them NAME.light.png and NAME.photo.tiff."

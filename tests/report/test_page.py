@@ -1,0 +1,40 @@
+"""Pages stand on their own."""
+
+import base64
+import re
+
+import numpy as np
+import pytest
+
+from nearfar.files import encode_png
+from nearfar.report.page import colour_map, false_colour, gallery, page, picture
+
+
+def test_a_page_fetches_nothing():
+    body = gallery(["a"], [("row", [picture(np.ones((3, 4)), "white & bright")])])
+    text = page("a < b", body)
+    assert "http" not in text
+    assert "<script" not in text
+    assert "a &lt; b" in text
+    assert 'alt="white &amp; bright"' in text
+
+
+def test_pictures_are_srgb():
+    text = picture(np.full((2, 3), 0.2), "grey")
+    data = base64.b64decode(re.search(r"base64,([^\"]+)", text).group(1))
+    # sRGB of linear 0.2 is 124.
+    assert data == encode_png(np.full((2, 3), 124, np.uint8))
+
+
+def test_false_colour_is_ordered_and_marks_what_is_not_there():
+    colours = false_colour(np.array([[0.0, 0.5, 1.0, np.nan, -5.0, 9.0]]), 0, 1).astype(int)
+    lightness = colours[0] @ [0.2126, 0.7152, 0.0722]
+    assert lightness[0] < lightness[1] < lightness[2]
+    np.testing.assert_array_equal(colours[0, 3], (128, 128, 128))
+    np.testing.assert_array_equal(colours[0, 4], colours[0, 0])
+    np.testing.assert_array_equal(colours[0, 5], colours[0, 2])
+
+
+@pytest.mark.parametrize("low", [3.0, 7.0])
+def test_a_map_of_one_value_can_be_drawn(low):
+    assert "dB" in colour_map(np.full((2, 2), low), low, low, "dB", "flat")

@@ -1,0 +1,181 @@
+"""From a plan to a relit picture, by the Python interface."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import nearfar
+from nearfar.arrays import Size
+from nearfar.capture import open_capture
+from nearfar.correspondence import given_correspondence
+from nearfar.errors import InputError, PlanError
+from nearfar.plan import paper_plan
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.config import open_rig
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.workflow import reconstruct as reconstruction
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.evaluate import relighting_snr, snr
+from nearfar.workflow.judge import judge_by_truth
+from nearfar.workflow.reconstruct import reconstruct
+from tests.conftest import QUIET
+from tests.estimate.test_fit import _exact_of
+from tests.worlds import model_transport
+
+PROJECTOR = Size(24, 30)
+PLAN = paper_plan(PROJECTOR, 7, Size(3, 3))
+
+
+def _rig(world, camera=QUIET):
+    return SimulatedRig(world, "test", SimulatedProjector(), camera, 1.0, 0)
+
+
+@pytest.fixture
+def world():
+    return model_transport(
+        PROJECTOR, Size(24, 30), window=7, far=Size(3, 3), channels=3
+    ).with_gains(near=0.2)
+
+
+def test_a_clean_capture_of_a_model_world_relights_it(tmp_path, world):
+    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world))
+    transport, correspondence = reconstruct(capture)
+    assert correspondence.lit.all()
+    light = nearfar.natural_picture(PROJECTOR, 1, colour=True)
+    # Photos of 16 bits: a rounding of 1/65535 in each, on answers of a few tenths.
+    assert snr(world @ light, transport @ light) > 55
+    np.testing.assert_allclose(transport.black, 0.03, atol=1e-4)
+
+
+def test_more_noise_makes_it_worse_and_none_makes_it_exact(tmp_path, world):
+    light = nearfar.natural_picture(PROJECTOR, 2)
+    found = []
+    for number, camera in enumerate([SimulatedCamera(full_well=1000), SimulatedCamera(), QUIET]):
+        capture = acquire(PLAN, tmp_path / f"{number}.zarr", _rig(world, camera))
+        given = given_correspondence(world.correspondence, world.camera, PROJECTOR)
+        transport, _ = reconstruct(capture, given)
+        found.append(snr(world @ light, transport @ light))
+    assert found[0] + 8 < found[1] < found[2]
+    assert found[2] > 65
+
+
+def test_blocks_of_rows_change_next_to_nothing(tmp_path, world, monkeypatch):
+    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+    whole, _ = reconstruct(capture)
+    monkeypatch.setattr(reconstruction, "HELD", 4 * len(PLAN.patterns) * 30 * 3 * 12)
+    parts, _ = reconstruct(capture)
+    # The noise model is fitted in each block on its own: what differs is far below the noise.
+    for name in ("direct", "far", "near"):
+        one, other = getattr(parts, name), getattr(whole, name)
+        assert one.shape == other.shape
+        assert np.sqrt(np.mean((one - other) ** 2)) < 0.2 * whole.noise.mean()
+    np.testing.assert_allclose(parts.noise, whole.noise, rtol=0.05)
+
+
+def test_correspondence_can_be_given(tmp_path, world):
+    plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    with pytest.raises(InputError, match=r"--correspondence Q\.npy"):
+        reconstruct(capture)
+    given = given_correspondence(world.correspondence, world.camera, PROJECTOR)
+    transport, _ = reconstruct(capture, given)
+    light = nearfar.random_pattern(PROJECTOR, 1)
+    assert snr(world @ light, transport @ light) > 60
+
+
+def test_a_camera_twice_as_fine_keeps_its_own_resolution(tmp_path):
+    fine = model_transport(
+        PROJECTOR, Size(48, 60), window=7, far=Size(3, 3), fractional=True
+    ).with_gains(near=0.1)
+    transport, _ = reconstruct(acquire(PLAN, tmp_path / "c.zarr", _rig(fine)))
+    assert transport.camera == Size(48, 60)
+    light = nearfar.natural_picture(PROJECTOR, 3)
+    assert (transport @ light).shape == (48, 60)
+    assert snr(fine @ light, transport @ light) > 40
+
+
+def test_the_square_transport_has_the_projectors_size(tmp_path):
+    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3)).with_gains(near=0.1)
+    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(fine))
+    transport, correspondence = reconstruct(capture, square=True)
+    assert transport.camera == PROJECTOR
+    assert correspondence.pixels.shape == (48, 60, 2)
+    light = nearfar.natural_picture(PROJECTOR, 1)
+    picture, q = fine @ light, np.rint(correspondence.pixels).astype(int)
+    for y, x in ((3, 4), (12, 20)):
+        mine = (q == (y, x)).all(axis=-1)
+        assert (transport @ light)[y, x] == pytest.approx(picture[mine].mean(), rel=2e-3)
+
+
+def test_a_plan_that_is_not_the_papers_is_refused(tmp_path, world):
+    patterns = tuple(p for p in PLAN.patterns if p.purpose != "direct")
+    capture = acquire(
+        PLAN.model_copy(update={"patterns": patterns}), tmp_path / "c.zarr", _rig(world)
+    )
+    with pytest.raises(PlanError, match="not the paper's"):
+        reconstruct(capture)
+
+
+def test_a_rig_of_another_size_is_refused(tmp_path, world):
+    with pytest.raises(InputError, match="--projector 24x30"):
+        acquire(paper_plan(Size(30, 24), 7, Size(3, 3)), tmp_path / "c.zarr", _rig(world))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_exposure_is_remembered_so_that_truth_compares(tmp_path, world):
+    exact = _exact_of(world.with_gains(direct=1e-3, near=1e-3, far=1e-3))
+    rig = replace(_rig(exact), exposure=1000.0)
+    transport, _ = reconstruct(acquire(PLAN, tmp_path / "c.zarr", rig))
+    found = relighting_snr(transport, exact, {"white": nearfar.white(PROJECTOR)})
+    assert found["white"] > 60
+
+
+def test_judgement_is_json_and_the_ceiling_is_above(tmp_path):
+    truth = nearfar.open_rig("cornell", Size(16, 16)).world
+    plan = paper_plan(Size(16, 16), 5, Size(3, 3))
+    rig = open_rig("cornell", Size(16, 16))
+    transport, _ = reconstruct(acquire(plan, tmp_path / "c.zarr", rig))
+    judged = judge_by_truth(transport, truth)
+    assert json.loads(json.dumps(judged, allow_nan=False)) == judged
+    assert set(judged["snr"]) == {"T", "physical", "model", "floodlit"}
+    assert judged["snr_b"]["white"] > 40
+    # The best fit of rows is not the best of every picture, but of their mean it is.
+    assert judged["ceiling"]["snr_b_pictures"] > judged["snr_b_pictures"]
+    assert judged["snr_t"]["p5"] <= judged["snr_t"]["p50"] <= judged["snr_t"]["p95"]
+
+
+def test_a_truth_of_another_size_is_refused(world):
+    other = _exact_of(model_transport(PROJECTOR, Size(4, 4), window=7, far=Size(3, 3), channels=3))
+    with pytest.raises(InputError, match="compare two of the same scene"):
+        judge_by_truth(world, other)
+
+
+def test_an_interrupted_capture_leaves_nothing(tmp_path, world):
+    rig = _rig(world)
+
+    class Unplugged:
+        projector, full_scale, describe = rig.projector, rig.full_scale, rig.describe
+
+        def shoot(self, patterns):
+            for number, photo in enumerate(rig.shoot(patterns)):
+                if number == 9:
+                    raise KeyboardInterrupt
+                yield photo
+
+    with pytest.raises(KeyboardInterrupt):
+        acquire(PLAN, tmp_path / "c.zarr", Unplugged())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_capture_remembers_its_rig(tmp_path, world):
+    acquire(PLAN, tmp_path / "c.zarr", _rig(world))
+    capture = open_capture(tmp_path / "c.zarr")
+    assert capture.rig["scene"] == "test"
+    assert capture.rig["camera"]["bits"] == 16
+    assert capture.plan == PLAN
+    transport, _ = reconstruct(capture)
+    assert transport.provenance["rig"] == capture.rig
+    assert transport.provenance["plan"]["window"] == 7

@@ -383,8 +383,16 @@ def test_an_unknown_ending_lists_the_known(tmp_path: Path, name: str) -> None:
 def test_no_nan_and_no_odd_shape_is_written(tmp_path: Path) -> None:
     for image in (np.full((4, 5), np.nan), np.ones((4, 5, 2)), np.ones(4)):
         with pytest.raises(InputError):
-            write_picture(tmp_path / "a.npy", image.astype(np.float32))
+            write_picture(tmp_path / "a.exr", image.astype(np.float32))
+    with pytest.raises(InputError):
+        write_picture(tmp_path / "a.npy", np.ones(4, dtype=np.float32))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_array_holds_any_number_of_channels(tmp_path: Path) -> None:
+    image = np.random.default_rng(0).random((4, 5, 2), dtype=np.float32)
+    write_picture(tmp_path / "a.npy", image)
+    np.testing.assert_array_equal(np.load(tmp_path / "a.npy"), image)
 
 
 def test_srgb_is_there_and_back() -> None:

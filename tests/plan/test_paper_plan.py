@@ -148,6 +148,7 @@ def test_sinusoids_far_from_the_origin_are_exact():
     [
         ((Size(16, 8), 9, Size(3, 3)), "W = 9 does not fit a projector of 16x8"),
         ((Size(16, 16), 5, Size(17, 3)), "far band 17x3 is larger"),
+        ((Size(16, 10**8), 5, Size(3, 3)), "a side over 16384"),
     ],
 )
 def test_what_does_not_fit_is_refused(arguments, message):

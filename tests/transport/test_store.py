@@ -177,3 +177,25 @@ def test_pickles_and_garbage_are_not_read(tmp_path):
     for name in ("t.npy", "u.npy", "v.npz", "w.npz", "missing.npy"):
         with pytest.raises(NearfarError, match=name):
             load_exact(tmp_path / name, projector=Size(3, 4))
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"projector": (16, 20, 3)},
+        {"camera": ("a", "b")},
+        {"projector": (0, 12)},
+        {"projector": 3.0},
+    ],
+)
+def test_sizes_that_are_none_get_a_sentence(tmp_path, sizes):
+    np.savez(tmp_path / "t.npz", T=np.ones((12, 12), np.float32), **sizes)
+    with pytest.raises(InputError, match="that is no size"):
+        load_exact(tmp_path / "t.npz", projector=Size(3, 4))
+
+
+def test_a_channel_that_is_missing_is_missed(tmp_path, generator):
+    save_exact(tmp_path / "e.zarr", _exact(generator, channels=2))
+    (tmp_path / "e.zarr" / "far-1" / "zarr.json").unlink()
+    with pytest.raises(UnreadableFileError, match=r"e\.zarr"):
+        load_exact(tmp_path / "e.zarr")

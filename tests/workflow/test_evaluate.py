@@ -51,7 +51,7 @@ def test_the_models_split_of_a_model_world_is_its_own(world):
 def test_standard_lights_are_lights():
     for size in (Size(16, 16), Size(9, 31)):
         lights = standard_lights(size)
-        assert list(lights)[0] == "white"
+        assert next(iter(lights)) == "white"
         assert len(lights) == 7
         for light in lights.values():
             assert light.shape == size

@@ -1,15 +1,15 @@
 """``nearfar acquire`` and ``nearfar import``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nearfar import capture as captures
-from nearfar.cli.options import Force, PlanFile, Quiet
+from nearfar.cli.options import Force, PlanFile, Quiet, keep_input
 from nearfar.cli.progress import counted, progress_bar, say, warn
-from nearfar.files import check_output
-from nearfar.plan import read_plan
+
+if TYPE_CHECKING:
+    from nearfar.capture import Capture
 
 # A share of saturated values above this is worth a warning.
 SATURATED = 1e-4
@@ -35,14 +35,16 @@ def acquire(
 
     Example: nearfar acquire plan.json capture.zarr --rig cornell
     """
-    # Ray casting and sparse solvers load only where a rig is opened.
+    from nearfar.files import check_output
+    from nearfar.plan import read_plan
     from nearfar.rigs.config import open_rig
     from nearfar.workflow.acquire import acquire as shoot
 
     made = read_plan(plan_file)
     made.require_real("shoot")
+    keep_input(output, plan_file, Path(rig))
     check_output(output, force=force)
-    with progress_bar(quiet=quiet) as report:
+    with progress_bar("opening the rig", quiet=quiet) as report:
         opened = open_rig(rig, made.projector, progress=report)
         taken = shoot(
             made,
@@ -75,11 +77,17 @@ def import_photos(
 
     Example: nearfar import plan.json photos capture.zarr --full-scale 16383
     """
+    from nearfar.capture import import_photos as bring_in
+    from nearfar.capture import pair
+    from nearfar.files import check_output
+    from nearfar.plan import read_plan
+
     made = read_plan(plan_file)
+    keep_input(output, plan_file, photos)
     check_output(output, force=force)
-    paths = captures.pair(made, photos, list_file)
-    with progress_bar(quiet=quiet) as report:
-        summary = captures.import_photos(
+    paths = pair(made, photos, list_file)
+    with progress_bar("photos", quiet=quiet) as report:
+        summary = bring_in(
             made,
             paths,
             output,
@@ -91,7 +99,7 @@ def import_photos(
     _conclude(summary.capture, output, quiet=quiet)
 
 
-def _conclude(taken: captures.Capture, output: Path, *, quiet: bool) -> None:
+def _conclude(taken: "Capture", output: Path, *, quiet: bool) -> None:
     share = taken.saturated_share
     if share > SATURATED:
         warn(

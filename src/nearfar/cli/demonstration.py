@@ -7,7 +7,6 @@ import typer
 
 from nearfar.cli.options import Force, Quiet
 from nearfar.cli.progress import progress_bar, say
-from nearfar.files import check_output
 
 
 def demo(
@@ -21,11 +20,11 @@ def demo(
 
     Example: nearfar demo
     """
-    # The demo needs everything; other commands start without it.
+    from nearfar.files import check_output
     from nearfar.report.demo import is_demo, run_demo
 
     check_output(output, force=force, replaceable=is_demo)
-    with progress_bar(quiet=quiet) as report:
+    with progress_bar("demo", quiet=quiet) as report:
         found = run_demo(output, force=force, progress=report)
     say(
         f"SNR_b {found['snr_b']['white']:.1f} dB under white, {found['snr_b_pictures']:.1f} dB "

@@ -19,7 +19,22 @@ def size(text: str | Size) -> Size:
         raise typer.BadParameter(str(error)) from None
 
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but faults.")]
+def keep_input(output: Path, *inputs: Path) -> None:
+    """Refuse an output that is an input of the same command, for --force to replace.
+
+    Raises
+    ------
+    InputError
+    """
+    if any(output.resolve() == path.resolve() for path in inputs):
+        raise InputError(
+            f"{output} is an input of this command and is kept: choose another name for the output."
+        )
+
+
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print nothing but faults and warnings.")
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdout.")]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]

@@ -3,16 +3,16 @@
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.options import AsJson, Force, PlanFile, Quiet, size
 from nearfar.cli.progress import counted, progress_bar, say
-from nearfar.files import new_output
-from nearfar.plan import Plan, paper_plan, read_plan
-from nearfar.workflow.export import export_patterns
+
+if TYPE_CHECKING:
+    from nearfar.plan import Plan
 
 
 class Offset(StrEnum):
@@ -63,6 +63,8 @@ def plan(
 
     Example: nearfar plan --projector 128x128 --near 19 --far 13x13 -o plan.json
     """
+    from nearfar.plan import paper_plan
+
     made = paper_plan(
         projector,
         near,
@@ -72,6 +74,8 @@ def plan(
         correspondence=correspondence.value,
     )
     if output is not None:
+        from nearfar.files import new_output
+
         with new_output(output, force=force) as partial:
             partial.write_text(made.to_json(), encoding="utf-8")
     if as_json:
@@ -82,7 +86,7 @@ def plan(
             say(f"plan written to {output}", quiet=quiet)
 
 
-def describe_plan(made: Plan) -> str:
+def describe_plan(made: "Plan") -> str:
     """Say in lines what a plan holds."""
     counts = ", ".join(f"{count} {purpose}" for purpose, count in made.counts.items() if count)
     return "\n".join(
@@ -118,8 +122,11 @@ def export(
 
     Example: nearfar export plan.json patterns --native 1080x1920
     """
+    from nearfar.plan import read_plan
+    from nearfar.workflow.export import export_patterns
+
     made = read_plan(plan_file)
-    with progress_bar(quiet=quiet) as report:
+    with progress_bar("patterns", quiet=quiet) as report:
         shown = export_patterns(
             made,
             folder,

@@ -1,27 +1,15 @@
 """``nearfar reconstruct``, ``nearfar relight`` and ``nearfar convert``."""
 
 from enum import StrEnum
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from nearfar.capture import open_capture
-from nearfar.cli.options import CapturePath, Force, Quiet, TransportPath
+from nearfar.cli.options import CapturePath, Force, Quiet, TransportPath, keep_input
 from nearfar.cli.progress import progress_bar, say
-from nearfar.correspondence import read_correspondence
 from nearfar.errors import InputError
-from nearfar.files import (
-    check_output,
-    check_picture_ending,
-    luminance,
-    new_output,
-    read_light,
-    write_picture,
-)
-from nearfar.transport.store import load_transport, save_transport
-from nearfar.workflow.reconstruct import reconstruct as rebuild
 
 
 class Method(StrEnum):
@@ -54,16 +42,24 @@ def reconstruct(
 
     Example: nearfar reconstruct capture.zarr transport.zarr
     """
+    from nearfar.capture import open_capture
+    from nearfar.correspondence import read_correspondence
+    from nearfar.files import check_output
+    from nearfar.transport.store import save_transport
+    from nearfar.workflow.reconstruct import reconstruct as rebuild
+
+    keep_input(output, capture, *([correspondence] if correspondence else []))
     check_output(output, force=force)
     opened = open_capture(capture)
     given = None
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
-    with progress_bar(quiet=quiet) as report:
+    with progress_bar("reconstructing", quiet=quiet) as report:
         transport, found = rebuild(opened, given, square=square, progress=report)
-    save_transport(output, transport, force=force)
+        save_transport(output, transport, force=force)
     say(
-        f"transport of {transport.camera} camera pixels with {transport.channels} channels, "
+        f"transport of {transport.camera} camera pixels with {transport.channels} "
+        f"channel{'s' if transport.channels > 1 else ''}, "
         f"{found.lit.mean():.1%} of the camera's directly lit, written to {output}",
         quiet=quiet,
     )
@@ -73,14 +69,16 @@ COMPONENTS = ("direct", "near", "far")
 
 
 def _gains(texts: list[str]) -> dict[str, float]:
-    gains = {}
+    gains: dict[str, float] = {}
     for text in texts:
         name, _, value = text.partition("=")
+        if name in gains:
+            raise typer.BadParameter(f"the gain of {name} is given twice.", param_hint="--gain")
         try:
             number = float(value)
         except ValueError:
             number = float("nan")
-        if name not in COMPONENTS or not np.isfinite(number):
+        if name not in COMPONENTS or not isfinite(number):
             raise typer.BadParameter(
                 f"{text!r} is no gain: write direct=1, near=2 or far=0, one per --gain.",
                 param_hint="--gain",
@@ -107,15 +105,28 @@ def relight(
 
     Example: nearfar relight transport.zarr light.png relit.exr --srgb --gain near=2
     """
+    import numpy as np
+
+    from nearfar.files import (
+        check_output,
+        check_picture_ending,
+        luminance,
+        read_light,
+        write_picture,
+    )
+    from nearfar.transport.store import load_transport
+
     gains = _gains(gain or [])
     check_picture_ending(output)
+    keep_input(output, transport, light)
     check_output(output, force=force)
-    opened = load_transport(transport)
-    shown = read_light(light, opened.projector, srgb=srgb)
-    if shown.ndim == 3 and opened.channels == 1:
-        shown = luminance(shown)
-    picture = opened.relight(shown, **gains)
-    write_picture(output, picture.astype(np.float32), force=force)
+    with progress_bar("relighting", quiet=quiet):
+        opened = load_transport(transport)
+        shown = read_light(light, opened.projector, srgb=srgb)
+        if shown.ndim == 3 and opened.channels == 1:
+            shown = luminance(shown)
+        picture = opened.relight(shown, **gains)
+        write_picture(output, picture.astype(np.float32), force=force)
     say(f"relit picture of {opened.camera} written to {output}", quiet=quiet)
 
 
@@ -133,16 +144,27 @@ def convert(
 
     Example: nearfar convert transport.zarr T.npy
     """
+    import numpy as np
+
+    from nearfar.files import check_output, new_output
+    from nearfar.transport.store import load_transport
+
     if output.suffix.lower() != ".npy":
-        raise InputError(f"{output} does not end in .npy: convert writes NumPy arrays.")
+        raise InputError(f"{output} does not end in .npy: choose a name that does.")
+    keep_input(output, transport)
     check_output(output, force=force)
-    opened = load_transport(transport)
-    if correspondence:
-        array, what = opened.correspondence, "correspondence"
-    else:
-        array, what = np.moveaxis(opened.dense(), 1, 2), "dense transport"
-        array = array[..., 0] if opened.channels == 1 else array
-    with new_output(output, force=force) as partial, partial.open("wb") as file:
-        np.save(file, np.ascontiguousarray(array), allow_pickle=False)
+    with progress_bar("converting", quiet=quiet):
+        opened = load_transport(transport)
+        if correspondence:
+            array, what = opened.correspondence, "correspondence"
+        else:
+            array, what = np.moveaxis(opened.dense(), 1, 2), "dense transport"
+            array = array[..., 0] if opened.channels == 1 else array
+        array = np.ascontiguousarray(array)
+        with new_output(output, force=force) as partial, partial.open("wb") as file:
+            header = np.lib.format.header_data_from_array_1_0(array)
+            np.lib.format.write_array_header_1_0(file, header)
+            # numpy's own writing does not tell a full disk from other faults.
+            file.write(array.data)
     shape = " x ".join(map(str, array.shape))
     say(f"{what}, {shape} {array.dtype}, written to {output}", quiet=quiet)

@@ -54,7 +54,7 @@ def given_correspondence(
     InputError
         If the shape does not fit the photos, or q lies off the projector.
     """
-    if pixels.shape != (*camera, 2) or not np.issubdtype(pixels.dtype, np.number):
+    if pixels.shape != (*camera, 2) or pixels.dtype.kind not in "fiu":
         raise InputError(
             f"{source} is an array of {'x'.join(map(str, pixels.shape))}, the photos need "
             f"{camera}x2: give (y, x) for each camera pixel, NaN where there is no direct light."

@@ -1,5 +1,6 @@
 """Files: pictures, Zarr stores, and outputs that appear whole or not at all."""
 
+from nearfar.files.arrays import read_arrays
 from nearfar.files.codecs import encode_png
 from nearfar.files.colour import from_srgb, luminance, to_srgb
 from nearfar.files.images import (
@@ -42,6 +43,7 @@ __all__ = [
     "open_array",
     "open_store",
     "read_array",
+    "read_arrays",
     "read_light",
     "read_linear",
     "read_picture",

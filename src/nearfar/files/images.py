@@ -201,7 +201,7 @@ def write_picture(path: Path, image: NDArray[np.float32], *, force: bool = False
         ``.npy``, ``.exr``, ``.tiff`` and ``.tif`` keep float32 exactly; ``.png`` is 8-bit sRGB,
         clipped to [0, 1], for looking.
     image : array
-        Linear light, shape (y, x) or (y, x, 3).
+        Linear light, shape (y, x) or (y, x, 3); for ``.npy`` any number of channels.
     force : bool
         Replace a file that is there.
 
@@ -216,9 +216,11 @@ def write_picture(path: Path, image: NDArray[np.float32], *, force: bool = False
     image = np.asarray(image, dtype=np.float32)
     if image.ndim == 3 and image.shape[2] == 1:
         image = image[..., 0]
-    if image.ndim not in {2, 3} or image.shape[2:] not in {(), (3,)}:
+    any_channels = path.suffix.lower() == ".npy"
+    if image.ndim not in {2, 3} or not (any_channels or image.shape[2:] in {(), (3,)}):
         raise InputError(
-            f"the image for {path} has the shape {image.shape}: give (y, x) or (y, x, 3)."
+            f"the image for {path} has the shape {image.shape}: give (y, x) or (y, x, 3), or "
+            f"choose a name that ends in .npy, which holds any number of channels."
         )
     require_finite(image, f"the image for {path}")
     with new_output(path, force=force) as partial:

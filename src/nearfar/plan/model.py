@@ -230,5 +230,8 @@ def read_plan(path: Path) -> Plan:
             f"{path} is not there: make a plan with 'nearfar plan -o {path}'."
         ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise UnreadableFileError(f"{path} cannot be read as a plan: {error}.") from None
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise UnreadableFileError(
+            f"{path} cannot be read as a plan ({reason}): name a file that 'nearfar plan -o' wrote."
+        ) from None
     return parse_plan(text, source=str(path))

@@ -15,6 +15,9 @@ from nearfar.illumination.frequencies import (
 )
 from nearfar.plan.model import Exponential, Plan, Purpose, Sinusoid, Stripe
 
+# No projector has a longer side.
+LARGEST = 16384
+
 Offset = Literal["inverse", "none"]
 Correspondence = Literal["stripes", "none"]
 
@@ -53,9 +56,14 @@ def paper_plan(
     Raises
     ------
     PlanError
-        If W or the far band is larger than the projector, or the dropped block is even or
-        larger than W.
+        If the projector has a side over `LARGEST`, if W or the far band is larger than it, or if
+        the dropped block is even or larger than W.
     """
+    if max(projector) > LARGEST:
+        raise PlanError(
+            f"a projector of {projector} has a side over {LARGEST}: give the pattern grid, of "
+            f"which a pixel may be a block of the projector's."
+        )
     if not 1 <= window <= min(projector):
         raise PlanError(
             f"W = {window} does not fit a projector of {projector}: choose --near between 1 and "

@@ -2,9 +2,9 @@
 
 import tomllib
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from nearfar.arrays import Size, parse_size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
@@ -33,6 +33,20 @@ class SceneTable(BaseModel):
     transport: str | None = None
     camera: str | None = None
 
+    @field_validator("name")
+    @classmethod
+    def _a_scene(cls, name: str | None) -> str | None:
+        if name is not None and name not in NAMES:
+            raise ValueError(f"there is no scene {name!r}, choose one of {', '.join(NAMES)}")
+        return name
+
+    @field_validator("camera")
+    @classmethod
+    def _a_size(cls, camera: str | None) -> str | None:
+        if camera is not None:
+            parse_size(camera)
+        return camera
+
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.name is None) == (self.transport is None):
@@ -48,7 +62,7 @@ class RigTable(BaseModel):
     scene: SceneTable
     projector: SimulatedProjector = SimulatedProjector()
     camera: SimulatedCamera = SimulatedCamera()
-    exposure: float | Literal["auto"] | None = Field(default=None)
+    exposure: Literal["auto"] | Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
     seed: int = Field(default=0, ge=0)
 
 
@@ -100,9 +114,20 @@ def read_rig_table(path: Path) -> RigTable:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise UnreadableFileError(f"{path} is no rig: {where}: {first['msg']}.") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UnreadableFileError(f"{path} cannot be read as a rig: {error}.") from None
+        message = first["msg"].removeprefix("Value error, ").rstrip(".")
+        if first["type"] == "extra_forbidden":
+            message = "there is no such key, correct or remove it"
+        raise UnreadableFileError(f"{path} is no rig: {where or 'the file'}: {message}.") from None
+    except OSError as error:
+        raise UnreadableFileError(
+            f"{path} cannot be read as a rig ({error.strerror}): check that it is a file you may "
+            f"read."
+        ) from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = " ".join(str(error).split())
+        raise UnreadableFileError(
+            f"{path} cannot be read as a rig ({reason}): correct it, it must be TOML in UTF-8."
+        ) from None
 
 
 def _rig(table: RigTable, folder: Path, projector: Size, progress: Progress | None) -> SimulatedRig:
@@ -120,22 +145,28 @@ def _rig(table: RigTable, folder: Path, projector: Size, progress: Progress | No
             f"{name} has a projector of {world.projector}, the plan one of {projector}: make the "
             f"plan with --projector {world.projector}."
         )
-    return SimulatedRig(
-        world, name, table.projector, table.camera, _exposure(table.exposure, world), table.seed
-    )
+    exposure = _exposure(table.exposure, world, name)
+    return SimulatedRig(world, name, table.projector, table.camera, exposure, table.seed)
 
 
 def load_world(path: Path, projector: Size | None, camera: Size | None) -> World:
     """Load a stored transport: a measured one, an exact one, or a dense array."""
-    if kind_of_store(path) == TRANSPORT_KIND:
-        return load_transport(path)
-    return load_exact(path, projector=projector, camera=camera)
+    measured = kind_of_store(path) == TRANSPORT_KIND
+    world = (
+        load_transport(path) if measured else load_exact(path, projector=projector, camera=camera)
+    )
+    if camera is not None and world.camera != camera:
+        raise InputError(
+            f"{path} has a camera of {world.camera}, the rig says {camera}: correct or remove "
+            f"camera."
+        )
+    return world
 
 
-def _exposure(wanted: float | Literal["auto"] | None, world: World) -> float:
+def _exposure(wanted: float | Literal["auto"] | None, world: World, name: str) -> float:
     if isinstance(wanted, float):
         return wanted
-    peak = brightest(world)
+    peak = brightest(world, name)
     if wanted is None and PHOTO_UNITS[0] <= peak <= PHOTO_UNITS[1]:
         return 1.0
     return WHITE / peak

@@ -18,7 +18,7 @@ class SimulatedProjector(BaseModel):
         Exponent of the response; 1 is linear.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     black_level: float = Field(default=0.0, ge=0.0, lt=1.0)
     gamma: float = Field(default=1.0, gt=0.0, le=10.0)

@@ -95,7 +95,7 @@ def _batches(
         yield batch
 
 
-def brightest(world: World) -> float:
+def brightest(world: World, name: str = "the transport") -> float:
     """Return the brightest camera pixel under full white.
 
     Raises
@@ -106,5 +106,8 @@ def brightest(world: World) -> float:
     floodlit = world.pictures(np.ones((1, *world.projector), dtype=np.float32))
     highest = float(floodlit.max())
     if not highest > 0:
-        raise InputError("the transport is black under full white: there is nothing to expose for.")
+        raise InputError(
+            f"{name} is black under full white, so there is nothing to expose for: name a "
+            f"transport with light in it."
+        )
     return highest

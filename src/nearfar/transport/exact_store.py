@@ -1,15 +1,23 @@
 """Exact transports on the disk: what ``nearfar render`` writes, and plain arrays."""
 
-import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from nearfar.arrays import Floats, Size
-from nearfar.errors import InputError, MissingFileError, UnreadableFileError
-from nearfar.files import add_array, create_store, new_output, open_store, read_array
+from nearfar.errors import InputError, UnreadableFileError
+from nearfar.files import (
+    add_array,
+    create_store,
+    new_output,
+    open_store,
+    read_array,
+    read_arrays,
+)
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.store import listed, write_in_rows
 
@@ -31,6 +39,7 @@ def save_exact(path: Path, transport: ExactTransport, *, force: bool = False) ->
         "name": transport.name,
         "projector": list(transport.projector),
         "camera": list(transport.camera),
+        "channels": transport.channels,
         "apart": transport.is_apart,
     }
     with new_output(path, force=force) as partial:
@@ -93,7 +102,7 @@ def load_exact(
             for name in ("projector", "camera")
         )
         shape = (stored_camera.pixels, stored_projector.pixels)
-        channels = len([name for name in group.array_keys() if name.startswith("far-")])
+        channels = int(str(attributes["channels"]))
         apart = range(channels if attributes["apart"] else 0)
         direct = tuple(_read_sparse(group, f"direct-{i}", shape) for i in apart)
         near = tuple(_read_sparse(group, f"near-{i}", shape) for i in apart)
@@ -110,19 +119,11 @@ def load_exact(
 
 
 def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> ExactTransport:
-    try:
-        loaded = np.load(path, allow_pickle=False)
-        arrays = {"T": loaded} if isinstance(loaded, np.ndarray) else dict(loaded.items())
-    except FileNotFoundError:
-        raise MissingFileError(f"{path} is not there: check the name.") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise UnreadableFileError(
-            f"{path} cannot be read as a stored transport ({error}): save it with numpy.save."
-        ) from None
-    if "projector" in arrays:
-        projector = Size(*(int(side) for side in arrays["projector"]))
-    if "camera" in arrays:
-        camera = Size(*(int(side) for side in arrays["camera"]))
+    arrays = read_arrays(path)
+    if path.suffix.lower() == ".npy":
+        arrays = {"T": arrays["array"]}
+    projector = _stored_size(arrays, "projector", path) or projector
+    camera = _stored_size(arrays, "camera", path) or camera
     names = ("direct", "near", "far") if "far" in arrays else ("T",)
     missing = [name for name in names if name not in arrays]
     if missing:
@@ -142,6 +143,15 @@ def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> Exac
     sparse_parts = [tuple(sparse.csr_array(channel) for channel in part) for part in apart]
     direct, near = sparse_parts or ((), ())
     return ExactTransport(projector, camera, direct, near, far, path.name)
+
+
+def _stored_size(arrays: Mapping[str, NDArray[Any]], name: str, path: Path) -> Size | None:
+    if name not in arrays:
+        return None
+    sides = arrays[name]
+    if sides.shape != (2,) or sides.dtype.kind not in "iu" or sides.min() < 1:
+        raise InputError(f"{path} has a {name} that is no size: store it as (height, width).")
+    return Size(*(int(side) for side in sides))
 
 
 def _as_matrices(

@@ -9,7 +9,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.errors import InputError, MissingFileError
-from nearfar.files import list_pictures, luminance, read_light, read_linear
+from nearfar.files import full_scale_of, list_pictures, luminance, read_light, read_picture
 from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
@@ -99,7 +99,8 @@ def judge_by_photos(
         A pair whose light is all black gives the photo under black; without one the black that
         was measured with the transport is taken.
     full_scale : float, optional
-        Value of full scale of the photos.
+        Value of full scale of the photos; by default the capture's, for photos of its kind of
+        numbers.
 
     Returns
     -------
@@ -119,7 +120,7 @@ def judge_by_photos(
         light = read_light(light_path, transport.projector)
         if light.ndim == 3 and transport.channels == 1:
             light = luminance(light)
-        photo = read_linear(photo_path, full_scale=full_scale)
+        photo = _photo(transport, photo_path, full_scale)
         expected = (*transport.camera, *((transport.channels,) if transport.channels > 1 else ()))
         if photo.shape != expected:
             raise InputError(
@@ -136,6 +137,15 @@ def judge_by_photos(
         raise InputError(f"{folder} has a black light only: add pairs under other lights.")
     found = {name: snr(photos[name] - black, transport @ lights[name]) for name in judged}
     return {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
+
+
+def _photo(transport: Transport, path: Path, full_scale: float | None) -> Floats:
+    """Read a photo as the capture's were, unless another full scale is given."""
+    raw = read_picture(path)
+    taken = transport.provenance.get("photos", {})
+    if full_scale is None and taken.get("dtype") == str(raw.dtype):
+        full_scale = float(taken["full_scale"])
+    return raw.astype(np.float32) / np.float32(full_scale or full_scale_of(raw.dtype))
 
 
 def _pairs(folder: Path) -> dict[str, tuple[Path, Path]]:

@@ -166,5 +166,6 @@ def _provenance(capture: Capture, *, square: bool) -> dict[str, Any]:
             "offset": plan.offset,
             "photos": len(plan.patterns),
         },
+        "photos": {"dtype": str(capture.photos.dtype), "full_scale": capture.full_scale},
         "rig": capture.rig,
     }

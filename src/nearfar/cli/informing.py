@@ -1,0 +1,140 @@
+"""``nearfar info``."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nearfar.cli.options import Quiet
+from nearfar.cli.planning import describe_plan
+from nearfar.cli.progress import say
+from nearfar.errors import MissingFileError, UnreadableFileError
+
+
+def info(
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Plan, capture, transport, array, picture, RIG.toml or folder."
+        ),
+    ],
+    quiet: Quiet = False,
+) -> None:
+    """Say what a file holds.
+
+    Example: nearfar info capture.zarr
+    """
+    if not path.exists():
+        raise MissingFileError(f"{path} is not there: check the name.")
+    describe = _describe_folder if path.is_dir() else _describe_file
+    say(describe(path), quiet=quiet)
+
+
+def _describe_file(path: Path) -> str:
+    from nearfar.files import read_picture
+    from nearfar.plan import read_plan
+    from nearfar.rigs.config import read_rig_table
+
+    match path.suffix.lower():
+        case ".json":
+            return "nearfar plan\n" + describe_plan(read_plan(path))
+        case ".toml":
+            return f"rig: {json.dumps(read_rig_table(path).model_dump())}"
+        case ".npy" | ".npz":
+            return _describe_arrays(path)
+    pixels = read_picture(path)
+    shape = " x ".join(map(str, pixels.shape))
+    return f"picture, {shape} {pixels.dtype}, values {pixels.min():g} to {pixels.max():g}"
+
+
+def _describe_arrays(path: Path) -> str:
+    import numpy as np
+
+    from nearfar.files import read_arrays
+
+    lines = []
+    for name, array in read_arrays(path).items():
+        shape = " x ".join(map(str, array.shape)) or "a single number"
+        line = f"{name}, {shape} {array.dtype}"
+        if array.dtype.kind in "fiu" and array.size:
+            finite = array[np.isfinite(array)]
+            if finite.size:
+                line += f", values {finite.min():g} to {finite.max():g}"
+            if finite.size < array.size:
+                line += f", {array.size - finite.size} NaN or infinite"
+        lines.append(line)
+    return "\n".join(lines)
+
+
+def _describe_folder(path: Path) -> str:
+    from nearfar.capture import KIND as CAPTURE_KIND
+    from nearfar.files import kind_of_store, list_pictures
+    from nearfar.transport.exact_store import KIND as EXACT_KIND
+    from nearfar.transport.store import KIND as TRANSPORT_KIND
+
+    describe = {
+        CAPTURE_KIND: _describe_capture,
+        TRANSPORT_KIND: _describe_transport,
+        EXACT_KIND: _describe_exact,
+    }.get(kind_of_store(path) or "")
+    if describe is not None:
+        return describe(path)
+    pictures = list_pictures(path)
+    if not pictures or (path / "zarr.json").exists():
+        raise UnreadableFileError(
+            f"{path} is nothing that nearfar wrote: name a plan, a capture, a transport or a "
+            f"picture."
+        )
+    return f"folder of {len(pictures)} pictures, {pictures[0].name} to {pictures[-1].name}"
+
+
+def _describe_capture(path: Path) -> str:
+    from nearfar.capture import KIND, open_capture
+
+    capture = open_capture(path)
+    return "\n".join(
+        [
+            f"{KIND}: photos of {capture.camera}, {_channels(capture.channels)}, "
+            f"{capture.photos.dtype}, full scale {capture.full_scale:g}, "
+            f"{capture.saturated_share:.3%} saturated",
+            describe_plan(capture.plan),
+            f"rig: {json.dumps(capture.rig)}",
+        ]
+    )
+
+
+def _describe_transport(path: Path) -> str:
+    import numpy as np
+
+    from nearfar.transport.store import KIND, load_transport
+
+    transport = load_transport(path)
+    floodlit = transport.components(np.ones(transport.projector, dtype=np.float32))
+    sums = {name: float(part.sum()) for name, part in zip(floodlit._fields, floodlit, strict=True)}
+    total = sum(sums.values())
+    shares = ", ".join(f"{name} {value / total:.1%}" for name, value in sums.items() if total)
+    return "\n".join(
+        [
+            f"{KIND}: projector {transport.projector}, camera {transport.camera}, "
+            f"{_channels(transport.channels)}, W = {transport.window}, "
+            f"{transport.far_basis.count} far coefficients",
+            f"{transport.lit.mean():.1%} of the camera pixels directly lit",
+            f"floodlit: {shares or 'black'}",
+            f"provenance: {json.dumps(dict(transport.provenance))}",
+        ]
+    )
+
+
+def _describe_exact(path: Path) -> str:
+    from nearfar.transport.exact_store import KIND, load_exact
+
+    exact = load_exact(path)
+    return (
+        f"{KIND}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
+        f"{_channels(exact.channels)}, components {'apart' if exact.is_apart else 'together'}"
+    )
+
+
+def _channels(count: int) -> str:
+    return f"{count} channel{'s' if count > 1 else ''}"

@@ -1,0 +1,98 @@
+"""Plans and their patterns as files."""
+
+import json
+from pathlib import Path
+
+import imagecodecs
+import numpy as np
+import pytest
+
+from nearfar.plan import read_plan
+from tests.cli.conftest import PLAN, check_done, run_nearfar
+
+
+@pytest.mark.parametrize(
+    ("options", "photos", "total", "savings"),
+    [
+        (("128x128", "--near", "19", "--far", "13x13"), 1060, 1316, 16384 / 1060),
+        (("128x128", "--near", "15", "--far", "13x13"), 788, 1044, 16384 / 788),
+        (
+            ("68x100", "--near", "19", "--far", "7x10", "--drop", "3x3", "--offset", "none"),
+            423,
+            423 + 168,
+            6800 / 423,
+        ),
+        (
+            ("16x20", "--near", "5", "--far", "3x3", "--correspondence", "none"),
+            2 * (1 + 25 - 1 + 9),
+            2 * (1 + 25 - 1 + 9),
+            320 / 68,
+        ),
+    ],
+)
+@pytest.mark.parametrize("quiet", [(), ("--quiet",)])
+def test_json_has_these_keys_and_stands_alone(options, photos, total, savings, quiet):
+    ran = check_done(run_nearfar("plan", "--projector", *options, "--json", *quiet))
+    found = json.loads(ran.out)
+    assert list(found) == ["photos", "transport_photos", "total_photos", "brute_force", "savings"]
+    assert list(found["photos"]) == ["direct", "near", "far", "reference", "correspondence"]
+    assert found["transport_photos"] == photos
+    assert found["total_photos"] == total == sum(found["photos"].values())
+    assert found["savings"] == pytest.approx(savings, rel=1e-12)
+    assert sum(found["photos"][name] for name in ("direct", "near", "far")) == photos
+
+
+def test_json_stands_alone_beside_a_file(tmp_path: Path):
+    ran = check_done(run_nearfar(*PLAN, "--json", "-o", tmp_path / "plan.json"))
+    assert json.loads(ran.out) == read_plan(tmp_path / "plan.json").summary()
+
+
+def test_quiet_says_nothing(tmp_path: Path):
+    plan = tmp_path / "plan.json"
+    assert check_done(run_nearfar(*PLAN, "-o", plan, "--quiet")).out == ""
+    assert check_done(run_nearfar("export", plan, tmp_path / "patterns", "-q")).out == ""
+    assert check_done(run_nearfar("info", plan, "--quiet")).out == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "scale", "frame"),
+    [
+        ((), 1, (16, 20)),
+        (("--scale", "3"), 3, (48, 60)),
+        (("--native", "50x70"), 3, (50, 70)),
+        (("--native", "50x70", "--scale", "2"), 2, (50, 70)),
+        (("--native", "16x20"), 1, (16, 20)),
+    ],
+)
+def test_patterns_are_blocks_in_the_middle_of_a_black_frame(
+    finished, tmp_path: Path, options, scale, frame
+):
+    out = tmp_path / "patterns"
+    ran = check_done(run_nearfar("export", finished.plan, out, *options))
+    plan = read_plan(finished.plan)
+    count = len(plan.patterns)
+    names = sorted(path.name for path in out.iterdir())
+    assert names == [*(f"pattern-{i:05d}.png" for i in range(count)), "plan.json"]
+    assert read_plan(out / "plan.json") == plan
+    assert f"{frame[0]}x{frame[1]}" in ran.out
+    top, left = (frame[0] - 16 * scale) // 2, (frame[1] - 20 * scale) // 2
+    for i in range(0, count, 11):
+        shown = imagecodecs.png_decode((out / f"pattern-{i:05d}.png").read_bytes())
+        assert shown.dtype == np.uint8
+        assert shown.shape == frame
+        block = np.kron(plan.draw(i), np.ones((scale, scale), dtype=np.uint8))
+        inside = (slice(top, top + 16 * scale), slice(left, left + 20 * scale))
+        np.testing.assert_array_equal(shown[inside], block)
+        rest = shown.copy()
+        rest[inside] = 0
+        assert not rest.any()
+
+
+def test_pairs_of_exported_patterns_sum_to_white(finished):
+    shown = [
+        imagecodecs.png_decode((finished.patterns / f"pattern-{i:05d}.png").read_bytes())
+        for i in range(68)
+    ]
+    for pattern, inverse in zip(shown[::2], shown[1::2], strict=True):
+        assert (pattern.astype(int) + inverse == 255).all()
+    assert len({pattern.tobytes() for pattern in shown}) == 68

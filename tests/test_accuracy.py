@@ -1,0 +1,65 @@
+"""Accuracy on the exact scenes from noisy photos, by the command line, as users would see it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from nearfar.cli.main import main
+
+# Scene, projector, W, far band; least SNR_b over five pictures and under white, dB. Camera: 30 000
+# e- full well, read noise 4 e-, 14 bits, ambient 1 %, white at 90 % of the range: the defaults.
+CASES = [
+    ("cornell", "64x64", 11, "7x7", 40.3, 48.0),
+    ("cornell-aside", "64x64", 11, "7x7", 40.2, 48.0),
+    ("wedge", "68x100", 19, "7x11", 45.5, 48.0),
+]
+
+
+def _run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
+    monkeypatch.setattr("sys.argv", ["nearfar", *map(str, arguments)])
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, arguments
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(("scene", "projector", "window", "far", "pictures", "white"), CASES)
+def test_a_scene_is_relit_as_well_as_asked(
+    tmp_path: Path, monkeypatch, capsys, scene, projector, window, far, pictures, white
+):
+    plan, capture, found, truth = (
+        tmp_path / name for name in ("plan.json", "c.zarr", "t.zarr", "truth.zarr")
+    )
+    _run(monkeypatch, "plan", "--projector", projector, "--near", window, "--far", far, "-o", plan)
+    _run(monkeypatch, "acquire", plan, capture, "--rig", scene)
+    _run(monkeypatch, "reconstruct", capture, found)
+    _run(monkeypatch, "render", scene, truth)
+    capsys.readouterr()
+    _run(monkeypatch, "evaluate", found, "--truth", truth, "--json")
+    judged = json.loads(capsys.readouterr().out)
+    assert judged["snr_b_pictures"] >= pictures
+    assert judged["snr_b"]["white"] >= white
+    # No camera pixel or frequency fails unseen behind the means.
+    assert judged["snr_t"]["p5"] > 20
+    assert judged["snr_b_frequency"]["p5"] > 30
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_demo_ends_in_a_page(tmp_path: Path, monkeypatch, capsys):
+    _run(monkeypatch, "demo", tmp_path / "out")
+    said = capsys.readouterr().out
+    text = (tmp_path / "out" / "report.html").read_text()
+    assert str(tmp_path / "out" / "report.html") in said
+    # Three lights by seven pictures, and four maps, all inside the page.
+    assert text.count("data:image/png;base64,") == 3 * 7 + 4
+    assert "http" not in text
+    assert "nan dB" not in text
+    judged = json.loads((tmp_path / "out" / "numbers.json").read_text())
+    assert f"{judged['snr_b_pictures']:.1f} dB" in text
+    assert judged["snr_b_pictures"] > 40.3
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"plan.json", "capture.zarr", "transport.zarr", "report.html", "numbers.json"}

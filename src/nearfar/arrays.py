@@ -4,6 +4,7 @@ Everywhere: images are [y, x] or [y, x, channel], a size AxB is height x width, 
 projector pixels are flattened row by row.
 """
 
+import os
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -11,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.errors import InputError
+
+# Where a file is, for functions that users call.
+AnyPath = str | os.PathLike[str]
 
 Floats = NDArray[np.floating[Any]]
 Complexes = NDArray[np.complexfloating[Any, Any]]

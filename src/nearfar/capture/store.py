@@ -13,7 +13,7 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from nearfar.arrays import Size
+from nearfar.arrays import AnyPath, Size
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import (
     add_array,
@@ -113,7 +113,7 @@ class Capture:
         return scaled
 
 
-def open_capture(path: Path) -> Capture:
+def open_capture(path: AnyPath) -> Capture:
     """Open a capture.
 
     Raises
@@ -123,6 +123,7 @@ def open_capture(path: Path) -> Capture:
     UnreadableFileError
         If it is damaged, something else, or it or its plan of another version.
     """
+    path = Path(path)
     group = open_store(path, KIND, FORMAT_VERSION)
     attributes = dict(group.attrs)
     plan = parse_plan(json.dumps(attributes.get("plan")), source=f"the plan in {path}")
@@ -163,7 +164,7 @@ def _is_positive(value: object) -> TypeGuard[float]:
 
 
 def write_capture(
-    path: Path,
+    path: AnyPath,
     plan: Plan,
     photos: Iterable[NDArray[Any]],
     *,
@@ -178,7 +179,7 @@ def write_capture(
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Folder to make, ending in ``.zarr`` by custom.
     plan : Plan
     photos : iterable of arrays
@@ -213,6 +214,7 @@ def write_capture(
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`; nothing is left behind.
     """
+    path = Path(path)
     plan.require_real("capture")
     for name, value in (("full scale", full_scale), ("exposure", exposure)):
         if value is not None and not _is_positive(value):

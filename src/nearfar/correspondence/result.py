@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import AnyPath, Booleans, Floats, Size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 
 
@@ -74,13 +74,14 @@ def given_correspondence(
     return Correspondence(on_projector, np.where(lit, np.float32(1), np.float32(0)))
 
 
-def read_correspondence(path: Path, camera: Size, projector: Size) -> Correspondence:
+def read_correspondence(path: AnyPath, camera: Size, projector: Size) -> Correspondence:
     """Read correspondence from a .npy file; see `given_correspondence`.
 
     Raises
     ------
     MissingFileError, UnreadableFileError, InputError
     """
+    path = Path(path)
     try:
         pixels = np.load(path, allow_pickle=False)
     except FileNotFoundError:

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from nearfar.arrays import Size
+from nearfar.arrays import AnyPath, Size
 from nearfar.errors import MissingFileError, PlanError, UnreadableFileError
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import (
@@ -216,13 +216,14 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
         ) from None
 
 
-def read_plan(path: Path) -> Plan:
+def read_plan(path: AnyPath) -> Plan:
     """Read a plan file.
 
     Raises
     ------
     MissingFileError, UnreadableFileError
     """
+    path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import AnyPath, Floats, Size
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import (
     add_array,
@@ -27,7 +27,7 @@ FORMAT_VERSION = 1
 MOST_CHANNELS = 4
 
 
-def save_exact(path: Path, transport: ExactTransport, *, force: bool = False) -> None:
+def save_exact(path: AnyPath, transport: ExactTransport, *, force: bool = False) -> None:
     """Write an exact transport, components apart, as a Zarr group.
 
     Raises
@@ -35,6 +35,7 @@ def save_exact(path: Path, transport: ExactTransport, *, force: bool = False) ->
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`.
     """
+    path = Path(path)
     attributes = {
         "name": transport.name,
         "projector": list(transport.projector),
@@ -71,13 +72,13 @@ def _read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_ar
 
 
 def load_exact(
-    path: Path, *, projector: Size | None = None, camera: Size | None = None
+    path: AnyPath, *, projector: Size | None = None, camera: Size | None = None
 ) -> ExactTransport:
     """Read an exact transport: a Zarr of `save_exact`, or a dense .npy or .npz.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A dense T is (C, P) or (C, P, channels), or with its axes apart (Cy, Cx, Py, Px) or
         (Cy, Cx, Py, Px, channels). An .npz holds it as ``T``, or as ``direct``, ``near`` and
         ``far``, and may hold ``projector`` and ``camera`` as (height, width).
@@ -92,6 +93,7 @@ def load_exact(
     InputError
         If its sizes cannot be told or do not fit.
     """
+    path = Path(path)
     if path.suffix.lower() in {".npy", ".npz"}:
         return _load_dense(path, projector, camera)
     group = open_store(path, KIND, FORMAT_VERSION)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import AnyPath, Floats, Size
 from nearfar.errors import UnreadableFileError
 from nearfar.files import add_array, create_store, new_output, open_store, read_array
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
@@ -21,7 +21,7 @@ CHUNK_BYTES = 8 * 2**20
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
 
 
-def save_transport(path: Path, transport: Transport, *, force: bool = False) -> None:
+def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) -> None:
     """Write a transport as a Zarr group, whole or not at all.
 
     Raises
@@ -29,6 +29,7 @@ def save_transport(path: Path, transport: Transport, *, force: bool = False) -> 
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`.
     """
+    path = Path(path)
     attributes = {
         "projector": list(transport.projector),
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
@@ -48,7 +49,7 @@ def write_in_rows(group: Any, name: str, values: Floats) -> None:
     add_array(group, name, values.shape, values.dtype, (rows, *values.shape[1:]))[:] = values
 
 
-def load_transport(path: Path) -> Transport:
+def load_transport(path: AnyPath) -> Transport:
     """Read a transport.
 
     Raises
@@ -56,6 +57,7 @@ def load_transport(path: Path) -> Transport:
     MissingFileError, UnreadableFileError
         If it is not there, damaged, of another kind or of another version.
     """
+    path = Path(path)
     group = open_store(path, KIND, FORMAT_VERSION)
     factors = {name: read_array(group, name) for name in FACTORS}
     try:

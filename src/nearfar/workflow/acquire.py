@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, write_capture
 from nearfar.errors import InputError
 from nearfar.plan import Plan
@@ -11,7 +12,7 @@ from nearfar.rigs.base import Rig
 
 def acquire(
     plan: Plan,
-    path: Path,
+    path: AnyPath,
     rig: Rig,
     *,
     force: bool = False,
@@ -22,7 +23,7 @@ def acquire(
     Parameters
     ----------
     plan : Plan
-    path : Path
+    path : str or Path
         Capture to make.
     rig : Rig
     force : bool
@@ -43,6 +44,7 @@ def acquire(
     NearfarError
         As `nearfar.capture.write_capture`.
     """
+    path = Path(path)
     plan.require_real("shoot")
     if rig.projector != plan.projector:
         raise InputError(

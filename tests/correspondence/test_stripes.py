@@ -90,6 +90,15 @@ def test_camera_pixels_without_direct_light_are_marked(shoot, noisy):
         assert np.median(found.confidence[~lit]) < 0.9
 
 
+@pytest.mark.parametrize("size", [Size(8, 8), Size(9, 12), Size(11, 8)])
+def test_small_projectors_correspond(shoot, size):
+    world = model_transport(size, size, window=3, far=Size(1, 1), entries=0)
+    world = replace(world, near=np.zeros_like(world.near))
+    found = correspond_by_stripes(shoot(paper_plan(size, 3, Size(1, 1)), world, SimulatedCamera()))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.2)
+
+
 def test_rows_correspond_on_their_own(shoot):
     photos = shoot(PLAN, _world())
     whole, part = correspond_by_stripes(photos), correspond_by_stripes(photos, slice(3, 9))

@@ -8,6 +8,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.frequencies import default_dropped
+from nearfar.illumination.pictures import natural_picture
 from tests.worlds import ideal_measurements, model_transport
 
 
@@ -140,3 +141,64 @@ def test_windows_are_clipped_at_the_projectors_border():
     found = estimate(measurements, world.correspondence, window, far, dropped)
     assert np.all(found.near[0, 0, 0, :4] == 0)
     assert np.all(found.near[23, 23, 0, :, 5:] == 0)
+
+
+def _bouncing(projector):
+    """Strong inter-reflection that no window and band hold: (C, 1, P)."""
+    y, x = np.divmod(np.arange(projector.pixels), projector.width)
+    kernel = 1.0 / (1.0 + (y[:, None] - y) ** 2 + (x[:, None] - x) ** 2)
+    kernel /= kernel.sum(axis=1, keepdims=True)
+    albedo = np.clip(0.6 + 0.2 * np.random.default_rng(1).normal(size=len(y)), 0.2, 0.95)
+    rows = np.linalg.inv(np.eye(len(y)) - 0.8 * albedo[:, None] * kernel) * albedo
+    return rows[:, None] * 0.9 / rows.sum(axis=1).max()
+
+
+@pytest.mark.parametrize(
+    ("window", "far", "dropped"),
+    [
+        # The lowest near frequency lies at the edge of the far band, or inside it.
+        (11, Size(5, 5), None),
+        (13, Size(5, 5), None),
+        (9, Size(7, 7), Size(1, 1)),
+        (7, Size(9, 9), Size(1, 1)),
+        (9, Size(5, 5), None),
+    ],
+)
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropped, noise):
+    projector = Size(24, 24)
+    dropped = dropped or default_dropped(window, far, projector)
+    rows = _bouncing(projector)
+    frame = model_transport(projector, projector, window=window, far=far)
+    measurements = ideal_measurements(frame, window, far, dropped)
+    answers = rows @ measurements.basis.patterns.T
+    answers += np.random.default_rng(0).normal(0, noise, answers.shape)
+    told = replace(
+        measurements,
+        answers=answers.astype(np.float32),
+        noise=np.full_like(measurements.noise, noise),
+    )
+    light = natural_picture(projector, 1).ravel()
+    found = [
+        _snr(
+            rows @ light,
+            estimate(told, frame.correspondence, window, far, dropped, rounds=rounds).dense()
+            @ light,
+        )
+        for rounds in (1, 60)
+    ]
+    assert found[0] > 25
+    # The leak of an f that is not band-limited may cost decibels; it must not cost the picture.
+    assert found[1] > found[0] - 5
+
+
+def test_direct_light_fades_where_nothing_tells_it():
+    # W = 1 shoots the checkerboard alone for it, which a camera pixel half-way does not answer.
+    projector, far = Size(24, 24), Size(3, 3)
+    world = model_transport(projector, Size(37, 37), window=5, far=far, fractional=True, entries=0)
+    world = replace(world, near=np.zeros_like(world.near))
+    measurements = ideal_measurements(world, 1, far, Size(1, 1))
+    noise = np.random.default_rng(0).normal(0, 0.01, measurements.answers.shape)
+    told = replace(measurements, answers=(measurements.answers + noise).astype(np.float32))
+    found = estimate(told, world.correspondence, 1, far, Size(1, 1))
+    assert np.abs(found.direct).max() < 0.6

@@ -138,10 +138,37 @@ def test_rows_are_measured_on_their_own(small_world, shoot):
     np.testing.assert_allclose(part.answers, whole.answers[2 * 9 : 5 * 9], atol=1e-6)
 
 
-def test_a_dark_capture_is_refused(small_world, shoot):
-    photos = shoot(PLAN, small_world.with_gains(direct=0, near=0, far=0))
-    with pytest.raises(InputError, match="white is nowhere brighter than black"):
-        measure(photos)
+def test_dark_rows_are_measured_as_dark(small_world, shoot):
+    photos = shoot(PLAN, small_world)
+    shown = photos.photos.copy()
+    shown[:, 3:6] = 0
+    dark = measure(replace(photos, photos=shown), slice(3, 6))
+    assert np.all(dark.answers == 0)
+    assert np.all(dark.black == 0)
+    assert np.all(np.isfinite(dark.noise))
+
+
+@pytest.mark.parametrize(("gamma", "least"), [(1.1, 0.01), (2.2, 0.1)])
+def test_a_projector_that_is_not_linear_is_told_by_its_sums(small_world, shoot, gamma, least):
+    linear = measure(shoot(PLAN, small_world, NOISY))
+    assert abs(linear.excess_of_sums) < 0.003
+    bent = measure(shoot(PLAN, small_world, NOISY, SimulatedProjector(gamma=gamma)))
+    assert bent.excess_of_sums < -least
+    # White was photographed: it is not spoiled by sums that do not hold.
+    truth = (small_world @ np.ones(PLAN.projector)).reshape(-1, 2)
+    white = bent.answers[..., bent.places([DC])[0]]
+    assert np.abs(white - truth).mean() < 0.01 * truth.mean()
+
+
+def test_dim_answers_do_not_shrink(small_world, shoot):
+    # Few electrons: what a noisy rho would take away on average is given back.
+    dim = SimulatedCamera(full_well=300, read_noise=0, bits=16, ambient=0, black_level=0.02)
+    clean = measure(shoot(PLAN, small_world)).answers
+    ratios = []
+    for seed in range(30):
+        found = measure(shoot(PLAN, small_world, dim, seed=seed)).answers
+        ratios.append(np.vdot(found, clean) / np.vdot(clean, clean))
+    assert np.mean(ratios) == pytest.approx(1.0, abs=4e-3)
 
 
 def test_a_pattern_without_its_inverse_is_refused():

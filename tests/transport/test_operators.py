@@ -217,6 +217,26 @@ def test_unlit_camera_pixels_answer_through_f_alone(generator):
     np.testing.assert_allclose((transport @ light)[dark], parts.far[dark])
 
 
+@pytest.mark.parametrize("kind", [bool, np.uint8, np.int64, np.float32, np.float64])
+def test_a_mask_is_a_light_whatever_its_numbers(kind, generator):
+    transport = _transport(generator)
+    mask = generator.random(PROJECTOR) > 0.5
+    expected = transport @ mask.astype(np.float64)
+    np.testing.assert_allclose(transport @ mask.astype(kind), expected, atol=1e-5)
+    operator = transport.as_linear_operator(1)
+    np.testing.assert_allclose(
+        operator @ mask.ravel().astype(kind), expected[..., 1].ravel(), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_light_of_no_numbers_is_refused(value, generator):
+    light = np.ones(PROJECTOR)
+    light[2, 3] = value
+    with pytest.raises(InputError, match="no finite numbers"):
+        _transport(generator) @ light
+
+
 def test_single_precision_stays_single(generator):
     transport = _transport(generator)
     assert (transport @ np.ones(PROJECTOR, np.float32)).dtype == np.float32

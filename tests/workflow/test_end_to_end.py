@@ -75,6 +75,28 @@ def test_blocks_of_rows_change_next_to_nothing(tmp_path, world, monkeypatch):
     np.testing.assert_allclose(parts.noise, whole.noise, rtol=0.05)
 
 
+def test_a_dark_margin_is_no_fault(tmp_path, world, monkeypatch):
+    q = world.correspondence.copy()
+    q[:12] = np.nan
+    dark = replace(
+        world,
+        correspondence=q,
+        **{
+            name: np.concatenate([0 * getattr(world, name)[:12], getattr(world, name)[12:]])
+            for name in ("direct", "near", "far")
+        },
+    )
+    camera = SimulatedCamera(black_level=0.0, ambient=0.0, read_noise=0.0)
+    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(dark, camera))
+    monkeypatch.setattr(reconstruction, "HELD", 4 * len(PLAN.patterns) * 30 * 3 * 6)
+    transport, correspondence = reconstruct(capture)
+    np.testing.assert_array_equal(correspondence.lit, np.isfinite(q[..., 0]))
+    assert np.all(np.isfinite(transport.near))
+    light = nearfar.natural_picture(PROJECTOR, 1)
+    assert np.all((transport @ light)[:12] == 0)
+    assert snr(dark @ light, transport @ light) > 35
+
+
 def test_correspondence_can_be_given(tmp_path, world):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world))

@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.cli.options import Force, PlanFile, Quiet, keep_input
-from nearfar.cli.progress import counted, progress_bar, say, warn
+from nearfar.cli.progress import SATURATED, counted, progress_bar, say, warn
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
-
-# A share of saturated values above this is worth a warning.
-SATURATED = 1e-4
 
 NewCapture = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Capture to make.")]
 

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 # Seconds; a job that ends sooner shows no bar.
 PATIENCE = 1.0
 
+# A share of saturated values above this is worth a warning.
+SATURATED = 1e-4
+
 Report = Callable[[str, float], None]
 
 

@@ -3,13 +3,20 @@
 from enum import StrEnum
 from math import isfinite
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nearfar.cli.options import CapturePath, Force, Quiet, TransportPath, keep_input
-from nearfar.cli.progress import progress_bar, say
+from nearfar.cli.progress import SATURATED, progress_bar, say, warn
 from nearfar.errors import InputError
+
+if TYPE_CHECKING:
+    from nearfar.capture import Capture
+    from nearfar.transport.model import Transport
+
+# Pairs that sum to more or less than white and black by this share of white are worth a warning.
+NOT_LINEAR = 0.01
 
 
 class Method(StrEnum):
@@ -57,6 +64,7 @@ def reconstruct(
     with progress_bar("reconstructing", quiet=quiet) as report:
         transport, found = rebuild(opened, given, square=square, progress=report)
         save_transport(output, transport, force=force)
+    _warn_of_faults(opened, transport)
     say(
         f"transport of {transport.camera} camera pixels with {transport.channels} "
         f"channel{'s' if transport.channels > 1 else ''}, "
@@ -66,6 +74,22 @@ def reconstruct(
 
 
 COMPONENTS = ("direct", "near", "far")
+
+
+def _warn_of_faults(capture: "Capture", transport: "Transport") -> None:
+    """Say what the photos themselves tell of a rig that is not linear."""
+    excess = float(transport.provenance["excess_of_sums"])
+    if abs(excess) > NOT_LINEAR:
+        warn(
+            f"in {capture.path} a pattern and its inverse sum to {abs(excess):.1%} "
+            f"{'more' if excess > 0 else 'less'} than white and black: projector or camera is not "
+            f"linear, or the lamp drifts; relighting will be wrong by about as much."
+        )
+    if capture.saturated_share > SATURATED:
+        warn(
+            f"{capture.saturated_share:.2%} of the values in {capture.path} are saturated: their "
+            f"camera pixels will be wrong."
+        )
 
 
 def _gains(texts: list[str]) -> dict[str, float]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Floats, Integers, Size
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.photometry.measure import BATCH, Photos
@@ -21,10 +21,12 @@ from nearfar.plan import Plan, Stripe
 
 # A peak has no background closer than this to it.
 REACH = 2
+# Stripes away from the peak that are needed to tell its noise.
+FEWEST = 3
 # Confidence at which direct light is taken as seen: a false alarm of noise in a million.
 SURE = 1 - 1e-6
 # A second pixel shares the direct light only if it stands out by as many deviations.
-SHARED = 3.0
+SHARED = 4.0
 # Direct light under this share of a camera pixel's white is near-range light's own peak.
 LEAST_SHARE = 0.04
 # The two axes see the same direct light; they may differ by this factor.
@@ -128,6 +130,17 @@ def _marginal(photos: Photos, numbers: Sequence[int], rows: slice) -> tuple[Floa
     return white[:, None] - shown, white
 
 
+def _deviation(curvature: Floats, peak: Integers) -> Floats:
+    """Scatter of what is no peak, (C,): the noise as each pixel's own stripes show it."""
+    length = curvature.shape[1]
+    # A peak bends the curve as far as two reaches of the second difference.
+    away = np.abs(np.arange(length) - peak[:, None]) > REACH + 1
+    enough = away.sum(axis=1) >= FEWEST
+    kept = np.where(away | ~enough[:, None], curvature, np.nan)
+    spread = np.abs(kept - np.nanmedian(kept, axis=1)[:, None])
+    return np.asarray(1.4826 * np.nanmedian(spread, axis=1) + 1e-12)
+
+
 def _peak(taken: Floats, white: Floats) -> _Axis:
     pixels, length = taken.shape
     number = np.arange(pixels)
@@ -137,9 +150,7 @@ def _peak(taken: Floats, white: Floats) -> _Axis:
     right = np.where(place < length - REACH, place + REACH, np.maximum(place - REACH, 0))
     curvature = taken - 0.5 * (taken[:, left] + taken[:, right])
     peak = np.argmax(curvature, axis=1)
-    # Scatter of what is no peak: the noise as this pixel's own stripes show it.
-    spread = np.abs(curvature - np.median(curvature, axis=1)[:, None])
-    deviation = 1.4826 * np.median(spread, axis=1) + 1e-12
+    deviation = _deviation(curvature, peak)
     noise = deviation / np.sqrt(1.5)
 
     # Beyond the border stands what lies past the neighbour on the other side: no direct light.

@@ -27,8 +27,12 @@ from nearfar.transport.model import Transport
 ROUNDS = 60
 AGREED_NOISE = 0.02
 AGREED = 2e-7
+# Each round must move a camera pixel's leaks by this much less than the one before.
+SETTLING = 0.85
 # lambda of equation (10) before each window has its own, as a share of an entry's noise.
 FIRST = np.float32(0.75)
+# Where no measured pattern tells direct light from none, d fades out instead of growing noise.
+FAINT = 0.1
 # Camera pixels at once: keeps a block's windows near the processor.
 BLOCK = 512
 # Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
@@ -68,7 +72,7 @@ def estimate(
     matrices = build_matrices(measurements, window, far, dropped)
     where = footprint(correspondence, measurements.projector)
     centres = near.centre(correspondence, measurements.projector)
-    lit = np.isfinite(correspondence[..., 0]).ravel()
+    lit = np.isfinite(correspondence).all(axis=-1).ravel()
     number, channels = measurements.answers.shape[:2]
     direct = np.empty((number, channels), dtype=np.float32)
     windows = np.empty((number, channels, window**2), dtype=np.float32)
@@ -119,27 +123,53 @@ class _Estimate(NamedTuple):
     far: Floats
     unseen: Floats  # z of equation (10)
 
+    def copy(self) -> "_Estimate":
+        return _Estimate(*(values.copy() for values in self))
+
+    def only(self, pixels: Booleans) -> "_Estimate":
+        return _Estimate(*(values[pixels] for values in self))
+
+    def put(self, pixels: NDArray[np.int64], others: "_Estimate") -> None:
+        """Take over the estimates of others at some pixels."""
+        for values, new in zip(self, others, strict=True):
+            values[pixels] = new
+
 
 def _estimate_block(pixels: _Pixels, matrices: Matrices, rounds: int) -> _Estimate:
-    """Alternate near and far; each camera pixel stops when its own leaks have settled."""
+    """Alternate near and far; each camera pixel stops when its own leaks have settled.
+
+    Where a scene does not obey the model, or the near set reaches into the far band, the rounds
+    may not settle: a camera pixel whose leaks move no less than before keeps its best round.
+    """
     found = _round(pixels, None, _no_leaks(pixels), matrices)
     moving = np.arange(len(pixels.lit))
-    latest, leaks = found, _no_leaks(pixels)
+    latest, leaks = found.copy(), _no_leaks(pixels)
+    before = np.full(len(moving), np.inf)
     for _ in range(rounds - 1):
         previous, leaks = leaks, _leaks(latest.far, pixels, matrices)
+        moved = _moved(previous, leaks)
         limit = AGREED_NOISE * pixels.noise.mean(axis=1) + AGREED * pixels.light
-        going = np.zeros(len(moving), dtype=bool)
-        for old, new in zip(previous, leaks, strict=True):
-            if new.size:
-                going |= np.sqrt(np.mean((new - old) ** 2, axis=(1, 2))) > limit
+        settling = moved <= SETTLING * before
+        # The latest round of a pixel that still settles is its best so far.
+        found.put(moving[settling], latest.only(settling))
+        going = settling & (moved > limit)
         if not going.any():
             break
-        moving, pixels = moving[going], pixels.only(going)
+        moving, pixels, before = moving[going], pixels.only(going), moved[going]
         leaks = _Leaks(*(leak[going] for leak in leaks))
         latest = _round(pixels, latest.unseen[going], leaks, matrices)
-        for values, new in zip(found, latest, strict=True):
-            values[moving] = new
+    else:
+        found.put(moving, latest)
     return found
+
+
+def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
+    """Root mean square by which each camera pixel's leaks changed, (n,)."""
+    moved = np.zeros(len(leaks.near))
+    for old, new in zip(previous, leaks, strict=True):
+        if new.size:
+            moved = np.maximum(moved, np.sqrt(np.mean((new - old) ** 2, axis=(1, 2))))
+    return moved
 
 
 class _Leaks(NamedTuple):
@@ -242,7 +272,7 @@ def _direct(
     total = checkerboard[..., 0] * answer + faded[:, None] * np.einsum(
         "ncr,nr->nc", near_answers[..., high], high_answer
     )
-    d = total / np.maximum(energy, 1e-6)[:, None] * pixels.lit[:, None]
+    d = total / np.maximum(energy, FAINT)[:, None] * pixels.lit[:, None]
     return np.asarray(d, dtype=np.float32)
 
 

@@ -26,6 +26,8 @@ from nearfar.transport.far import real_basis
 
 # Photos read at once.
 BATCH = 16
+# Pairs that sum to more or less than white + black by this share of white are not linear.
+NOT_LINEAR = 0.005
 
 
 class Photos(Protocol):
@@ -115,7 +117,7 @@ def measure(
     Raises
     ------
     InputError
-        If white is nowhere brighter than black.
+        If a pattern has no inverse.
     """
     plan = photos.plan
     rows = slice(0, photos.camera.height) if rows is None else rows
@@ -150,19 +152,19 @@ def measure(
     def variance(photo: Floats) -> Floats:
         return np.stack([m.variance(photo[:, i]) for i, m in enumerate(models)], axis=1)
 
+    excess = _excess_of_sums(pair_mean, white, black)
+    # Sums that do not add up tell of a projector or camera that is not linear, not of white.
+    sums = [(pair_mean, 2.0, 1.0, pair_variance / len(pairs))]
+    if abs(excess) > NOT_LINEAR:
+        sums = []
     dark, light = _two_levels(
         [
-            (pair_mean, 2.0, 1.0, pair_variance / len(pairs)),
             (white, 1.0, 1.0, variance(white)),
             (black, 1.0, 0.0, variance(black)),
+            *sums,
             *_stripe_references(photos, rows, shape, variance),
         ]
     )
-    if not np.any(light > 0):
-        raise InputError(
-            "white is nowhere brighter than black in this capture: the photos show no light of "
-            "the projector, or stand in another order than the plan's."
-        )
     left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
     answers = np.zeros((*shape, basis.count), dtype=np.float32)
     repeats = np.zeros(basis.count, dtype=np.float32)
@@ -179,7 +181,14 @@ def measure(
         noise=np.sqrt(pair_variance * left).astype(np.float32),
         black=dark.astype(np.float32),
         shown_error=_shown_error(plan, pairs, place, basis.patterns),
+        excess_of_sums=excess,
     )
+
+
+def _excess_of_sums(pair_mean: Floats, white: Floats, black: Floats) -> float:
+    """Tell by what share of white the pairs sum to more than white + black: 0 if all is linear."""
+    light = (white - black).sum()
+    return float((pair_mean - white - black).sum() / light) if light > 0 else 0.0
 
 
 def _reference_photos(
@@ -211,10 +220,13 @@ def _take_out_strays(
     """
     gain = np.array([model.gain for model in models], dtype=np.float32)
     scale = (gain / total).astype(np.float32)
+    shrinkage = np.clip(gain * scale, 0.0, 0.5)
     left = np.zeros(total.shape)
     for difference, stray in zip(differences, strays, strict=True):
         rho = np.clip(scale * difference, -1.0, 1.0)
+        # rho is taken from the noisy difference, which shrinks it by gain * scale on average.
         np.subtract(difference, rho * stray, out=difference)
+        np.divide(difference, 1.0 - shrinkage, out=difference)
         left += 1.0 - rho.astype(np.float64) ** 2
     return left / len(differences)
 

@@ -30,6 +30,9 @@ class Measurements:
         The photo under black.
     shown_error : ndarray, shape (R, P), float32
         What was shown (8 bits) less the ideal cosine or sine; 0 in theory.
+    excess_of_sums : float
+        By what share of white inverse pairs sum to more than white + black; 0 where projector
+        and camera are linear.
     """
 
     camera: Size
@@ -38,6 +41,7 @@ class Measurements:
     noise: Floats
     black: Floats
     shown_error: Floats
+    excess_of_sums: float = 0.0
 
     @property
     def projector(self) -> Size:

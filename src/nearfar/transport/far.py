@@ -75,12 +75,14 @@ class RealBasis:
 
     def analyse(self, light: Floats) -> Floats:
         """Return weights times the light's overlap with each pattern: (..., P) to (..., M)."""
-        return np.asarray((light @ self.patterns.T.astype(light.dtype)) * self.weights)
+        kind = np.result_type(light.dtype, np.float32)
+        return np.asarray((light.astype(kind) @ self.patterns.T.astype(kind)) * self.weights)
 
     def synthesise(self, coefficients: Floats) -> Floats:
         """Adjoint of `analyse`, and the rows of F: (..., M) to (..., P)."""
-        weighted = coefficients * self.weights.astype(coefficients.dtype)
-        return np.asarray(weighted @ self.patterns.astype(coefficients.dtype, copy=False))
+        kind = np.result_type(coefficients.dtype, np.float32)
+        weighted = coefficients * self.weights.astype(kind)
+        return np.asarray(weighted @ self.patterns.astype(kind, copy=False))
 
 
 def real_basis(frequencies: Sequence[Frequency], projector: Size) -> RealBasis:

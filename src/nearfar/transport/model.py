@@ -215,7 +215,7 @@ class Transport:
             raise InputError(f"channel {channel} is not one of this transport's {self.channels}.")
 
         def matvec(light: Floats) -> Floats:
-            lights = np.reshape(light, (1, -1))
+            lights = np.reshape(light, (1, -1)).astype(np.float64)
             parts = (
                 self._direct_pictures(lights, (channel,)),
                 self._near_pictures(lights, (channel,)),
@@ -233,6 +233,10 @@ class Transport:
 
     def _lights(self, light: Floats) -> Floats:
         light = np.asarray(light)
+        if light.dtype.kind in "biu":
+            light = light.astype(np.float32)
+        if light.dtype.kind != "f" or not np.isfinite(light).all():
+            raise InputError("the light holds values that are no finite numbers: mend it first.")
         if light.shape[:2] != self.projector or light.ndim not in (2, 3):
             raise InputError(
                 f"the light is {'x'.join(map(str, light.shape))}, this transport's projector is "

@@ -92,18 +92,25 @@ def reconstruct(
             f"{capture.path} shows no direct light at any camera pixel: check that the camera "
             f"sees the projector's light, or give --correspondence Q.npy."
         )
+    excesses: list[float] = []
+
+    def estimated(rows: slice) -> Transport:
+        measurements = measure(capture, rows)
+        excesses.append(measurements.excess_of_sums)
+        return _estimate(capture.plan, measurements, correspondence.pixels[rows])
+
     if square:
         parts = [measure(capture, rows) for rows in _row_blocks(capture, report, "measuring")]
         measurements, pixels = onto_projector(parts, correspondence)
+        excesses = [part.excess_of_sums for part in parts]
         transport = _estimate(capture.plan, measurements, pixels)
     else:
         transport = _stacked(
-            [
-                _estimate(capture.plan, measure(capture, rows), correspondence.pixels[rows])
-                for rows in _row_blocks(capture, report, "reconstructing")
-            ]
+            [estimated(rows) for rows in _row_blocks(capture, report, "reconstructing")]
         )
-    return replace(transport, provenance=_provenance(capture, square=square)), correspondence
+    provenance = _provenance(capture, square=square)
+    provenance["excess_of_sums"] = max(excesses, key=abs)
+    return replace(transport, provenance=provenance), correspondence
 
 
 def _by_stripes(capture: Capture, report: Progress) -> Correspondence:

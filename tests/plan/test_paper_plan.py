@@ -92,6 +92,21 @@ def test_an_even_window_shoots_the_checkerboard_once():
     assert paper_plan(Size(24, 24), 8, Size(3, 3), offset="none").counts["near"] == 64 - 1 - 1
 
 
+@pytest.mark.parametrize(("projector", "window", "far"), SIZES)
+def test_with_references_each_pattern_is_shot_once(projector, window, far):
+    pairs = paper_plan(projector, window, far, correspondence="none")
+    plan = paper_plan(projector, window, far, offset="reference", correspondence="none")
+    # Half the photos, and black, which is white's inverse.
+    assert plan.transport_photos == pairs.transport_photos // 2
+    assert plan.counts["reference"] == 1
+    drawn = np.stack([plan.draw(i) for i in range(len(plan.patterns))])
+    assert np.all(drawn[0] == 0)
+    assert sum(np.all(shown == 255) for shown in drawn) == 1
+    wanted = {shown.tobytes() for shown in map(pairs.draw, range(0, len(pairs.patterns), 2))}
+    assert {shown.tobytes() for shown in drawn[1:]} == wanted
+    assert parse_plan(plan.to_json()) == plan
+
+
 def test_the_theory_counts_a_complex_pattern_per_frequency():
     plan = paper_plan(Size(20, 20), 7, Size(4, 6), offset="none")
     assert plan.counts["far"] == 24

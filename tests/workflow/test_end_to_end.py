@@ -141,6 +141,12 @@ def test_a_plan_that_is_not_the_papers_is_refused(tmp_path, world):
         reconstruct(capture)
 
 
+def test_measurements_want_inverse_pairs(tmp_path, world):
+    plan = paper_plan(PROJECTOR, 7, Size(3, 3), offset="reference")
+    with pytest.raises(InputError, match="--offset inverse"):
+        reconstruct(acquire(plan, tmp_path / "c.zarr", _rig(world)))
+
+
 def test_a_rig_of_another_size_is_refused(tmp_path, world):
     with pytest.raises(InputError, match="--projector 24x30"):
         acquire(paper_plan(Size(30, 24), 7, Size(3, 3)), tmp_path / "c.zarr", _rig(world))

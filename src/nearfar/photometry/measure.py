@@ -84,8 +84,8 @@ def find_pairs(plan: Plan) -> list[Pair]:
         partners = waiting.get((frequency, kind, purpose, not inverse), [])
         if len(partners) != len(numbers):
             raise InputError(
-                f"the plan shows pattern {numbers[0]} without its inverse: make the plan again "
-                f"with 'nearfar plan'."
+                f"the plan shows pattern {numbers[0]} without its inverse, and measurements are "
+                f"made of inverse pairs: plan with --offset inverse."
             )
         if not inverse:
             pairs += [

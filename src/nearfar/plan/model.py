@@ -101,8 +101,8 @@ class Plan(_Frozen):
         W of the near-range window.
     far, dropped : Size
         Far band, and the block of lowest near frequencies that are not shot.
-    offset : {"inverse", "none"}
-        Inverse pairs, or none (complex patterns, for simulation).
+    offset : {"inverse", "reference", "none"}
+        Inverse pairs, one white and one black for all, or none (complex patterns, for simulation).
     correspondence : {"stripes", "none"}
     patterns : tuple of Sinusoid, Exponential or Stripe
     """
@@ -113,7 +113,7 @@ class Plan(_Frozen):
     window: int = Field(ge=1)
     far: SizeField
     dropped: SizeField
-    offset: Literal["inverse", "none"]
+    offset: Literal["inverse", "reference", "none"]
     correspondence: Literal["stripes", "none"]
     patterns: tuple[Pattern, ...]
 

@@ -1,12 +1,13 @@
 """The paper's plan: checkerboard, uniform near set, low far set (sections 4.1 to 4.3, 5.1)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Literal
 
 from nearfar.arrays import Size
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
+    DC,
     Frequency,
     default_dropped,
     far_frequencies,
@@ -18,7 +19,7 @@ from nearfar.plan.model import Exponential, Plan, Purpose, Sinusoid, Stripe
 # No projector has a longer side.
 LARGEST = 16384
 
-Offset = Literal["inverse", "none"]
+Offset = Literal["inverse", "reference", "none"]
 Correspondence = Literal["stripes", "none"]
 
 
@@ -44,8 +45,9 @@ def paper_plan(
     dropped : Size, optional
         Block of lowest near frequencies to leave out, odd by odd. By default those with both
         |k| <= k_far, at least DC.
-    offset : {"inverse", "none"}
-        Each pattern with its inverse, or the theory's complex patterns (simulation only).
+    offset : {"inverse", "reference", "none"}
+        Each pattern with its inverse; each once, with one white and one black to take the offset
+        out; or the theory's complex patterns (simulation only).
     correspondence : {"stripes", "none"}
 
     Returns
@@ -81,8 +83,11 @@ def paper_plan(
             f"--drop {dropped} is not a block of near frequencies around DC: both sides must be "
             f"odd, from 1 to W = {window}."
         )
-    sinusoids = _exponentials if offset == "none" else _inverse_pairs
+    sinusoids = _SHAPES[offset]
+    black = Sinusoid(kind="cosine", frequency=DC, inverse=True, purpose="reference")
     patterns = (
+        # White is the DC frequency's own photo.
+        *((black,) if offset == "reference" else ()),
         *sinusoids([CHECKERBOARD], "direct"),
         *sinusoids(far_frequencies(far, projector), "far"),
         *sinusoids(near_frequencies(window, dropped), "near"),
@@ -110,6 +115,19 @@ def _inverse_pairs(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterat
         for kind in kinds[:1] if frequency.is_own_negative else kinds:
             for inverse in (False, True):
                 yield Sinusoid(kind=kind, frequency=frequency, inverse=inverse, purpose=purpose)
+
+
+def _once(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
+    return (shown for shown in _inverse_pairs(frequencies, purpose) if not shown.inverse)
+
+
+_SHAPES: dict[
+    Offset, Callable[[Iterable[Frequency], Purpose], Iterator[Exponential | Sinusoid]]
+] = {
+    "inverse": _inverse_pairs,
+    "reference": _once,
+    "none": _exponentials,
+}
 
 
 def stripes(projector: Size) -> tuple[Stripe, ...]:

@@ -154,18 +154,19 @@ def _bouncing(projector):
 
 
 @pytest.mark.parametrize(
-    ("window", "far", "dropped"),
+    ("window", "far", "dropped", "cost"),
     [
         # The lowest near frequency lies at the edge of the far band, or inside it.
-        (11, Size(5, 5), None),
-        (13, Size(5, 5), None),
-        (9, Size(7, 7), Size(1, 1)),
-        (7, Size(9, 9), Size(1, 1)),
-        (9, Size(5, 5), None),
+        (11, Size(5, 5), None, 3),
+        # 3.3 dB are lost here with noise: a shortfall, see docs/decisions/0004.
+        (13, Size(5, 5), None, 5),
+        (9, Size(7, 7), Size(1, 1), 3),
+        (7, Size(9, 9), Size(1, 1), 3),
+        (9, Size(5, 5), None, 3),
     ],
 )
 @pytest.mark.parametrize("noise", [0.0, 0.003])
-def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropped, noise):
+def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropped, cost, noise):
     projector = Size(24, 24)
     dropped = dropped or default_dropped(window, far, projector)
     rows = _bouncing(projector)
@@ -189,7 +190,7 @@ def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropp
     ]
     assert found[0] > 25
     # The leak of an f that is not band-limited may cost decibels; it must not cost the picture.
-    assert found[1] > found[0] - 5
+    assert found[1] > found[0] - cost
 
 
 def test_direct_light_fades_where_nothing_tells_it():

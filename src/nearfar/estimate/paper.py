@@ -27,8 +27,8 @@ from nearfar.transport.model import Transport
 ROUNDS = 60
 AGREED_NOISE = 0.02
 AGREED = 2e-7
-# Each round must move a camera pixel's leaks by this much less than the one before.
-SETTLING = 0.85
+# Each round must move a camera pixel's leaks by at most this share of what the last one did.
+SETTLING = 0.8
 # lambda of equation (10) before each window has its own, as a share of an entry's noise.
 FIRST = np.float32(0.75)
 # Where no measured pattern tells direct light from none, d fades out instead of growing noise.

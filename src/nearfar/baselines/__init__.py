@@ -1,0 +1,1 @@
+"""Rival and reference ways to acquire transport, to compare against on equal terms."""

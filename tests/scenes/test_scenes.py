@@ -14,7 +14,7 @@ from nearfar.scenes.form_factors import exchange
 from nearfar.scenes.library import describe
 from nearfar.scenes.optics import pinhole, sub_rays
 from nearfar.scenes.patches import albedo, build_patches, with_medium
-from nearfar.scenes.radiosity import reflection_factor, resolvent_less_one
+from nearfar.scenes.radiosity import bounced, reflection_factor
 from nearfar.scenes.rays import surface
 from nearfar.scenes.render import body_of
 
@@ -163,6 +163,5 @@ def test_transport_is_the_sum_of_all_bounces():
         known += bounce
 
     factor = reflection_factor(values, patches, candle, inside)
-    rest = resolvent_less_one(form, factor)
-    far = factor @ (rest @ (factor.T @ patches.flux.astype(np.float32)))
+    far = bounced(form, factor) @ patches.flux.astype(np.float32)
     np.testing.assert_allclose(far, known, rtol=1e-4, atol=1e-5 * known.max())

@@ -10,6 +10,7 @@ import numpy as np
 
 from nearfar.arrays import Floats, blocks
 from nearfar.scenes.geometry import Medium
+from nearfar.scenes.parallel import side_by_side
 from nearfar.scenes.patches import Patches
 
 ROWS = 16
@@ -70,7 +71,10 @@ def diffuse_profile(source: Dipole, square: Floats) -> Floats:
     total = np.zeros_like(square)
     for depth in (source.real, source.virtual):
         far = np.sqrt(square + depth**2)
-        total += depth * (source.attenuation * far + 1) / far**3 * np.exp(-source.attenuation * far)
+        # Products: a power of 3 is many times slower.
+        cube = far * far * far
+        far *= -source.attenuation
+        total += depth * (1 - far) / cube * np.exp(far)
     return source.reduced_albedo / (4 * np.pi) * total
 
 
@@ -100,7 +104,8 @@ def subsurface(patches: Patches, source: Dipole) -> Floats:
     bounds = np.append(starts, len(owner))
     own = diffuse_reflectance(source, np.sqrt(area / np.pi)) / area
     result = np.zeros((len(patches), len(patches)))
-    for rows in blocks(len(patches), ROWS):
+
+    def fill(rows: slice) -> None:
         # Only pairs j >= the block's first row; the rest by symmetry.
         begin, end = bounds[rows.start], bounds[rows.stop]
         square = np.zeros((end - begin, len(owner) - begin), dtype=np.float32)
@@ -113,4 +118,6 @@ def subsurface(patches: Patches, source: Dipole) -> Floats:
         kernel = np.add.reduceat(kernel, starts[rows.start :] - begin, axis=1)
         kernel *= weight[begin:end, None]
         result[rows, rows.start :] = np.add.reduceat(kernel, starts[rows] - begin, axis=0)
+
+    side_by_side(fill, blocks(len(patches), ROWS))
     return np.triu(result) + np.triu(result, 1).T

@@ -10,6 +10,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.scenes.geometry import Part
+from nearfar.scenes.parallel import side_by_side
 from nearfar.scenes.patches import Patches
 from nearfar.scenes.rays import OFFSET, Surface, blocked
 
@@ -44,7 +45,8 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
     result = np.zeros((count, count), dtype=np.float32)
     flat = np.array([not part.occludes for part in parts])[patches.part]
     boxes = occluder_boxes(parts)
-    for rows in blocks(count, ROWS):
+
+    def fill(rows: slice) -> None:
         # Only pairs j >= the block's first row; the rest by symmetry.
         columns = slice(rows.start, count)
         block, square = point_exchange(
@@ -69,6 +71,8 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
         block[:, : len(block)] = np.triu(inner) + np.triu(inner, 1).T
         result[rows, columns] = block
         result[columns, rows] = block.T
+
+    side_by_side(fill, blocks(count, ROWS))
     return _at_most_all(result, patches.area)
 
 

@@ -16,6 +16,7 @@ L (K - I) L^T phi is all the rest, far-range.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -28,26 +29,79 @@ from nearfar.scenes.patches import Patches
 ROWS = 1024
 
 
-def resolvent_less_one(form: Floats, factor: sparse.csr_array) -> Floats:
-    """K - I of the module's equations.
+class ReflectionFactor(NamedTuple):
+    """L with L L^T = R / A, in one channel: a diagonal, but for a translucent body.
+
+    Attributes
+    ----------
+    scale : ndarray, shape (n,), float32
+        The diagonal; 0 at the body's patches.
+    places : ndarray of int, shape (m,)
+        The body's patches.
+    block : ndarray, shape (m, m), float32
+        Lower triangle between them.
+    """
+
+    scale: Floats
+    places: Integers
+    block: Floats
+
+
+def reflection_factor(
+    albedo: Floats, patches: Patches, translucent: Integers, inside: Floats | None
+) -> ReflectionFactor:
+    """Factor R / A.
+
+    Parameters
+    ----------
+    albedo : ndarray, shape (n,)
+    patches : Patches
+    translucent : ndarray of int, shape (m,)
+        The patches of the translucent body.
+    inside : ndarray, shape (m, m) or None
+        Its dipole, per square metre.
+    """
+    scale = np.sqrt(albedo / patches.area).astype(np.float32)
+    if inside is None:
+        nothing = np.empty(0, dtype=np.int64)
+        return ReflectionFactor(scale, nothing, np.empty((0, 0), dtype=np.float32))
+    scale[translucent] = 0
+    block = linalg.cholesky(np.diag((albedo / patches.area)[translucent]) + inside, lower=True)
+    return ReflectionFactor(scale, translucent, np.tril(block).astype(np.float32))
+
+
+def _between(factor: ReflectionFactor, block: Floats, matrix: Floats) -> None:
+    """Turn a matrix into X matrix X^T in place, X the factor with `block` for its own."""
+    columns = matrix[:, factor.places] @ block.T
+    matrix *= factor.scale
+    matrix[:, factor.places] = columns
+    rows = block @ matrix[factor.places]
+    matrix *= factor.scale[:, None]
+    matrix[factor.places] = rows
+
+
+def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
+    """L (K - I) L^T of the module's equations: from the light that falls on patches to far-range.
 
     Parameters
     ----------
     form : ndarray, shape (n, n), float32
         G, symmetric.
-    factor : scipy.sparse.csr_array, shape (n, n)
+    factor : ReflectionFactor
         L.
 
     Returns
     -------
     ndarray, shape (n, n), float32, symmetric
+
+    Raises
+    ------
+    NearfarError
+        If more light is reflected than falls.
     """
-    turned = sparse.csr_array(factor.T)
-    matrix = np.empty_like(form)
-    for rows in blocks(len(form), ROWS):
-        # In strips: a transposed copy of the whole would take longer than the factorisation.
-        strip = np.ascontiguousarray((turned[rows] @ form).T)
-        matrix[rows] = -(turned @ strip).T
+    matrix = form.copy()
+    _between(factor, factor.block.T, matrix)
+    np.negative(matrix, out=matrix)
     diagonal = np.einsum("ii->i", matrix)
     diagonal += 1
     # The transpose of a symmetric row-major array is what LAPACK wants, without a copy.
@@ -63,36 +117,8 @@ def resolvent_less_one(form: Floats, factor: sparse.csr_array) -> Floats:
         inverse[rows.stop :, rows] = inverse[rows, rows.stop :].T
     diagonal = np.einsum("ii->i", inverse)
     diagonal -= 1
+    _between(factor, factor.block, inverse)
     return np.asarray(inverse)
-
-
-def reflection_factor(
-    albedo: Floats, patches: Patches, translucent: Integers, inside: Floats | None
-) -> sparse.csr_array:
-    """L with L L^T = R / A, in one channel.
-
-    Parameters
-    ----------
-    albedo : ndarray, shape (n,)
-    patches : Patches
-    translucent : ndarray of int, shape (m,)
-        The patches of the translucent body.
-    inside : ndarray, shape (m, m) or None
-        Its dipole, per square metre.
-
-    Returns
-    -------
-    scipy.sparse.csr_array, shape (n, n), float32
-    """
-    values = np.sqrt(albedo / patches.area)
-    if inside is None:
-        return sparse.csr_array(sparse.diags_array(values.astype(np.float32)))
-    values[translucent] = 0
-    block = linalg.cholesky(np.diag((albedo / patches.area)[translucent]) + inside, lower=True)
-    lower = sparse.coo_array(np.tril(block))
-    i, j = translucent[lower.coords[0]], translucent[lower.coords[1]]
-    dense = sparse.csr_array((lower.data, (i, j)), shape=(len(patches),) * 2)
-    return sparse.csr_array((sparse.diags_array(values) + dense).astype(np.float32))
 
 
 def components(
@@ -133,6 +159,7 @@ def components(
         (patches.flux[lit].astype(np.float32), (lit, patches.pixel[lit])),
         shape=(len(patches), projector_pixels),
     )
+    fall = sparse.csr_array(flux.T)
     see = sparse.csr_array(gathered.radiosity.astype(np.float32))
     channels = albedo.shape[1]
     camera_pixels = see.shape[0]
@@ -154,12 +181,10 @@ def components(
         factor = reflection_factor(
             albedo[:, channel], patches, translucent, inside[channel] if inside else None
         )
-        rest = resolvent_less_one(form, factor)
-        # L (K - I) L^T phi, read by the camera; K is symmetric.
-        right, left = sparse.csr_array(flux.T @ factor), sparse.csr_array(see @ factor)
+        rest = bounced(form, factor)
         for rows in blocks(camera_pixels, ROWS):
-            strip = np.ascontiguousarray((left[rows] @ rest).T)
-            far[channel, rows] = (right @ strip).T
+            strip = np.ascontiguousarray((see[rows] @ rest).T)
+            far[channel, rows] = (fall @ strip).T
         del rest
         progress((channel + 1) / channels)
     return direct, near, far

@@ -74,6 +74,9 @@ def surface(parts: Sequence[Part], indices: Sequence[int]) -> Surface:
             np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3),
         )
 
+        # The first query builds the scene's tree: now, before several threads ask at once.
+        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), output=1)
+
     def closest(origin: Floats, direction: Floats) -> dict[str, Any]:
         found: dict[str, Any] = scene.run(_single(origin), _single(direction), output=1)
         return found

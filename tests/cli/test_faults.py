@@ -13,6 +13,7 @@ from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfa
 
 Untouched = Callable[[], bool]
 RENDER = ("render", "corner", "--projector", "16x20", "--camera", "8x9")
+SEPARATE = ("separate", "--projector", "16x20")
 
 
 def check_refused(untouched: Untouched, arguments: tuple[object, ...], *names: object) -> str:
@@ -280,8 +281,16 @@ OUTPUTS = {
     "convert": lambda finished, out: ("convert", finished.transport, out),
     "render": lambda finished, out: (*RENDER, out),
     "demo": lambda finished, out: ("demo", out),
+    "separate": lambda finished, out: (*SEPARATE, out, "--rig", finished.truth),
 }
-ENDINGS = {"plan": ".json", "relight": ".npy", "convert": ".npy", "export": "", "demo": ""}
+ENDINGS = {
+    "plan": ".json",
+    "relight": ".npy",
+    "convert": ".npy",
+    "export": "",
+    "demo": "",
+    "separate": "",
+}
 
 
 @pytest.mark.parametrize("command", OUTPUTS)
@@ -342,6 +351,7 @@ def test_a_scene_that_is_not_there(untouched: Untouched, tmp_path: Path):
         ("acquire", "truth"),
         ("import", "photos"),
         ("import", "plan"),
+        ("separate", "truth"),
     ],
 )
 def test_force_costs_no_input(
@@ -377,6 +387,17 @@ READERS = {
     "evaluate photos": lambda job, path, out: ("evaluate", job.transport, "--photos", path),
     "convert": lambda job, path, out: ("convert", path, f"{out}.npy"),
     "info": lambda job, path, out: ("info", path),
+    "separate a rig": lambda job, path, out: (*SEPARATE, out, "--rig", path),
+    "separate photos": lambda job, path, out: ("separate", out, "--photos", path),
+    "separate a dark photo": lambda job, path, out: (
+        *("separate", out, "--photos", job.photos, "--pattern", "any", "--ambient", path),
+    ),
+    "separate truth": lambda job, path, out: (
+        *(*SEPARATE, out, "--rig", job.truth, "--truth", path),
+    ),
+    "separate transport": lambda job, path, out: (
+        *(*SEPARATE, out, "--rig", job.truth, "--transport", path),
+    ),
 }
 
 

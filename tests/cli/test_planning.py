@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nearfar.plan import read_plan
-from tests.cli.conftest import PLAN, check_done, run_nearfar
+from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfar
 
 
 @pytest.mark.parametrize(
@@ -96,3 +96,14 @@ def test_pairs_of_exported_patterns_sum_to_white(finished):
     for pattern, inverse in zip(shown[::2], shown[1::2], strict=True):
         assert (pattern.astype(int) + inverse == 255).all()
     assert len({pattern.tobytes() for pattern in shown}) == 68
+
+
+def test_pictures_without_a_plan_are_not_an_export(finished: Job, tmp_path: Path):
+    mine = tmp_path / "photos"
+    mine.mkdir()
+    (mine / "pattern-1.png").write_bytes(b"a photo of wallpaper")
+    check_sentence(run_nearfar("export", finished.plan, mine, "--force"), mine)
+    assert [path.name for path in mine.iterdir()] == ["pattern-1.png"]
+    (mine / "pattern-1.png").unlink()
+    check_done(run_nearfar("export", finished.plan, mine, "--force"))
+    check_done(run_nearfar("export", finished.plan, mine, "--force"))

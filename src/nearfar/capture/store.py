@@ -225,7 +225,7 @@ def write_capture(
         called = [f"{photo} ({name})" for photo, name in zip(called, names, strict=True)]
     with new_output(path, force=force) as partial:
         remaining = iter(photos)
-        first = _as_photo(next(remaining, None), called[0])
+        first = as_photo(next(remaining, None), called[0])
         scale = full_scale_of(first.dtype) if full_scale is None else float(full_scale)
         group = create_durable_store(
             partial,
@@ -243,7 +243,7 @@ def write_capture(
         times, saturated, means = np.zeros(count), np.zeros(count), np.full(count, np.nan)
         written, all_equal, white_black = 0, True, white_and_black(plan)
         for photo in _with_first(first, islice(remaining, count - 1)):
-            _check_photo(photo, first, scale, called[written])
+            check_photo(photo, first, scale, called[written])
             array[written] = photo
             times[written] = time.time()
             saturated[written] = np.mean(photo >= scale)
@@ -271,7 +271,14 @@ def _with_first(first: NDArray[Any], others: Iterable[NDArray[Any]]) -> Iterable
     yield from (np.atleast_3d(photo) for photo in others)
 
 
-def _as_photo(photo: NDArray[Any] | None, name: str) -> NDArray[Any]:
+def as_photo(photo: NDArray[Any] | None, name: str) -> NDArray[Any]:
+    """Bring a photo to (Cy, Cx, channels).
+
+    Raises
+    ------
+    InputError
+        If there is none, or its kind or shape is not a photo's.
+    """
     if photo is None:
         raise InputError("there are no photos: give one for each pattern of the plan.")
     if photo.dtype not in DTYPES or photo.ndim not in {2, 3} or photo.size == 0:
@@ -288,7 +295,13 @@ def _describe(photo: NDArray[Any]) -> str:
     return f"{Size(height, width)} with {channels} channel{plural} of {photo.dtype}"
 
 
-def _check_photo(photo: NDArray[Any], first: NDArray[Any], scale: float, name: str) -> None:
+def check_photo(photo: NDArray[Any], first: NDArray[Any], scale: float, name: str) -> None:
+    """Refuse a photo that is not like the first, or is beyond its full scale.
+
+    Raises
+    ------
+    InputError
+    """
     if photo.shape != first.shape or photo.dtype != first.dtype:
         raise InputError(
             f"{name} is {_describe(photo)}, but the first photo is {_describe(first)}: "

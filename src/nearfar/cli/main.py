@@ -14,7 +14,15 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from nearfar.cli import acquiring, demonstration, informing, looking, planning, transports
+from nearfar.cli import (
+    acquiring,
+    demonstration,
+    informing,
+    looking,
+    planning,
+    separating,
+    transports,
+)
 from nearfar.errors import NearfarError
 
 app = typer.Typer(
@@ -38,6 +46,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "render": looking.render,
     "info": informing.info,
     "convert": transports.convert,
+    "separate": separating.separate,
 }
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -61,7 +61,7 @@ def export_patterns(
         As `nearfar.files.new_output`.
     """
     plan.require_real("export")
-    shown = _fit(plan.projector, scale, native)
+    shown = fit_frame(plan.projector, scale, native)
     with new_output(folder, force=force, replaceable=_is_export) as partial:
         partial.mkdir()
         for number in range(len(plan.patterns)):
@@ -73,7 +73,14 @@ def export_patterns(
     return shown
 
 
-def _fit(projector: Size, scale: int | None, native: Size | None) -> Shown:
+def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
+    """Return the frame and scale that show a pattern grid; see `export_patterns`.
+
+    Raises
+    ------
+    InputError
+        If the pattern does not fit on `native`.
+    """
     if native is None:
         scale = scale or 1
         return Shown(Size(projector.height * scale, projector.width * scale), scale)
@@ -98,8 +105,13 @@ def draw_frame(pattern: NDArray[np.uint8], shown: Shown) -> NDArray[np.uint8]:
 
 
 def _is_export(folder: Path) -> bool:
-    """Tell whether a folder holds an export and nothing else."""
-    return all(
-        entry.name == PLAN_NAME or (entry.name.startswith("pattern-") and entry.suffix == ".png")
-        for entry in folder.iterdir()
+    """Tell whether a folder holds an export and nothing else, or nothing at all."""
+    names = [entry.name for entry in folder.iterdir()]
+    # Pictures alone may be someone's own.
+    return not names or (
+        PLAN_NAME in names
+        and all(
+            name == PLAN_NAME or (name.startswith("pattern-") and name.endswith(".png"))
+            for name in names
+        )
     )

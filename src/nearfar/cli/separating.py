@@ -1,0 +1,211 @@
+"""``nearfar separate``."""
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nearfar.arrays import Size
+from nearfar.cli import separation_steps as steps
+from nearfar.cli.options import AsJson, Force, Quiet, keep_input, size
+from nearfar.cli.progress import progress_bar, say
+
+if TYPE_CHECKING:
+    from nearfar.baselines.separation_methods import Method
+
+
+class Pattern(StrEnum):
+    """What is projected."""
+
+    CHECKERBOARD = "checkerboard"
+    SINUSOID = "sinusoid"
+    ANY = "any"
+
+
+def separate(
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to make.")],
+    rig: Annotated[
+        str | None,
+        typer.Option(
+            help="Shoot on this rig: scene (cornell, cornell-aside, wedge, corner), stored "
+            "transport (.npy, .npz, Zarr), or RIG.toml.",
+            metavar="RIG",
+        ),
+    ] = None,
+    photos: Annotated[
+        Path | None,
+        typer.Option(
+            help="Separate your own photos, one per pattern in natural order of their names; one "
+            "more, the last, may be under black.",
+            metavar="DIR",
+        ),
+    ] = None,
+    export: Annotated[
+        bool,
+        typer.Option("--export", help="Write the patterns, and a last one black, to project."),
+    ] = False,
+    projector: Annotated[
+        Size | None,
+        typer.Option(
+            parser=size, metavar="HxW", help="Pattern grid; a scene's own if left out with --rig."
+        ),
+    ] = None,
+    pattern: Annotated[
+        Pattern,
+        typer.Option(
+            help="Shifted checkerboards, which a projector that is not linear shows as well; "
+            "shifted sinusoids; any half-lit fine patterns, known by their photos only."
+        ),
+    ] = Pattern.CHECKERBOARD,
+    side: Annotated[
+        int | None,
+        typer.Option(
+            help="Side of a checkerboard's square, pixels; 2 if left out. 1 is better where each "
+            "camera pixel sees one projector pixel, and useless elsewhere.",
+            metavar="N",
+        ),
+    ] = None,
+    step: Annotated[
+        int | None,
+        typer.Option(help="Shift of the checkerboard; half a square if left out.", metavar="N"),
+    ] = None,
+    period: Annotated[
+        int | None,
+        typer.Option(help="Period of the sinusoid, pixels; 3 if left out.", metavar="N"),
+    ] = None,
+    shifts: Annotated[
+        int | None,
+        typer.Option(help="Phases of the sinusoid, 3 or more; 4 if left out.", metavar="N"),
+    ] = None,
+    ambient: Annotated[
+        Path | None,
+        typer.Option(help="Photo with the projector covered or off.", metavar="PHOTO"),
+    ] = None,
+    black: Annotated[
+        Path | None,
+        typer.Option(help="Photo under a black pattern, if it is not in DIR.", metavar="PHOTO"),
+    ] = None,
+    black_level: Annotated[
+        float | None,
+        typer.Option(
+            help="Light of a black pixel as a share of a white one's, 0 if left out; a photo "
+            "under black is better.",
+            metavar="SHARE",
+        ),
+    ] = None,
+    full_scale: Annotated[
+        float | None, typer.Option(help="Value of full scale of the photos.", metavar="VALUE")
+    ] = None,
+    scale: Annotated[
+        int | None, typer.Option(min=1, help="Export each pattern pixel as N x N.", metavar="N")
+    ] = None,
+    native: Annotated[
+        Size | None,
+        typer.Option(
+            parser=size, metavar="HxW", help="Centre exported patterns on a frame, black around."
+        ),
+    ] = None,
+    truth: Annotated[
+        Path | None,
+        typer.Option(help="Compare with what render wrote of the scene.", metavar="TRUTH"),
+    ] = None,
+    transport: Annotated[
+        Path | None,
+        typer.Option(
+            help="Compare with the direct, and near and far, light of a reconstruction.",
+            metavar="TRANSPORT.zarr",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Separate direct from global light under full white (Nayar et al. 2006).
+
+    OUT gets direct and global as .npy and .exr, in photo units, and .png for looking; their sum
+    is photo(white) - photo(black). OUT/numbers.json says what was used.
+
+    Example: nearfar separate separated --rig corner
+    """
+    from nearfar.baselines.separation_photos import separate as take_apart
+    from nearfar.files import check_output
+    from nearfar.workflow.separate import describe_separation, is_separation, write_separation
+
+    source = _source({"--rig": rig, "--photos": photos, "--export": export or None})
+    taken_only = {"--ambient": ambient, "--black": black, "--black-level": black_level}
+    _refuse(source, ("--photos",), taken_only | {"--full-scale": full_scale})
+    _refuse(source, ("--export",), {"--scale": scale, "--native": native})
+    _refuse(source, ("--rig", "--photos"), {"--truth": truth, "--transport": transport})
+    _refuse(source, ("--rig", "--photos"), {"--json": as_json or None})
+    if pattern is Pattern.ANY and source != "--photos":
+        raise typer.BadParameter("any goes with --photos only.", param_hint="--pattern")
+    method = _method(pattern, side=side, step=step, period=period, shifts=shifts)
+    inputs = (photos, ambient, black, truth, transport, Path(rig) if rig else None)
+    keep_input(output, *(path for path in inputs if path is not None))
+    check_output(output, force=force, replaceable=is_separation)
+    if export:
+        steps.export_patterns(output, method, projector, scale, native, force=force, quiet=quiet)
+        return
+    exposure = 1.0
+    with progress_bar("separating", quiet=quiet) as report:
+        if photos is not None:
+            taken = steps.read_photos(
+                photos, method, ambient, black, black_level, full_scale, report
+            )
+            described: dict[str, Any] = {"photos": str(photos)}
+        else:
+            assert rig is not None
+            taken, rig_says = steps.shoot_photos(rig, projector, method, report)
+            described, exposure = {"rig": rig_says}, rig_says["transport_exposure"]
+        found = take_apart(
+            taken, method.separate, progress=lambda share: report("separating", share)
+        )
+        numbers = describe_separation(found, taken, method) | described
+        numbers["snr"] = steps.compare(found, truth, transport, exposure, projector)
+        write_separation(output, found, numbers, force=force)
+    steps.warn_of_faults(taken, method, rig or str(photos))
+    if as_json:
+        print(json.dumps(numbers, allow_nan=False))
+    else:
+        say(steps.lines(numbers, output), quiet=quiet)
+
+
+def _source(sources: dict[str, Any]) -> str:
+    given = [name for name, value in sources.items() if value is not None]
+    if len(given) != 1:
+        raise typer.BadParameter(
+            f"give one of {', '.join(sources)}, and only one.", param_hint="--rig"
+        )
+    return given[0]
+
+
+def _refuse(source: str, sources: tuple[str, ...], options: dict[str, Any]) -> None:
+    for name, value in options.items():
+        if value is not None and source not in sources:
+            raise typer.BadParameter(
+                f"goes with {' or '.join(sources)}, not with {source}.", param_hint=name
+            )
+
+
+def _method(pattern: Pattern, **numbers: int | None) -> "Method":
+    from nearfar.baselines.separation_methods import (
+        by_any_patterns,
+        by_checkerboards,
+        by_sinusoids,
+    )
+
+    own = {Pattern.CHECKERBOARD: ("side", "step"), Pattern.SINUSOID: ("period", "shifts")}
+    for name, value in numbers.items():
+        if value is not None and name not in own.get(pattern, ()):
+            raise typer.BadParameter(
+                f"is not for --pattern {pattern.value}.", param_hint=f"--{name}"
+            )
+    match pattern:
+        case Pattern.CHECKERBOARD:
+            return by_checkerboards(numbers["side"], numbers["step"])
+        case Pattern.SINUSOID:
+            return by_sinusoids(numbers["period"], numbers["shifts"])
+        case _:
+            return by_any_patterns()

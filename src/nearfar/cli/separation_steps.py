@@ -1,0 +1,154 @@
+"""Steps of ``nearfar separate``: photos from a rig or a folder, comparison, what is said."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from nearfar.arrays import Size
+from nearfar.cli.progress import SATURATED, Report, counted, progress_bar, say, warn
+
+if TYPE_CHECKING:
+    from nearfar.baselines.separation import Separation
+    from nearfar.baselines.separation_methods import Method
+    from nearfar.baselines.separation_photos import PhotosToSeparate
+
+# Groups of photos whose means differ by more than this are out of order, or the rig is unsteady.
+UNSTEADY = 0.05
+
+
+def export_patterns(
+    output: Path,
+    method: "Method",
+    projector: Size | None,
+    scale: int | None,
+    native: Size | None,
+    *,
+    force: bool,
+    quiet: bool,
+) -> None:
+    """Write the patterns of a method, and say so."""
+    from nearfar.workflow.separate import export_to_separate
+
+    if projector is None:
+        raise typer.BadParameter("--export needs the pattern grid.", param_hint="--projector")
+    count = (method.count or 0) + 1
+    with progress_bar("patterns", quiet=quiet) as report:
+        shown = export_to_separate(
+            output,
+            method,
+            projector,
+            scale=scale,
+            native=native,
+            force=force,
+            progress=counted(report, "patterns", count),
+        )
+    say(
+        f"{count} patterns of {shown.frame}, the last one black, written to {output}, a pattern "
+        f"pixel as {shown.scale} x {shown.scale}",
+        quiet=quiet,
+    )
+
+
+def read_photos(
+    photos: Path,
+    method: "Method",
+    ambient: Path | None,
+    black: Path | None,
+    black_level: float | None,
+    full_scale: float | None,
+    report: Report,
+) -> "PhotosToSeparate":
+    """Read the user's own photos."""
+    from nearfar.baselines.separation_photos import read_to_separate
+
+    return read_to_separate(
+        photos,
+        method.count,
+        ambient=ambient,
+        black=black,
+        black_level=black_level,
+        full_scale=full_scale,
+        progress=lambda done, total: report("photos", done / total),
+    )
+
+
+def shoot_photos(
+    rig: str, projector: Size | None, method: "Method", report: Report
+) -> "tuple[PhotosToSeparate, dict[str, Any]]":
+    """Shoot a method's patterns; tell what the rig says of itself."""
+    from nearfar.baselines.separation_photos import shoot_to_separate
+    from nearfar.rigs.config import open_rig
+    from nearfar.scenes import NAMES, sizes
+
+    if projector is None:
+        if rig not in NAMES:
+            raise typer.BadParameter(
+                f"--rig {rig} needs the pattern grid.", param_hint="--projector"
+            )
+        projector, _ = sizes(rig)
+    assert method.draw is not None
+    # Patterns that do not fit are refused before a scene is computed.
+    patterns = method.draw(projector)
+    opened = open_rig(rig, projector, progress=report)
+    progress = counted(report, "photos", len(patterns) + 1)
+    return shoot_to_separate(opened, patterns, progress=progress), opened.describe()
+
+
+def compare(
+    found: "Separation",
+    truth: Path | None,
+    transport: Path | None,
+    exposure: float,
+    projector: Size | None,
+) -> dict[str, dict[str, float]]:
+    """SNR of direct and global against what else is known, dB."""
+    from nearfar.transport.exact_store import load_exact
+    from nearfar.transport.store import load_transport
+    from nearfar.workflow.separate import compare_to_transport, compare_to_truth
+
+    answer = {}
+    if truth is not None:
+        camera = Size(*found.direct.shape[:2])
+        known = load_exact(truth, projector=projector, camera=camera)
+        answer["truth"] = compare_to_truth(found, known, exposure)
+    if transport is not None:
+        answer["transport"] = compare_to_transport(found, load_transport(transport))
+    return answer
+
+
+def warn_of_faults(taken: "PhotosToSeparate", method: "Method", source: str) -> None:
+    """Say what the photos themselves tell of a fault."""
+    from nearfar.baselines.separation_photos import unsteadiness
+
+    if taken.saturated_share > SATURATED:
+        warn(
+            f"{taken.saturated_share:.2%} of the values in the photos of {source} are saturated: "
+            f"expose less, or their camera pixels will be wrong."
+        )
+    if taken.dark is None and taken.black_level == 0.0:
+        warn(
+            f"the photos of {source} have none under black and none of ambient light, so ambient "
+            f"light and the camera's black level count as global: add a photo under black."
+        )
+    apart = unsteadiness(taken, method.groups)
+    if apart > UNSTEADY:
+        warn(
+            f"photos of {source} that should sum to one white differ by {apart:.0%}: they may be "
+            f"out of order or of other patterns, or the lamp drifts."
+        )
+
+
+def lines(numbers: dict[str, Any], output: Path) -> str:
+    """Say in lines what was found."""
+    lines = [
+        f"against the {what}: direct {found['direct']:.2f} dB, global {found['global']:.2f} dB"
+        for what, found in numbers["snr"].items()
+    ]
+    share = numbers["direct_share"]
+    lines.append(
+        f"{numbers['patterns']} photos separated"
+        + (f", {share:.1%} of the light direct" if share is not None else "")
+        + f", written to {output}"
+    )
+    return "\n".join(lines)

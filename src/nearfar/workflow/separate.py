@@ -1,0 +1,198 @@
+"""Separate direct from global light: export the patterns, compare and write the pictures."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nearfar.arrays import Size
+from nearfar.baselines.separation import Separation
+from nearfar.baselines.separation_methods import Method
+from nearfar.baselines.separation_photos import PhotosToSeparate
+from nearfar.errors import InputError
+from nearfar.files import encode_png, new_output, write_picture
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.model import Transport
+from nearfar.version import version
+from nearfar.workflow.evaluate import snr
+from nearfar.workflow.export import Shown, draw_frame, fit_frame
+
+NUMBERS = "numbers.json"
+PICTURES = ("direct", "global")
+ENDINGS = (".npy", ".exr", ".png")
+# Channels that picture files hold besides .npy, which holds any number.
+DRAWABLE = (1, 3)
+
+
+def export_to_separate(
+    folder: Path,
+    method: Method,
+    projector: Size,
+    *,
+    scale: int | None = None,
+    native: Size | None = None,
+    force: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Shown:
+    """Write ``pattern-00000.png`` and so on, the last one black, and the method beside them.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder to make.
+    method : Method
+        Of patterns that are known.
+    projector : Size
+        Pattern grid.
+    scale, native, force, progress
+        As `nearfar.workflow.export.export_patterns`.
+
+    Returns
+    -------
+    Shown
+
+    Raises
+    ------
+    InputError
+        If the pattern does not fit the projector, or that `native`.
+    NearfarError
+        As `nearfar.files.new_output`.
+    """
+    assert method.draw is not None
+    patterns = method.draw(projector)
+    shown = fit_frame(projector, scale, native)
+    numbers = {
+        **method.settings,
+        "patterns": len(patterns),
+        "projector": list(projector),
+        "frame": list(shown.frame),
+        "scale": shown.scale,
+    }
+    with new_output(folder, force=force, replaceable=is_separation) as partial:
+        partial.mkdir()
+        for number, pattern in enumerate([*patterns, np.zeros_like(patterns[0])]):
+            frame = draw_frame(pattern, shown)
+            (partial / f"pattern-{number:05d}.png").write_bytes(encode_png(frame))
+            if progress is not None:
+                progress(number + 1)
+        _write_numbers(partial, numbers)
+    return shown
+
+
+def describe_separation(
+    found: Separation, taken: PhotosToSeparate, method: Method
+) -> dict[str, Any]:
+    """Tell what was separated and how, ready for JSON."""
+    direct, global_ = (float(picture.sum(dtype=np.float64)) for picture in found)
+    total = direct + global_
+    return {
+        **method.settings,
+        "patterns": len(taken.photos),
+        "dark": taken.dark_shows,
+        "black_level": None if taken.dark_shows == "black" else taken.black_level,
+        "camera": list(taken.camera),
+        "channels": taken.channels,
+        "saturated_share": taken.saturated_share,
+        "direct_share": direct / total if total > 0 else None,
+        "nearfar": version(),
+    }
+
+
+def write_separation(
+    folder: Path, found: Separation, numbers: Mapping[str, Any], *, force: bool = False
+) -> None:
+    """Write direct and global as .npy, .exr and .png, and numbers.json, in a folder.
+
+    More or fewer channels than a picture's go into the .npy alone.
+
+    Raises
+    ------
+    NearfarError
+        As `nearfar.files.new_output`.
+    """
+    endings = ENDINGS if found.direct.shape[2] in DRAWABLE else ENDINGS[:1]
+    with new_output(folder, force=force, replaceable=is_separation) as partial:
+        partial.mkdir()
+        for name, picture in zip(PICTURES, found, strict=True):
+            for ending in endings:
+                write_picture(partial / f"{name}{ending}", picture.astype(np.float32))
+        _write_numbers(partial, numbers)
+
+
+def _write_numbers(folder: Path, numbers: Mapping[str, Any]) -> None:
+    text = json.dumps(numbers, indent=2, allow_nan=False)
+    (folder / NUMBERS).write_text(text + "\n", encoding="utf-8")
+
+
+def is_separation(folder: Path) -> bool:
+    """Tell whether a folder is empty, or holds pictures or patterns of a separation alone."""
+    entries = list(folder.iterdir())
+    ours = all(
+        entry.name == NUMBERS
+        or (entry.stem in PICTURES and entry.suffix in ENDINGS)
+        or (entry.name.startswith("pattern-") and entry.suffix == ".png")
+        for entry in entries
+    )
+    # Photos may be named as the patterns that they show; the numbers are ours alone.
+    return ours and (not entries or (folder / NUMBERS).is_file())
+
+
+def compare_to_truth(
+    found: Separation, truth: ExactTransport, exposure: float = 1.0
+) -> dict[str, float]:
+    """SNR of direct and global under full white, as physics has them (global = N + F), dB.
+
+    Parameters
+    ----------
+    found : Separation
+    truth : ExactTransport
+        With its components apart.
+    exposure : float
+        Photo units per unit of the truth.
+
+    Raises
+    ------
+    InputError
+        If its components are not known, or its camera or channels are others.
+    """
+    if not truth.is_apart:
+        raise InputError(
+            f"the truth {truth.name} holds T without its components, so its direct light is not "
+            f"known: give what nearfar render wrote."
+        )
+    light = np.ones(truth.projector, dtype=np.float32)
+    direct, near, far = truth.component_pictures(light)
+    scale = np.float32(exposure)
+    return _snr_of(found, Separation(scale * direct, scale * (near + far)), "truth")
+
+
+def compare_to_transport(found: Separation, transport: Transport) -> dict[str, float]:
+    """SNR of direct and global against a reconstruction's direct, and near and far, pictures, dB.
+
+    Both are in photo units: the photos of both are taken with one exposure.
+
+    Raises
+    ------
+    InputError
+        If its camera or channels are others.
+    """
+    parts = transport.components(np.ones(transport.projector, dtype=np.float32))
+    shape = (*transport.camera, transport.channels)
+    direct, global_ = parts.direct.reshape(shape), (parts.near + parts.far).reshape(shape)
+    return _snr_of(found, Separation(direct, global_), "transport")
+
+
+def _snr_of(found: Separation, known: Separation, what: str) -> dict[str, float]:
+    if found.direct.shape != known.direct.shape:
+        ours, theirs = (
+            f"{Size(*pictures.direct.shape[:2])} with {pictures.direct.shape[2]} channels"
+            for pictures in (found, known)
+        )
+        raise InputError(
+            f"the photos are {ours}, the {what}'s camera is {theirs}: compare two of the same "
+            f"scene and sizes."
+        )
+    pairs = zip(PICTURES, known, found, strict=True)
+    return {name: snr(values, mine) for name, values, mine in pairs}

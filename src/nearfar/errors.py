@@ -32,3 +32,7 @@ class UnreadableFileError(NearfarError, OSError):
 
 class StorageError(NearfarError, OSError):
     """An output that could not be written: full disk, no permission."""
+
+
+class MissingPackageError(NearfarError, ImportError):
+    """A package that an optional part needs and that is not installed."""

@@ -20,8 +20,8 @@ def acquire(
     rig: Annotated[
         str,
         typer.Option(
-            help="Scene (cornell, cornell-aside, wedge, corner), stored transport (.npy, .npz, "
-            "Zarr), or RIG.toml.",
+            help="Scene (cornell, cornell-aside, wedge, corner), Mitsuba 3 scene (.xml), stored "
+            "transport (.npy, .npz, Zarr), or RIG.toml.",
             metavar="RIG",
         ),
     ],
@@ -34,7 +34,7 @@ def acquire(
     """
     from nearfar.files import check_output
     from nearfar.plan import read_plan
-    from nearfar.rigs.config import open_rig
+    from nearfar.rigs.config import notes_of, open_rig
     from nearfar.workflow.acquire import acquire as shoot
 
     made = read_plan(plan_file)
@@ -43,6 +43,8 @@ def acquire(
     check_output(output, force=force)
     with progress_bar("opening the rig", quiet=quiet) as report:
         opened = open_rig(rig, made.projector, progress=report)
+        for note in notes_of(opened):
+            warn(note)
         taken = shoot(
             made,
             output,

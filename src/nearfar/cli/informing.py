@@ -16,7 +16,8 @@ def info(
     path: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="Plan, capture, transport, array, picture, RIG.toml or folder."
+            metavar="FILE",
+            help="Plan, capture, transport, array, picture, RIG.toml, Mitsuba scene or folder.",
         ),
     ],
     quiet: Quiet = False,
@@ -43,9 +44,23 @@ def _describe_file(path: Path) -> str:
             return f"rig: {json.dumps(read_rig_table(path).model_dump())}"
         case ".npy" | ".npz":
             return _describe_arrays(path)
+        case ".xml":
+            return _describe_mitsuba(path)
     pixels = read_picture(path)
     shape = " x ".join(map(str, pixels.shape))
     return f"picture, {shape} {pixels.dtype}, values {pixels.min():g} to {pixels.max():g}"
+
+
+def _describe_mitsuba(path: Path) -> str:
+    from nearfar.arrays import Size
+    from nearfar.scenes.mitsuba.loading import load_scene
+
+    loaded = load_scene(path, Size(1, 1))
+    return (
+        f"Mitsuba scene: projector {loaded.picture or 'without a picture of its own'}, camera "
+        f"{loaded.camera}, {_channels(loaded.channels)}, integrator {loaded.integrator}, "
+        f"{loaded.samples} samples per camera pixel"
+    )
 
 
 def _describe_arrays(path: Path) -> str:

@@ -2,13 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, Quiet, TransportPath, size
-from nearfar.cli.progress import progress_bar, say
+from nearfar.cli.options import AsJson, Force, Quiet, TransportPath, keep_input, size
+from nearfar.cli.progress import Report, progress_bar, say, warn
+
+if TYPE_CHECKING:
+    from nearfar.transport.exact import ExactTransport
 
 
 def evaluate(
@@ -68,7 +71,11 @@ def _lines(found: dict[str, Any], indent: str = "") -> str:
 
 def render(
     scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="cornell, cornell-aside, wedge or corner.")
+        str,
+        typer.Argument(
+            metavar="SCENE",
+            help="cornell, cornell-aside, wedge or corner, or a Mitsuba 3 scene (.xml).",
+        ),
     ],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr to make.")],
     projector: Annotated[
@@ -79,23 +86,61 @@ def render(
         Size | None,
         typer.Option(parser=size, metavar="HxW", help="Photo; the scene's own if left out."),
     ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Paths per camera pixel of a Mitsuba scene; 4096 if left out."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=0, help="Seed of those paths; 0 if left out."),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the exact transport of a built-in scene, components apart.
+    """Compute a scene's transport: a built-in one's exactly, a Mitsuba scene's by path tracing.
+
+    Components are apart for a built-in scene, together for a Mitsuba scene.
 
     Example: nearfar render cornell truth.zarr --projector 64x64
     """
     from nearfar.files import check_output
-    from nearfar.scenes.cache import cached_scene
+    from nearfar.rigs.config import is_mitsuba
     from nearfar.transport.exact_store import save_exact
 
+    keep_input(output, Path(scene))
     check_output(output, force=force)
+    from_file = is_mitsuba(Path(scene))
+    if not from_file and (samples, seed) != (None, None):
+        raise typer.BadParameter("a built-in scene is computed without chance.", param_hint=scene)
     with progress_bar("rendering", quiet=quiet) as report:
-        transport = cached_scene(scene, projector, camera, progress=report)
+        if from_file:
+            transport = _render_file(scene, projector, camera, samples, seed or 0, report)
+        else:
+            from nearfar.scenes.cache import cached_scene
+
+            transport = cached_scene(scene, projector, camera, progress=report)
         save_exact(output, transport, force=force)
     say(
         f"transport of {scene}, projector {transport.projector}, camera {transport.camera}, "
         f"written to {output}",
         quiet=quiet,
     )
+
+
+def _render_file(
+    scene: str,
+    projector: Size | None,
+    camera: Size | None,
+    samples: int | None,
+    seed: int,
+    report: Report,
+) -> "ExactTransport":
+    from nearfar.scenes.mitsuba.loading import load_scene
+    from nearfar.scenes.mitsuba.transport import SAMPLES, render_transport
+
+    loaded = load_scene(scene, projector, camera)
+    for note in loaded.notes:
+        warn(note)
+    return render_transport(loaded, samples or SAMPLES, seed, progress=report)

@@ -1,4 +1,4 @@
-"""Which rig: a scene by name, a stored transport, or a RIG.toml that says more."""
+"""Which rig: a scene by name or of Mitsuba, a stored transport, or a RIG.toml that says more."""
 
 import tomllib
 from pathlib import Path
@@ -14,7 +14,11 @@ from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig, World, brightest
 from nearfar.scenes import NAMES
 from nearfar.scenes.cache import Progress, cached_scene
+from nearfar.scenes.mitsuba.loading import load_scene
+from nearfar.scenes.mitsuba.photos import RenderedWorld
+from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact
+from nearfar.transport.model import Transport
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
 
@@ -25,13 +29,29 @@ PHOTO_UNITS = (0.1, 0.95)
 
 
 class SceneTable(BaseModel):
-    """[scene] of a RIG.toml: a built-in scene's name or a stored transport's path."""
+    """[scene] of a RIG.toml: a built-in scene's name, or a path of what is photographed.
+
+    Attributes
+    ----------
+    name : str, optional
+        Built-in scene.
+    transport : str, optional
+        Stored transport, relative to the RIG.toml.
+    mitsuba : str, optional
+        Mitsuba 3 scene, relative to the RIG.toml; each photo is a rendering.
+    camera : str, optional
+        Size of the photo, ``HxW``.
+    samples : int, optional
+        Samples per camera pixel and photo of a Mitsuba scene; the scene's own if left out.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str | None = None
     transport: str | None = None
+    mitsuba: str | None = None
     camera: str | None = None
+    samples: int | None = Field(default=None, ge=1)
 
     @field_validator("name")
     @classmethod
@@ -48,9 +68,13 @@ class SceneTable(BaseModel):
         return camera
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if (self.name is None) == (self.transport is None):
-            raise ValueError("give either name, a built-in scene, or transport, a file")
+    def _one_of_all(self) -> Self:
+        if sum(given is not None for given in (self.name, self.transport, self.mitsuba)) != 1:
+            raise ValueError(
+                "give either name, a built-in scene, transport, a file, or mitsuba, a scene file"
+            )
+        if self.samples is not None and self.mitsuba is None:
+            raise ValueError("samples are those of a Mitsuba scene, remove them")
         return self
 
 
@@ -72,10 +96,11 @@ def open_rig(rig: str, projector: Size, *, progress: Progress | None = None) -> 
     Parameters
     ----------
     rig : str
-        Name of a built-in scene; path of a stored transport (.npy, .npz, or a Zarr that
-        ``render`` or ``reconstruct`` wrote); or path of a RIG.toml.
+        Name of a built-in scene; path of a Mitsuba 3 scene (.xml), of a stored transport (.npy,
+        .npz, or a Zarr that ``render`` or ``reconstruct`` wrote), or of a RIG.toml.
     projector : Size
-        Pattern grid of the plan; a built-in scene is made for it.
+        Pattern grid of the plan; a built-in scene is made for it, and a Mitsuba scene's
+        projector shows it.
     progress : callable, optional
         Told what a scene's computation does and the share done.
 
@@ -86,6 +111,8 @@ def open_rig(rig: str, projector: Size, *, progress: Progress | None = None) -> 
     Raises
     ------
     InputError, MissingFileError, UnreadableFileError
+    MissingPackageError
+        If a Mitsuba scene is asked for and Mitsuba is not installed.
     """
     if rig in NAMES:
         return _rig(RigTable(scene=SceneTable(name=rig)), Path(), projector, progress)
@@ -94,10 +121,11 @@ def open_rig(rig: str, projector: Size, *, progress: Progress | None = None) -> 
         return _rig(read_rig_table(path), path.parent, projector, progress)
     if not path.exists():
         raise MissingFileError(
-            f"{rig} is no rig: name a scene ({', '.join(NAMES)}), a stored transport or a RIG.toml."
+            f"{rig} is no rig: name a scene ({', '.join(NAMES)}), a Mitsuba scene, a stored "
+            f"transport or a RIG.toml."
         )
-    table = RigTable(scene=SceneTable(transport=path.name))
-    return _rig(table, path.parent, projector, progress)
+    scene = SceneTable(mitsuba=path.name) if is_mitsuba(path) else SceneTable(transport=path.name)
+    return _rig(RigTable(scene=scene), path.parent, projector, progress)
 
 
 def read_rig_table(path: Path) -> RigTable:
@@ -136,6 +164,10 @@ def _rig(table: RigTable, folder: Path, projector: Size, progress: Progress | No
     if table.scene.name is not None:
         name = table.scene.name
         world = cached_scene(name, projector, camera, progress=progress)
+    elif table.scene.mitsuba is not None:
+        path = folder / table.scene.mitsuba
+        name = path.name
+        world = RenderedWorld(load_scene(path, projector, camera), table.scene.samples, table.seed)
     else:
         path = folder / str(table.scene.transport)
         name = path.name
@@ -146,13 +178,26 @@ def _rig(table: RigTable, folder: Path, projector: Size, progress: Progress | No
             f"plan with --projector {world.projector}."
         )
     exposure = _exposure(table.exposure, world, name)
-    return SimulatedRig(world, name, table.projector, table.camera, exposure, table.seed)
+    details = world.describe() if isinstance(world, RenderedWorld) else {}
+    return SimulatedRig(world, name, table.projector, table.camera, exposure, table.seed, details)
 
 
-def load_world(path: Path, projector: Size | None, camera: Size | None) -> World:
+def is_mitsuba(path: Path) -> bool:
+    """Tell a Mitsuba scene from other rigs by its name."""
+    return path.suffix.lower() == ".xml"
+
+
+def notes_of(rig: SimulatedRig) -> tuple[str, ...]:
+    """Return what a user should know of a rig, a sentence each."""
+    return rig.world.notes if isinstance(rig.world, RenderedWorld) else ()
+
+
+def load_world(
+    path: Path, projector: Size | None, camera: Size | None
+) -> ExactTransport | Transport:
     """Load a stored transport: a measured one, an exact one, or a dense array."""
     measured = kind_of_store(path) == TRANSPORT_KIND
-    world = (
+    world: ExactTransport | Transport = (
         load_transport(path) if measured else load_exact(path, projector=projector, camera=camera)
     )
     if camera is not None and world.camera != camera:

@@ -1,7 +1,7 @@
 """A simulated rig: photo = sensor(noise(T l)) on a transport that is known."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Protocol
 
@@ -46,6 +46,8 @@ class SimulatedRig:
         Photo units per unit of the world's transport.
     seed : int
         Each photo's noise follows from the seed and its number alone.
+    details : mapping
+        What else a capture should remember of how the world was made, as JSON.
     """
 
     world: World
@@ -54,6 +56,7 @@ class SimulatedRig:
     sensor: SimulatedCamera
     exposure: float
     seed: int
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def projector(self) -> Size:
@@ -74,6 +77,7 @@ class SimulatedRig:
             "camera": self.sensor.model_dump(),
             "transport_exposure": self.exposure,
             "seed": self.seed,
+            **self.details,
         }
 
     def shoot(self, patterns: Iterable[NDArray[np.uint8]]) -> Iterator[Photo]:

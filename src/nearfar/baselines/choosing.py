@@ -1,0 +1,192 @@
+"""How strongly to regularise compressive light transport, chosen fairly.
+
+`best_share` looks at the truth and so favours the rival; `held_out_share` needs none: it keeps
+some patterns back and asks which lambda predicts them best. Both try every share of a grid on the
+same random rows, with and without the refit, and name the best.
+
+Index convention: g runs over the shares tried.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers
+from nearfar.baselines.compressive import SHARES, refit_few
+from nearfar.baselines.lasso import highest_strength, settle, start
+from nearfar.baselines.random_patterns import CompressiveMeasurements
+from nearfar.baselines.sensing import sense
+from nearfar.errors import InputError
+from nearfar.transport.exact import ExactTransport
+
+ROWS = 200
+# One pattern in so many is held out.
+HELD_OUT = 10
+# Noise that is fitted costs time: no share is tried below one this far under the best, dB.
+FALLEN = 1.5
+# An exact match has no finite SNR.
+LEAST = 1e-30
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was tried and what came out.
+
+    Attributes
+    ----------
+    shares : tuple of float
+        lambda as a share of the least that leaves a row without wavelets; those that were tried,
+        down to where the score has fallen by `FALLEN`.
+    plain, refitted : tuple of float
+        SNR of each share, as the l1 norm has it and refitted, dB.
+    """
+
+    shares: tuple[float, ...]
+    plain: tuple[float, ...]
+    refitted: tuple[float, ...]
+
+    @property
+    def is_refitted(self) -> bool:
+        """Whether the best is refitted."""
+        return max(self.refitted) >= max(self.plain)
+
+    @property
+    def share(self) -> float:
+        """The best share."""
+        scores = self.refitted if self.is_refitted else self.plain
+        return self.shares[int(np.argmax(scores))]
+
+
+def best_share(
+    measurements: CompressiveMeasurements,
+    truth: ExactTransport,
+    *,
+    exposure: float = 1.0,
+    rows: int = ROWS,
+    seed: int = 0,
+    shares: Sequence[float] = SHARES,
+) -> Choice:
+    """Try shares on random rows, judged by the SNR of T against the truth.
+
+    Parameters
+    ----------
+    measurements : CompressiveMeasurements
+    truth : ExactTransport
+    exposure : float
+        Photo units per unit of the truth.
+    rows : int
+        Rows of T to try them on, drawn from all camera pixels and channels.
+    seed : int
+    shares : sequence of float
+        In (0, 1], decreasing.
+
+    Raises
+    ------
+    InputError
+        If the truth is of other sizes, or there is no share to try.
+    """
+    sizes = (measurements.projector, measurements.camera, measurements.answers.shape[1])
+    if sizes != (truth.projector, truth.camera, truth.channels):
+        raise InputError(
+            f"the truth is of a projector {truth.projector}, a camera {truth.camera} and "
+            f"{truth.channels} channels, the measurements of {sizes[0]}, {sizes[1]} and "
+            f"{sizes[2]}: compare two of the same scene and sizes."
+        )
+    chosen = _draw(len(measurements.rows), rows, seed)
+    known = np.float32(exposure) * _rows_of(truth, chosen)
+    everything = np.arange(len(measurements.patterns))
+
+    def judge(found: Floats) -> float:
+        return _decibels(known, found - known)
+
+    return _try(measurements, chosen, everything, shares, judge)
+
+
+def held_out_share(
+    measurements: CompressiveMeasurements,
+    *,
+    held_out: int | None = None,
+    rows: int = ROWS,
+    seed: int = 0,
+    shares: Sequence[float] = SHARES,
+) -> Choice:
+    """Try shares on random rows, judged by how well they foretell patterns that were kept back.
+
+    Parameters
+    ----------
+    measurements : CompressiveMeasurements
+    held_out : int, optional
+        Patterns to keep back; one in `HELD_OUT` by default.
+    rows, seed, shares
+        As `best_share`.
+
+    Raises
+    ------
+    InputError
+        If no pattern is kept back or none is left, or there is no share to try.
+    """
+    count = len(measurements.patterns)
+    held_out = max(1, count // HELD_OUT) if held_out is None else held_out
+    if not 1 <= held_out < count:
+        raise InputError(
+            f"{held_out} of {count} patterns cannot be held out: keep back at least 1 and leave "
+            f"at least 1."
+        )
+    order = np.random.default_rng([seed, 10]).permutation(count)
+    kept, back = np.sort(order[held_out:]), np.sort(order[:held_out])
+    chosen = _draw(len(measurements.rows), rows, seed)
+    asked = measurements.rows[chosen][:, back]
+    patterns = measurements.patterns[back].reshape(held_out, -1).astype(np.float32)
+
+    def judge(found: Floats) -> float:
+        return _decibels(asked, found @ patterns.T - asked)
+
+    return _try(measurements, chosen, kept, shares, judge)
+
+
+def _rows_of(truth: ExactTransport, chosen: Integers) -> Floats:
+    """Return true rows i = camera pixel * channels + channel, (n, P), float32."""
+    pixel, channel = np.divmod(chosen, truth.channels)
+    return np.stack(
+        [truth.rows(slice(c, c + 1))[0, i] for c, i in zip(pixel, channel, strict=True)]
+    )
+
+
+def _draw(count: int, rows: int, seed: int) -> Integers:
+    generator = np.random.default_rng([seed, 11])
+    return np.sort(generator.choice(count, size=min(rows, count), replace=False))
+
+
+def _try(
+    measurements: CompressiveMeasurements,
+    chosen: Integers,
+    kept: Integers,
+    shares: Sequence[float],
+    judge: Callable[[Floats], float],
+) -> Choice:
+    """Reconstruct the chosen rows from the patterns kept, with every share, and judge (n, P)."""
+    if not shares or not all(0 < share <= 1 for share in shares):
+        raise InputError(f"shares of {list(shares)} give no lambda: try some above 0 and up to 1.")
+    shares = sorted(shares, reverse=True)
+    sensing = sense(measurements.patterns[kept])
+    answers, along = sensing.project(measurements.rows[chosen][:, kept])
+    rows = start(sensing.columns, answers)
+    highest = highest_strength(rows)
+    plain: list[float] = []
+    refitted: list[float] = []
+    for share in shares:
+        settle(sensing.columns, answers, rows, share * highest, np.arange(len(chosen)))
+        found = (rows.coefficients, refit_few(sensing, answers, rows.coefficients))
+        for scores, coefficients in zip((plain, refitted), found, strict=True):
+            pictures = sensing.pictures(coefficients, along)
+            scores.append(judge(pictures.reshape(len(chosen), -1)))
+        if max(plain[-1], refitted[-1]) < max(*plain, *refitted) - FALLEN:
+            break
+    return Choice(tuple(shares[: len(plain)]), tuple(plain), tuple(refitted))
+
+
+def _decibels(signal: Floats, error: Floats) -> float:
+    energies = (float(np.sum(np.square(values, dtype=np.float64))) for values in (signal, error))
+    kept, lost = (max(energy, LEAST) for energy in energies)
+    return float(10 * np.log10(kept / lost))

@@ -1,0 +1,234 @@
+"""l1-regularised least squares for many rows that share one matrix.
+
+Each row i minimises over its coefficients x
+
+    1/2 |b - x A|^2 + lambda |x|_1.
+
+Only a few coefficients differ from 0, so a row works on few columns at a time: those in use and
+those whose overlap with the residual exceeds lambda, which are looked for among all columns, for
+a block of rows in one matrix product. A row whose duality gap over all columns is small leaves.
+
+Index convention: i runs over rows, n over the N columns of the problem, k over the K answers.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers, blocks
+from nearfar.baselines.working_sets import relative_gap, solve_small
+
+# Duality gap at which a row leaves, as a share of its objective: at the end, and before.
+TOLERANCE = 1e-3
+ROUGH = 1e-2
+# From one lambda to the next on the way down.
+STEP = 0.3
+# A working set is solved to this share of the gap that is asked for.
+INNER = 0.3
+# and no further than this share of the gap that there is.
+SHARE_OF_GAP = 0.3
+ROUNDS = 20
+# Columns that a row may take up at once: as many as it uses, and at least these.
+FEWEST = 16
+# Rows of working sets within this factor of each other are solved together.
+ALIKE = 1.4
+# Numbers in the matrices that are solved at once.
+NUMBERS = 2**24
+
+
+class Rows(NamedTuple):
+    """Where the rows stand.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (I, N + 1), float32
+        x; the last, of no column, is 0.
+    residual : ndarray, shape (I, K), float32
+        b - x A.
+    overlap : ndarray, shape (I, N + 1), float32
+        Of each column with the residual.
+    """
+
+    coefficients: Floats
+    residual: Floats
+    overlap: Floats
+
+
+def start(columns: Floats, answers: Floats) -> Rows:
+    """Return rows of zeros.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (N + 1, K), float32
+        A, and a last row of zeros.
+    answers : ndarray, shape (I, K), float32
+        b.
+    """
+    nothing = np.zeros((len(answers), len(columns)), dtype=np.float32)
+    residual = answers.astype(np.float32, copy=True)
+    return Rows(nothing, residual, residual @ columns.T)
+
+
+def highest_strength(rows: Rows) -> Floats:
+    """Return the least lambda at which rows of zeros stay so, (I,): of `start`'s rows."""
+    return np.asarray(np.abs(rows.overlap).max(axis=1, initial=0.0))
+
+
+def solve(
+    columns: Floats, answers: Floats, strength: Floats, tolerance: float = TOLERANCE
+) -> Floats:
+    """Minimise for one lambda per row, by way of larger ones.
+
+    Parameters
+    ----------
+    columns, answers
+        As `start`.
+    strength : ndarray, shape (I,)
+        lambda; 0 only where the answers are 0.
+    tolerance : float
+        Duality gap at which a row leaves, as a share of its objective.
+
+    Returns
+    -------
+    ndarray, shape (I, N + 1), float32
+        x, and a 0.
+    """
+    rows = start(columns, answers)
+    everything = np.arange(len(answers))
+    before = STEP * highest_strength(rows)
+    while (before > strength).any():
+        settle(columns, answers, rows, np.maximum(before, strength), everything, ROUGH)
+        before = STEP * before
+    settle(columns, answers, rows, strength, everything, tolerance)
+    return rows.coefficients
+
+
+def refit(columns: Floats, answers: Floats, coefficients: Floats, most: int) -> Floats:
+    """Fit the coefficients that are not 0 by least squares, where there are at most `most`.
+
+    The l1 norm pulls every coefficient towards 0; this takes the pull back.
+
+    Parameters
+    ----------
+    columns, answers
+        As `start`.
+    coefficients : ndarray, shape (I, N + 1)
+
+    Returns
+    -------
+    ndarray, shape (I, N + 1), float32
+    """
+    used = coefficients != 0
+    counts = used.sum(axis=1)
+    found = coefficients.copy()
+    for group in _groups(np.where(counts <= most, counts, 0), columns.shape[1]):
+        # A place unused points at the column of zeros.
+        places = _first_places(np.where(used[group], np.inf, 0.0), counts[group])
+        chosen = columns[places].astype(np.float64)
+        matrix = chosen @ chosen.transpose(0, 2, 1)
+        diagonal = np.arange(places.shape[1])
+        # Squares as small as this against a column's own cannot be told from rounding.
+        matrix[:, diagonal, diagonal] *= 1.0 + 1e-9
+        matrix[:, diagonal, diagonal] += places == len(columns) - 1
+        right = chosen @ answers[group].astype(np.float64)[..., None]
+        values = np.linalg.solve(matrix, right)[..., 0].astype(np.float32)
+        fitted = np.zeros((len(group), len(columns)), dtype=np.float32)
+        np.put_along_axis(fitted, places, values, axis=1)
+        found[group] = fitted
+    return found
+
+
+def settle(
+    columns: Floats,
+    answers: Floats,
+    rows: Rows,
+    strength: Floats,
+    chosen: Integers,
+    tolerance: float = TOLERANCE,
+) -> None:
+    """Bring chosen rows to their minimum at lambda = `strength`, in place.
+
+    Parameters
+    ----------
+    columns, answers
+        As `start`.
+    rows : Rows
+        Where to start; best at the minimum of a lambda a few times as large.
+    strength : ndarray, shape (I,)
+        lambda of every row, chosen or not.
+    chosen : ndarray of int
+    tolerance : float
+        Duality gap at which a row leaves, as a share of its objective. After `ROUNDS` rounds it
+        stays where it is.
+    """
+    strength = strength.astype(np.float32)
+    active = chosen
+    for _ in range(ROUNDS):
+        energy = np.einsum("ik,ik->i", rows.residual[active], rows.residual[active])
+        gap = relative_gap(
+            rows.coefficients[active], rows.overlap[active], energy, strength[active]
+        )
+        active, gap = active[gap > tolerance], gap[gap > tolerance]
+        if not len(active):
+            return
+        wanted = np.maximum(INNER * tolerance, SHARE_OF_GAP * gap)
+        _one_round(columns, rows, active, strength, wanted)
+        residual = answers[active] - rows.coefficients[active] @ columns
+        rows.residual[active] = residual
+        rows.overlap[active] = residual @ columns.T
+
+
+def _one_round(
+    columns: Floats, rows: Rows, active: Integers, strength: Floats, tolerance: Floats
+) -> None:
+    """Solve each active row on its working set; only the coefficients are brought up to date."""
+    used = rows.coefficients[active] != 0
+    steep = np.abs(rows.overlap[active])
+    steep[steep <= strength[active, None]] = 0.0
+    in_use = used.sum(axis=1)
+    steep[used] = np.inf
+    wanted = np.count_nonzero(steep, axis=1) - in_use
+    sizes = in_use + np.minimum(wanted, np.maximum(FEWEST, in_use))
+    for group in _groups(sizes, columns.shape[1]):
+        i = active[group]
+        places = _first_places(steep[group], sizes[group])
+        chosen = columns[places]
+        gram = chosen @ chosen.transpose(0, 2, 1)
+        diagonal = np.arange(places.shape[1])
+        gram[:, diagonal, diagonal] += places == len(columns) - 1
+        entries = solve_small(
+            np.ascontiguousarray(gram.transpose(1, 0, 2)),
+            np.take_along_axis(rows.coefficients[i], places, axis=1),
+            np.take_along_axis(rows.overlap[i], places, axis=1),
+            strength[i],
+            np.einsum("ik,ik->i", rows.residual[i], rows.residual[i]),
+            tolerance[group],
+        )
+        fresh = np.zeros((len(i), len(columns)), dtype=np.float32)
+        np.put_along_axis(fresh, places, entries, axis=1)
+        rows.coefficients[i] = fresh
+
+
+def _groups(sizes: Integers, answers: int) -> Iterator[Integers]:
+    """Cut rows into groups of like sizes whose matrices fit in `NUMBERS`; size 0 is left out."""
+    order = np.argsort(sizes, kind="stable")
+    order = order[sizes[order] > 0]
+    while len(order):
+        alike = order[
+            : np.searchsorted(sizes[order], ALIKE * max(sizes[order[0]], FEWEST), "right")
+        ]
+        largest = int(sizes[alike[-1]])
+        for block in blocks(len(alike), max(1, NUMBERS // (largest * (2 * largest + answers)))):
+            yield alike[block]
+        order = order[len(alike) :]
+
+
+def _first_places(scores: Floats, sizes: Integers) -> Integers:
+    """List each row's places of highest score, `sizes` of them, the rest the last place."""
+    largest = int(sizes.max())
+    places = np.argpartition(-scores, largest - 1, axis=1)[:, :largest]
+    order = np.argsort(-np.take_along_axis(scores, places, axis=1), axis=1)
+    places = np.take_along_axis(places, order, axis=1)
+    places[np.arange(largest) >= sizes[:, None]] = scores.shape[1] - 1
+    return np.asarray(places)

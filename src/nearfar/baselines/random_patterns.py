@@ -1,0 +1,140 @@
+"""Random patterns, and what every camera pixel answers to them: b = T l.
+
+Index convention: k runs over K patterns.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.errors import InputError
+from nearfar.rigs.base import Rig
+from nearfar.transport.exact import ExactTransport
+
+# Patterns shown to a known transport at once.
+LIGHTS = 32
+
+
+def bernoulli_patterns(projector: Size, count: int, seed: int) -> Booleans:
+    """Draw patterns whose pixels are white or black with probability 1/2 each.
+
+    Parameters
+    ----------
+    projector : Size
+    count : int
+        K, at least 1.
+    seed : int
+
+    Returns
+    -------
+    ndarray of bool, shape (K, Py, Px)
+
+    Raises
+    ------
+    InputError
+        If there is no pattern to draw.
+    """
+    if count < 1:
+        raise InputError(f"{count} random patterns measure nothing: ask for at least 1.")
+    generator = np.random.default_rng([seed, 2009])
+    return np.asarray(generator.integers(0, 2, size=(count, *projector), dtype=np.uint8) > 0)
+
+
+@dataclass(frozen=True)
+class CompressiveMeasurements:
+    """What every camera pixel answers to random patterns.
+
+    Attributes
+    ----------
+    camera : Size
+    patterns : ndarray of bool, shape (K, Py, Px)
+    answers : ndarray, shape (C, channels, K), float32
+        b in photo units, black subtracted.
+    photos : int
+        Exposures that were needed: K, and 1 for black where a rig was used.
+    name : str
+        What was measured.
+    """
+
+    camera: Size
+    patterns: Booleans
+    answers: Floats
+    photos: int
+    name: str = "compressive light transport"
+
+    def __post_init__(self) -> None:
+        if self.answers.ndim != 3 or (self.answers.shape[0], self.answers.shape[2]) != (
+            self.camera.pixels,
+            len(self.patterns),
+        ):
+            raise InputError(
+                f"answers of shape {self.answers.shape} do not fit a camera of {self.camera} and "
+                f"{len(self.patterns)} patterns: give (camera pixels, channels, patterns)."
+            )
+        if not self.patterns.any():
+            raise InputError("all patterns are black, which measures nothing: draw others.")
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        return Size(*self.patterns.shape[1:])
+
+    @property
+    def rows(self) -> Floats:
+        """Answers as rows, shape (C * channels, K)."""
+        return self.answers.reshape(-1, len(self.patterns))
+
+
+def measure_in_theory(truth: ExactTransport, patterns: Booleans) -> CompressiveMeasurements:
+    """Measure a known transport without noise, black level or steps of a sensor: b = T l.
+
+    Parameters
+    ----------
+    truth : ExactTransport
+    patterns : ndarray of bool, shape (K, Py, Px)
+
+    Raises
+    ------
+    InputError
+        If the patterns are not of the projector's size.
+    """
+    answers = np.empty((len(patterns), truth.camera.pixels, truth.channels), dtype=np.float32)
+    for block in blocks(len(patterns), LIGHTS):
+        pictures = truth.pictures(patterns[block].astype(np.float32))
+        answers[block] = pictures.reshape(-1, *answers.shape[1:])
+    return CompressiveMeasurements(
+        truth.camera, patterns, np.moveaxis(answers, 0, 2).copy(), len(patterns), truth.name
+    )
+
+
+def measure_by_rig(rig: Rig, patterns: Booleans) -> CompressiveMeasurements:
+    """Show random patterns, and black once, which is subtracted.
+
+    Parameters
+    ----------
+    rig : Rig
+    patterns : ndarray of bool, shape (K, Py, Px)
+
+    Raises
+    ------
+    InputError
+        If the patterns are not of the projector's size.
+    """
+    if patterns.shape[1:] != rig.projector:
+        raise InputError(
+            f"the patterns are {Size(*patterns.shape[1:])}, the rig's projector is "
+            f"{rig.projector}: draw them of its size."
+        )
+    shown = (
+        255 * pattern.astype(np.uint8) for pattern in (np.zeros(rig.projector, bool), *patterns)
+    )
+    photos = rig.shoot(shown)
+    black = next(photos).astype(np.float32)
+    camera = Size(*black.shape[:2])
+    answers = np.empty((len(patterns), camera.pixels, black.shape[2]), dtype=np.float32)
+    for k, photo in enumerate(photos):
+        answers[k] = (photo - black).reshape(answers.shape[1:]) / np.float32(rig.full_scale)
+    return CompressiveMeasurements(
+        camera, patterns, np.moveaxis(answers, 0, 2).copy(), len(patterns) + 1
+    )

@@ -1,0 +1,169 @@
+"""Reference acquisitions: as many photos as T has columns, or more, and a linear decoder.
+
+They ask nothing of the scene, so they give the truth that other methods are compared with, at its
+price. Photos are kept as they come, in a file where they are many, and decoded for a few camera
+pixels at a time.
+
+Index convention: m runs over photos in the order they are shot, i over rows, that is over camera
+pixels and channels, p over projector pixels.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Size, blocks
+from nearfar.errors import InputError, StorageError
+from nearfar.rigs.base import Photo, Rig
+from nearfar.transport.exact import ExactTransport
+
+# Bytes of photos and of what is decoded that are held at once, the result aside.
+HELD = 2**29
+# What a decoder needs for each photo and each column of a row, at the most.
+BYTES_PER_NUMBER = 64
+
+Progress = Callable[[str, float], None]
+
+
+class Acquisition(Protocol):
+    """Patterns to show, and how their photos give T."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in tables."""
+        ...
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        ...
+
+    @property
+    def photos(self) -> int:
+        """Exposures, those of black and of inverses counted."""
+        ...
+
+    def patterns(self) -> Iterator[NDArray[np.uint8]]:
+        """Draw the 8-bit patterns (Py, Px) one after the other."""
+        ...
+
+    def decode(self, photos: Floats) -> Floats:
+        """Return rows of T from their photos.
+
+        Parameters
+        ----------
+        photos : ndarray, shape (photos, I), float32
+            In photo units.
+
+        Returns
+        -------
+        ndarray, shape (I, P)
+            T @ l = photo(l) - photo(black).
+        """
+        ...
+
+
+def acquire_reference(
+    acquisition: Acquisition,
+    rig: Rig,
+    *,
+    held: int = HELD,
+    out: NDArray[np.float32] | None = None,
+    folder: Path | None = None,
+    progress: Progress | None = None,
+) -> ExactTransport:
+    """Shoot all patterns and decode T in pieces.
+
+    Parameters
+    ----------
+    acquisition : Acquisition
+    rig : Rig
+    held : int
+        Bytes of photos and of work that may be held in memory; the rig's own and `out` come on
+        top. One camera pixel is worked on even where it needs more.
+    out : ndarray, shape (channels, C, P), float32, optional
+        Where T goes, for instance an np.memmap, for a T larger than memory; a new array by
+        default. It becomes `far` of the result, which `nearfar.save_exact` can then keep.
+    folder : Path, optional
+        Where photos that are more than `held` wait in a file, removed in the end; the system's
+        folder for such files by default.
+    progress : callable, optional
+        Told what is being done and the share done.
+
+    Returns
+    -------
+    ExactTransport
+        All in `far`, in photo units.
+
+    Raises
+    ------
+    InputError
+        If the rig has another projector or takes too few photos, or `out` does not fit.
+    StorageError
+        If the photos cannot be kept.
+    """
+    if rig.projector != acquisition.projector:
+        raise InputError(
+            f"{acquisition.name} is for a projector of {acquisition.projector}, the rig has "
+            f"{rig.projector}: make it for {rig.projector}."
+        )
+    report = progress or (lambda _what, _share: None)
+    photos, camera = _shoot(acquisition, rig, held, folder, report)
+    pixels, channels = camera.pixels, photos.shape[2]
+    columns = acquisition.projector.pixels
+    shape = (channels, pixels, columns)
+    far = np.empty(shape, dtype=np.float32) if out is None else out
+    if far.shape != shape or far.dtype != np.float32:
+        raise InputError(
+            f"the array for T is {far.dtype} of shape {far.shape}: give float32 of shape {shape}."
+        )
+    row = BYTES_PER_NUMBER * channels * (acquisition.photos + columns)
+    for block in blocks(pixels, held // 2 // row):
+        cut = photos[:, block].reshape(acquisition.photos, -1)
+        rows = acquisition.decode(cut.astype(np.float32) / np.float32(rig.full_scale))
+        far[:, block] = np.moveaxis(rows.reshape(-1, channels, columns), 1, 0)
+        report("decoding", block.stop / pixels)
+    return ExactTransport(acquisition.projector, camera, (), (), far, acquisition.name)
+
+
+def _shoot(
+    acquisition: Acquisition, rig: Rig, held: int, folder: Path | None, report: Progress
+) -> tuple[NDArray[Any], Size]:
+    """Return the photos as they came, shape (photos, C, channels), and the camera's size."""
+    kept: NDArray[Any] | None = None
+    camera = Size(1, 1)
+    taken = 0
+    for photo in rig.shoot(acquisition.patterns()):
+        if kept is None:
+            camera = Size(*photo.shape[:2])
+            kept = _room(photo, acquisition.photos, held, folder)
+        kept[taken] = photo.reshape(kept.shape[1:])
+        taken += 1
+        report("shooting", taken / acquisition.photos)
+    if kept is None or taken != acquisition.photos:
+        raise InputError(
+            f"the rig took {taken} photos of the {acquisition.photos} patterns of "
+            f"{acquisition.name}: shoot them all."
+        )
+    return kept, camera
+
+
+def _room(photo: Photo, count: int, held: int, folder: Path | None) -> NDArray[Any]:
+    """Return room for photos, in memory where they are a quarter of what may be held."""
+    shape = (count, photo.shape[0] * photo.shape[1], photo.shape[2])
+    if count * photo.nbytes <= held // 4:
+        return np.empty(shape, dtype=photo.dtype)
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            # The map keeps the nameless file alive; it is gone with the map.
+            return np.memmap(file, dtype=photo.dtype, mode="w+", shape=shape)
+    except OSError as error:
+        raise StorageError(
+            f"{count} photos of {count * photo.nbytes} bytes in all cannot be kept in "
+            f"{folder or tempfile.gettempdir()} ({error.strerror}): make room or name another "
+            f"folder."
+        ) from error

@@ -6,15 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from nearfar.arrays import Floats, Size
-from nearfar.illumination.frequencies import (
-    CHECKERBOARD,
-    DC,
-    far_frequencies,
-    near_frequencies,
-    representatives,
-)
+from nearfar.illumination.frequencies import DC, far_frequencies, representatives
 from nearfar.photometry.measurements import Measurements
-from nearfar.plan import Plan
+from nearfar.photometry.theory import measure_in_theory
+from nearfar.plan import Plan, paper_plan
 from nearfar.transport import near
 from nearfar.transport.far import real_basis
 from nearfar.transport.model import Transport
@@ -95,20 +90,7 @@ def model_transport(
 
 def ideal_measurements(transport: Transport, window: int, far: Size, dropped: Size) -> Measurements:
     """Measure by theory: no offset, no noise, no 8 bits."""
-    frequencies = [
-        CHECKERBOARD,
-        *far_frequencies(far, transport.projector),
-        *near_frequencies(window, dropped),
-    ]
-    basis = real_basis(representatives(frequencies), transport.projector)
-    patterns = basis.patterns.astype(np.float64).T
-    answers = transport.dense().astype(np.float64) @ patterns
-    nothing = np.zeros(answers.shape[:2], dtype=np.float32)
-    return Measurements(
-        camera=transport.camera,
-        basis=basis,
-        answers=answers.astype(np.float32),
-        noise=nothing,
-        black=nothing,
-        shown_error=np.zeros((basis.count, transport.projector.pixels), dtype=np.float32),
+    plan = paper_plan(
+        transport.projector, window, far, dropped=dropped, offset="none", correspondence="none"
     )
+    return measure_in_theory(plan, transport)

@@ -21,11 +21,13 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
         If there is no such file, or it is damaged or holds something else.
     """
     try:
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return {"array": loaded}
-        with loaded:
-            return dict(loaded.items())
+        # Opened here: of a damaged archive NumPy forgets to close what it opened itself.
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            if isinstance(loaded, np.ndarray):
+                return {"array": loaded}
+            with loaded:
+                return dict(loaded.items())
     except FileNotFoundError:
         raise MissingFileError(f"{path} is not there: check the name.") from None
     except (OSError, zipfile.BadZipFile, zlib.error, *DAMAGE) as error:

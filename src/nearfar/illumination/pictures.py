@@ -21,6 +21,12 @@ def white(size: Size) -> Floats:
     return np.ones((size.height, size.width), dtype=np.float32)
 
 
+def _shown(drawn: Floats, size: Size) -> Floats:
+    """Average what was drawn finer: (Py, Px, channels), float32."""
+    shown = drawn.reshape(size.height, FINER, size.width, FINER, -1).mean(axis=(1, 3))
+    return np.asarray(shown, dtype=np.float32)
+
+
 def natural_picture(size: Size, seed: int, *, colour: bool = False) -> Floats:
     """Draw dead leaves in linear light, float32, (Py, Px) or (Py, Px, 3), values in [0, 1].
 
@@ -58,8 +64,7 @@ def natural_picture(size: Size, seed: int, *, colour: bool = False) -> Floats:
         drawn[box][leaf] = np.clip(tint * shading[leaf][:, None], 0.0, 1.0)
         empty[box] &= ~leaf
     drawn[empty] = 0.2
-    shown = drawn.reshape(size.height, FINER, size.width, FINER, -1).mean(axis=(1, 3))
-    picture: Floats = shown.astype(np.float32)
+    picture = _shown(drawn, size)
     return picture if colour else picture[..., 0]
 
 
@@ -95,8 +100,62 @@ def penguin(size: Size) -> Floats:
         along = down * np.cos(tilt) - across * np.sin(tilt)
         beside = down * np.sin(tilt) + across * np.cos(tilt)
         drawn[(along / half_y) ** 2 + (beside / half_x) ** 2 <= 1.0] = colour
-    shown = drawn.reshape(size.height, FINER, size.width, FINER, 3).mean(axis=(1, 3))
-    picture: Floats = shown.astype(np.float32)
+    return _shown(drawn, size)
+
+
+def landscape(size: Size) -> Floats:
+    """Draw hills and a lake under a sky, after the paper's figure 4: (Py, Px, 3), float32."""
+    height, width = size.height * FINER, size.width * FINER
+    y = (np.arange(height)[:, None] + 0.5) / height
+    x = (np.arange(width)[None, :] + 0.5) / width
+    drawn = np.array([0.08, 0.30, 0.85]) + np.clip(y * 1.6, 0, 1)[..., None] * [0.5, 0.45, 0.15]
+    drawn = np.broadcast_to(drawn, (height, width, 3)).copy()
+    drawn[(y - 0.2) ** 2 + (x - 0.74) ** 2 < 0.07**2] = (1.0, 0.95, 0.7)
+    # Ranges, far to near: height of the ridge, its waves, and the colour at the ridge.
+    ranges = (
+        (0.48, ((0.07, 1.3, 0.4), (0.03, 3.7, 1.9)), (0.20, 0.32, 0.42)),
+        (0.60, ((0.05, 2.1, 2.6), (0.02, 6.3, 0.2)), (0.10, 0.36, 0.12)),
+        (0.78, ((0.04, 1.7, 1.1), (0.01, 9.1, 2.2)), (0.16, 0.50, 0.05)),
+    )
+    for level, waves, colour in ranges:
+        ridge = level + sum(a * np.sin(2 * np.pi * k * x + phase) for a, k, phase in waves)
+        below = y > ridge
+        shade = 1.0 - 0.6 * np.clip((y - ridge) / 0.25, 0, 1)
+        drawn[below] = (np.array(colour) * shade[..., None])[below]
+    drawn[((y - 0.9) / 0.05) ** 2 + ((x - 0.36) / 0.26) ** 2 < 1] = (0.15, 0.35, 0.60)
+    return _shown(drawn, size)
+
+
+# Letters of 5 x 7 dots, a row of dots in each number's bits.
+_LETTERS = {
+    "A": (14, 17, 17, 31, 17, 17, 17),
+    "D": (30, 17, 17, 17, 17, 17, 30),
+    "E": (31, 16, 16, 30, 16, 16, 31),
+    "F": (31, 16, 16, 30, 16, 16, 16),
+    "I": (14, 4, 4, 4, 4, 4, 14),
+    "M": (17, 27, 21, 21, 17, 17, 17),
+    "N": (17, 25, 21, 19, 17, 17, 17),
+    "O": (14, 17, 17, 17, 17, 17, 14),
+    "R": (30, 17, 17, 30, 20, 18, 17),
+    " ": (0, 0, 0, 0, 0, 0, 0),
+}
+_TEXT = "NEAR AND FAR FROM "
+
+
+def lettering(size: Size) -> Floats:
+    """Draw lines of small letters, black on white, strokes one pixel wide: (Py, Px), float32."""
+    dots = [
+        np.array([[row >> (4 - x) & 1 for x in range(5)] for row in _LETTERS[letter]])
+        for letter in _TEXT
+    ]
+    line = np.concatenate([np.pad(letter, ((1, 1), (0, 1))) for letter in dots], axis=1)
+    repeated = np.tile(line, (1, size.width // line.shape[1] + 2))
+    lines = [
+        # Each line starts elsewhere, so that no two are alike.
+        repeated[:, 36 * number % line.shape[1] :][:, : size.width]
+        for number in range(size.height // len(line) + 1)
+    ]
+    picture: Floats = (1.0 - np.concatenate(lines)[: size.height]).astype(np.float32)
     return picture
 
 

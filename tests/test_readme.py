@@ -49,7 +49,7 @@ def test_every_command_it_shows_is_one():
     ]
     assert {words[1] for words in shown} >= {
         "plan", "export", "import", "reconstruct", "relight", "evaluate", "acquire", "render",
-        "info", "convert",
+        "info", "convert", "figures", "check", "separate",
     }  # fmt: skip
     assert {words[1] for words in shown} <= known
 

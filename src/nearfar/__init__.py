@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from nearfar.transport.store import load_transport, save_transport
     from nearfar.version import version
     from nearfar.workflow.acquire import acquire
+    from nearfar.workflow.check import check_model, condition_near
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruct import reconstruct
 
@@ -38,6 +39,8 @@ _HOMES = {
     "Size": "nearfar.arrays",
     "Transport": "nearfar.transport.model",
     "acquire": "nearfar.workflow.acquire",
+    "check_model": "nearfar.workflow.check",
+    "condition_near": "nearfar.workflow.check",
     "correspond_by_stripes": "nearfar.correspondence",
     "given_correspondence": "nearfar.correspondence",
     "load_exact": "nearfar.transport.exact_store",
@@ -71,6 +74,8 @@ __all__ = [
     "Size",
     "Transport",
     "acquire",
+    "check_model",
+    "condition_near",
     "correspond_by_stripes",
     "given_correspondence",
     "load_exact",

@@ -16,7 +16,9 @@ import typer
 
 from nearfar.cli import (
     acquiring,
+    checking,
     demonstration,
+    figuring,
     informing,
     looking,
     planning,
@@ -46,6 +48,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "render": looking.render,
     "info": informing.info,
     "convert": transports.convert,
+    "check": checking.check,
+    "figures": figuring.figures,
     "separate": separating.separate,
 }
 

@@ -43,6 +43,7 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .numbers th { color: var(--soft); font-weight: 500; font-size: .85rem; }
 .maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }
 figure { margin: 0; }
+.sheet img { image-rendering: auto; background: #ffffff; }
 figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
 .scale { display: flex; justify-content: space-between; font-size: .75rem; color: var(--soft); }
 .bar { height: 8px; border-radius: 4px; margin-top: .5rem; }

@@ -1,0 +1,140 @@
+"""What each figure is: its experiment, the arrays behind it, how it is drawn, and its caption."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from nearfar.report.figures import accuracy, components, rival, spectra, transport_slice
+from nearfar.workflow.experiments.acquired import BOX, CORNER, Report, acquire_scene
+from nearfar.workflow.experiments.data import Data
+from nearfar.workflow.experiments.in_theory import WEDGE, acquire_in_theory
+from nearfar.workflow.experiments.rivals import acquire_compressively
+from nearfar.workflow.experiments.scan_line import components_along_a_line
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A figure.
+
+    Attributes
+    ----------
+    title : str
+    experiments : tuple of str
+        Which of `EXPERIMENTS` it draws.
+    draw : callable
+    caption : callable
+        Writes the caption from the data.
+    arrays : tuple of str
+        Beginnings of the names of the arrays behind it; all where empty.
+    """
+
+    title: str
+    experiments: tuple[str, ...]
+    draw: Callable[[Data], Figure]
+    caption: Callable[[Data], str]
+    arrays: tuple[str, ...] = ()
+
+    def behind(self, data: Data) -> Data:
+        """Return the data behind the figure."""
+        chosen = {
+            name: values
+            for name, values in data.arrays.items()
+            if not self.arrays or name.startswith(self.arrays)
+        }
+        return Data(chosen, data.numbers)
+
+
+EXPERIMENTS: Mapping[str, Callable[[Report], Data]] = {
+    "box": partial(acquire_scene, BOX),
+    "scan-line": partial(components_along_a_line, BOX),
+    "corner": partial(acquire_scene, CORNER),
+    "wedge": partial(acquire_in_theory, WEDGE),
+    "CLT": partial(acquire_compressively, WEDGE),
+}
+
+
+def _acquired(data: Data) -> str:
+    plan = data.numbers["plan"]
+    return (
+        f"W = {data.numbers['window']}, far band {'x'.join(map(str, data.numbers['far']))}: "
+        f"{plan['transport_photos']} photos with sensor noise for a transport of "
+        f"{plan['brute_force']} projector pixels, {plan['savings']:.1f} times fewer than brute "
+        f"force, and {plan['photos']['correspondence']} of stripes for correspondence. Near- and "
+        f"far-range light is shown twice as bright."
+    )
+
+
+def _slice(data: Data) -> str:
+    return (
+        "The transport between a row of the camera and the same row of the projector: a dominant "
+        "diagonal with much weaker light beside it, dense, of slowly decaying singular values. "
+        "What was acquired follows the exact slice down to about 1/10 000 of the diagonal; the "
+        "fringes below that beside the candle are the far band's end."
+    )
+
+
+def _spectra(data: Data) -> str:
+    ranks = data.numbers["ranks"]
+    return (
+        f"Direct light is diagonal and of full rank ({ranks['D']}), near-range light a band "
+        f"around it ({ranks['N']}), far-range light dense, weak and of low rank ({ranks['F']}). "
+        f"Ranks count singular values over {data.numbers['rank_above']:g} of T's largest. k_far "
+        f"is the far band's end, k_near holds {data.numbers['held']:.0%} of N's energy."
+    )
+
+
+def _accuracy(data: Data) -> str:
+    y, x = data.numbers["lowest_camera_pixel"]
+    ky, kx = data.numbers["lowest_frequency"]
+    return (
+        f"{data.numbers['plan']['transport_photos']} complex patterns without noise; near- and "
+        f"far-range light is shown four times as bright. The lowest SNR_b, "
+        f"{data.numbers['snr_b_frequency']['p0']:.1f} dB, is at (kx, ky) = ({kx}, {ky}); the "
+        f"lowest SNR_t, {data.numbers['snr_t']['p0']:.1f} dB, at camera pixel ({x}, {y})."
+    )
+
+
+def _rival(data: Data) -> str:
+    found = data.numbers["CLT"]
+    return (
+        f"{found['patterns']} patterns each, without noise. Compressive light transport (CLT): "
+        f"Bernoulli patterns, rows sparse in the Haar basis, each reconstructed on its own with "
+        f"the lambda that is best against the truth over a grid of {len(found['grid'])}, "
+        f"{'refitted by least squares' if found['refitted'] else 'without refitting'}."
+    )
+
+
+SHEETS: Mapping[str, Sheet] = {
+    "1": Sheet(
+        "A slice of the transport",
+        ("box",),
+        transport_slice.draw,
+        _slice,
+        ("white/exact", "slice"),
+    ),
+    "2": Sheet(
+        "A box with a candle, taken apart",
+        ("box",),
+        partial(components.draw, picture="penguin"),
+        _acquired,
+        ("white/", "picture/"),
+    ),
+    "3": Sheet("Components in space and frequency", ("scan-line",), spectra.draw, _spectra),
+    "4": Sheet(
+        "A corner",
+        ("corner",),
+        partial(components.draw, picture="landscape"),
+        _acquired,
+        ("white/", "picture/"),
+    ),
+    "5": Sheet(
+        "Accuracy at every frequency and camera pixel",
+        ("wedge",),
+        accuracy.draw,
+        _accuracy,
+        ("white/", "picture/", "snr"),
+    ),
+    "6": Sheet("Against compressive light transport", ("wedge", "CLT"), rival.draw, _rival),
+}

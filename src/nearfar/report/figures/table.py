@@ -1,0 +1,83 @@
+"""The table: what the paper states and what was measured."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from nearfar.report.figures.rival import LIGHTS
+from nearfar.report.page import numbers
+from nearfar.workflow.experiments.data import Data
+
+HEAD = (
+    "",
+    "photos of transport",
+    "savings in theory (equation 13)",
+    "savings",
+    "SNR_b over frequencies: lowest",
+    "mean",
+    "SNR_t over camera pixels: lowest",
+    "mean",
+    "reconstruction",
+)
+
+
+# The paper's own figures, column by column; empty where it prints none.
+PAPER = {
+    "2": ("1060", "about 31", "15.4", "", "", "", "", ""),
+    "4": ("788", "about 31", "20.8", "", "", "", "", ""),
+    "5": ("423", "", "", "25 dB or more", "", "25 dB or more", "", ""),
+}
+NAMES = {
+    "2": "figure 2: box with a candle, noisy photos",
+    "4": "figure 4: corner, noisy photos",
+    "5": "figure 5: wedge with a toy, by theory",
+}
+
+
+def rows(found: Mapping[str, Data]) -> list[list[str]]:
+    """Return the table's lines: each experiment, and under it what the paper states."""
+    lines: list[list[str]] = []
+    for figure, data in found.items():
+        if figure not in PAPER:
+            continue
+        lines.append([NAMES[figure], *_measured(data.numbers)])
+        lines.append(["as the paper states", *(stated or "not stated" for stated in PAPER[figure])])
+    return lines
+
+
+def _measured(found: Mapping[str, Any]) -> list[str]:
+    plan = found["plan"]
+    photos = str(plan["transport_photos"])
+    if stripes := plan["photos"]["correspondence"]:
+        photos += f" + {stripes} stripes"
+    return [
+        photos,
+        f"{found['savings_in_theory']:.2f}",
+        f"{plan['savings']:.2f}",
+        f"{found['snr_b_frequency']['p0']:.1f} dB",
+        f"{found['snr_b_frequency']['mean']:.1f} dB",
+        f"{found['snr_t']['p0']:.1f} dB",
+        f"{found['snr_t']['mean']:.1f} dB",
+        f"{found['seconds']['reconstruction']:.1f} s",
+    ]
+
+
+def relighting_rows(found: Data) -> list[list[str]]:
+    """Return a line for each of figure 6's lights: this method, CLT, and their difference."""
+    ours, theirs = found.numbers, found.numbers["CLT"]
+    pairs = [
+        (f"SNR_b, {LIGHTS[light]}", value, theirs["snr_b"][light])
+        for light, value in ours["snr_b"].items()
+    ]
+    pairs += [
+        (f"SNR_t, {name}", ours["snr_t"][key], theirs["snr_t"][key])
+        for name, key in (("mean", "mean"), ("lowest", "p0"))
+    ]
+    return [
+        [name, f"{one:.1f} dB", f"{other:.1f} dB", f"{one - other:+.1f} dB"]
+        for name, one, other in pairs
+    ]
+
+
+def table(found: Mapping[str, Data]) -> str:
+    """Return the main table as HTML."""
+    return numbers(list(HEAD), rows(found))

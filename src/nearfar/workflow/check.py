@@ -1,0 +1,352 @@
+"""Where the paper's assumptions hold on a scene (sections 3.2, 3.3 and 4.2).
+
+The method takes N to lie in a window and to be silent beyond k_near, F to be silent beyond k_far,
+and both to be silent at the checkerboard. These functions say how much of each lies elsewhere, and
+how well the near patterns tell the entries of a window apart (equation 5).
+
+Index convention: rows are (n, channels, Py, Px), n camera pixels in a block.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import gcd
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from nearfar.arrays import Floats, Size, blocks
+from nearfar.errors import InputError
+from nearfar.illumination.frequencies import (
+    as_array,
+    band,
+    near_frequencies,
+    representatives,
+)
+from nearfar.transport import near
+
+BLOCK = 64
+# Camera pixels that are looked at by default, evenly spaced.
+SAMPLE = 4096
+# Shares of the energy for which a bandwidth is told.
+SHARES = (0.5, 0.9, 0.99)
+# Eigenvalues under this share of the largest stand for directions that no pattern sees.
+UNSEEN = 1e-6
+
+
+class Apart(Protocol):
+    """A transport whose components are known apart."""
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        ...
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        ...
+
+    @property
+    def correspondence(self) -> Floats:
+        """q, shape (Cy, Cx, 2); NaN without direct light."""
+        ...
+
+    def component_rows(self, pixels: slice) -> tuple[Floats, Floats, Floats]:
+        """Dense rows of D, N and F, each (n, channels, P)."""
+        ...
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """Where a transport keeps to the paper's model; shares are of energy, 0 to 1.
+
+    Attributes
+    ----------
+    window : int
+        W.
+    far : Size
+        Far band, in DFT frequencies of the pattern grid.
+    k_near : float
+        Cycles per projector pixel, on either axis.
+    camera_pixels : int
+        Camera pixels that were looked at.
+    floodlit : mapping
+        Shares of direct, near and far in the light under full white.
+    near_beyond, near_outside : float
+        Shares of N beyond k_near, and outside the window.
+    near_bandwidth, far_bandwidth : mapping
+        Cycles per projector pixel, on either axis, that hold a share of the energy.
+    far_beyond : float
+        Share of F beyond k_far.
+    far_beyond_in_window : float
+        Share of that part that lies inside the window, where n takes it up.
+    checkerboard_near, checkerboard_far : float
+        Amplitude of N's and of F's answer to the checkerboard over D's, root mean square over lit
+        camera pixels: what the direct estimate is off by.
+    far_beyond_map, checkerboard_map : ndarray, shape (n,)
+        Per camera pixel looked at: share of F beyond k_far that is outside the window, and
+        |N + F| over D at the checkerboard (NaN without direct light).
+    """
+
+    window: int
+    far: Size
+    k_near: float
+    camera_pixels: int
+    floodlit: Mapping[str, float]
+    near_beyond: float
+    near_outside: float
+    near_bandwidth: Mapping[float, float]
+    far_beyond: float
+    far_beyond_in_window: float
+    far_bandwidth: Mapping[float, float]
+    checkerboard_near: float
+    checkerboard_far: float
+    far_beyond_map: Floats
+    checkerboard_map: Floats
+
+
+def default_k_near(window: int) -> float:
+    """Return 3 / W cycles per pixel, at most 1/2.
+
+    The window's light falls off towards its border, so it varies over a third of W or more; the
+    paper asks for 2 k_near > W P / P, which this exceeds (section 3.3).
+    """
+    return min(0.5, 3.0 / window)
+
+
+def check_model(
+    transport: Apart,
+    window: int,
+    far: Size,
+    *,
+    k_near: float | None = None,
+    sample: int = SAMPLE,
+    progress: Callable[[float], None] | None = None,
+) -> ModelCheck:
+    """Tell how far a transport keeps to the paper's model.
+
+    Parameters
+    ----------
+    transport : ExactTransport or Transport
+        With its components apart.
+    window : int
+        W.
+    far : Size
+        Far band.
+    k_near : float, optional
+        Cycles per projector pixel; `default_k_near` if left out.
+    sample : int
+        Camera pixels to look at, evenly spaced; all where there are fewer.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    ModelCheck
+
+    Raises
+    ------
+    InputError
+        If W or the far band do not fit the projector, or the components are not apart.
+    """
+    projector = transport.projector
+    if not 1 <= window <= min(projector) or far.height > projector[0] or far.width > projector[1]:
+        raise InputError(
+            f"W = {window} and a far band of {far} do not fit a projector of {projector}: choose "
+            f"smaller ones."
+        )
+    if getattr(transport, "is_apart", True) is False:
+        raise InputError(
+            "the transport's components are not known apart, so there is nothing to check: name "
+            "one that 'nearfar render' or 'nearfar reconstruct' wrote."
+        )
+    limit = default_k_near(window) if k_near is None else k_near
+    totals = _Totals(projector, window, far)
+    pixels = transport.camera.pixels
+    step = max(1, pixels // sample)
+    # Evenly spaced, but not down the same few columns of the camera.
+    while step > 1 and gcd(step, transport.camera.width) > 1:
+        step += 1
+    chosen = np.arange(0, pixels, step)
+    centres = near.centre(transport.correspondence, projector)
+    lit = np.isfinite(transport.correspondence[..., 0]).ravel()
+    for block in blocks(len(chosen), BLOCK):
+        mine = chosen[block]
+        part = slice(int(mine[0]), int(mine[-1]) + 1, step)
+        rows = [
+            np.asarray(component).reshape(len(mine), -1, *projector)
+            for component in transport.component_rows(part)
+        ]
+        totals.add(rows, centres[mine], lit[mine])
+        if progress is not None:
+            progress(block.stop / len(chosen))
+    return totals.result(limit)
+
+
+class _Totals:
+    """Energies that add up over blocks of camera pixels."""
+
+    def __init__(self, projector: Size, window: int, far: Size) -> None:
+        self.projector, self.window, self.far = projector, window, far
+        frequencies = [np.fft.fftfreq(n) for n in projector]
+        # |k| on either axis, as bands and windows are square.
+        self.height = np.maximum(np.abs(frequencies[0])[:, None], np.abs(frequencies[1])[None, :])
+        inside = [np.isin(_whole(n), band(m)) for n, m in zip(projector, far, strict=True)]
+        self.in_band = inside[0][:, None] & inside[1][None, :]
+        y, x = np.indices(projector)
+        self.checkerboard = 1.0 - 2.0 * ((y + x) % 2)
+        self.flood = np.zeros(3)
+        self.spectrum = np.zeros((2, *projector))
+        self.near = np.zeros(2)  # outside the window, all
+        self.beyond = np.zeros(2)  # beyond k_far: inside the window, all
+        self.board = np.zeros(3)  # energies of D, N and F at the checkerboard, lit pixels
+        self.far_maps: list[Floats] = []
+        self.board_maps: list[Floats] = []
+
+    def add(self, rows: list[Floats], centres: NDArray[np.int64], lit: NDArray[np.bool_]) -> None:
+        self.flood += [float(part.sum(dtype=np.float64)) for part in rows]
+        _, n, f = rows
+        mask = self._windows(centres) & lit[:, None, None]
+        self.near += [
+            float(np.sum((n * ~mask[:, None]) ** 2, dtype=np.float64)),
+            float(np.sum(n**2, dtype=np.float64)),
+        ]
+        for number, part in enumerate((n, f)):
+            answer = fft.fft2(part)
+            self.spectrum[number] += np.sum(np.abs(answer) ** 2, axis=(0, 1), dtype=np.float64)
+            if number == 1:
+                high = fft.ifft2(np.where(self.in_band, 0, answer)).real
+                within = np.sum(high**2 * mask[:, None], axis=(1, 2, 3), dtype=np.float64)
+                total = np.sum(high**2, axis=(1, 2, 3), dtype=np.float64)
+                self.beyond += [within.sum(), total.sum()]
+                every = np.sum(part**2, axis=(1, 2, 3), dtype=np.float64)
+                self.far_maps.append((total - within) / np.maximum(every, 1e-300))
+        boards = [np.einsum("ncyx,yx->nc", part, self.checkerboard) for part in rows]
+        self.board += [float(np.sum(board[lit] ** 2)) for board in boards]
+        other = np.sqrt(np.sum((boards[1] + boards[2]) ** 2, axis=1))
+        own = np.sqrt(np.sum(boards[0] ** 2, axis=1))
+        self.board_maps.append(np.where(lit, other / np.maximum(own, 1e-300), np.nan))
+
+    def _windows(self, centres: NDArray[np.int64]) -> NDArray[np.bool_]:
+        mask = np.zeros((len(centres), self.projector.pixels), dtype=bool)
+        inside = near.inside(centres, self.window, self.projector)
+        places = near.places_on(centres, self.window, self.projector)
+        number, entry = np.nonzero(inside)
+        mask[number, places[number, entry]] = True
+        return mask.reshape(-1, *self.projector)
+
+    def result(self, k_near: float) -> ModelCheck:
+        n, f = self.spectrum
+        d_board = max(self.board[0], 1e-300)
+        total = max(float(self.flood.sum()), 1e-300)
+        return ModelCheck(
+            window=self.window,
+            far=self.far,
+            k_near=k_near,
+            camera_pixels=sum(len(part) for part in self.far_maps),
+            floodlit={
+                name: float(value / total)
+                for name, value in zip(("direct", "near", "far"), self.flood, strict=True)
+            },
+            near_beyond=_share(n[self.height > k_near].sum(), n.sum()),
+            near_outside=_share(*self.near),
+            near_bandwidth=self._bandwidth(n),
+            far_beyond=_share(f[~self.in_band].sum(), f.sum()),
+            far_beyond_in_window=_share(*self.beyond),
+            far_bandwidth=self._bandwidth(f),
+            checkerboard_near=float(np.sqrt(self.board[1] / d_board)),
+            checkerboard_far=float(np.sqrt(self.board[2] / d_board)),
+            far_beyond_map=np.concatenate(self.far_maps),
+            checkerboard_map=np.concatenate(self.board_maps),
+        )
+
+    def _bandwidth(self, energy: Floats) -> dict[float, float]:
+        order = np.argsort(self.height, axis=None, kind="stable")
+        rising = np.cumsum(energy.ravel()[order])
+        if rising[-1] <= 0:
+            return dict.fromkeys(SHARES, 0.0)
+        places = np.searchsorted(rising, np.array(SHARES) * rising[-1])
+        return {
+            share: float(self.height.ravel()[order[place]])
+            for share, place in zip(SHARES, places, strict=True)
+        }
+
+
+def _whole(count: int) -> NDArray[np.int64]:
+    """Whole frequencies in the order of the DFT."""
+    return np.asarray(np.rint(np.fft.fftfreq(count) * count).astype(np.int64))
+
+
+def _share(part: float, whole: float) -> float:
+    return float(part / whole) if whole > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """How well near patterns tell the entries of a window apart.
+
+    Attributes
+    ----------
+    windows : int
+        Different ways in which the projector's border cuts a window, the whole one included.
+    unseen : int
+        Directions of a whole window that no pattern sees: one for each frequency dropped.
+    whole, worst : float
+        Largest over smallest singular value in the directions that are seen: of the whole
+        window, and of the worst cut one. 1 is ideal (equation 5).
+    """
+
+    windows: int
+    unseen: int
+    whole: float
+    worst: float
+
+
+def condition_near(projector: Size, window: int, dropped: Size) -> Conditioning:
+    """Condition of the near patterns over every window on a projector (equation 5).
+
+    Parameters
+    ----------
+    projector : Size
+    window : int
+        W.
+    dropped : Size
+        Block of lowest near frequencies that are not shot.
+
+    Returns
+    -------
+    Conditioning
+    """
+    frequencies = representatives(near_frequencies(window, dropped))
+    angle = 2 * np.pi * (as_array(frequencies) @ near.offsets(window).T)
+    # Each pair +-k counts twice, k = -k once; its sine is zero.
+    twice = np.array([1.0 if k.is_own_negative else 2.0 for k in frequencies])[:, None]
+    patterns = np.concatenate([np.sqrt(twice) * np.cos(angle), np.sqrt(twice) * np.sin(angle)])
+    gram = patterns.T @ patterns / window**2
+    y, x = np.divmod(np.arange(projector.pixels), projector.width)
+    kinds = np.unique(near.inside(np.stack([y, x], axis=1), window, projector), axis=0)
+    conditions = []
+    for kind in kinds:
+        values = np.linalg.eigvalsh(gram[np.ix_(kind, kind)])
+        seen = values[values > UNSEEN * values[-1]]
+        conditions.append(float(np.sqrt(seen[-1] / seen[0])) if len(seen) else np.inf)
+    full = np.linalg.eigvalsh(gram)
+    seen = full[full > UNSEEN * full[-1]]
+    return Conditioning(
+        windows=len(kinds),
+        unseen=int(np.sum(full <= UNSEEN * full[-1])),
+        whole=float(np.sqrt(seen[-1] / seen[0])),
+        worst=max(conditions),
+    )
+
+
+def numbers_of(check: ModelCheck, condition: Conditioning) -> dict[str, Any]:
+    """Return a check's numbers as JSON holds them: all but its maps."""
+    found = {
+        name: value for name, value in vars(check).items() if not isinstance(value, np.ndarray)
+    }
+    for name in ("near_bandwidth", "far_bandwidth"):
+        found[name] = {str(share): k for share, k in found[name].items()}
+    return found | {"far": list(check.far), "condition": vars(condition)}

@@ -1,0 +1,58 @@
+"""``nearfar check``: where the model holds, in lines, JSON and a page."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Job, check_done, check_sentence, run_nearfar
+
+MODEL = ("--near", "5", "--far", "3x3")
+
+
+def test_a_world_of_the_model_passes(finished: Job):
+    found = json.loads(check_done(run_nearfar("check", finished.apart, *MODEL, "--json")).out)
+    assert found["near_outside"] < 1e-6
+    assert found["far_beyond"] < 1e-6
+    assert found["checkerboard_near"] < 1e-3
+    assert found["camera_pixels"] == 72
+    assert sum(found["floodlit"].values()) == pytest.approx(1.0)
+    assert found["condition"]["whole"] == pytest.approx(1.0)
+    narrow = json.loads(
+        check_done(
+            run_nearfar("check", finished.apart, "--near", "3", "--far", "1x1", "--json")
+        ).out
+    )
+    assert narrow["near_outside"] > 0.1
+    assert narrow["far_beyond"] > 1e-3
+
+
+def test_a_reconstruction_is_checked_too(finished: Job):
+    said = check_done(run_nearfar("check", finished.transport, *MODEL)).out
+    assert "F beyond k_far (a band of 3x3)" in said
+    assert "condition of the near patterns over a whole window: 1.000" in said
+
+
+def test_the_page_has_tables_and_maps(finished: Job, tmp_path: Path):
+    page = tmp_path / "check.html"
+    check_done(run_nearfar("check", finished.apart, *MODEL, "--html", page))
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("<!doctype html>")
+    assert text.count("data:image/png;base64,") == 2
+    assert "http" not in text
+    check_sentence(run_nearfar("check", finished.apart, *MODEL, "--html", page), page, "--force")
+    check_done(run_nearfar("check", finished.apart, *MODEL, "--html", page, "--force"))
+
+
+def test_what_cannot_be_checked(finished: Job, tmp_path: Path, folder_listing):
+    page = tmp_path / "check.html"
+    for arguments, words in (
+        ((finished.truth, *MODEL), ("not known apart",)),
+        ((tmp_path / "none.zarr", *MODEL), ("none.zarr",)),
+        ((finished.apart, "--near", "17", "--far", "3x3"), ("W = 17",)),
+        ((finished.apart, "--near", "5", "--far", "3x21"), ("3x21",)),
+        ((finished.apart, *MODEL, "--drop", "2x2"), ("--drop 2x2",)),
+        ((finished.capture, *MODEL), (finished.capture,)),
+    ):
+        check_sentence(run_nearfar("check", *arguments, "--html", page), *words)
+    assert folder_listing() == []

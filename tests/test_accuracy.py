@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from nearfar.cli.main import main
+from nearfar.workflow.experiments.in_theory import WEDGE, acquire_in_theory
 
 # Scene, projector, W, far band; least SNR_b over five pictures and under white, dB. Camera: 30 000
 # e- full well, read noise 4 e-, 14 bits, ambient 1 %, white at 90 % of the range: the defaults.
@@ -45,6 +46,19 @@ def test_a_scene_is_relit_as_well_as_asked(
     # No camera pixel or frequency fails unseen behind the means.
     assert judged["snr_t"]["p5"] > 20
     assert judged["snr_b_frequency"]["p5"] > 30
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_without_noise_every_frequency_and_camera_pixel_is_as_good_as_in_the_paper():
+    found = acquire_in_theory(WEDGE, lambda _what, _share: None).numbers
+    assert found["plan"]["transport_photos"] == 423
+    # The paper's figure 5, dB.
+    assert found["snr_b_frequency"]["p0"] >= 25
+    assert found["snr_t"]["p0"] >= 25
+    # The far band is measured itself; its neighbours are where near and far meet.
+    ky, kx = found["lowest_frequency"]
+    assert max(abs(ky) / 3.5, abs(kx) / 5) < 2
 
 
 @pytest.mark.slow

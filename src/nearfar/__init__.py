@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from nearfar.transport.store import load_transport, save_transport
     from nearfar.version import version
     from nearfar.workflow.acquire import acquire
-    from nearfar.workflow.check import check_model, condition_near
+    from nearfar.workflow.check import check_model
+    from nearfar.workflow.conditioning import condition_near
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruct import reconstruct
 
@@ -40,7 +41,7 @@ _HOMES = {
     "Transport": "nearfar.transport.model",
     "acquire": "nearfar.workflow.acquire",
     "check_model": "nearfar.workflow.check",
-    "condition_near": "nearfar.workflow.check",
+    "condition_near": "nearfar.workflow.conditioning",
     "correspond_by_stripes": "nearfar.correspondence",
     "given_correspondence": "nearfar.correspondence",
     "load_exact": "nearfar.transport.exact_store",

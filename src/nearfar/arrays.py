@@ -68,6 +68,13 @@ def parse_size(text: str, *, name: str = "size") -> Size:
     return Size(height, width)
 
 
+def processors() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def blocks(count: int, length: int) -> Iterator[slice]:
     """Cut ``range(count)`` into slices of at most `length`."""
     for start in range(0, count, max(1, length)):

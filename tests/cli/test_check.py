@@ -52,6 +52,8 @@ def test_what_cannot_be_checked(finished: Job, tmp_path: Path, folder_listing):
         ((finished.apart, "--near", "17", "--far", "3x3"), ("W = 17",)),
         ((finished.apart, "--near", "5", "--far", "3x21"), ("3x21",)),
         ((finished.apart, *MODEL, "--drop", "2x2"), ("--drop 2x2",)),
+        ((finished.apart, *MODEL, "--drop", "5x5"), ("W = 5", "no near pattern")),
+        ((finished.apart, "--near", "1", "--far", "3x3"), ("W = 1", "no near pattern")),
         ((finished.capture, *MODEL), (finished.capture,)),
     ):
         check_sentence(run_nearfar("check", *arguments, "--html", page), *words)

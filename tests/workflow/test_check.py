@@ -9,7 +9,8 @@ from nearfar.errors import InputError
 from nearfar.illumination.frequencies import near_frequencies
 from nearfar.illumination.patterns import exponential
 from nearfar.transport.exact import ExactTransport
-from nearfar.workflow.check import check_model, condition_near
+from nearfar.workflow.check import check_model
+from nearfar.workflow.conditioning import condition_near
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA = Size(16, 20), Size(8, 9)
@@ -111,6 +112,9 @@ def test_what_cannot_be_checked_is_refused():
         check_model(world, 17, Size(3, 3))
     with pytest.raises(InputError, match="do not fit"):
         check_model(world, 5, Size(3, 21))
+    for wrong in ({"sample": 0}, {"k_near": -1.0}):
+        with pytest.raises(InputError, match="above 0"):
+            check_model(world, 5, Size(3, 3), **wrong)
     together = ExactTransport(PROJECTOR, CAMERA, (), (), _nothing()[None].astype(np.float32))
     with pytest.raises(InputError, match="not known apart"):
         check_model(together, 5, Size(3, 3))

@@ -16,19 +16,19 @@ keeps. lambda is given as a share of the least that leaves the row without wavel
 Index convention: k runs over K patterns, n over wavelets, i over rows: camera pixels and channels.
 """
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from nearfar.arrays import Floats, Integers, blocks
+from nearfar.arrays import Floats, Integers, blocks, processors
 from nearfar.baselines.lasso import highest_strength, refit, settle, solve, start
 from nearfar.baselines.random_patterns import (
     CompressiveMeasurements,
+    answer_in_theory,
     bernoulli_patterns,
     measure_by_rig,
-    measure_in_theory,
 )
 from nearfar.baselines.sensing import Sensing, sense
 from nearfar.errors import InputError
@@ -39,9 +39,9 @@ __all__ = [
     "SHARE",
     "SHARES",
     "CompressiveMeasurements",
+    "answer_in_theory",
     "bernoulli_patterns",
     "measure_by_rig",
-    "measure_in_theory",
     "reconstruct_compressive",
     "reconstruct_to_noise",
     "refit_few",
@@ -51,10 +51,9 @@ __all__ = [
 SHARES = tuple(10 ** (-0.5 - 0.25 * i) for i in range(13))
 SHARE = 1e-3
 # Least squares on the support is trusted with at most one coefficient for this many patterns.
-PATTERNS_PER_COEFFICIENT = 4
+PATTERNS_PER_COEFFICIENT = 2
 # Rows solved together.
 BLOCK = 512
-WORKERS = os.cpu_count() or 1
 
 Progress = Callable[[float], None]
 
@@ -76,7 +75,7 @@ def reconstruct_compressive(
     share : float
         lambda as a share of the least that leaves a row without wavelets, in (0, 1].
     refitted : bool
-        Fit the coefficients that are kept by least squares, where a row keeps at most a quarter
+        Fit the coefficients that are kept by least squares, where a row keeps at most half
         as many as there are patterns.
     progress : callable, optional
         Told the share of rows done.
@@ -175,7 +174,8 @@ def _reconstruct(
         return len(pictures)
 
     done = 0
-    with ThreadPoolExecutor(WORKERS) as pool:
+    # One thread of linear algebra in each of ours: more would only wait for each other.
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(processors()) as pool:
         for count in pool.map(one, blocks(len(rows), BLOCK)):
             done += count
             if progress is not None:

@@ -94,8 +94,21 @@ class FullDFT:
 
     def _answers_of(self, rows: Floats) -> Floats:
         """Answers of rows to what is shown: 2 l / 255 - 1."""
+        height, width = self.projector
+        period = int(np.lcm(height, width))
+        y, x = np.divmod(np.arange(height * width), width)
+        # Every pattern is a walk through one period of a sinusoid, in whole steps.
+        angle = 2 * np.pi * np.arange(period) / period
+        period_of = {
+            False: quantise(0.5 + 0.5 * np.cos(angle)) * (2.0 / 255.0) - 1.0,
+            True: quantise(0.5 + 0.5 * np.sin(angle)) * (2.0 / 255.0) - 1.0,
+        }
+        numbers = self._numbers[self.basis.index]
         answers = np.empty_like(rows)
-        for block in blocks(len(self.basis.index), DRAWN):
-            drawn = np.stack([self._shown(r).ravel() for r in range(*block.indices(block.stop))])
-            answers[:, block] = rows @ (drawn * (2.0 / 255.0) - 1.0).T
+        for is_sine, shown in period_of.items():
+            mine = np.flatnonzero(self.basis.is_sine == is_sine)
+            for block in blocks(len(mine), DRAWN):
+                ky, kx = numbers[mine[block]].T[..., None]
+                steps = (ky * y * (period // height) + kx * x * (period // width)) % period
+                answers[:, mine[block]] = rows @ shown[steps].T
         return answers

@@ -8,6 +8,7 @@ Index convention: m runs over photos in the order they are shot, i over rows, th
 pixels and channels, p over projector pixels.
 """
 
+import os
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -159,6 +160,8 @@ def _room(photo: Photo, count: int, held: int, folder: Path | None) -> NDArray[A
         return np.empty(shape, dtype=photo.dtype)
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
+            # A map of a file with holes would end the process on a full disk.
+            os.posix_fallocate(file.fileno(), 0, count * photo.nbytes)
             # The map keeps the nameless file alive; it is gone with the map.
             return np.memmap(file, dtype=photo.dtype, mode="w+", shape=shape)
     except OSError as error:

@@ -107,9 +107,11 @@ def render(
     """
     from nearfar.files import check_output
     from nearfar.rigs.config import is_mitsuba
+    from nearfar.scenes import NAMES
     from nearfar.transport.exact_store import save_exact
 
-    keep_input(output, Path(scene))
+    if scene not in NAMES:
+        keep_input(output, Path(scene))
     check_output(output, force=force)
     from_file = is_mitsuba(Path(scene))
     if not from_file and (samples, seed) != (None, None):

@@ -141,8 +141,17 @@ def separate(
     _refuse(source, ("--rig", "--photos"), {"--json": as_json or None})
     if pattern is Pattern.ANY and source != "--photos":
         raise typer.BadParameter("any goes with --photos only.", param_hint="--pattern")
+    from nearfar.scenes import NAMES
+
     method = _method(pattern, side=side, step=step, period=period, shifts=shifts)
-    inputs = (photos, ambient, black, truth, transport, Path(rig) if rig else None)
+    inputs = (
+        photos,
+        ambient,
+        black,
+        truth,
+        transport,
+        Path(rig) if rig and rig not in NAMES else None,
+    )
     keep_input(output, *(path for path in inputs if path is not None))
     check_output(output, force=force, replaceable=is_separation)
     if export:

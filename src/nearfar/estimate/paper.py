@@ -33,6 +33,8 @@ SETTLING = 0.8
 FIRST = np.float32(0.75)
 # Where no measured pattern tells direct light from none, d fades out instead of growing noise.
 FAINT = 0.1
+# What strays beyond the border by less than this share of a window's peak is rounding.
+DEPARTS = 1e-3
 # Camera pixels at once: keeps a block's windows near the processor.
 BLOCK = 512
 # Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
@@ -289,7 +291,21 @@ def _near(
         _, z = solve(n0, matrices.unseen, inside, FIRST * entry_noise)
     else:
         z = start.reshape(len(n0), -1)
-    threshold = least_risk(n0 + z @ matrices.unseen.T, inside, entry_noise)
-    windows, unseen = solve(n0, matrices.unseen, inside, threshold, z)
+    v = n0 + z @ matrices.unseen.T
+    entry_noise = np.maximum(entry_noise, _strays_beyond_the_border(v, inside, z.shape[1]))
+    windows, unseen = solve(n0, matrices.unseen, inside, least_risk(v, inside, entry_noise), z)
     shape = (number, channels, -1)
     return windows.reshape(shape) * pixels.lit[:, None, None], unseen.reshape(shape)
+
+
+def _strays_beyond_the_border(v: Floats, inside: Booleans, unknowns: int) -> Floats:
+    """Root mean square of window entries beyond the projector's border, (I,); 0 where none are.
+
+    They are known to be zero: what a scene that departs from the model leaves there tells how far
+    the entries inside can be trusted, as noise would. Where the model holds it is 0.
+    """
+    beyond = np.count_nonzero(~inside, axis=1)
+    energy = np.sum(np.where(inside, 0.0, v) ** 2, axis=1)
+    strays = np.sqrt(energy / np.maximum(beyond - unknowns, 1))
+    told = (beyond > unknowns) & (strays > DEPARTS * np.abs(v).max(axis=1))
+    return np.asarray(strays * told)

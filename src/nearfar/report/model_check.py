@@ -7,7 +7,8 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.report.page import colour_map, facts, numbers, page
-from nearfar.workflow.check import Conditioning, ModelCheck, numbers_of
+from nearfar.workflow.check import ModelCheck, numbers_of
+from nearfar.workflow.conditioning import Conditioning
 
 HEAD = ("", "assumed", "measured")
 

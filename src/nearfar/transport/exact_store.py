@@ -179,7 +179,7 @@ def _as_matrices(
         raise InputError(
             f"{source} has {columns} columns"
             + (f", the projector of {projector} has {projector.pixels}" if projector else "")
-            + ": make the plan for its projector."
+            + ": name the projector that it is for."
         )
     camera = camera or _finer(projector, rows)
     if camera is None or camera.pixels != rows:

@@ -1,8 +1,7 @@
 """Where the paper's assumptions hold on a scene (sections 3.2, 3.3 and 4.2).
 
 The method takes N to lie in a window and to be silent beyond k_near, F to be silent beyond k_far,
-and both to be silent at the checkerboard. These functions say how much of each lies elsewhere, and
-how well the near patterns tell the entries of a window apart (equation 5).
+and both to be silent at the checkerboard. `check_model` says how much of each lies elsewhere.
 
 Index convention: rows are (n, channels, Py, Px), n camera pixels in a block.
 """
@@ -18,21 +17,15 @@ from scipy import fft
 
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
-from nearfar.illumination.frequencies import (
-    as_array,
-    band,
-    near_frequencies,
-    representatives,
-)
+from nearfar.illumination.frequencies import band
 from nearfar.transport import near
+from nearfar.workflow.conditioning import Conditioning
 
 BLOCK = 64
 # Camera pixels that are looked at by default, evenly spaced.
 SAMPLE = 4096
 # Shares of the energy for which a bandwidth is told.
 SHARES = (0.5, 0.9, 0.99)
-# Eigenvalues under this share of the largest stand for directions that no pattern sees.
-UNSEEN = 1e-6
 
 
 class Apart(Protocol):
@@ -110,8 +103,8 @@ class ModelCheck:
 def default_k_near(window: int) -> float:
     """Return 3 / W cycles per pixel, at most 1/2.
 
-    The window's light falls off towards its border, so it varies over a third of W or more; the
-    paper asks for 2 k_near > W P / P, which this exceeds (section 3.3).
+    The window's light falls off towards its border, so it varies over a third of W or more. The
+    paper gives no number; it finds 2 k_near > W in cycles across the projector (section 3.3).
     """
     return min(0.5, 3.0 / window)
 
@@ -160,9 +153,15 @@ def check_model(
     if getattr(transport, "is_apart", True) is False:
         raise InputError(
             "the transport's components are not known apart, so there is nothing to check: name "
-            "one that 'nearfar render' or 'nearfar reconstruct' wrote."
+            "a built-in scene's, which 'nearfar render' writes, or what 'nearfar reconstruct' "
+            "wrote."
         )
     limit = default_k_near(window) if k_near is None else k_near
+    if sample < 1 or not limit > 0:
+        raise InputError(
+            f"a sample of {sample} camera pixels and k_near = {limit} tell nothing: both must be "
+            f"above 0."
+        )
     totals = _Totals(projector, window, far)
     pixels = transport.camera.pixels
     step = max(1, pixels // sample)
@@ -281,65 +280,6 @@ def _whole(count: int) -> NDArray[np.int64]:
 
 def _share(part: float, whole: float) -> float:
     return float(part / whole) if whole > 0 else 0.0
-
-
-@dataclass(frozen=True)
-class Conditioning:
-    """How well near patterns tell the entries of a window apart.
-
-    Attributes
-    ----------
-    windows : int
-        Different ways in which the projector's border cuts a window, the whole one included.
-    unseen : int
-        Directions of a whole window that no pattern sees: one for each frequency dropped.
-    whole, worst : float
-        Largest over smallest singular value in the directions that are seen: of the whole
-        window, and of the worst cut one. 1 is ideal (equation 5).
-    """
-
-    windows: int
-    unseen: int
-    whole: float
-    worst: float
-
-
-def condition_near(projector: Size, window: int, dropped: Size) -> Conditioning:
-    """Condition of the near patterns over every window on a projector (equation 5).
-
-    Parameters
-    ----------
-    projector : Size
-    window : int
-        W.
-    dropped : Size
-        Block of lowest near frequencies that are not shot.
-
-    Returns
-    -------
-    Conditioning
-    """
-    frequencies = representatives(near_frequencies(window, dropped))
-    angle = 2 * np.pi * (as_array(frequencies) @ near.offsets(window).T)
-    # Each pair +-k counts twice, k = -k once; its sine is zero.
-    twice = np.array([1.0 if k.is_own_negative else 2.0 for k in frequencies])[:, None]
-    patterns = np.concatenate([np.sqrt(twice) * np.cos(angle), np.sqrt(twice) * np.sin(angle)])
-    gram = patterns.T @ patterns / window**2
-    y, x = np.divmod(np.arange(projector.pixels), projector.width)
-    kinds = np.unique(near.inside(np.stack([y, x], axis=1), window, projector), axis=0)
-    conditions = []
-    for kind in kinds:
-        values = np.linalg.eigvalsh(gram[np.ix_(kind, kind)])
-        seen = values[values > UNSEEN * values[-1]]
-        conditions.append(float(np.sqrt(seen[-1] / seen[0])) if len(seen) else np.inf)
-    full = np.linalg.eigvalsh(gram)
-    seen = full[full > UNSEEN * full[-1]]
-    return Conditioning(
-        windows=len(kinds),
-        unseen=int(np.sum(full <= UNSEEN * full[-1])),
-        whole=float(np.sqrt(seen[-1] / seen[0])),
-        worst=max(conditions),
-    )
 
 
 def numbers_of(check: ModelCheck, condition: Conditioning) -> dict[str, Any]:

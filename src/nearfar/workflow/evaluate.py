@@ -3,7 +3,6 @@
 Index convention: rows are (n, channels, P), n camera pixels in a block.
 """
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from nearfar.arrays import Floats, blocks
+from nearfar.arrays import Floats, blocks, processors
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 
 BLOCK = 128
-WORKERS = os.cpu_count() or 1
+WORKERS = processors()
 # An exact match has no finite SNR; JSON needs a number.
 HIGHEST = 300.0
 PERCENTILES = (0, 5, 25, 50, 75, 95, 100)
@@ -156,6 +155,18 @@ def row_snr(
         np.fft.fftshift(np.clip(snr_k, -HIGHEST, HIGHEST)),
         components,
     )
+
+
+def snr_of_rows(truth: ExactTransport, found: ExactTransport) -> Floats:
+    """SNR_t of each camera pixel, channels together, of a transport without a model, dB, (C,)."""
+    signal, error = np.empty(truth.camera.pixels), np.empty(truth.camera.pixels)
+    for block in blocks(truth.camera.pixels, BLOCK):
+        rows = truth.rows(block)
+        signal[block], error[block] = (
+            _energy_of_rows(rows),
+            _energy_of_rows(rows - found.rows(block)),
+        )
+    return np.asarray(10 * np.log10(np.maximum(signal, 1e-300) / np.maximum(error, 1e-300)))
 
 
 def energies(truth: Floats, estimate: Floats) -> tuple[float, float]:

@@ -160,7 +160,7 @@ def compare_to_truth(
     if not truth.is_apart:
         raise InputError(
             f"the truth {truth.name} holds T without its components, so its direct light is not "
-            f"known: give what nearfar render wrote."
+            f"known: give what nearfar render wrote of a built-in scene."
         )
     light = np.ones(truth.projector, dtype=np.float32)
     direct, near, far = truth.component_pictures(light)

@@ -12,11 +12,12 @@ from nearfar.errors import ExistingOutputError, InputError, UnreadableFileError
 from nearfar.files import read_picture
 from nearfar.report.figures import NAMES
 from nearfar.report.figures.run import make_figures
-from nearfar.report.figures.sheets import EXPERIMENTS, SHEETS
+from nearfar.report.figures.sheets import SHEETS
 from nearfar.report.figures.style import styled
 from nearfar.workflow.experiments import acquired, in_theory
 from nearfar.workflow.experiments import data as kept_data
 from nearfar.workflow.experiments.data import Data, kept, read_data, together, write_data
+from nearfar.workflow.experiments.paper import EXPERIMENTS
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 
 
@@ -167,14 +168,16 @@ def test_figures_that_are_not_there(tmp_path: Path, folder_listing):
     assert folder_listing() == []
 
 
-def test_a_folder_of_someone_else_is_left_alone(small, tmp_path: Path):
+@pytest.mark.parametrize("names", [("figure-9.png",), ("1.png", "2.png"), ("index.html",)])
+def test_a_folder_of_someone_else_is_left_alone(small, tmp_path: Path, names):
     mine = tmp_path / "thesis"
     mine.mkdir()
-    (mine / "figure-9.png").write_text("mine")
+    for name in names:
+        (mine / name).write_text("mine")
     with pytest.raises(ExistingOutputError):
         make_figures(mine, ["5"], force=True)
     assert small == []
-    assert (mine / "figure-9.png").read_text() == "mine"
+    assert sorted(path.name for path in mine.iterdir()) == sorted(names)
 
 
 @pytest.mark.slow

@@ -7,8 +7,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.scenes.cache import cached_scene
-from nearfar.workflow.evaluate import snr
-from nearfar.workflow.experiments.rivals import snr_of_rows
+from nearfar.workflow.evaluate import snr, snr_of_rows
 from tests.report.figures.conftest import BOX, WEDGE
 
 pytestmark = pytest.mark.slow
@@ -66,6 +65,10 @@ def test_the_rival_has_as_many_patterns_and_its_own_lambda(measured_once):
     share, plain, refitted = next(line for line in found["grid"] if line[0] == found["share"])
     assert best == (refitted if found["refitted"] else plain)
     assert 0 < share <= 1
+    ours = measured_once["wedge"].numbers["snr_b"]
+    assert ours.keys() == found["snr_b"].keys() == {"white", "picture", "letters", "random"}
+    for light, theirs in found["snr_b"].items():
+        assert ours[light] > theirs + 10
 
 
 def test_snr_of_rows_is_that_of_each_row():

@@ -7,29 +7,30 @@ from pathlib import Path
 from nearfar.errors import InputError
 from nearfar.files import new_output
 from nearfar.report.figures import NAMES
-from nearfar.report.figures.sheets import EXPERIMENTS, SHEETS
+from nearfar.report.figures.sheets import SHEETS
 from nearfar.report.figures.style import save, styled
 from nearfar.report.figures.table import relighting_rows, table
 from nearfar.report.model_check import HEAD, check_rows
 from nearfar.report.page import numbers, page
 from nearfar.workflow.experiments.acquired import Report
 from nearfar.workflow.experiments.data import Data, kept, together, write_data
+from nearfar.workflow.experiments.paper import EXPERIMENTS
 
 INDEX = "index.html"
+# The title, by which a page of figures is told from others.
+MARK = "nearfar: figures of the paper"
 # Figures whose experiments the table is made of.
 OF_TABLE = ("2", "4", "5", "3", "6")
 
 
 def is_figures(folder: Path) -> bool:
-    """Tell whether a folder holds figures and nothing else."""
-    return all(
-        entry.name == INDEX
-        or (
-            entry.stem.removeprefix("figure-") in SHEETS
-            and entry.suffix in {".pdf", ".png", ".npz"}
-        )
-        for entry in folder.iterdir()
-    )
+    """Tell whether a folder is one of figures and nothing else, or holds nothing at all."""
+    entries = list(folder.iterdir())
+    ours = {f"figure-{name}{ending}" for name in SHEETS for ending in (".pdf", ".png", ".npz")}
+    if not all(entry.is_file() and entry.name in {INDEX, *ours} for entry in entries):
+        return False
+    # A lone index.html may be anyone's.
+    return not entries or MARK in (folder / INDEX).read_text(encoding="utf-8", errors="replace")
 
 
 def check_names(names: list[str]) -> list[str]:
@@ -138,7 +139,7 @@ def index_page(drawn: list[str], found: dict[str, Data], *, with_table: bool) ->
         )
     if with_table:
         body += _tables(found)
-    return page("nearfar: the paper's figures", "\n".join(body))
+    return page(MARK, "\n".join(body))
 
 
 def _tables(found: dict[str, Data]) -> list[str]:
@@ -149,7 +150,7 @@ def _tables(found: dict[str, Data]) -> list[str]:
         "<p>Lowest and mean over all DFT frequencies of the pattern grid (SNR_b) and over all "
         "camera pixels (SNR_t). The paper's box and corner are real scenes, whose truth nobody "
         "knows; its text prints no SNR for them.</p>",
-        table(found),
+        f'<div class="broad">{table(found)}</div>',
         "<h2>Beside compressive light transport</h2>",
         f"<p>Under figure 6's lights and over all camera pixels, {patterns} patterns each.</p>",
         numbers(beside, relighting_rows(found["6"])),

@@ -102,7 +102,7 @@ def _draw_singular_values(data: Data, axes: Axes) -> None:
     axes.set_title("(2) singular values of each slice")
     axes.set_xlabel("number")
     axes.set_ylabel("singular value")
-    axes.legend(loc="center right")
+    axes.legend(loc="lower right")
 
 
 def _draw_patterns(data: Data, axes: Axes) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.typing import RcKeyType
-from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
 from nearfar.files import to_srgb
@@ -114,8 +113,3 @@ def centred_extent(size: Sequence[int]) -> tuple[float, float, float, float]:
         height - height // 2 - 0.5,
         -(height // 2) - 0.5,
     )
-
-
-def as_floats(values: NDArray[Any]) -> Floats:
-    """Return values as float64."""
-    return np.asarray(values, dtype=np.float64)

@@ -222,6 +222,8 @@ def _film(state: Any, eye: Any, camera: Size | None, path: Path) -> tuple[dict[s
     if kind != "hdrfilm":
         raise InputError(f"{path} has a film of type {kind}: use an hdrfilm, which is linear RGB.")
     size = Size(own.get("height", DEFAULT_FILM.height), own.get("width", DEFAULT_FILM.width))
+    if min(size) < 1:
+        raise InputError(f"{path} has a film of {size}, which shows nothing: make it larger.")
     crop = Size(own.get("crop_height", size.height), own.get("crop_width", size.width))
     grey = str(own.get("pixel_format", "rgb")).lower() in GREY_FILMS
     film = {

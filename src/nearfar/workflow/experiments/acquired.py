@@ -112,6 +112,7 @@ def acquire_scene(case: Acquisition, report: Report) -> Data:
         "dropped": list(plan.dropped),
         "plan": plan.summary(),
         "savings_in_theory": savings_in_theory(case.projector, case.window, case.far),
+        "slice_off": _off_by_decade(arrays["slice"], arrays["slice/exact"]),
         "snr_b": relighting_snr(transport, truth, lights),
         "snr_b_frequency": percentiles(rows.snr_b_of_frequency),
         "snr_t": percentiles(rows.snr_t),
@@ -165,6 +166,16 @@ def savings_in_theory(projector: Size, window: int, far: Size) -> float:
 def thin(values: NDArray[Any]) -> NDArray[Any]:
     """Keep what a plot needs: float32."""
     return values.astype(np.float32) if values.dtype.kind == "f" else values
+
+
+def _off_by_decade(found: Floats, exact: Floats) -> dict[str, float]:
+    """Median relative error of entries of 10^n to 10^(n+1) of the largest, by n as text."""
+    level = np.log10(np.maximum(np.abs(exact), 1e-300) / np.abs(exact).max())
+    chosen = {n: (level >= n) & (level < n + 1) for n in (-2, -3, -4)}
+    off = np.abs(found - exact) / np.maximum(np.abs(exact), 1e-300)
+    return {
+        str(n): float(np.median(off[mine])) if mine.any() else 0.0 for n, mine in chosen.items()
+    }
 
 
 def _share_found(correspondence: Correspondence, truth: ExactTransport) -> float:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import nearfar
 from nearfar.errors import NearfarError, UnreadableFileError
 from nearfar.files import new_output, read_arrays
 from nearfar.scenes.cache import cache_folder
@@ -137,7 +136,7 @@ def kept(name: str, make: Callable[[], Data], *, note: Callable[[str], None]) ->
 def code_fingerprint() -> str:
     """Return a name that changes with the code that measures: no stale data are drawn."""
     digest = hashlib.sha256()
-    home = Path(str(nearfar.__file__)).parent
+    home = Path(__file__).parents[2]
     for source in sorted(home.rglob("*.py")):
         place = source.relative_to(home)
         if place.parts[0] in SHOWING:

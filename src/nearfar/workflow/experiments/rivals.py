@@ -3,21 +3,19 @@
 import time
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, blocks
 from nearfar.baselines.choosing import best_share
 from nearfar.baselines.compressive import reconstruct_compressive
-from nearfar.baselines.random_patterns import bernoulli_patterns, measure_in_theory
+from nearfar.baselines.random_patterns import answer_in_theory, bernoulli_patterns
+from nearfar.illumination.frequencies import representatives
+from nearfar.plan.model import Exponential
 from nearfar.scenes.cache import cached_scene
-from nearfar.transport.exact import ExactTransport
-from nearfar.workflow.evaluate import percentiles, snr
+from nearfar.transport.far import real_basis
+from nearfar.workflow.evaluate import percentiles, snr, snr_of_rows
 from nearfar.workflow.experiments.acquired import Report, thin
 from nearfar.workflow.experiments.data import Data
 from nearfar.workflow.experiments.in_theory import Theory, lights
-
-BLOCK = 256
 
 
 def acquire_compressively(case: Theory, report: Report) -> Data:
@@ -37,7 +35,7 @@ def acquire_compressively(case: Theory, report: Report) -> Data:
     """
     truth = cached_scene(case.scene, case.projector, progress=report)
     count = case.plan.transport_photos
-    measurements = measure_in_theory(truth, bernoulli_patterns(case.projector, count, 0))
+    measurements = answer_in_theory(truth, bernoulli_patterns(case.projector, count, 0))
     report("choosing lambda", 0.0)
     choice = best_share(measurements, truth)
     report("choosing lambda", 1.0)
@@ -56,6 +54,14 @@ def acquire_compressively(case: Theory, report: Report) -> Data:
         snr_b[name] = snr(truth @ light, arrays[f"{name}/CLT"])
     numbers = {
         "patterns": count,
+        "answers_of_this_method": real_basis(
+            representatives(
+                pattern.frequency
+                for pattern in case.plan.patterns
+                if isinstance(pattern, Exponential)
+            ),
+            case.projector,
+        ).count,
         "snr_b": snr_b,
         "snr_t": percentiles(snr_of_rows(truth, found)),
         "share": choice.share,
@@ -65,13 +71,3 @@ def acquire_compressively(case: Theory, report: Report) -> Data:
         "seconds": {"reconstruction": seconds},
     }
     return Data({name: thin(values) for name, values in arrays.items()}, {"CLT": numbers})
-
-
-def snr_of_rows(truth: ExactTransport, found: ExactTransport) -> Floats:
-    """SNR_t of each camera pixel, channels together, dB, shape (C,)."""
-    signal, error = np.empty(truth.camera.pixels), np.empty(truth.camera.pixels)
-    for block in blocks(truth.camera.pixels, BLOCK):
-        rows = truth.rows(block).astype(np.float64)
-        signal[block] = np.sum(rows**2, axis=(1, 2))
-        error[block] = np.sum((rows - found.rows(block)) ** 2, axis=(1, 2))
-    return np.asarray(10 * np.log10(np.maximum(signal, 1e-300) / np.maximum(error, 1e-300)))

@@ -13,14 +13,13 @@ from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import as_array, far_frequencies, near_frequencies
 from nearfar.illumination.pictures import white
 from nearfar.scenes.cache import cached_scene
-from nearfar.workflow.check import check_model, condition_near, numbers_of
+from nearfar.workflow.check import check_model, numbers_of
+from nearfar.workflow.conditioning import condition_near
 from nearfar.workflow.experiments.acquired import Acquisition, Report, thin
 from nearfar.workflow.experiments.data import Data
 
 # Singular values above this share of the largest of T count towards a rank.
 RANK = 1e-3
-# The share of N's energy that k_near is to hold, of F's that is told beside k_far.
-HELD = 0.9
 
 
 @dataclass(frozen=True)
@@ -93,8 +92,8 @@ def components_along_a_line(case: Acquisition, report: Report) -> Data:
         "energy": {name: float(np.sum(values**2)) for name, values in singular.items()},
         # Cycles along the line, as the paper counts k.
         "k_far": case.far.width // 2,
-        "k_near": check.near_bandwidth[HELD] * case.projector.width,
-        "held": HELD,
+        "k_near": check.k_near * case.projector.width,
+        "held": 1.0 - check.near_beyond,
         "check": numbers_of(check, condition),
     }
     return Data({name: thin(values) for name, values in arrays.items()}, numbers)

@@ -1,0 +1,84 @@
+"""How well the near patterns tell the entries of a window apart (equation 5)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats, Size
+from nearfar.errors import InputError
+from nearfar.illumination.frequencies import as_array, near_frequencies, representatives
+from nearfar.transport import near
+
+# Eigenvalues under this share of the largest stand for directions that no pattern sees.
+UNSEEN = 1e-6
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """How well near patterns tell the entries of a window apart.
+
+    Attributes
+    ----------
+    windows : int
+        Different ways in which the projector's border cuts a window, the whole one included.
+    unseen : int
+        Directions of a whole window that no pattern sees: one for each frequency dropped, and
+        for even W the checkerboard, which is the direct measurement.
+    whole, worst : float
+        Largest over smallest singular value in the directions that are seen: of the whole
+        window, and of the worst cut one. 1 is ideal (equation 5).
+    """
+
+    windows: int
+    unseen: int
+    whole: float
+    worst: float
+
+
+def condition_near(projector: Size, window: int, dropped: Size) -> Conditioning:
+    """Condition of the near patterns over every window on a projector (equation 5).
+
+    Parameters
+    ----------
+    projector : Size
+    window : int
+        W.
+    dropped : Size
+        Block of lowest near frequencies that are not shot.
+
+    Returns
+    -------
+    Conditioning
+
+    Raises
+    ------
+    InputError
+        If no near frequency is left.
+    """
+    frequencies = representatives(near_frequencies(window, dropped))
+    if not frequencies:
+        raise InputError(
+            f"W = {window} with {dropped} near frequencies dropped leaves no near pattern: choose "
+            f"a larger W or drop fewer."
+        )
+    angle = 2 * np.pi * (as_array(frequencies) @ near.offsets(window).T)
+    # Each pair +-k counts twice, k = -k once; its sine is zero.
+    twice = np.array([1.0 if k.is_own_negative else 2.0 for k in frequencies])[:, None]
+    patterns = np.concatenate([np.sqrt(twice) * np.cos(angle), np.sqrt(twice) * np.sin(angle)])
+    gram = patterns.T @ patterns / window**2
+    y, x = np.divmod(np.arange(projector.pixels), projector.width)
+    kinds = np.unique(near.inside(np.stack([y, x], axis=1), window, projector), axis=0)
+    spectra = [np.linalg.eigvalsh(gram[np.ix_(kind, kind)]) for kind in kinds]
+    full = np.linalg.eigvalsh(gram)
+    return Conditioning(
+        windows=len(kinds),
+        unseen=int(np.sum(full <= UNSEEN * full[-1])),
+        whole=_ratio(full),
+        worst=max(_ratio(values) for values in spectra),
+    )
+
+
+def _ratio(eigenvalues: Floats) -> float:
+    """Largest over smallest singular value of what is seen, from rising eigenvalues."""
+    seen = eigenvalues[eigenvalues > UNSEEN * eigenvalues[-1]]
+    return float(np.sqrt(seen[-1] / seen[0]))

@@ -83,7 +83,12 @@ def read_data(path: Path, name: str) -> Data:
     MissingFileError, UnreadableFileError
         If it is not there, damaged, of something else, or written by another version.
     """
-    arrays = read_arrays(path)
+    try:
+        arrays = read_arrays(path)
+    except UnreadableFileError:
+        raise UnreadableFileError(
+            f"{path} is damaged: its data are measured again and it is replaced."
+        ) from None
     try:
         about = json.loads(str(arrays.pop(ABOUT)))
         written = (about["format"], about["version"], about["name"])
@@ -91,7 +96,7 @@ def read_data(path: Path, name: str) -> Data:
         numbers = about["numbers"]
     except (KeyError, TypeError, ValueError):
         raise UnreadableFileError(
-            f"{path} holds no data of a figure: remove it, it is made again."
+            f"{path} holds no data of a figure: they are measured again and it is replaced."
         ) from None
     if written != (FORMAT, FORMAT_VERSION, name) or by != (version(), code_fingerprint()):
         raise UnreadableFileError(

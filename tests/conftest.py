@@ -1,6 +1,7 @@
 """Scenes small enough for tests, and a camera without faults."""
 
 import os
+import signal
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -13,6 +14,11 @@ from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
 from tests.worlds import Photographed, model_transport
+
+# A shell that runs the tests in the background has SIGINT ignored, and commands started from here
+# would inherit that: interrupts are what some tests are about.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 QUIET = SimulatedCamera(full_well=1e9, read_noise=0.0, bits=16, shot_noise=False)
 

@@ -91,7 +91,7 @@ def long_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Return a plan of many photos, and a rig for it."""
     folder = tmp_path_factory.mktemp("long")
     plan = folder / "plan.json"
-    sizes = ("--projector", "48x48", "--near", "9", "--far", "3x3")
+    sizes = ("--projector", "48x48", "--near", "19", "--far", "3x3")
     check_done(run_nearfar("plan", *sizes, "-o", plan))
     generator = np.random.default_rng(0)
     np.save(folder / "T.npy", generator.random((3, 4, 48, 48), dtype=np.float32) / 5000)

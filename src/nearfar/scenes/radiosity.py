@@ -86,7 +86,7 @@ def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
     Parameters
     ----------
     form : ndarray, shape (n, n), float32
-        G, symmetric.
+        G, symmetric. Overwritten by the result: it is the largest array of a scene.
     factor : ReflectionFactor
         L.
 
@@ -99,13 +99,12 @@ def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
     NearfarError
         If more light is reflected than falls.
     """
-    matrix = form.copy()
-    _between(factor, factor.block.T, matrix)
-    np.negative(matrix, out=matrix)
-    diagonal = np.einsum("ii->i", matrix)
+    _between(factor, factor.block.T, form)
+    np.negative(form, out=form)
+    diagonal = np.einsum("ii->i", form)
     diagonal += 1
     # The transpose of a symmetric row-major array is what LAPACK wants, without a copy.
-    lower, info = linalg.lapack.spotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
+    lower, info = linalg.lapack.spotrf(form.T, lower=1, overwrite_a=1, clean=0)
     if info == 0:
         lower, info = linalg.lapack.spotri(lower, lower=1, overwrite_c=1)
     if info != 0:
@@ -141,7 +140,7 @@ def components(
     projector_pixels : int
         P.
     form : ndarray, shape (n, n), float32
-        G.
+        G; overwritten.
     albedo : ndarray, shape (n, channels)
     translucent : ndarray of int, shape (m,)
     inside : tuple of ndarray, shape (m, m)
@@ -181,7 +180,8 @@ def components(
         factor = reflection_factor(
             albedo[:, channel], patches, translucent, inside[channel] if inside else None
         )
-        rest = bounced(form, factor)
+        last = channel == channels - 1
+        rest = bounced(form if last else form.copy(), factor)
         for rows in blocks(camera_pixels, ROWS):
             strip = np.ascontiguousarray((see[rows] @ rest).T)
             far[channel, rows] = (fall @ strip).T

@@ -161,7 +161,7 @@ def test_info_tells_what_each_file_is(finished, tmp_path: Path):
 
 
 def test_help_names_every_scene():
-    for command in ("acquire", "render"):
+    for command in ("acquire", "render", "separate"):
         said = " ".join(run_nearfar(command, "--help").out.split())
         for name in NAMES:
             assert name in said

@@ -6,9 +6,11 @@ from nearfar.arrays import Size
 from nearfar.scenes.cornell import WAX
 from nearfar.scenes.dipole import diffuse_profile, diffuse_reflectance, dipole, subsurface
 from nearfar.scenes.geometry import Material, View, quadrilateral
+from nearfar.scenes.library import describe
 from nearfar.scenes.optics import pinhole
-from nearfar.scenes.patches import build_patches
+from nearfar.scenes.patches import build_patches, with_medium
 from nearfar.scenes.rays import surface
+from nearfar.scenes.render import body_of
 
 
 @pytest.mark.parametrize("channel", range(3))
@@ -52,3 +54,17 @@ def test_patch_matrix_returns_the_total_in_the_middle_of_a_plane():
         middle = np.linalg.norm(patches.centre, axis=1).argmin()
         total = matrix[middle] @ patches.area
         assert total == pytest.approx(diffuse_reflectance(source), rel=0.02)
+
+
+@pytest.mark.parametrize(("name", "size"), [("shelf", Size(10, 10)), ("alcove", Size(8, 8))])
+def test_patch_matrix_is_positive_definite_on_a_coarse_grid(name, size):
+    """Where a sample seen at a glancing angle stands for more than its true area."""
+    scene = describe(name)
+    everything = surface(scene.parts, range(len(scene.parts)))
+    patches = build_patches(everything, scene.parts, pinhole(scene.projector_view, size), size)
+    body = body_of(patches, np.flatnonzero(with_medium(patches, scene.parts)))
+    material = scene.parts[body.part[0]].material
+    for channel in range(3):
+        matrix = subsurface(body, dipole(material.medium, channel))
+        matrix += np.diag(material.albedo[channel] / body.area)
+        assert np.linalg.eigvalsh(matrix)[0] > 0

@@ -8,7 +8,6 @@ from scipy import sparse
 from nearfar import scenes
 from nearfar.arrays import Size
 from nearfar.errors import InputError
-from nearfar.scenes.cornell import cornell
 from nearfar.scenes.dipole import dipole, subsurface
 from nearfar.scenes.form_factors import exchange
 from nearfar.scenes.library import describe
@@ -37,12 +36,32 @@ def box():
 
 
 @pytest.fixture(scope="module")
+def niche():
+    return scenes.build("alcove", TINY)
+
+
+@pytest.fixture(scope="module")
 def beside():
     return scenes.build("cornell-aside", TINY)
 
 
+@pytest.fixture(scope="module")
+def case():
+    return scenes.build("shelf", Size(16, 24))
+
+
+def described(name, size):
+    """Parts, patches and exchange of a scene."""
+    scene = describe(name)
+    parts = scene.parts
+    everything = surface(parts, range(len(parts)))
+    occluders = surface(parts, [i for i, part in enumerate(parts) if part.occludes])
+    patches = build_patches(everything, parts, pinhole(scene.projector_view, size), size)
+    return parts, patches, exchange(patches, parts, occluders)
+
+
 def test_names_are_light_to_import_and_a_wrong_one_is_told():
-    with pytest.raises(InputError, match="cornell, cornell-aside, wedge, corner"):
+    with pytest.raises(InputError, match="cornell, cornell-aside, wedge, corner, alcove, shelf"):
         scenes.build("teapot")
     code = "import nearfar.scenes, sys; sys.exit('trimesh' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -57,6 +76,10 @@ def test_names_are_light_to_import_and_a_wrong_one_is_told():
         ("wedge", Size(9, 8), Size(5, 31)),
         ("corner", Size(16, 16), Size(32, 32)),
         ("corner", Size(1, 2), Size(3, 1)),
+        ("alcove", Size(13, 17), None),
+        ("shelf", Size(12, 18), None),
+        # So coarse that some sides of books have no patch of their own.
+        ("shelf", Size(2, 1), Size(11, 8)),
     ],
 )
 def test_any_size_is_whole_exposed_and_not_negative(name, projector, camera):
@@ -80,8 +103,10 @@ def test_the_same_again(box):
     assert (again.direct[0] != box.direct[0]).nnz == 0
 
 
-def test_components_have_their_place(box):
-    """Direct light on the diagonal, near-range on the candle alone, far-range everywhere."""
+@pytest.mark.parametrize("name", ["box", "niche"])
+def test_components_have_their_place(name, request):
+    """Direct light on the diagonal, near-range on one body alone, far-range everywhere."""
+    box = request.getfixturevalue(name)
     lit = sparse.coo_array(box.direct[0])
     shares = [sum(part.sum() for part in parts) for parts in (box.direct, box.near)]
     direct, near, far = np.array([*shares, box.far.sum()]) / (sum(shares) + box.far.sum())
@@ -92,26 +117,29 @@ def test_components_have_their_place(box):
     y, x = np.indices(TINY)
     np.testing.assert_allclose(box.correspondence[box.lit], np.stack([y, x], -1)[box.lit])
     assert box.lit.all()
-    candle = box.near[0].sum(axis=1) > 0
-    assert 0.05 < candle.mean() < 0.4
+    body = box.near[0].sum(axis=1) > 0
+    assert 0.05 < body.mean() < 0.4
     assert (box.far.sum(axis=2) > 0).all()
 
 
-@pytest.mark.parametrize("name", ["cornell", "corner"])
-def test_coaxial_transport_is_reciprocal(name, box):
+@pytest.mark.parametrize("name", ["cornell", "corner", "alcove"])
+def test_coaxial_transport_is_reciprocal(name, box, niche):
     """T(c, p) / T(p, c) is the ratio of the fluxes of p and c, solid angles in the image plane."""
-    transport = box if name == "cornell" else scenes.build(name, TINY)
+    known = {"cornell": box, "alcove": niche}
+    transport = known.get(name) or scenes.build(name, TINY)
     _, solid_angle, pixel = sub_rays(pinhole(describe(name).projector_view, TINY), TINY, 4)
     even = total(transport) / np.bincount(pixel, solid_angle)
     np.testing.assert_allclose(even, np.swapaxes(even, 1, 2), atol=1e-6 * even.max())
 
 
-def test_shadows_hold_only_indirect_light(beside):
-    dark = ~beside.lit
+@pytest.mark.parametrize("name", ["beside", "case"])
+def test_shadows_hold_only_indirect_light(name, request):
+    transport = request.getfixturevalue(name)
+    dark = ~transport.lit
     assert 0.005 < dark.mean() < 0.12
     rows = dark.ravel()
-    assert all(part[rows].nnz == 0 for part in beside.direct)
-    far = beside.far.sum(axis=(0, 2))[rows]
+    assert all(part[rows].nnz == 0 for part in transport.direct)
+    far = transport.far.sum(axis=(0, 2))[rows]
     assert (far > 0).mean() > 0.98
 
 
@@ -127,7 +155,22 @@ def test_camera_aside_sees_each_point_lit_by_its_own_pixel(beside):
     assert np.abs(design @ fit - q[wall]).mean() < 0.3
 
 
-@pytest.mark.parametrize("name", ["cornell", "corner"])
+def test_camera_aside_sees_what_the_projector_lights(case):
+    """All lit points of the bookcase lie in the field of the pattern, the duck at the lower left.
+
+    Red light goes furthest in the soap.
+    """
+    q = case.correspondence[case.lit]
+    assert (q >= 0).all()
+    assert (q <= np.array(case.projector) - 1).all()
+    near = np.stack([part.sum(axis=1) for part in case.near]).reshape(3, *case.camera)
+    red, green, blue = near.sum(axis=(1, 2))
+    assert red > green > blue > 0
+    assert near[:, :16].sum() == 0
+    assert near[:, :, 24:].sum() == 0
+
+
+@pytest.mark.parametrize("name", ["cornell", "corner", "shelf"])
 def test_finer_camera_averages_to_the_coarser(name):
     coarse = scenes.build(name, TINY, TINY)
     fine = scenes.build(name, TINY, Size(32, 32))
@@ -138,15 +181,27 @@ def test_finer_camera_averages_to_the_coarser(name):
     np.testing.assert_allclose(mean, expected, atol=1e-5)
 
 
-def test_transport_is_the_sum_of_all_bounces():
+@pytest.mark.parametrize("name", scenes.NAMES)
+def test_nothing_reflects_more_than_falls(name):
+    """No patch of any scene sends out more than arrives, nor reflects more than falls on it."""
+    parts, patches, form = described(name, Size(12, 15))
+    assert (form.sum(axis=1) / patches.area).max() < 1
+    values = albedo(patches, parts)
+    body = np.flatnonzero(with_medium(patches, parts))
+    if len(body):
+        material = parts[patches.part[body[0]]].material
+        for channel in range(3):
+            inside = subsurface(body_of(patches, body), dipole(material.medium, channel))
+            share = 1 - material.albedo[channel]
+            values[body, channel] += share * inside @ patches.area[body]
+    assert values.min() > 0
+    assert values.max() < 1
+
+
+@pytest.mark.parametrize("name", ["cornell", "alcove", "shelf"])
+def test_transport_is_the_sum_of_all_bounces(name):
     """Against the Neumann series, bounce by bounce, in float64 and with R and F themselves."""
-    scene = cornell()
-    parts = scene.parts
-    everything = surface(parts, range(len(parts)))
-    occluders = surface(parts, [i for i, part in enumerate(parts) if part.occludes])
-    size = Size(10, 10)
-    patches = build_patches(everything, parts, pinhole(scene.projector_view, size), size)
-    form = exchange(patches, parts, occluders)
+    parts, patches, form = described(name, Size(10, 10))
     candle = np.flatnonzero(with_medium(patches, parts))
     medium = parts[patches.part[candle[0]]].material.medium
     assert medium is not None

@@ -20,8 +20,8 @@ def acquire(
     rig: Annotated[
         str,
         typer.Option(
-            help="Scene (cornell, cornell-aside, wedge, corner), Mitsuba 3 scene (.xml), stored "
-            "transport (.npy, .npz, Zarr), or RIG.toml.",
+            help="Scene (cornell, cornell-aside, wedge, corner, alcove, shelf), Mitsuba 3 scene "
+            "(.xml), stored transport (.npy, .npz, Zarr), or RIG.toml.",
             metavar="RIG",
         ),
     ],

@@ -74,7 +74,8 @@ def render(
         str,
         typer.Argument(
             metavar="SCENE",
-            help="cornell, cornell-aside, wedge or corner, or a Mitsuba 3 scene (.xml).",
+            help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a Mitsuba 3 scene "
+            "(.xml).",
         ),
     ],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr to make.")],

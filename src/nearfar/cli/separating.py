@@ -29,8 +29,8 @@ def separate(
     rig: Annotated[
         str | None,
         typer.Option(
-            help="Shoot on this rig: scene (cornell, cornell-aside, wedge, corner), stored "
-            "transport (.npy, .npz, Zarr), or RIG.toml.",
+            help="Shoot on this rig: a scene (cornell, cornell-aside, wedge, corner, alcove, "
+            "shelf), stored transport (.npy, .npz, Zarr), or RIG.toml.",
             metavar="RIG",
         ),
     ] = None,

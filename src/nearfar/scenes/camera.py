@@ -93,7 +93,7 @@ def _patch_at(
     """Find the patch at points on the surface, shape (n,).
 
     Where the projector sees the point it is the patch of that part under that projector pixel;
-    elsewhere the nearest patch without light on the same part.
+    elsewhere the nearest patch without light on the same part, or the nearest there is.
     """
     eye, size = projector
     part, normal = where.part[face], where.normals[face]
@@ -112,9 +112,9 @@ def _patch_at(
     for index in np.unique(part[~lit]):
         mine = np.flatnonzero(~lit & (part == index))
         of_part = patches.part == index
-        choice = np.flatnonzero(of_part & (patches.pixel < 0))
-        if not len(choice):
-            choice = np.flatnonzero(of_part)
+        # A sliver on a coarse grid may have no patch of its own.
+        masks = (of_part & (patches.pixel < 0), of_part, np.ones(len(patches), dtype=bool))
+        choice = next(found for found in map(np.flatnonzero, masks) if len(found))
         result[mine] = choice[cKDTree(patches.centre[choice]).query(position[mine])[1]]
     return np.asarray(result)
 

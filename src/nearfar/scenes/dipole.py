@@ -120,4 +120,10 @@ def subsurface(patches: Patches, source: Dipole) -> Floats:
         result[rows, rows.start :] = np.add.reduceat(kernel, starts[rows] - begin, axis=0)
 
     side_by_side(fill, blocks(len(patches), ROWS))
+    # R_d is positive definite, so by Cauchy and Schwarz no mean between two patches is above the
+    # geometric mean of those within them; samples of a very coarse grid may say otherwise.
+    within = np.sqrt(np.diag(result))
+    limit = np.outer(within, within)
+    np.fill_diagonal(limit, np.inf)
+    np.minimum(result, limit, out=result)
     return np.triu(result) + np.triu(result, 1).T

@@ -14,6 +14,9 @@ from nearfar.arrays import Floats, Integers
 
 Vector = tuple[float, float, float]
 
+# Triangles smaller than this (square metres) are rounding where curves meet in a point.
+LEAST_AREA = 1e-12
+
 
 @dataclass(frozen=True)
 class Gloss:
@@ -168,11 +171,26 @@ def lathe(profile: Any, *, sections: int = 192) -> Any:
     low, following = ring * sections, (around + 1) % sections
     corners = np.stack(
         [low + around, low + following, low + sections + following, low + sections + around], -1
-    ).reshape(-1, 4)
-    faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    mesh.update_faces(mesh.area_faces > 0)
-    return mesh
+    )
+    return _tiled(vertices, corners)
+
+
+def sheet(curves: Any) -> Any:
+    """Surface through curves side by side.
+
+    Parameters
+    ----------
+    curves : array_like, shape (n, m, 3)
+        Points of each curve. The surface faces ``along the curve x to the next curve``.
+
+    Returns
+    -------
+    trimesh.Trimesh
+    """
+    points = np.asarray(curves, dtype=float)
+    number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
+    corners = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], -1)
+    return _tiled(points, corners)
 
 
 def ball(radius: float | Vector, *, subdivisions: int = 5) -> Any:
@@ -197,3 +215,18 @@ def tube(start: Vector, end: Vector, radius: float) -> Any:
 def ring(major: float, minor: float) -> Any:
     """Torus in the xy plane about the origin, as a `trimesh.Trimesh`."""
     return trimesh.creation.torus(major, minor, major_sections=96, minor_sections=32)
+
+
+def rotation(angle: float, axis: Vector, *, point: Vector = (0.0, 0.0, 0.0)) -> Floats:
+    """Matrix (4, 4) that turns by an angle (radians) about an axis through a point."""
+    turn: Any = trimesh.transformations.rotation_matrix(angle, axis, point)  # type: ignore[no-untyped-call]
+    return np.asarray(turn)
+
+
+def _tiled(points: Floats, corners: Integers) -> Any:
+    """Mesh of quadrilaterals (..., 4), numbers of points (..., 3); empty ones are left out."""
+    corners = corners.reshape(-1, 4)
+    faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    mesh = trimesh.Trimesh(points.reshape(-1, 3), faces, process=False)
+    mesh.update_faces(mesh.area_faces > LEAST_AREA)
+    return mesh

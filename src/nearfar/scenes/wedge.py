@@ -14,6 +14,7 @@ from nearfar.scenes.geometry import (
     ball,
     quadrilateral,
     ring,
+    rotation,
     solid,
     tube,
 )
@@ -64,8 +65,7 @@ def _bear(move: Vector, turn: float) -> list[Part]:
                 FUR,
             ),
         ]
-    cosine, sine = np.cos(turn), np.sin(turn)
-    about = np.array([[cosine, 0, sine, 0], [0, 1, 0, 0], [-sine, 0, cosine, 0], [0, 0, 0, 1]])
+    about = rotation(turn, (0.0, 1.0, 0.0))
     parts = []
     for name, mesh, place, material in pieces:
         mesh.apply_translation(place)

@@ -708,7 +708,8 @@ def test_usage_that_is_wrong(finished: Job, untouched: Untouched, tmp_path: Path
         (("acquire", finished.plan, tmp_path / "out.zarr"), "--rig"),
         (("plan", "--projector", "16x16"), "--near"),
         (("plan", *PLAN[1:-4], "--near", "0", *PLAN[-2:]), "--near"),
-        (("plan", *PLAN[1:], "--offset", "reference"), "--offset"),
+        (("plan", *PLAN[1:], "--offset", "white"), "--offset"),
+        (("plan", *PLAN[1:], "--correspondence", "dots"), "--correspondence"),
         (("export", finished.plan, tmp_path / "out", "--scale", "0"), "--scale"),
         (("reconstruct", finished.capture, tmp_path / "o.zarr", "--method", "guess"), "--method"),
         (

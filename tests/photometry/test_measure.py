@@ -8,7 +8,8 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC
-from nearfar.photometry.measure import find_pairs, measure
+from nearfar.photometry.by_inverse import find_pairs
+from nearfar.photometry.measure import measure
 from nearfar.photometry.noise import fit_noise
 from nearfar.plan import paper_plan
 from nearfar.rigs.camera import SimulatedCamera

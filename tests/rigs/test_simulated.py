@@ -8,6 +8,7 @@ from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.plan import paper_plan
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.config import open_rig
+from nearfar.rigs.drift import SimulatedDrift
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
 from nearfar.transport.exact_store import save_exact
@@ -92,6 +93,26 @@ def test_exposure_scales_light_but_not_ambient():
     np.testing.assert_allclose(light[1], 2 * light[0], atol=5e-5)
 
 
+def test_lamp_and_ambient_drift_from_photo_to_photo():
+    world = model_transport(SIZE, Size(5, 5), window=5, far=Size(3, 3))
+    lamp = SimulatedDrift(per_100_photos=-0.5, swing=0.1, period=16)
+    ambient = SimulatedDrift(per_100_photos=2.0)
+    optics = SimulatedProjector(lamp_drift=lamp)
+    camera = SimulatedCamera(read_noise=0, shot_noise=False, bits=16, ambient_drift=ambient)
+    white = np.full(SIZE, 255, np.uint8)
+    photos = list(SimulatedRig(world, "w", optics, camera, 1.0, 0).shoot([white] * 40))
+    light = (world @ np.ones(SIZE))[..., None]
+    # More than a batch, so that numbers run on.
+    for number in (0, 4, 31, 32, 39):
+        share = 1 - 0.005 * number + 0.1 * np.sin(2 * np.pi * number / 16)
+        expected = light * share + 0.01 * (1 + 0.02 * number) + 0.02
+        np.testing.assert_allclose(photos[number] / 65535, expected, atol=1e-5)
+
+
+def test_a_light_is_never_less_than_none():
+    assert SimulatedDrift(per_100_photos=-1.0).at(250) == 0.0
+
+
 def _stored(tmp_path, scale=1.0):
     world = model_transport(SIZE, SIZE, window=5, far=Size(3, 3)).with_gains(
         direct=scale, near=scale, far=scale
@@ -127,11 +148,16 @@ def test_a_rig_file_says_everything(tmp_path):
     (tmp_path / "rig.toml").write_text(
         'exposure = "auto"\nseed = 7\n[scene]\ntransport = "dense.npy"\ncamera = "12x14"\n'
         "[projector]\nblack_level = 0.01\ngamma = 2.2\n"
+        "lamp_drift = { per_100_photos = -0.03, swing = 0.01, period = 50 }\n"
         "[camera]\nfull_well = 1000\nread_noise = 2\nbits = 10\nblack_level = 0.0\nambient = 0.0\n"
+        "ambient_drift = { per_100_photos = 0.5 }\n"
     )
     rig = open_rig(str(tmp_path / "rig.toml"), SIZE)
     assert rig.seed == 7
     assert rig.optics.gamma == 2.2
+    assert rig.optics.lamp_drift == SimulatedDrift(per_100_photos=-0.03, swing=0.01, period=50)
+    assert rig.sensor.ambient_drift.at(200) == 2.0
+    assert rig.describe()["camera"]["ambient_drift"]["per_100_photos"] == 0.5
     assert rig.full_scale == 1023
     assert rig.exposure * peak == pytest.approx(0.9, rel=1e-4)
 
@@ -144,6 +170,11 @@ def test_a_rig_file_says_everything(tmp_path):
         ('[scene]\nname = "cornell"\ntransport = "x.npy"\n', "either name"),
         ('[scene]\nname = "cornell"\n[camera]\nbits = 99\n', "camera.bits"),
         ('[scene]\nname = "cornell"\n[camera]\nlens = 1\n', "camera.lens"),
+        ('[scene]\nname = "wedge"\n[projector]\nlamp_drift = { slope = 1 }\n', "lamp_drift.slope"),
+        (
+            '[scene]\nname = "wedge"\n[camera]\nambient_drift = { period = 0 }\n',
+            "ambient_drift.period",
+        ),
         ("scene = [\n", "cannot be read as a rig"),
     ],
 )

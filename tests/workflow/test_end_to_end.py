@@ -14,6 +14,7 @@ from nearfar.errors import InputError, PlanError
 from nearfar.plan import paper_plan
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.config import open_rig
+from nearfar.rigs.drift import SimulatedDrift
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
 from nearfar.workflow import reconstruct as reconstruction
@@ -27,6 +28,7 @@ from tests.worlds import model_transport
 
 PROJECTOR = Size(24, 30)
 PLAN = paper_plan(PROJECTOR, 7, Size(3, 3))
+BY_REFERENCE = paper_plan(PROJECTOR, 7, Size(3, 3), offset="reference")
 
 
 def _rig(world, camera=QUIET):
@@ -141,10 +143,78 @@ def test_a_plan_that_is_not_the_papers_is_refused(tmp_path, world):
         reconstruct(capture)
 
 
-def test_measurements_want_inverse_pairs(tmp_path, world):
-    plan = paper_plan(PROJECTOR, 7, Size(3, 3), offset="reference")
-    with pytest.raises(InputError, match="--offset inverse"):
-        reconstruct(acquire(plan, tmp_path / "c.zarr", _rig(world)))
+def test_a_capture_by_reference_relights_as_well(tmp_path, world):
+    capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(world))
+    transport, correspondence = reconstruct(capture)
+    assert correspondence.lit.all()
+    light = nearfar.natural_picture(PROJECTOR, 1, colour=True)
+    assert snr(world @ light, transport @ light) > 55
+    np.testing.assert_allclose(transport.black, 0.03, atol=1e-4)
+    assert transport.provenance["drift"]["lamp"] < 1e-4
+    assert transport.provenance["drift"]["ambient"] < 1e-4
+
+
+def test_drift_is_taken_out_told_and_kept_from_stripes(tmp_path, world):
+    drift = SimulatedDrift(per_100_photos=-0.15)
+    camera = SimulatedCamera(ambient_drift=SimulatedDrift(per_100_photos=2.0))
+    rigs = {
+        "still": _rig(world, SimulatedCamera()),
+        "moved": replace(_rig(world, camera), optics=SimulatedProjector(lamp_drift=drift)),
+    }
+    light, found = nearfar.natural_picture(PROJECTOR, 1), {}
+    for name, rig in rigs.items():
+        transport, correspondence = reconstruct(
+            acquire(BY_REFERENCE, tmp_path / f"{name}.zarr", rig)
+        )
+        assert correspondence.lit.all()
+        gain = np.vdot(world @ light, transport @ light) / np.vdot(world @ light, world @ light)
+        found[name] = snr(gain * (world @ light), transport @ light)
+    # The lamp gets darker and the ambient light brighter, so there is more noise as well.
+    assert found["moved"] > found["still"] - 1.0
+    photos = len(BY_REFERENCE.patterns)
+    expected = 0.15 * photos / 100 / (1 - 0.15 * photos / 200)
+    assert transport.provenance["drift"]["lamp"] == pytest.approx(expected, rel=0.1)
+
+
+def test_blocks_of_rows_change_nothing_by_reference(tmp_path, world, monkeypatch):
+    capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+    whole, _ = reconstruct(capture)
+    monkeypatch.setattr(reconstruction, "HELD", 4 * len(BY_REFERENCE.patterns) * 30 * 3 * 5)
+    parts, _ = reconstruct(capture)
+    # Drift and noise are those of the whole camera; matrix products round by blocks.
+    for name in ("direct", "far", "near", "noise", "black"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), atol=2e-5)
+
+
+def test_the_square_transport_by_reference(tmp_path):
+    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3)).with_gains(near=0.1)
+    capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(fine))
+    transport, _ = reconstruct(capture, square=True)
+    assert transport.camera == PROJECTOR
+    assert transport.provenance["square"]
+
+
+def test_a_plan_of_phase_takes_a_correspondence_that_is_given(tmp_path, world):
+    plan = paper_plan(PROJECTOR, 7, Size(3, 3), offset="reference", correspondence="phase")
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    given = given_correspondence(world.correspondence, world.camera, PROJECTOR)
+    transport, _ = reconstruct(capture, given)
+    light = nearfar.random_pattern(PROJECTOR, 1)
+    assert snr(world @ light, transport @ light) > 60
+
+
+def test_a_plan_by_reference_that_lacks_photos_is_refused(tmp_path, world):
+    for number, (lacking, message) in enumerate(
+        [
+            (lambda p: p.purpose == "direct", "not the paper's"),
+            (lambda p: p.purpose == "reference", "neither noise nor drift"),
+        ]
+    ):
+        patterns = tuple(p for p in BY_REFERENCE.patterns if not lacking(p))
+        plan = BY_REFERENCE.model_copy(update={"patterns": patterns})
+        capture = acquire(plan, tmp_path / f"{number}.zarr", _rig(world))
+        with pytest.raises(InputError, match=message):
+            reconstruct(capture)
 
 
 def test_a_rig_of_another_size_is_refused(tmp_path, world):

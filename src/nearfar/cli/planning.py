@@ -19,6 +19,7 @@ class Offset(StrEnum):
     """How the offset of a sinusoid is taken out."""
 
     INVERSE = "inverse"
+    REFERENCE = "reference"
     NONE = "none"
 
 
@@ -26,6 +27,7 @@ class CorrespondenceBy(StrEnum):
     """What is projected for correspondence."""
 
     STRIPES = "stripes"
+    PHASE = "phase"
     NONE = "none"
 
 
@@ -47,10 +49,15 @@ def plan(
         ),
     ] = None,
     offset: Annotated[
-        Offset, typer.Option(help="Inverse pairs; none is for counting and simulation only.")
+        Offset,
+        typer.Option(
+            help="Each pattern with its inverse, or once with white and black at intervals; none "
+            "is for counting and simulation only."
+        ),
     ] = Offset.INVERSE,
     correspondence: Annotated[
-        CorrespondenceBy, typer.Option(help="Photos of black stripes, or none.")
+        CorrespondenceBy,
+        typer.Option(help="Photos of black stripes, the patterns' own phase, or none."),
     ] = CorrespondenceBy.STRIPES,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the plan here.", metavar="FILE")

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from nearfar.capture import Capture
     from nearfar.transport.model import Transport
 
+# Lamp or ambient light that changed by more than this share of the lamp's is worth a warning.
+DRIFT = 0.05
 # Pairs that sum to more or less than white and black by this share of white are worth a warning.
 NOT_LINEAR = 0.01
 
@@ -77,13 +79,20 @@ COMPONENTS = ("direct", "near", "far")
 
 
 def _warn_of_faults(capture: "Capture", transport: "Transport") -> None:
-    """Say what the photos themselves tell of a rig that is not linear."""
+    """Say what the photos themselves tell of a rig that is not linear or not steady."""
     excess = float(transport.provenance["excess_of_sums"])
     if abs(excess) > NOT_LINEAR:
         warn(
             f"in {capture.path} a pattern and its inverse sum to {abs(excess):.1%} "
             f"{'more' if excess > 0 else 'less'} than white and black: projector or camera is not "
             f"linear, or the lamp drifts; relighting will be wrong by about as much."
+        )
+    drift = transport.provenance["drift"]
+    if drift is not None and max(drift.values()) > DRIFT:
+        warn(
+            f"in {capture.path} the lamp changed by {drift['lamp']:.1%}, and ambient light by "
+            f"{drift['ambient']:.1%} of white: both were followed by the references and taken out, "
+            f"but what changes between two of them is not seen."
         )
     if capture.saturated_share > SATURATED:
         warn(

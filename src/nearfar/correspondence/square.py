@@ -42,13 +42,19 @@ def onto_projector(
         np.add.at(total, place, together)
         return total * share.reshape(-1, *(1,) * (together.ndim - 1))
 
+    def noise(name: str) -> Floats:
+        # Independent noise: the mean's variance is the variances' mean over their number.
+        return np.asarray(np.sqrt(mean([getattr(part, name) ** 2 for part in parts]) * share))
+
     measurements = replace(
         parts[0],
         camera=projector,
         answers=mean([part.answers for part in parts]),
-        # Independent noise: the mean's variance is the variances' mean over their number.
-        noise=np.sqrt(mean([part.noise**2 for part in parts]) * share),
+        noise=noise("noise"),
         black=mean([part.black for part in parts]),
+        white_noise=noise("white_noise"),
+        black_noise=noise("black_noise"),
+        light_noise=noise("light_noise"),
     )
     y, x = np.divmod(np.arange(projector.pixels), projector.width)
     pixels = np.stack([y, x], axis=-1).astype(np.float32)

@@ -16,7 +16,7 @@ from scipy.special import ndtr
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
-from nearfar.photometry.measure import BATCH, Photos
+from nearfar.photometry.photos import BATCH, Photos
 from nearfar.plan import Plan, Stripe
 
 # A peak has no background closer than this to it.

@@ -1,109 +1,44 @@
-"""Photos of inverse pairs become measurements.
+"""From the photos of a plan to measurements, whatever takes the offset out."""
 
-A pair's difference is the answer to a sinusoid without offset; ambient light, black level and
-the projector's black fall out. Every pair sums to white + black: the mean of the sums is a
-white reference with almost no noise, and their scatter is the noise.
+from collections.abc import Callable
 
-What a pair's sum strays from that mean is noise that can be seen. Shot noise is larger in the
-brighter photo of a pair, so it shows in the difference too, by rho = (v+ - v-) / (v+ + v-) for
-variances v+ and v-; taking it out leaves 1 - rho^2 of the variance (half of it, on average, at a
-camera pixel with direct light alone), and a lamp that flickers falls out with it.
-"""
-
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
-
-from nearfar.arrays import Floats, Size
-from nearfar.errors import InputError
-from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.illumination.frequencies import Frequency
+from nearfar.photometry.by_inverse import find_pairs, measure_pairs
+from nearfar.photometry.by_reference import measure_by_reference
+from nearfar.photometry.drift import find_references
 from nearfar.photometry.measurements import Measurements
-from nearfar.photometry.noise import NoiseModel, fit_noise
-from nearfar.plan import Plan, Sinusoid, Stripe
-from nearfar.transport.far import real_basis
-
-# Photos read at once.
-BATCH = 16
-# Pairs that sum to more or less than white + black by this share of white are not linear.
-NOT_LINEAR = 0.005
+from nearfar.photometry.photos import Photos, find_shown
+from nearfar.photometry.steady import SteadyPhotos, steady
+from nearfar.plan import Plan
 
 
-class Photos(Protocol):
-    """Whatever holds the photos of a plan, in photo units (full scale = 1)."""
-
-    @property
-    def plan(self) -> Plan:
-        """The plan that was shot."""
-        ...
-
-    @property
-    def camera(self) -> Size:
-        """Height and width of the photos."""
-        ...
-
-    @property
-    def channels(self) -> int:
-        """Channels of the photos."""
-        ...
-
-    def read(self, indices: Sequence[int], rows: slice) -> Floats:
-        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
-        ...
-
-
-# A value, how many blacks and how many (white - black) it holds, and its variance.
-Reference = tuple[Floats, float, float, Floats]
-
-
-class Pair(NamedTuple):
-    """Photo numbers of a pattern and its inverse, and what they answer."""
-
-    frequency: Frequency
-    sine: bool
-    photo: int
-    inverse: int
-
-
-def find_pairs(plan: Plan) -> list[Pair]:
-    """List a plan's inverse pairs in the order of their first photo.
+def measured_frequencies(plan: Plan) -> set[Frequency]:
+    """Tell which frequencies the photos of a plan measure.
 
     Raises
     ------
+    PlanError
+        If the plan's patterns are complex.
     InputError
-        If a pattern has no inverse in the plan.
+        If a pattern lacks its inverse, or a plan by reference its whites and blacks.
     """
-    waiting: dict[tuple[Frequency, str, str, bool], list[int]] = {}
-    for number, pattern in enumerate(plan.patterns):
-        if isinstance(pattern, Sinusoid):
-            key = (pattern.frequency, pattern.kind, pattern.purpose, pattern.inverse)
-            waiting.setdefault(key, []).append(number)
-    pairs = []
-    for (frequency, kind, purpose, inverse), numbers in waiting.items():
-        partners = waiting.get((frequency, kind, purpose, not inverse), [])
-        if len(partners) != len(numbers):
-            raise InputError(
-                f"the plan shows pattern {numbers[0]} without its inverse, and measurements are "
-                f"made of inverse pairs: plan with --offset inverse."
-            )
-        if not inverse:
-            pairs += [
-                Pair(frequency, kind == "sine", a, b)
-                for a, b in zip(numbers, partners, strict=True)
-            ]
-    return sorted(pairs, key=lambda pair: pair.photo)
+    plan.require_real("measure")
+    if plan.offset == "reference":
+        find_references(plan)
+        return {frequency for frequency, _ in find_shown(plan)}
+    return {pair.frequency for pair in find_pairs(plan)}
 
 
 def measure(
     photos: Photos, rows: slice | None = None, progress: Callable[[int], None] | None = None
 ) -> Measurements:
-    """Turn photos of inverse pairs into measurements.
+    """Turn photos into measurements.
 
     Parameters
     ----------
     photos : Photos
-        A capture.
+        A capture; one by reference is made `steady` first, so to measure it in blocks of rows
+        make it steady once and give that.
     rows : slice, optional
         Rows of the camera to measure; all by default.
     progress : callable, optional
@@ -112,175 +47,18 @@ def measure(
     Returns
     -------
     Measurements
-        In photo units. A frequency that was shot twice counts as the mean.
+        In photo units. A pattern that was shot several times counts as the mean.
 
     Raises
     ------
+    PlanError
+        If the plan's patterns are complex.
     InputError
-        If a pattern has no inverse.
+        If a pattern lacks its inverse, or a plan by reference its whites and blacks.
     """
-    plan = photos.plan
+    photos.plan.require_real("measure")
     rows = slice(0, photos.camera.height) if rows is None else rows
-    camera = Size(len(range(*rows.indices(photos.camera.height))), photos.camera.width)
-    pairs = find_pairs(plan)
-    basis = real_basis(list(dict.fromkeys(pair.frequency for pair in pairs)), plan.projector)
-    place = {
-        (basis.frequencies[i], bool(sine)): r
-        for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True))
-    }
-    shape = (camera.pixels, photos.channels)
-    differences = np.empty((len(pairs), *shape), dtype=np.float32)
-    strays = np.empty((len(pairs), *shape), dtype=np.float32)
-    for start in range(0, len(pairs), BATCH):
-        batch = pairs[start : start + BATCH]
-        shown = photos.read([pair.photo for pair in batch], rows).reshape(-1, *shape)
-        inverse = photos.read([pair.inverse for pair in batch], rows).reshape(-1, *shape)
-        differences[start : start + len(batch)] = shown - inverse
-        strays[start : start + len(batch)] = shown + inverse
-        if progress is not None:
-            progress(2 * (start + len(batch)))
-    pair_mean = strays.mean(axis=0, dtype=np.float64)
-    strays -= pair_mean.astype(np.float32)
-    pair_variance = np.einsum("kci,kci->ci", strays, strays, dtype=np.float64)
-    pair_variance /= max(len(pairs) - 1, 1)
-    white, black = _reference_photos(pairs, differences, strays, pair_mean)
-    models = [
-        fit_noise(pair_mean[:, i], pair_variance[:, i], float(np.median(black[:, i])))
-        for i in range(photos.channels)
-    ]
-
-    def variance(photo: Floats) -> Floats:
-        return np.stack([m.variance(photo[:, i]) for i, m in enumerate(models)], axis=1)
-
-    excess = _excess_of_sums(pair_mean, white, black)
-    # Sums that do not add up tell of a projector or camera that is not linear, not of white.
-    sums = [(pair_mean, 2.0, 1.0, pair_variance / len(pairs))]
-    if abs(excess) > NOT_LINEAR:
-        sums = []
-    dark, light = _two_levels(
-        [
-            (white, 1.0, 1.0, variance(white)),
-            (black, 1.0, 0.0, variance(black)),
-            *sums,
-            *_stripe_references(photos, rows, shape, variance),
-        ]
-    )
-    left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
-    answers = np.zeros((*shape, basis.count), dtype=np.float32)
-    repeats = np.zeros(basis.count, dtype=np.float32)
-    for pair, difference in zip(pairs, differences, strict=True):
-        r = place[pair.frequency, pair.sine]
-        answers[..., r] += difference
-        repeats[r] += 1
-    answers /= repeats
-    answers[..., place[DC, False]] = light
-    return Measurements(
-        camera=camera,
-        basis=basis,
-        answers=answers,
-        noise=np.sqrt(pair_variance * left).astype(np.float32),
-        black=dark.astype(np.float32),
-        shown_error=_shown_error(plan, pairs, place, basis.patterns),
-        excess_of_sums=excess,
-    )
-
-
-def _excess_of_sums(pair_mean: Floats, white: Floats, black: Floats) -> float:
-    """Tell by what share of white the pairs sum to more than white + black: 0 if all is linear."""
-    light = (white - black).sum()
-    return float((pair_mean - white - black).sum() / light) if light > 0 else 0.0
-
-
-def _reference_photos(
-    pairs: Sequence[Pair], differences: Floats, strays: Floats, pair_mean: Floats
-) -> tuple[Floats, Floats]:
-    """Photos of white and of black, which are the DC pair's."""
-    chosen = [i for i, pair in enumerate(pairs) if pair.frequency == DC]
-    total = strays[chosen].mean(axis=0) + pair_mean
-    difference = differences[chosen].mean(axis=0)
-    return (total + difference) / 2, (total - difference) / 2
-
-
-def _take_out_strays(
-    differences: Floats, strays: Floats, models: Sequence[NoiseModel], total: Floats
-) -> Floats:
-    """Take the noise that the sums show out of the differences, in place.
-
-    Parameters
-    ----------
-    differences, strays : ndarray, shape (pairs, C, channels)
-    models : sequence of NoiseModel, one per channel
-    total : ndarray, shape (C, channels)
-        v+ + v-, the same for all pairs.
-
-    Returns
-    -------
-    ndarray, shape (C, channels)
-        Share of the variance that is left, the mean over pairs.
-    """
-    gain = np.array([model.gain for model in models], dtype=np.float32)
-    scale = (gain / total).astype(np.float32)
-    shrinkage = np.clip(gain * scale, 0.0, 0.5)
-    left = np.zeros(total.shape)
-    for difference, stray in zip(differences, strays, strict=True):
-        rho = np.clip(scale * difference, -1.0, 1.0)
-        # rho is taken from the noisy difference, which shrinks it by gain * scale on average.
-        np.subtract(difference, rho * stray, out=difference)
-        np.divide(difference, 1.0 - shrinkage, out=difference)
-        left += 1.0 - rho.astype(np.float64) ** 2
-    return left / len(differences)
-
-
-def _stripe_references(
-    photos: Photos,
-    rows: slice,
-    shape: tuple[int, int],
-    variance: Callable[[Floats], Floats],
-) -> list[Reference]:
-    """Every set of stripes adds up to a known number of whites: one more reference each."""
-    found: list[Reference] = []
-    for kind in ("black row", "black column"):
-        numbers = [
-            i
-            for i, pattern in enumerate(photos.plan.patterns)
-            if isinstance(pattern, Stripe) and pattern.kind == kind
-        ]
-        if numbers:
-            total = np.zeros(shape, dtype=np.float64)
-            for start in range(0, len(numbers), BATCH):
-                read = photos.read(numbers[start : start + BATCH], rows)
-                total += read.reshape(-1, *shape).sum(axis=0, dtype=np.float64)
-            mean = total / len(numbers)
-            found.append((mean, 1.0, 1.0 - 1.0 / len(numbers), variance(mean) / len(numbers)))
-    return found
-
-
-def _two_levels(
-    references: Sequence[Reference],
-) -> tuple[Floats, Floats]:
-    """Weighted least squares for black and white - black from (value, blacks, whites, variance)."""
-    a11 = a12 = a22 = b1 = b2 = np.zeros(())
-    for value, blacks, whites, variance in references:
-        weight = 1.0 / np.maximum(variance, 1e-12)
-        a11 = a11 + weight * blacks * blacks
-        a12 = a12 + weight * blacks * whites
-        a22 = a22 + weight * whites * whites
-        b1 = b1 + weight * blacks * value
-        b2 = b2 + weight * whites * value
-    determinant = a11 * a22 - a12 * a12
-    return (a22 * b1 - a12 * b2) / determinant, (a11 * b2 - a12 * b1) / determinant
-
-
-def _shown_error(
-    plan: Plan,
-    pairs: Sequence[Pair],
-    place: dict[tuple[Frequency, bool], int],
-    ideal: NDArray[np.float32],
-) -> Floats:
-    """Return what 8-bit pairs show, 2 l / 255 - 1, less the ideal sinusoid: (R, P)."""
-    error = np.zeros_like(ideal)
-    for pair in pairs:
-        r = place[pair.frequency, pair.sine]
-        shown = plan.draw(pair.photo).ravel().astype(np.float32) * np.float32(2 / 255) - 1
-        error[r] = shown - ideal[r]
-    return error
+    if photos.plan.offset == "reference":
+        followed = photos if isinstance(photos, SteadyPhotos) else steady(photos)
+        return measure_by_reference(followed, rows, progress)
+    return measure_pairs(photos, rows, progress)

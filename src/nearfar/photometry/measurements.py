@@ -1,7 +1,7 @@
 """Measurements: what the photos say about each frequency, in photo units."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats, Size
 from nearfar.illumination.frequencies import Frequency
 from nearfar.transport.far import RealBasis
+
+
+def _left_out() -> Floats:
+    """Stand in for a field that was not given: an array without axes."""
+    return np.zeros((), dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -25,14 +30,23 @@ class Measurements:
         The frequencies that were measured, one of each +-k, and the pattern grid.
     answers : ndarray, shape (C, channels, R), float32
     noise : ndarray, shape (C, channels), float32
-        Standard deviation of one real answer; 0 where there is none.
+        Standard deviation of one real answer from one measurement: a pair, or one photo against
+        references; 0 where there is none.
     black : ndarray, shape (C, channels), float32
         The photo under black.
     shown_error : ndarray, shape (R, P), float32
         What was shown (8 bits) less the ideal cosine or sine; 0 in theory.
     excess_of_sums : float
         By what share of white inverse pairs sum to more than white + black; 0 where projector
-        and camera are linear.
+        and camera are linear, and by reference.
+    repeats : ndarray, shape (R,), float32
+        How often each answer was measured; answer r has noise / sqrt(repeats[r]). Ones by default.
+    white_noise, black_noise : ndarray, shape (C, channels), float32
+        Standard deviations of the white and the black that all sinusoids' answers were taken
+        against: errors e_w and e_k of theirs add -(e_w + e_k) to every one of them. 0, the
+        default, where each was taken against its own inverse.
+    light_noise : ndarray, shape (C, channels), float32
+        Standard deviation of DC's answer, white - black, whatever its repeats; by default `noise`.
     """
 
     camera: Size
@@ -42,6 +56,21 @@ class Measurements:
     black: Floats
     shown_error: Floats
     excess_of_sums: float = 0.0
+    repeats: Floats = field(default_factory=_left_out)
+    white_noise: Floats = field(default_factory=_left_out)
+    black_noise: Floats = field(default_factory=_left_out)
+    light_noise: Floats = field(default_factory=_left_out)
+
+    def __post_init__(self) -> None:
+        defaults = {
+            "repeats": np.ones(self.basis.count, dtype=np.float32),
+            "white_noise": np.zeros_like(self.noise),
+            "black_noise": np.zeros_like(self.noise),
+            "light_noise": self.noise,
+        }
+        for name, values in defaults.items():
+            if getattr(self, name).ndim == 0:
+                object.__setattr__(self, name, values)
 
     @property
     def projector(self) -> Size:
@@ -68,4 +97,7 @@ class Measurements:
             answers=self.answers[pixels],
             noise=self.noise[pixels],
             black=self.black[pixels],
+            white_noise=self.white_noise[pixels],
+            black_noise=self.black_noise[pixels],
+            light_noise=self.light_noise[pixels],
         )

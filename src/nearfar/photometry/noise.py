@@ -1,53 +1,87 @@
 """The camera's noise as the photos themselves tell it."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from nearfar.arrays import Floats
 
+# Variances this many times that of the quiet nine tenths are no noise: something moved. Of the
+# variances of two photos each, the widest there are, fewer than one in ten thousand are beyond.
+OUTLYING = 30.0
+
 
 class NoiseModel(NamedTuple):
-    """Variance of one photo's pixel: gain times its value, plus a floor (photo units)."""
+    """Variance of one photo's pixel: gain times its value, plus a floor (photo units).
+
+    `least` is below no variance: that of rounding, where it is known.
+    """
 
     gain: float
     floor: float
+    least: float = 0.0
 
     def variance(self, photo: Floats) -> Floats:
         """Return the variance of a pixel that reads `photo`; at least a hair above 0."""
-        least = max(self.floor, 0.0) + 1e-12
+        least = max(self.floor, self.least, 0.0) + 1e-12
         return np.asarray(np.maximum(self.gain * photo + self.floor, least))
 
 
-def fit_noise(sum_mean: Floats, sum_variance: Floats, dark: float = 0.0) -> NoiseModel:
-    """Fit shot and read noise to pair sums.
+def fit_noise(
+    mean: Floats,
+    variance: Floats,
+    dark: float = 0.0,
+    *,
+    photos: int = 2,
+    least: float = 0.0,
+    typical: Callable[[Floats], float] = lambda values: float(np.median(values)),
+) -> NoiseModel:
+    """Fit shot and read noise to the scatter of photos that should be the same.
 
     A pattern and its inverse sum to the same picture in every pair, so the scatter of the sums
     is the noise of two photos: variance = gain * sum + 2 * floor (shot noise grows with light,
-    read noise does not).
+    read noise does not). A pattern that is shown again tells the noise of one photo likewise.
 
     Parameters
     ----------
-    sum_mean, sum_variance : ndarray
-        Mean and variance of the pair sums at each camera pixel, photo units.
+    mean, variance : ndarray
+        Mean and variance at each camera pixel, photo units.
     dark : float
         What a photo under black reads. Part of it may be a black level, which has no noise, so
         the floor may be as low as that much less shot noise, and no lower: a flickering lamp,
         whose variance grows with the square of the light, would ask for less.
+    photos : int
+        How many photos each value sums.
+    least : float
+        Variance of rounding, which photos that are all the same do not show.
+    typical : callable
+        What variances of pixels of one brightness come to; the median, which is right where
+        each comes from many photos.
 
     Returns
     -------
     NoiseModel
     """
-    # Bins of equal population, medians in each: a few odd pixels (saturated, moving) drop out.
-    order = np.argsort(sum_mean.ravel())
+    # Bins of equal population: a few odd pixels (saturated, moving) drop out.
+    order = np.argsort(mean.ravel())
     parts = np.array_split(order, min(64, max(2, len(order) // 64)))
-    level = np.array([np.median(sum_mean.ravel()[part]) for part in parts])
-    variance = np.array([np.median(sum_variance.ravel()[part]) for part in parts])
+    level = np.array([np.median(mean.ravel()[part]) for part in parts])
+    binned = np.array([max(typical(variance.ravel()[part]), least) for part in parts])
     if np.ptp(level) <= 1e-9:
-        return NoiseModel(0.0, float(np.mean(variance)) / 2)
-    weight = 1.0 / np.maximum(variance, 1e-3 * variance.max(initial=0.0) + 1e-30)
-    gain, offset = np.polyfit(level, variance, 1, w=weight)
+        return NoiseModel(0.0, float(np.mean(binned)) / photos, least)
+    weight = 1.0 / np.maximum(binned, 1e-3 * binned.max(initial=0.0) + 1e-30)
+    gain, offset = np.polyfit(level, binned, 1, w=weight)
     if gain < 0:
-        return NoiseModel(0.0, float(np.median(variance)) / 2)
-    return NoiseModel(float(gain), max(float(offset) / 2, -float(gain) * dark))
+        return NoiseModel(0.0, float(np.median(binned)) / photos, least)
+    return NoiseModel(float(gain), max(float(offset) / photos, -float(gain) * dark), least)
+
+
+def mean_of_few(variances: Floats) -> float:
+    """Return the mean of variances that come from a few photos each, less what moved.
+
+    Their median would be far below their mean, the more so where the camera rounds coarsely.
+    """
+    ordered = np.sort(variances)
+    quiet = ordered[: max(1, int(0.9 * len(ordered)))].mean()
+    return float(ordered[ordered <= OUTLYING * quiet].mean())

@@ -27,8 +27,10 @@ from nearfar.illumination.frequencies import (
     frequency_to_text,
 )
 
-# Stands in the model as a literal, too.
-FORMAT_VERSION = 1
+# Stands in the model as a literal, too. Version 2 knows phase and repeats; all of version 1 is
+# version 2 as well.
+FORMAT_VERSION = 2
+READABLE = (1, 2)
 
 Purpose = Literal["direct", "near", "far", "reference", "correspondence"]
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
@@ -93,6 +95,8 @@ Pattern = Annotated[Sinusoid | Exponential | Stripe, Field(discriminator="kind")
 class Plan(_Frozen):
     """What to project: one pattern for each photo, in the order to shoot.
 
+    A pattern may stand in it several times: its photos are averaged.
+
     Attributes
     ----------
     projector : Size
@@ -102,19 +106,21 @@ class Plan(_Frozen):
     far, dropped : Size
         Far band, and the block of lowest near frequencies that are not shot.
     offset : {"inverse", "reference", "none"}
-        Inverse pairs, one white and one black for all, or none (complex patterns, for simulation).
-    correspondence : {"stripes", "none"}
+        Inverse pairs, whites and blacks at intervals for all, or none (complex patterns, for
+        simulation).
+    correspondence : {"stripes", "phase", "none"}
+        Photos of stripes, the phase of the transport's own photos, or none at all.
     patterns : tuple of Sinusoid, Exponential or Stripe
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     projector: SizeField
     window: int = Field(ge=1)
     far: SizeField
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
-    correspondence: Literal["stripes", "none"]
+    correspondence: Literal["stripes", "phase", "none"]
     patterns: tuple[Pattern, ...]
 
     @model_validator(mode="after")
@@ -200,13 +206,14 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
         raise UnreadableFileError(
             f"{source} is not a nearfar plan: make one with 'nearfar plan -o'."
         )
-    if data.get("version") != FORMAT_VERSION:
+    if data.get("version") not in READABLE:
         raise UnreadableFileError(
-            f"{source} is a plan of version {data.get('version')!r}, this nearfar reads version "
-            f"{FORMAT_VERSION}: make the plan again, or use the nearfar that made it."
+            f"{source} is a plan of version {data.get('version')!r}, this nearfar reads versions "
+            f"{' and '.join(map(str, READABLE))}: make the plan again, or use the nearfar that "
+            f"made it."
         )
     try:
-        return Plan.model_validate(data)
+        return Plan.model_validate(data | {"version": FORMAT_VERSION})
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "plan"

@@ -15,12 +15,13 @@ from nearfar.illumination.frequencies import (
     representatives,
 )
 from nearfar.plan.model import Exponential, Plan, Purpose, Sinusoid, Stripe
+from nearfar.plan.references import with_references
 
 # No projector has a longer side.
 LARGEST = 16384
 
 Offset = Literal["inverse", "reference", "none"]
-Correspondence = Literal["stripes", "none"]
+Correspondence = Literal["stripes", "phase", "none"]
 
 
 def paper_plan(
@@ -46,14 +47,16 @@ def paper_plan(
         Block of lowest near frequencies to leave out, odd by odd. By default those with both
         |k| <= k_far, at least DC.
     offset : {"inverse", "reference", "none"}
-        Each pattern with its inverse; each once, with one white and one black to take the offset
-        out; or the theory's complex patterns (simulation only).
-    correspondence : {"stripes", "none"}
+        Each pattern with its inverse; each once, with whites and blacks at intervals to take the
+        offset out; or the theory's complex patterns (simulation only).
+    correspondence : {"stripes", "phase", "none"}
+        Only stripes take photos of their own.
 
     Returns
     -------
     Plan
-        With inverse pairs, 2 (1 + W^2 - dropped + |K_far|) photos of transport for odd bands.
+        With inverse pairs, 2 (1 + W^2 - dropped + |K_far|) photos of transport for odd bands;
+        half as many by reference.
 
     Raises
     ------
@@ -84,13 +87,11 @@ def paper_plan(
             f"odd, from 1 to W = {window}."
         )
     sinusoids = _SHAPES[offset]
-    black = Sinusoid(kind="cosine", frequency=DC, inverse=True, purpose="reference")
     patterns = (
-        # White is the DC frequency's own photo.
-        *((black,) if offset == "reference" else ()),
         *sinusoids([CHECKERBOARD], "direct"),
         *sinusoids(far_frequencies(far, projector), "far"),
         *sinusoids(near_frequencies(window, dropped), "near"),
+        *(stripes(projector) if correspondence == "stripes" else ()),
     )
     return Plan(
         projector=projector,
@@ -99,7 +100,7 @@ def paper_plan(
         dropped=dropped,
         offset=offset,
         correspondence=correspondence,
-        patterns=patterns + (stripes(projector) if correspondence == "stripes" else ()),
+        patterns=with_references(patterns) if offset == "reference" else patterns,
     )
 
 
@@ -118,7 +119,9 @@ def _inverse_pairs(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterat
 
 
 def _once(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
-    return (shown for shown in _inverse_pairs(frequencies, purpose) if not shown.inverse)
+    # The DC frequency's photo is white, which `with_references` brings.
+    wanted = (frequency for frequency in frequencies if frequency != DC)
+    return (shown for shown in _inverse_pairs(wanted, purpose) if not shown.inverse)
 
 
 _SHAPES: dict[

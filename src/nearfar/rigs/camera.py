@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from nearfar.arrays import Floats
+from nearfar.rigs.drift import SimulatedDrift
 
 # Far above any full well, below what a generator of counts takes.
 MOST_ELECTRONS = 1e18
@@ -25,6 +26,8 @@ class SimulatedCamera(BaseModel):
         Level of no light at all, as a share of full scale.
     ambient : float
         Light that is not the projector's, as a share of full scale.
+    ambient_drift : SimulatedDrift
+        How the ambient light changes from photo to photo.
     shot_noise : bool
         Whether electrons are counted with Poisson noise.
     """
@@ -36,6 +39,7 @@ class SimulatedCamera(BaseModel):
     bits: int = Field(default=14, ge=1, le=16)
     black_level: float = Field(default=0.02, ge=0.0, lt=1.0)
     ambient: float = Field(default=0.01, ge=0.0, lt=1.0)
+    ambient_drift: SimulatedDrift = SimulatedDrift()
     shot_noise: bool = True
 
     @property
@@ -43,10 +47,11 @@ class SimulatedCamera(BaseModel):
         """Highest level of the sensor."""
         return int(2**self.bits - 1)
 
-    def expose(self, light: Floats) -> Floats:
-        """Return electrons from light in photo units, ambient light added."""
+    def expose(self, light: Floats, number: int = 0) -> Floats:
+        """Return electrons from light in photo units, ambient light of photo `number` added."""
         # A transport that was measured may answer a dark light with a little less than nothing.
-        return np.asarray(np.maximum(light + self.ambient, 0.0) * self.full_well)
+        ambient = self.ambient * self.ambient_drift.at(number)
+        return np.asarray(np.maximum(light + ambient, 0.0) * self.full_well)
 
     def noise(self, electrons: Floats, generator: np.random.Generator) -> Floats:
         """Return the electrons that are read: counted by chance, read with an error."""
@@ -66,7 +71,7 @@ class SimulatedCamera(BaseModel):
         return np.asarray(clipped.astype(kind))
 
     def photograph(
-        self, light: Floats, generator: np.random.Generator
+        self, light: Floats, generator: np.random.Generator, number: int = 0
     ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """Return the photo of a picture in photo units: sensor(noise(light))."""
-        return self.sensor(self.noise(self.expose(light), generator))
+        """Return photo `number`, of a picture in photo units: sensor(noise(light))."""
+        return self.sensor(self.noise(self.expose(light, number), generator))

@@ -84,10 +84,12 @@ class SimulatedRig:
         """Yield a photo for each pattern, in order."""
         number = 0
         for batch in _batches(patterns, BATCH):
-            lights = np.stack([self.optics.emit(pattern) for pattern in batch])
+            lights = np.stack(
+                [self.optics.emit(pattern, number + i) for i, pattern in enumerate(batch)]
+            )
             for picture in self.world.pictures(lights):
                 generator = np.random.default_rng([self.seed, number])
-                yield self.sensor.photograph(self.exposure * picture, generator)
+                yield self.sensor.photograph(self.exposure * picture, generator, number)
                 number += 1
 
 

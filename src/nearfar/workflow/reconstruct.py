@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import blocks
+from nearfar.arrays import Floats, blocks
 from nearfar.capture import Capture
 from nearfar.correspondence import (
     Correspondence,
@@ -17,8 +17,11 @@ from nearfar.correspondence import (
 from nearfar.errors import InputError, PlanError
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.frequencies import CHECKERBOARD, far_frequencies, near_frequencies
-from nearfar.photometry.measure import find_pairs, measure
+from nearfar.photometry.drift import find_references
+from nearfar.photometry.measure import measure, measured_frequencies
 from nearfar.photometry.measurements import Measurements
+from nearfar.photometry.photos import Photos
+from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
 from nearfar.transport.model import Transport
 from nearfar.version import version
@@ -27,6 +30,7 @@ from nearfar.version import version
 HELD = 2**29
 
 Progress = Callable[[str, float], None]
+Method = Literal["paper"]
 
 
 def require_paper_plan(plan: Plan) -> None:
@@ -37,7 +41,7 @@ def require_paper_plan(plan: Plan) -> None:
     PlanError
     """
     plan.require_real("reconstruct")
-    shot = {pair.frequency for pair in find_pairs(plan)}
+    shot = measured_frequencies(plan)
     wanted = [
         CHECKERBOARD,
         *far_frequencies(plan.far, plan.projector),
@@ -55,16 +59,19 @@ def reconstruct(
     capture: Capture,
     correspondence: Correspondence | None = None,
     *,
+    method: Method = "paper",
     square: bool = False,
     progress: Progress | None = None,
 ) -> tuple[Transport, Correspondence]:
-    """Reconstruct the transport of a capture as the paper does.
+    """Reconstruct the transport of a capture.
 
     Parameters
     ----------
     capture : Capture
     correspondence : Correspondence, optional
-        By default from the capture's stripes.
+        By default as the plan says: from the capture's stripes.
+    method : {"paper"}
+        Estimator.
     square : bool
         The paper's square T: average the camera pixels that one projector pixel lights.
     progress : callable, optional
@@ -81,12 +88,15 @@ def reconstruct(
     PlanError
         If the plan is not the paper's.
     InputError
-        If there are no stripes and no correspondence, or no light in the photos.
+        If there is no correspondence to be had, no light in the photos, or the plan by reference
+        has too few whites and blacks.
     """
     report = progress or (lambda _what, _share: None)
-    require_paper_plan(capture.plan)
+    estimator = _ESTIMATORS[method]
+    estimator.require(capture.plan)
+    photos = _without_drift(capture, report)
     if correspondence is None:
-        correspondence = _by_stripes(capture, report)
+        correspondence = _found(photos, str(capture.path), report)
     if not correspondence.lit.any():
         raise InputError(
             f"{capture.path} shows no direct light at any camera pixel: check that the camera "
@@ -95,33 +105,46 @@ def reconstruct(
     excesses: list[float] = []
 
     def estimated(rows: slice) -> Transport:
-        measurements = measure(capture, rows)
+        measurements = measure(photos, rows)
         excesses.append(measurements.excess_of_sums)
-        return _estimate(capture.plan, measurements, correspondence.pixels[rows])
+        return estimator.estimate(photos.plan, measurements, correspondence.pixels[rows])
 
     if square:
-        parts = [measure(capture, rows) for rows in _row_blocks(capture, report, "measuring")]
+        parts = [measure(photos, rows) for rows in _row_blocks(photos, report, "measuring")]
         measurements, pixels = onto_projector(parts, correspondence)
         excesses = [part.excess_of_sums for part in parts]
-        transport = _estimate(capture.plan, measurements, pixels)
+        transport = estimator.estimate(photos.plan, measurements, pixels)
     else:
         transport = _stacked(
-            [estimated(rows) for rows in _row_blocks(capture, report, "reconstructing")]
+            [estimated(rows) for rows in _row_blocks(photos, report, "reconstructing")]
         )
-    provenance = _provenance(capture, square=square)
+    provenance = _provenance(capture, photos, method=method, square=square)
     provenance["excess_of_sums"] = max(excesses, key=abs)
     return replace(transport, provenance=provenance), correspondence
 
 
-def _by_stripes(capture: Capture, report: Progress) -> Correspondence:
-    if not has_stripes(capture.plan):
-        raise InputError(
-            f"{capture.path} has no photos of stripes: give the correspondence with "
-            f"--correspondence Q.npy."
-        )
+def _without_drift(capture: Capture, report: Progress) -> Photos:
+    """Read a capture by reference without the drift of lamp and ambient; others as they are."""
+    if capture.plan.offset != "reference":
+        return capture
+    whites, blacks = find_references(capture.plan)
+    total = 2 * (len(whites) + len(blacks))
+    return steady(capture, lambda done: report("references", done / total))
+
+
+def _found(photos: Photos, source: str, report: Progress) -> Correspondence:
+    """Find the correspondence as the plan says."""
+    if has_stripes(photos.plan):
+        return _by_stripes(photos, report)
+    raise InputError(
+        f"{source} has no photos of stripes: give the correspondence with --correspondence Q.npy."
+    )
+
+
+def _by_stripes(photos: Photos, report: Progress) -> Correspondence:
     found = [
-        correspond_by_stripes(capture, rows)
-        for rows in _row_blocks(capture, report, "correspondence")
+        correspond_by_stripes(photos, rows)
+        for rows in _row_blocks(photos, report, "correspondence")
     ]
     return Correspondence(
         np.concatenate([part.pixels for part in found]),
@@ -129,16 +152,26 @@ def _by_stripes(capture: Capture, report: Progress) -> Correspondence:
     )
 
 
-def _row_blocks(capture: Capture, report: Progress, what: str) -> Iterator[slice]:
+def _row_blocks(photos: Photos, report: Progress, what: str) -> Iterator[slice]:
     """Cut the camera into blocks of rows of which the photos fit in memory."""
-    row = 4 * len(capture.plan.patterns) * capture.camera.width * capture.channels
-    for rows in blocks(capture.camera.height, HELD // row):
+    row = 4 * len(photos.plan.patterns) * photos.camera.width * photos.channels
+    for rows in blocks(photos.camera.height, HELD // row):
         yield rows
-        report(what, rows.stop / capture.camera.height)
+        report(what, rows.stop / photos.camera.height)
 
 
-def _estimate(plan: Plan, measurements: Measurements, pixels: Any) -> Transport:
+def _as_the_paper(plan: Plan, measurements: Measurements, pixels: Floats) -> Transport:
     return estimate(measurements, pixels, plan.window, plan.far, plan.dropped)
+
+
+class _Estimator(NamedTuple):
+    """What plan a method takes, and what it makes of a plan, measurements and q."""
+
+    require: Callable[[Plan], None]
+    estimate: Callable[[Plan, Measurements, Floats], Transport]
+
+
+_ESTIMATORS: dict[Method, _Estimator] = {"paper": _Estimator(require_paper_plan, _as_the_paper)}
 
 
 def _stacked(pieces: Sequence[Transport]) -> Transport:
@@ -160,11 +193,14 @@ def _stacked(pieces: Sequence[Transport]) -> Transport:
     )
 
 
-def _provenance(capture: Capture, *, square: bool) -> dict[str, Any]:
+def _provenance(
+    capture: Capture, photos: Photos, *, method: Method, square: bool
+) -> dict[str, Any]:
     plan = capture.plan
+    drift = photos.drift if isinstance(photos, SteadyPhotos) else None
     return {
         "nearfar": version(),
-        "method": "paper",
+        "method": method,
         "square": square,
         "plan": {
             "window": plan.window,
@@ -175,4 +211,6 @@ def _provenance(capture: Capture, *, square: bool) -> dict[str, Any]:
         },
         "photos": {"dtype": str(capture.photos.dtype), "full_scale": capture.full_scale},
         "rig": capture.rig,
+        # Shares of the mean lamp and of white, where references tell.
+        "drift": drift and {"lamp": drift.lamp_range, "ambient": drift.ambient_range},
     }

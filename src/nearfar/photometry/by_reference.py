@@ -1,0 +1,105 @@
+"""Photos against white and black become measurements.
+
+b(0.5 + 0.5 s) = 0.5 b(1) + 0.5 b(s), so the answer to a sinusoid without offset is twice its photo
+less white and black: b = 2 photo - (white + black). One photo does for two, but errors of white and
+black go into every answer of a camera pixel, so these are shown often, and how well they are known
+is told apart from the noise. Lamp and ambient light are followed by the same photos.
+
+Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
+real answers.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats
+from nearfar.illumination.frequencies import DC
+from nearfar.photometry.drift import find_references
+from nearfar.photometry.measurements import Measurements
+from nearfar.photometry.photos import (
+    Reference,
+    basis_of,
+    find_shown,
+    in_batches,
+    mean_photo,
+    shown_error,
+    size_of_rows,
+    stripe_references,
+    two_levels,
+)
+from nearfar.photometry.steady import SteadyPhotos
+
+
+def measure_by_reference(
+    photos: SteadyPhotos, rows: slice, progress: Callable[[int], None] | None = None
+) -> Measurements:
+    """Turn photos against white and black into measurements.
+
+    Parameters
+    ----------
+    photos : SteadyPhotos
+    rows : slice
+        Rows of the camera to measure.
+    progress : callable, optional
+        Called with the number of photos read so far.
+
+    Returns
+    -------
+    Measurements
+        In photo units. A pattern that was shot several times counts as the mean of its photos.
+
+    Raises
+    ------
+    InputError
+        If a cosine was shown without its sine.
+    """
+    camera = size_of_rows(photos, rows)
+    shown = find_shown(photos.plan)
+    basis, place = basis_of(list(shown), photos.plan.projector)
+    whites, blacks = find_references(photos.plan)
+    white = mean_photo(photos, whites.tolist(), rows)
+    black = mean_photo(photos, blacks.tolist(), rows)
+    levels = two_levels(
+        [
+            Reference(white, 1.0, 1.0, photos.variance(white) / len(whites)),
+            Reference(black, 1.0, 0.0, photos.variance(black) / len(blacks)),
+            *stripe_references(photos, rows, photos.variance),
+        ]
+    )
+    both = (2 * levels.black + levels.light).astype(np.float32)
+    repeats = np.zeros(basis.count, dtype=np.float32)
+    answers = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
+    terms = {
+        number: (place[answer], sign)
+        for answer, numbers in shown.items()
+        if answer != (DC, False)
+        for number, sign in numbers
+    }
+    for numbers, read in in_batches(photos, sorted(terms), rows):
+        for number, photo in zip(numbers, read, strict=True):
+            r, sign = terms[number]
+            answers[..., r] += sign * (2 * photo - both)
+            repeats[r] += 1
+        if progress is not None:
+            progress(numbers[-1] + 1)
+    repeats[place[DC, False]] = len(whites)
+    answers /= repeats
+    answers[..., place[DC, False]] = levels.light
+
+    def deviation(variance: Floats) -> NDArray[np.float32]:
+        return np.sqrt(variance).astype(np.float32)
+
+    return Measurements(
+        camera=camera,
+        basis=basis,
+        answers=answers,
+        noise=2 * deviation(photos.variance(levels.black + levels.light / 2)),
+        black=levels.black.astype(np.float32),
+        shown_error=shown_error(basis),
+        repeats=repeats,
+        white_noise=deviation(levels.white_variance),
+        black_noise=deviation(levels.black_variance),
+        light_noise=deviation(levels.light_variance),
+    )

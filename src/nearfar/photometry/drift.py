@@ -1,0 +1,263 @@
+"""Lamp and ambient light, followed through a capture by its whites and blacks.
+
+A photo of pattern l at time t is ambient(t, c) + lamp(t) (T l)(c). Blacks show the ambient light
+(with the camera's black level and the projector's own black), whites what the lamp adds. The
+lamp has one gain per channel. Ambient light changes by a constant, by a share of itself and by a
+share of the white picture: three numbers per channel, whatever the scene, so that next to no
+noise gets in. Between references they run straight, beyond the ends they stay.
+
+Index convention: t runs over photos, c over camera pixels row by row, i over channels, j over
+the shapes of a change: 1, black, light = white - black.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.errors import InputError
+from nearfar.illumination.frequencies import DC
+from nearfar.photometry.photos import Photos, in_batches
+from nearfar.photometry.robust import robust_fit
+from nearfar.plan import Plan, Sinusoid
+from nearfar.plan.references import FEWEST
+
+# Camera pixels that a fit looks at, evenly spaced; more would take time and add nothing.
+SAMPLE = 2**20
+# A channel whose lamp is known no better than this is taken as steady.
+UNSURE = 0.02
+# A lamp under this share of its mean has failed.
+FAILED = 0.1
+
+
+class References(NamedTuple):
+    """Numbers of the photos of white and of black, in order."""
+
+    whites: NDArray[np.int64]
+    blacks: NDArray[np.int64]
+
+
+def find_references(plan: Plan) -> References:
+    """Find a plan's whites and blacks.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two of either.
+    """
+    found = References(
+        *(
+            np.array(
+                [
+                    number
+                    for number, pattern in enumerate(plan.patterns)
+                    if isinstance(pattern, Sinusoid)
+                    and pattern.frequency == DC
+                    and pattern.inverse == inverse
+                ],
+                dtype=np.int64,
+            )
+            for inverse in (False, True)
+        )
+    )
+    if min(map(len, found)) < FEWEST:
+        raise InputError(
+            f"the plan shows white {len(found.whites)} and black {len(found.blacks)} times, which "
+            f"tells neither noise nor drift: plan again with --offset reference, which shows each "
+            f"at least {FEWEST} times."
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How lamp and ambient light changed through a capture.
+
+    Attributes
+    ----------
+    references : References
+    black, light : ndarray, shape (Cy, Cx, channels), float32
+        Mean ambient light, and what white adds to it under the mean lamp.
+    unsaturated : ndarray of bool, shape (Cy, Cx, channels)
+        Where no white is at full scale.
+    ambient : ndarray, shape (blacks, 3, channels)
+        Change of the ambient light at each black, as multiples of 1, black and light.
+    lamp : ndarray, shape (whites, channels)
+        The lamp at each white; its mean is 1.
+    """
+
+    references: References
+    black: Floats
+    light: Floats
+    unsaturated: Booleans
+    ambient: NDArray[np.float64]
+    lamp: NDArray[np.float64]
+
+    @property
+    def lamp_range(self) -> float:
+        """Largest less smallest lamp, as a share of its mean; of the worst channel."""
+        return float(np.ptp(self.lamp, axis=0).max())
+
+    @property
+    def ambient_range(self) -> float:
+        """Largest less smallest ambient light, mean over the camera, as a share of white's."""
+        shapes = [np.ones(self.lamp.shape[1])]
+        shapes += [picture.mean(axis=(0, 1), dtype=np.float64) for picture in self._pictures]
+        moved = np.ptp(np.einsum("tji,ji->ti", self.ambient, np.stack(shapes)), axis=0)
+        white = shapes[2]
+        return float(np.max(moved / np.where(white > 0, white, np.inf)))
+
+    @property
+    def _pictures(self) -> tuple[Floats, Floats]:
+        return self.black, self.light
+
+    def take_out(self, photos: Floats, numbers: Sequence[int], rows: slice) -> Floats:
+        """Bring photos to the mean lamp and the mean ambient light.
+
+        Parameters
+        ----------
+        photos : ndarray, shape (n, rows, Cx, channels)
+        numbers : sequence of int
+            Which photos they are.
+        rows : slice
+            Which rows of the camera.
+
+        Returns
+        -------
+        ndarray, as `photos`
+        """
+        black, light = (picture[rows] for picture in self._pictures)
+        ambient = _between(self.ambient, self.references.blacks, numbers).astype(np.float32)
+        lamp = _between(self.lamp, self.references.whites, numbers).astype(np.float32)
+        steady = np.empty_like(photos)
+        for photo, (constant, own, white), gain, out in zip(
+            photos, ambient, lamp, steady, strict=True
+        ):
+            out[...] = black + (photo - (constant + (1 + own) * black + white * light)) / gain
+        return steady
+
+
+def _between(values: Floats, at: Integers, numbers: Sequence[int]) -> NDArray[np.float64]:
+    """Interpolate `values`, (references, ...), to photo numbers: (n, ...)."""
+    flat = values.reshape(len(at), -1)
+    found = np.stack([np.interp(numbers, at, column) for column in flat.T], axis=-1)
+    return found.reshape(len(numbers), *values.shape[1:])
+
+
+def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) -> Drift:
+    """Follow lamp and ambient light by least squares over the camera.
+
+    Parameters
+    ----------
+    photos : Photos
+        With at least two whites and two blacks; only these are read.
+    progress : callable, optional
+        Called with the number of photos read so far.
+
+    Returns
+    -------
+    Drift
+
+    Raises
+    ------
+    InputError
+        If there are fewer whites or blacks, or the lamp failed at a white.
+    """
+    references = find_references(photos.plan)
+    whites, blacks = references
+    report = progress or (lambda _done: None)
+    rows, shape = slice(0, photos.camera.height), (photos.camera.pixels, photos.channels)
+    unsaturated = np.ones(shape, dtype=bool)
+    white, black = np.zeros(shape), np.zeros(shape)
+    for _, read in in_batches(photos, whites.tolist(), rows):
+        white += read.sum(axis=0, dtype=np.float64) / len(whites)
+        unsaturated &= (read < 1.0).all(axis=0)
+    report(len(whites))
+    for _, read in in_batches(photos, blacks.tolist(), rows):
+        black += read.sum(axis=0, dtype=np.float64) / len(blacks)
+    report(len(whites) + len(blacks))
+
+    mean_light = white - black
+    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLE))
+    channels = [
+        _Channel(
+            np.stack([np.ones_like(black[sampled, i]), black[sampled, i], mean_light[sampled, i]]),
+            np.sqrt(np.maximum(white[sampled, i], 1e-2 * white[:, i].max() + 1e-12)),
+            unsaturated[sampled, i],
+        )
+        for i in range(photos.channels)
+    ]
+    changes = []
+    for _, read in in_batches(photos, blacks.tolist(), rows):
+        changes += [
+            [channel.change(photo[:, i]) for i, channel in enumerate(channels)]
+            for photo in read[:, sampled]
+        ]
+        report(len(whites) + len(blacks) + len(changes))
+    # The mean of the whites holds ambient light of its own times: what is left is the lamp's.
+    ambient = np.swapaxes(changes, 1, 2)
+    constant, own, share = _between(ambient, blacks, whites.tolist()).mean(axis=0)
+    light = (1 - share) * mean_light - constant - own * black
+    ambient[:, 2] /= 1 - share
+    ambient[:, 0] += ambient[:, 2] * constant
+    ambient[:, 1] += ambient[:, 2] * own
+    drift = Drift(
+        references=references,
+        black=_picture(black, photos),
+        light=_picture(light, photos),
+        unsaturated=unsaturated.reshape(*photos.camera, -1),
+        ambient=ambient,
+        lamp=np.ones((len(whites), photos.channels)),
+    )
+    gains: list[list[tuple[float, float]]] = []
+    for numbers, read in in_batches(photos, whites.tolist(), rows):
+        # With the ambient light taken out, and the lamp left as it was.
+        steady = drift.take_out(read.reshape(-1, *drift.black.shape), numbers, rows)
+        lit = steady.reshape(read.shape)[:, sampled] - black[sampled]
+        gains += [
+            [channel.gain(photo[:, i], light[sampled, i]) for i, channel in enumerate(channels)]
+            for photo in lit
+        ]
+        report(len(whites) + 2 * len(blacks) + len(gains))
+    return replace(drift, lamp=_lamp(np.array(gains), whites))
+
+
+def _lamp(gains: NDArray[np.float64], whites: Integers) -> NDArray[np.float64]:
+    """Return the lamp at each white from gains and their errors, (whites, channels, 2)."""
+    gain, error = gains[..., 0], gains[..., 1]
+    known = np.all(error < UNSURE, axis=0)
+    lamp: NDArray[np.float64] = np.where(known, gain, 1.0)
+    if lamp.min() < FAILED:
+        raise InputError(
+            f"photo {whites[lamp.min(axis=1).argmin()]}, of white, shows under {FAILED:.0%} of the "
+            f"light of the others: shoot again with the projector on throughout."
+        )
+    return np.asarray(lamp / lamp.mean(axis=0))
+
+
+def _picture(values: Floats, photos: Photos) -> NDArray[np.float32]:
+    return values.astype(np.float32).reshape(*photos.camera, -1)
+
+
+class _Channel(NamedTuple):
+    """What the fits of a channel share: the shapes (3, C), noise up to a factor, pixels to use."""
+
+    shapes: Floats
+    scatter: Floats
+    usable: Booleans
+
+    def change(self, photo: Floats) -> NDArray[np.float64]:
+        """Return what a black is more than their mean, as multiples of the shapes."""
+        return robust_fit(self._told(self.shapes), self._told(photo - self.shapes[1]))[0]
+
+    def gain(self, photo: Floats, light: Floats) -> tuple[float, float]:
+        """Return the lamp at a white, whose ambient light was taken out, and its error."""
+        found, error = robust_fit(self._told(light[None]), self._told(photo))
+        return float(found[0]), error
+
+    def _told(self, values: Floats) -> Floats:
+        # Bright pixels scatter more: by shot noise, that much.
+        return np.asarray((values / self.scatter)[..., self.usable], dtype=np.float64)

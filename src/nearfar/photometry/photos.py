@@ -1,0 +1,171 @@
+"""What measuring reads, and what its shapes share: batches, the answers' places, two levels.
+
+Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
+real answers.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Size, blocks
+from nearfar.errors import InputError
+from nearfar.illumination import patterns
+from nearfar.illumination.frequencies import Frequency
+from nearfar.plan import Plan, Sinusoid, Stripe
+from nearfar.transport.far import RealBasis, real_basis
+
+# Photos read at once.
+BATCH = 16
+
+# An answer: a frequency, and whether to its sine.
+Answer = tuple[Frequency, bool]
+
+
+class Photos(Protocol):
+    """Whatever holds the photos of a plan, in photo units (full scale = 1)."""
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that was shot."""
+        ...
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        ...
+
+    @property
+    def channels(self) -> int:
+        """Channels of the photos."""
+        ...
+
+    def read(self, indices: Sequence[int], rows: slice) -> Floats:
+        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
+        ...
+
+
+def size_of_rows(photos: Photos, rows: slice) -> Size:
+    """Return the size of some rows of the camera."""
+    return Size(len(range(*rows.indices(photos.camera.height))), photos.camera.width)
+
+
+def in_batches(
+    photos: Photos, numbers: Sequence[int], rows: slice
+) -> Iterator[tuple[Sequence[int], Floats]]:
+    """Yield photo numbers and their photos, (n, C, channels), `BATCH` at once."""
+    for batch in blocks(len(numbers), BATCH):
+        mine = list(numbers[batch])
+        yield mine, photos.read(mine, rows).reshape(len(mine), -1, photos.channels)
+
+
+def mean_photo(photos: Photos, numbers: Sequence[int], rows: slice) -> NDArray[np.float64]:
+    """Return the mean of photos, (C, channels)."""
+    shape = (size_of_rows(photos, rows).pixels, photos.channels)
+    total = np.zeros(shape)
+    for _, read in in_batches(photos, numbers, rows):
+        total += read.sum(axis=0, dtype=np.float64)
+    return total / len(numbers)
+
+
+def find_shown(plan: Plan) -> dict[Answer, list[tuple[int, int]]]:
+    """List the photos of each cosine and sine, with the sign of their answer: -1 for inverses."""
+    found: dict[Answer, list[tuple[int, int]]] = {}
+    for number, pattern in enumerate(plan.patterns):
+        if isinstance(pattern, Sinusoid):
+            answer = (pattern.frequency, pattern.kind == "sine")
+            found.setdefault(answer, []).append((number, -1 if pattern.inverse else 1))
+    return found
+
+
+def basis_of(answers: Sequence[Answer], projector: Size) -> tuple[RealBasis, dict[Answer, int]]:
+    """Return the basis of what was answered, and the place of each answer in it.
+
+    Raises
+    ------
+    InputError
+        If a cosine was shown without its sine, or a sine without its cosine.
+    """
+    known = set(answers)
+    basis = real_basis(list(dict.fromkeys(frequency for frequency, _ in answers)), projector)
+    place = {
+        (basis.frequencies[i], bool(sine)): r
+        for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True))
+    }
+    for frequency, sine in place:
+        if (frequency, sine) not in known:
+            raise InputError(
+                f"the plan shows frequency ({frequency.fy}, {frequency.fx}) without its "
+                f"{'sine' if sine else 'cosine'}, and both are one measurement: make the plan "
+                f"again with both."
+            )
+    return basis, place
+
+
+def shown_error(basis: RealBasis) -> Floats:
+    """Return what 8 bits show of each cosine and sine, 2 l / 255 - 1, less the ideal: (R, P)."""
+    ideal = basis.patterns
+    error = np.empty_like(ideal)
+    for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True)):
+        draw = patterns.sine if sine else patterns.cosine
+        drawn = patterns.quantise(draw(basis.frequencies[i], basis.projector)).ravel()
+        error[r] = drawn.astype(np.float32) * np.float32(2 / 255) - 1 - ideal[r]
+    return error
+
+
+class Reference(NamedTuple):
+    """A picture, how many blacks and how many (white - black) it holds, and its variance."""
+
+    value: Floats
+    blacks: float
+    lights: float
+    variance: Floats
+
+
+def stripe_references(
+    photos: Photos, rows: slice, variance: Callable[[Floats], Floats]
+) -> list[Reference]:
+    """Every set of stripes adds up to a known number of whites: one more reference each."""
+    found: list[Reference] = []
+    for kind in ("black row", "black column"):
+        numbers = [
+            i
+            for i, pattern in enumerate(photos.plan.patterns)
+            if isinstance(pattern, Stripe) and pattern.kind == kind
+        ]
+        if numbers:
+            mean, count = mean_photo(photos, numbers, rows), len(numbers)
+            found.append(Reference(mean, 1.0, 1.0 - 1.0 / count, variance(mean) / count))
+    return found
+
+
+class Levels(NamedTuple):
+    """Black, and light = white - black, with the variance of light and of white."""
+
+    black: Floats
+    light: Floats
+    light_variance: Floats
+    white_variance: Floats
+    black_variance: Floats
+
+
+def two_levels(references: Sequence[Reference]) -> Levels:
+    """Weighted least squares for black and light = white - black, (C, channels)."""
+    a11 = a12 = a22 = b1 = b2 = np.zeros(())
+    for value, blacks, lights, variance in references:
+        weight = 1.0 / np.maximum(variance, 1e-12)
+        a11 = a11 + weight * blacks * blacks
+        a12 = a12 + weight * blacks * lights
+        a22 = a22 + weight * lights * lights
+        b1 = b1 + weight * blacks * value
+        b2 = b2 + weight * lights * value
+    determinant = a11 * a22 - a12 * a12
+    return Levels(
+        black=(a22 * b1 - a12 * b2) / determinant,
+        light=(a11 * b2 - a12 * b1) / determinant,
+        light_variance=a11 / determinant,
+        white_variance=(a11 + a22 - 2 * a12) / determinant,
+        black_variance=a22 / determinant,
+    )

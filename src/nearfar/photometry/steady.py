@@ -1,0 +1,139 @@
+"""Photos by reference, with lamp and ambient light made steady and their noise told.
+
+Index convention: arrays are (photos, C, channels) with C camera pixels row by row; i runs over
+channels.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats, Size
+from nearfar.errors import InputError
+from nearfar.photometry.drift import SAMPLE, Drift, follow_drift
+from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few
+from nearfar.photometry.photos import BATCH, Answer, Photos, find_shown, in_batches
+from nearfar.plan import Plan
+
+# Values among which two neighbouring levels are looked for.
+LEVELS = 2**18
+
+
+@dataclass(frozen=True)
+class SteadyPhotos:
+    """Photos by reference without the drift of lamp and ambient light; read as any others.
+
+    Attributes
+    ----------
+    photos : Photos
+        As they were taken.
+    drift : Drift
+    noise : tuple of NoiseModel
+        One for each channel.
+    """
+
+    photos: Photos
+    drift: Drift
+    noise: tuple[NoiseModel, ...] = ()
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that was shot."""
+        return self.photos.plan
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        return self.photos.camera
+
+    @property
+    def channels(self) -> int:
+        """Channels of the photos."""
+        return self.photos.channels
+
+    def read(self, indices: Sequence[int], rows: slice) -> Floats:
+        """Photos `indices` as float32, (n, len(rows), Cx, channels), lamp and ambient steady."""
+        return self.drift.take_out(self.photos.read(indices, rows), indices, rows)
+
+    def variance(self, photo: Floats) -> Floats:
+        """Variance of one photo that reads `photo`, (C, channels)."""
+        told = [model.variance(photo[:, i]) for i, model in enumerate(self.noise)]
+        return np.stack(told, axis=1)
+
+
+def steady(photos: Photos, progress: Callable[[int], None] | None = None) -> SteadyPhotos:
+    """Follow lamp, ambient light and noise through a capture, the whole camera at once.
+
+    Parameters
+    ----------
+    photos : Photos
+        A capture of a plan with offset reference.
+    progress : callable, optional
+        Called with the number of photos read so far.
+
+    Returns
+    -------
+    SteadyPhotos
+        To be measured in blocks of rows as one pleases.
+
+    Raises
+    ------
+    InputError
+        If the plan has fewer than two whites or two blacks, or the lamp failed.
+    """
+    drift = follow_drift(photos, progress)
+    found = SteadyPhotos(photos, drift)
+    return SteadyPhotos(photos, drift, _noise_of_repeats(found))
+
+
+def _noise_of_repeats(photos: SteadyPhotos) -> tuple[NoiseModel, ...]:
+    """Fit shot and read noise to the scatter of every pattern that was shown more than once."""
+    shown: dict[tuple[Answer, bool], list[int]] = {}
+    for answer, signed in find_shown(photos.plan).items():
+        for number, sign in signed:
+            shown.setdefault((answer, sign > 0), []).append(number)
+    rows = slice(0, photos.camera.height)
+    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLE))
+    usable = photos.drift.unsaturated.reshape(-1, photos.channels)[sampled]
+    means, variances = [], []
+    for numbers in shown.values():
+        if len(numbers) > 1:
+            first = photos.read(numbers[:1], rows).reshape(-1, photos.channels)[sampled]
+            total, squares = np.zeros(first.shape), np.zeros(first.shape)
+            for _, read in in_batches(photos, numbers, rows):
+                # Sums of what differs from the first photo lose no digits.
+                off = (read[:, sampled] - first).astype(np.float64)
+                total += off.sum(axis=0)
+                squares += (off**2).sum(axis=0)
+            means.append(first + total / len(numbers))
+            variances.append((squares - total**2 / len(numbers)) / (len(numbers) - 1))
+    mean, variance = np.stack(means), np.maximum(np.stack(variances), 0.0)
+    rounding = _rounding(photos.photos)
+    models = []
+    for i in range(photos.channels):
+        if not usable[:, i].any():
+            raise InputError(
+                f"white is at full scale at every camera pixel of channel {i}: expose less and "
+                f"shoot again."
+            )
+        dark = float(np.median(photos.drift.black[..., i]))
+        models.append(
+            fit_noise(
+                mean[:, usable[:, i], i],
+                variance[:, usable[:, i], i],
+                dark,
+                photos=1,
+                least=rounding,
+                typical=mean_of_few,
+            )
+        )
+    return tuple(models)
+
+
+def _rounding(photos: Photos) -> float:
+    """Variance of rounding to whole levels, of which two neighbours are the least apart."""
+    numbers = range(min(BATCH, len(photos.plan.patterns)))
+    some = photos.read(numbers, slice(0, photos.camera.height)).ravel()
+    levels = np.unique(some[:: -(-some.size // LEVELS)].astype(np.float64))
+    return float(np.diff(levels).min()) ** 2 / 12 if len(levels) > 1 else 0.0

@@ -1,0 +1,79 @@
+"""White and black through a plan, so that no pattern needs its inverse.
+
+b(0.5 + 0.5 s) = 0.5 b(1) + 0.5 b(s): one white and one black tell the offset of every sinusoid.
+They are repeated, at the start, the end and in between, so that lamp and ambient light can be
+followed and the noise be told.
+"""
+
+from collections.abc import Sequence
+
+from nearfar.errors import PlanError
+from nearfar.illumination.frequencies import DC
+from nearfar.plan.model import Pattern, Purpose, Sinusoid
+
+# Other photos from one white and black to the next.
+INTERVAL = 18
+# Whites, and blacks, from which scatter and drift can be told.
+FEWEST = 2
+
+
+def reference_count(photos: int) -> int:
+    """Return how many whites, and as many blacks, suit a number of other photos."""
+    return max(FEWEST, round(photos / INTERVAL) + 1)
+
+
+def with_references(
+    patterns: Sequence[Pattern], whites: int | None = None, blacks: int | None = None
+) -> tuple[Pattern, ...]:
+    """Spread whites and blacks evenly through patterns, from the start to the end.
+
+    Parameters
+    ----------
+    patterns : sequence of patterns
+        Everything but white and black, in the order to shoot; stripes as well.
+    whites, blacks : int, optional
+        How many; `reference_count` if left out. Each of the fewer stands next to one of the more.
+
+    Returns
+    -------
+    tuple of patterns
+        `patterns` in their order, and the references between them. The first white is the DC
+        frequency and counts as far, all others as reference.
+
+    Raises
+    ------
+    PlanError
+        If there are fewer than two whites or two blacks.
+    """
+    counts = [reference_count(len(patterns)) if n is None else n for n in (whites, blacks)]
+    if min(counts) < FEWEST:
+        raise PlanError(
+            f"{counts[0]} whites and {counts[1]} blacks tell neither noise nor drift: plan for at "
+            f"least {FEWEST} of each."
+        )
+    places = max(counts)
+    at_white, at_black = (set(_spread(count, places - 1)) for count in counts)
+    # How many patterns come before each place.
+    before = _spread(places, len(patterns))
+    found: list[Pattern] = []
+    done = 0
+    for place, upto in enumerate(before):
+        found += patterns[done:upto]
+        done = upto
+        white = [_uniform("far" if place == 0 else "reference", black=False)]
+        black = [_uniform("reference", black=True)] if place in at_black else []
+        if place not in at_white:
+            found += black
+        else:
+            # Blacks begin and end it: the ambient light is known at every white.
+            found += [*black, *white] if place == 0 else [*white, *black]
+    return tuple(found)
+
+
+def _spread(count: int, last: int) -> list[int]:
+    """Spread `count` whole numbers evenly from 0 to `last`."""
+    return [(2 * i * last + count - 1) // (2 * (count - 1)) for i in range(count)]
+
+
+def _uniform(purpose: Purpose, *, black: bool) -> Sinusoid:
+    return Sinusoid(kind="cosine", frequency=DC, inverse=black, purpose=purpose)

@@ -1,0 +1,114 @@
+"""A plan by reference on the command line: counts, repeats on the disk, drift told."""
+
+import json
+from pathlib import Path
+
+import imagecodecs
+import numpy as np
+import pytest
+
+from nearfar.capture import open_capture
+from nearfar.plan import read_plan
+from nearfar.transport.store import load_transport
+from tests.cli.conftest import (
+    PLAN,
+    Job,
+    check_done,
+    check_sentence,
+    photograph,
+    run_nearfar,
+)
+
+BY_REFERENCE = (*PLAN, "--offset", "reference")
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("plan") / "plan.json"
+    check_done(run_nearfar(*BY_REFERENCE, "-o", path))
+    return path
+
+
+@pytest.mark.parametrize(("by", "photos"), [("stripes", 36), ("phase", 0), ("none", 0)])
+def test_counts(by: str, photos: int):
+    ran = check_done(run_nearfar(*BY_REFERENCE, "--correspondence", by, "--json"))
+    found = json.loads(ran.out)
+    assert found["transport_photos"] == 34
+    assert found["savings"] == 320 / 34
+    assert found["photos"]["correspondence"] == photos
+    assert found["total_photos"] == 34 + photos + found["photos"]["reference"]
+
+
+def test_the_defaults_are_the_papers():
+    plain = check_done(run_nearfar(*PLAN, "--json"))
+    named = run_nearfar(*PLAN, "--offset", "inverse", "--correspondence", "stripes", "--json")
+    assert plain.out == check_done(named).out
+
+
+def test_from_plan_to_transport_through_pictures(finished: Job, plan: Path, tmp_path: Path):
+    patterns, photos = tmp_path / "patterns", tmp_path / "photos"
+    check_done(run_nearfar("export", plan, patterns))
+    made = read_plan(patterns / "plan.json")
+    pictures = sorted(patterns.glob("pattern-*.png"))
+    # A picture for each photo, repeats and all.
+    assert len(pictures) == len(made.patterns) == made.summary()["total_photos"]
+    shown = [imagecodecs.png_decode(path.read_bytes()) for path in pictures]
+    whites = [i for i, picture in enumerate(shown) if picture.min() == 255]
+    blacks = [i for i, picture in enumerate(shown) if picture.max() == 0]
+    assert len(whites) == len(blacks) >= 3
+    assert {blacks[0], blacks[-1]} == {0, len(shown) - 1}
+    photograph(patterns, photos, np.load(finished.truth))
+    capture, transport = tmp_path / "capture.zarr", tmp_path / "transport.zarr"
+    ran = check_done(run_nearfar("import", plan, photos, capture))
+    assert f"{len(shown)} photos" in ran.out
+    assert open_capture(capture).plan == made
+    said = check_done(run_nearfar("reconstruct", capture, transport)).out
+    assert "directly lit" in said
+    one, other = (load_transport(path) for path in (transport, finished.transport))
+    light = np.load(finished.light)
+    np.testing.assert_allclose(one @ light, other @ light, atol=0.01)
+    # One photo too few is told.
+    next(photos.glob("*00007.npy")).unlink()
+    check_sentence(run_nearfar("import", plan, photos, tmp_path / "c.zarr"), str(len(shown)))
+
+
+@pytest.mark.parametrize(("drift", "warned"), [(0.0, False), (-0.2, True)])
+def test_a_drift_over_five_per_cent_is_told(
+    finished: Job, plan: Path, tmp_path: Path, drift: float, warned: bool
+):
+    (tmp_path / "rig.toml").write_text(
+        f'[scene]\ntransport = "{finished.truth}"\n'
+        f"[projector]\nlamp_drift = {{ per_100_photos = {drift} }}\n"
+    )
+    capture, transport = tmp_path / "capture.zarr", tmp_path / "transport.zarr"
+    check_done(run_nearfar("acquire", plan, capture, "--rig", tmp_path / "rig.toml"))
+    ran = run_nearfar("reconstruct", capture, transport)
+    assert ran.status == 0
+    told = load_transport(transport).provenance["drift"]
+    if not warned:
+        assert ran.err == ""
+        assert max(told.values()) < 0.02
+        return
+    assert ran.err.startswith("warning: ")
+    assert ran.err.count("\n") == 1
+    for word in (str(capture), f"{told['lamp']:.1%}", "lamp", "ambient"):
+        assert word in ran.err
+
+
+def test_a_plan_with_one_white_is_refused(finished: Job, plan: Path, tmp_path: Path):
+    data = json.loads(plan.read_text())
+    seen: set[str] = set()
+    kept = []
+    for pattern in data["patterns"]:
+        text = json.dumps({**pattern, "purpose": ""})
+        if text not in seen:
+            kept.append(pattern)
+        seen.add(text)
+    # As version 1 planned it.
+    once = tmp_path / "plan.json"
+    once.write_text(json.dumps({**data, "version": 1, "patterns": kept}))
+    capture = tmp_path / "capture.zarr"
+    check_done(run_nearfar("acquire", once, capture, "--rig", finished.truth))
+    out = tmp_path / "transport.zarr"
+    check_sentence(run_nearfar("reconstruct", capture, out), "white 1", "--offset reference")
+    assert not out.exists()

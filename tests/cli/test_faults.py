@@ -210,7 +210,7 @@ def test_full_scale_of_fourteen_bits(job: Job, tmp_path: Path):
 
 
 def _version(text: str) -> str:
-    return text.replace('"version": 1', '"version": 7')
+    return text.replace('"version": 2', '"version": 7')
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Which projector pixel lights each camera pixel directly."""
 
+from nearfar.correspondence.phase import correspond_by_phase
 from nearfar.correspondence.result import (
     Correspondence,
     given_correspondence,
@@ -10,6 +11,7 @@ from nearfar.correspondence.stripes import correspond_by_stripes, has_stripes
 
 __all__ = [
     "Correspondence",
+    "correspond_by_phase",
     "correspond_by_stripes",
     "given_correspondence",
     "has_stripes",

@@ -1,0 +1,225 @@
+"""Correspondence by phase and by stripes against the truth on the exact scenes.
+
+Run ``python benchmarks/correspondence.py [SCENE[:HxW] ...]``, HxW being a camera's size. Photos
+are those of the default simulated camera: the paper's plan in inverse pairs, and two sparse plans
+of which every sinusoid is shown once, against the mean of 8 white and 8 black photos. For each it
+prints the photos used (for stripes their own), and in percent
+
+- how many lit camera pixels (at least half of their area lit directly) have q within 0.5 and
+  1 pixel of the centroid of their direct light, and of the centroid of their stronger surface,
+  which differ where a camera pixel sees two;
+- unlit camera pixels: how many of those that were marked are less than half lit (precision), and
+  how many of those without any direct light were marked (recall);
+
+and the seconds of the correspondence alone.
+"""
+
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from nearfar import ExactTransport, Plan, Size, paper_plan
+from nearfar.arrays import Floats, parse_size
+from nearfar.correspondence import Correspondence, correspond_by_phase, correspond_by_stripes
+from nearfar.illumination import patterns
+from nearfar.illumination.frequencies import (
+    CHECKERBOARD,
+    DC,
+    Frequency,
+    far_frequencies,
+    representatives,
+    wrap,
+)
+from nearfar.photometry.measure import measure
+from nearfar.photometry.measurements import Measurements
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes import sizes
+from nearfar.scenes.cache import cached_scene
+from nearfar.scenes.camera import gather
+from nearfar.scenes.library import describe
+from nearfar.scenes.optics import pinhole
+from nearfar.scenes.patches import build_patches
+from nearfar.scenes.rays import surface
+from nearfar.scenes.render import SAMPLES
+from nearfar.transport.far import real_basis
+
+CASES = (
+    *("cornell", "cornell:32x32", "cornell:48x48", "cornell:128x128"),
+    *("cornell-aside", "cornell-aside:64x64", "wedge", "wedge:34x50", "corner", "corner:64x64"),
+)
+WINDOWS = {
+    "cornell": (11, Size(7, 7)),
+    "cornell-aside": (11, Size(7, 7)),
+    "wedge": (19, Size(7, 11)),
+    "corner": (15, Size(13, 13)),
+}
+# Far band, and spacings of a fine near grid up to 0.16 cycles per pixel and of a coarse one.
+SPARSE = ((Size(7, 7), 13, 4), (Size(5, 5), 13, 4))
+FINE = 0.16
+REFERENCES = 8
+CAMERA = SimulatedCamera()
+
+
+class Photos:
+    """Photos in memory, read as from a capture."""
+
+    def __init__(self, plan: Plan, scene: ExactTransport) -> None:
+        self.plan, self.camera, self.channels = plan, scene.camera, scene.channels
+        self._photos = shoot(scene, (plan.draw(i) for i in range(len(plan.patterns))), 0)
+
+    def read(self, photos: Sequence[int], rows: slice) -> Floats:
+        """Read photos in photo units."""
+        return self._photos[list(photos)][:, rows].astype(np.float32) / CAMERA.full_scale
+
+
+def shoot(
+    scene: ExactTransport, shown: Iterable[NDArray[np.uint8]], seed: int
+) -> NDArray[np.uint16]:
+    """Photograph 8-bit patterns."""
+    rig = SimulatedRig(scene, scene.name, SimulatedProjector(), CAMERA, 1.0, seed)
+    return np.stack([np.asarray(photo, dtype=np.uint16) for photo in rig.shoot(shown)])
+
+
+def sparse_frequencies(projector: Size, far: Size, fine: int, coarse: int) -> list[Frequency]:
+    """List a low band, a fine near grid, a coarse one, rounded to the DFT grid."""
+    half, zero = Fraction(1, 2), Fraction(0)
+    chosen = [
+        DC,
+        *far_frequencies(far, projector),
+        CHECKERBOARD,
+        wrap(half, zero),
+        wrap(zero, half),
+    ]
+    for spacing, highest in ((fine, FINE), (coarse, 0.5)):
+        steps = range(-round(highest * spacing), round(highest * spacing) + 1)
+        on_grid = [
+            [Fraction(round(step * side / spacing), side) for step in steps] for side in projector
+        ]
+        chosen += [wrap(y, x) for y in on_grid[0] for x in on_grid[1]]
+    return representatives(chosen)
+
+
+def measure_by_reference(
+    scene: ExactTransport, frequencies: Sequence[Frequency]
+) -> tuple[Measurements, int]:
+    """Show every sinusoid once: b = 2 photo - (white + black). Returns the photos used, too."""
+    basis = real_basis(frequencies, scene.projector)
+    drawn = [
+        patterns.quantise(
+            (patterns.sine if sine else patterns.cosine)(basis.frequencies[i], scene.projector)
+        )
+        for i, sine in zip(basis.index, basis.is_sine, strict=True)
+    ]
+    dc = basis.frequencies.index(DC)
+    once = [pattern for i, pattern in zip(basis.index, drawn, strict=True) if i != dc]
+    white = np.full(scene.projector, 255, dtype=np.uint8)
+    shown = [*[white] * REFERENCES, *[patterns.invert(white)] * REFERENCES, *once]
+    photos = shoot(scene, shown, 1).reshape(len(shown), scene.camera.pixels, scene.channels)
+    units = photos.astype(np.float32) / CAMERA.full_scale
+    bright, black = units[:REFERENCES].mean(axis=0), units[REFERENCES:][:REFERENCES].mean(axis=0)
+    answers = np.empty((*black.shape, basis.count), dtype=np.float32)
+    answers[..., basis.index == dc] = (bright - black)[..., None]
+    answers[..., basis.index != dc] = (
+        np.moveaxis(2 * units[2 * REFERENCES :], 0, -1) - ((bright + black)[..., None])
+    )
+    electrons = np.maximum((bright + black) / 2 - CAMERA.black_level, 0.0) * CAMERA.full_well
+    noise = 2 * np.sqrt(electrons + CAMERA.read_noise**2) / CAMERA.full_well
+    error = np.stack([pattern.ravel() for pattern in drawn]) * np.float32(2 / 255) - 1
+    measurements = Measurements(
+        camera=scene.camera,
+        basis=basis,
+        answers=answers,
+        noise=noise.astype(np.float32),
+        black=black,
+        shown_error=error - basis.patterns,
+    )
+    return measurements, len(shown)
+
+
+def lit_area(name: str, projector: Size, camera: Size) -> Floats:
+    """Share of each camera pixel that the projector lights directly, shape (C,)."""
+    scene = describe(name)
+    everything = surface(scene.parts, range(len(scene.parts)))
+    eye = pinhole(scene.projector_view, projector)
+    lens = pinhole(scene.camera_view or scene.projector_view, projector)
+    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES)
+    finest = min(camera.height / projector.height, camera.width / projector.width)
+    samples = max(1, int(np.ceil(SAMPLES / finest)))
+    ends = (eye, projector), (lens, camera)
+    seen = gather(everything, scene.parts, patches, *ends, samples=samples)
+    return np.asarray(seen.radiosity @ (patches.pixel >= 0).astype(float))
+
+
+def stronger_surface(scene: ExactTransport) -> Floats:
+    """Centroid of the strongest connected patch of direct light, shape (C, 2)."""
+    direct = sum(scene.direct[1:], start=scene.direct[0])
+    q = scene.correspondence.reshape(-1, 2).copy()
+    for c in np.flatnonzero(np.isfinite(q[:, 0])):
+        row = slice(direct.indptr[c], direct.indptr[c + 1])
+        y, x = np.divmod(direct.indices[row], scene.projector.width)
+        entries = direct.data[row]
+        y0, x0 = y.min(), x.min()
+        image = np.zeros((y.max() - y0 + 1, x.max() - x0 + 1))
+        image[y - y0, x - x0] = entries
+        labels = ndimage.label(image > 0, np.ones((3, 3)))[0][y - y0, x - x0]
+        mine = labels == np.argmax(np.bincount(labels, entries))
+        q[c] = np.average(np.stack([y, x], axis=-1)[mine], axis=0, weights=entries[mine])
+    return q
+
+
+def report(
+    label: str,
+    photos: int,
+    found: Correspondence,
+    truths: Sequence[Floats],
+    area: Floats,
+    seconds: float,
+) -> None:
+    """Print a row of the table."""
+    unlit, lit = ~found.lit.ravel(), area >= 0.5
+    cells = []
+    for truth in truths:
+        off = np.abs(found.pixels.reshape(-1, 2)[lit] - truth[lit]).max(axis=1)
+        off[np.isnan(off)] = np.inf
+        cells += [f"{np.mean(off <= limit):9.2%}" for limit in (0.5, 1.0)]
+    for chosen in (~lit[unlit], unlit[area == 0]):
+        cells.append(f"{np.mean(chosen):9.2%}" if len(chosen) else "        -")
+    print(f"  {label:<16}{photos:>7}{''.join(cells)}{seconds:8.1f}", flush=True)
+
+
+def run(name: str, camera: Size | None) -> None:
+    """Print one scene's table."""
+    projector, camera = sizes(name, None, camera)
+    scene = cached_scene(name, projector, camera)
+    area = lit_area(name, projector, camera)
+    truths = (scene.correspondence.reshape(-1, 2), stronger_surface(scene))
+    print(f"{name}: projector {projector}, camera {camera}, {np.mean(area == 0):.1%} unlit")
+    titles = ("within .5", "within 1", "of strong", "within 1", "precision", "recall")
+    print(f"  {'':<16}{'photos':>7}" + "".join(f"{t:>9}" for t in titles) + "       s")
+    plan = paper_plan(projector, *WINDOWS[name])
+    photos = Photos(plan, scene)
+    started = time.perf_counter()
+    found = correspond_by_stripes(photos)
+    seconds = time.perf_counter() - started
+    report("stripes", plan.counts["correspondence"], found, truths, area, seconds)
+    measured = [("phase, pairs", measure(photos), plan.transport_photos)]
+    for sparse in SPARSE:
+        frequencies = sparse_frequencies(projector, *sparse)
+        measured.append(("phase, reference", *measure_by_reference(scene, frequencies)))
+    for label, measurements, count in measured:
+        started = time.perf_counter()
+        found = correspond_by_phase(measurements)
+        report(label, count, found, truths, area, time.perf_counter() - started)
+
+
+if __name__ == "__main__":
+    for case in sys.argv[1:] or CASES:
+        scene_name, _, size = case.partition(":")
+        run(scene_name, parse_size(size) if size else None)

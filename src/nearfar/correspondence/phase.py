@@ -1,0 +1,242 @@
+"""Correspondence from the photos of transport themselves, without photos of its own.
+
+Direct light is a peak of a row t: its answers to all frequencies agree on one place, where they
+add up. Far-range light answers low frequencies alone, and near-range light mostly those. So each
+answer is divided by the power of what else is in it (noise, far- and near-range light), and the
+answers are laid on every place of the pattern grid: a whitened matched filter. Two weightings are
+used. A weak background finds the place, for every answer helps to tell one place from another; a
+strong one then measures the footprint, the 5 x 5 entries of t around it, and tells direct light
+from near-range light that is concentrated, as in a crease.
+
+Sums over places replace an inverse FFT, so that frequencies may lie off the DFT grid.
+
+Index convention: c runs over camera pixels, r over real answers, k over frequencies, p over the
+pattern grid row by row, o and i over the offsets of a footprint.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.correspondence.ambiguity import require_settled
+from nearfar.correspondence.background import SEARCH, SHARP, STRONG, Background
+from nearfar.correspondence.result import Correspondence
+from nearfar.errors import InputError
+from nearfar.illumination.frequencies import DC, as_array
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport.far import RealBasis
+
+# Values of the score that are held at once.
+HELD = 2**22
+# Camera pixels at once.
+BLOCK = 1024
+# White under this share of the brightest white is rounding.
+BLACK = 1e-6
+# Half the side of a footprint.
+REACH = 2
+# Passes over a footprint's entries.
+SWEEPS = 15
+# Ridge on a footprint's entries two pixels away, in units of the diagonal: a second pixel of
+# direct light is believed more readily next to the first.
+RIDGE = 1.0
+# Direct light is seen where it stands above the background by this factor, root mean square over
+# the answers. Between the 98th percentile of unlit and the 0.05th of lit camera pixels of a
+# Cornell box seen from aside, by plans of 79 to 340 photos (benchmarks/correspondence.py).
+SEEN = 2.25
+
+
+class _Weighed(NamedTuple):
+    """Answers over white, channels summed by their weights.
+
+    `answers` (C, R) is sum of weight times answer, `weights` (C, K) the sum of weights, one for
+    the cosine and the sine of a frequency.
+    """
+
+    answers: Floats
+    weights: Floats
+
+
+def correspond_by_phase(measurements: Measurements) -> Correspondence:
+    """Find q(c) from the answers to the sinusoids.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        DC among them; any other frequencies that settle a place.
+
+    Returns
+    -------
+    Correspondence
+        q is the centroid of the direct light within 2 pixels of its peak: where one camera pixel
+        sees two surfaces, that of the stronger. NaN where no direct light stands above near-range
+        light. Confidence is 1/2 at that border.
+
+    Raises
+    ------
+    InputError
+        If there is no answer to DC, or if the frequencies leave several places alike.
+    """
+    basis = _without_dc(measurements)
+    require_settled(basis)
+    camera = measurements.camera
+    brightest = measurements.answers[..., measurements.places([DC])[0]].max(initial=0.0)
+    pixels = np.empty((camera.pixels, 2), dtype=np.float32)
+    confidence = np.empty(camera.pixels, dtype=np.float32)
+    for block in blocks(camera.pixels, BLOCK):
+        part = measurements.of_pixels(Size(1, block.stop - block.start), block)
+        answers, variance = _relative(part, BLACK * brightest)
+        found = _search(basis, _weigh(basis, answers, variance, SEARCH))
+        q, _ = _footprints(basis, _weigh(basis, answers, variance, SHARP), found)
+        _, excess = _footprints(basis, _weigh(basis, answers, variance, STRONG), found)
+        pixels[block] = np.where((excess > SEEN)[:, None], q, np.nan)
+        power = (excess / SEEN) ** 4
+        confidence[block] = power / (1 + power)
+    return Correspondence(pixels.reshape(*camera, 2), confidence.reshape(camera))
+
+
+def answer_variance(measurements: Measurements) -> Floats:
+    """Return the variance of each answer, broadcastable to (C, channels, R)."""
+    references = measurements.white_noise**2 + measurements.black_noise**2
+    repeated = measurements.noise[..., None] ** 2 / measurements.repeats
+    return np.asarray(repeated + references[..., None])
+
+
+def _without_dc(measurements: Measurements) -> RealBasis:
+    basis = measurements.basis
+    if DC not in basis.frequencies:
+        raise InputError(
+            "the measurements have no answer to white, of which direct light is a share: "
+            "plan with a white photo."
+        )
+    return RealBasis(tuple(k for k in basis.frequencies if k != DC), basis.projector)
+
+
+def _relative(measurements: Measurements, black: float) -> tuple[Floats, Floats]:
+    """Answers over each pixel's own white, (C, channels, R), and their variances; DC left out."""
+    places = measurements.places([k for k in measurements.basis.frequencies if k != DC])
+    white = measurements.answers[..., measurements.places([DC])[0]]
+    scale = np.maximum(white, black)
+    inverse = np.divide(1.0, scale, where=scale > 0, out=np.zeros_like(scale))[..., None]
+    shape = measurements.answers.shape
+    variance = np.broadcast_to(answer_variance(measurements), shape)[..., places] * inverse**2
+    return measurements.answers[..., places] * inverse, variance
+
+
+def _weigh(basis: RealBasis, answers: Floats, variance: Floats, background: Background) -> _Weighed:
+    cosine = np.flatnonzero(~basis.is_sine)
+    count = np.bincount(basis.index, minlength=len(basis.frequencies))
+    # A cosine and its sine get one weight, so that no place is favoured.
+    of_pair = np.add.reduceat(variance, cosine, axis=-1) / count if len(cosine) else variance
+    weights = 1.0 / (of_pair + background.power(basis))
+    summed = np.einsum("cir,cir->cr", answers, weights[..., basis.index])
+    return _Weighed(summed.astype(np.float32), weights.sum(axis=1).astype(np.float32))
+
+
+def _search(basis: RealBasis, weighed: _Weighed) -> NDArray[np.float64]:
+    """Find the place, to half a pixel, at which direct light explains the answers best: (C, 2).
+
+    Light at half a pixel is shared by the pixels around it, which adds half of both scores.
+    """
+    height, width = basis.projector
+    frequencies = as_array(basis.frequencies)
+    # Squares of a cosine and its sine add up to 1 at every whole place, and lose this between.
+    down, across = (np.cos(np.pi * frequencies[:, axis]) ** 2 for axis in (0, 1))
+    best = np.zeros((len(weighed.answers), 2))
+    for block in blocks(len(weighed.answers), HELD // basis.projector.pixels):
+        whole = (weighed.answers[block] @ basis.patterns).reshape(-1, height, width)
+        beside = 0.5 * (whole[:, :, 1:] + whole[:, :, :-1])
+        highest = np.full(len(whole), -np.inf)
+        for score, shift, energy in (
+            (whole, (0.0, 0.0), np.ones(len(frequencies))),
+            (beside, (0.0, 0.5), across),
+            (0.5 * (whole[:, 1:] + whole[:, :-1]), (0.5, 0.0), down),
+            (0.5 * (beside[:, 1:] + beside[:, :-1]), (0.5, 0.5), down * across),
+        ):
+            if score[0].size == 0:
+                continue
+            flat = score.reshape(len(score), -1)
+            place = flat.argmax(axis=1)
+            scale = np.sqrt(weighed.weights[block] @ energy) + 1e-12
+            deviations = flat[np.arange(len(flat)), place] / scale
+            better = deviations > highest
+            highest[better] = deviations[better]
+            y, x = np.divmod(place, score.shape[2])
+            best[block][better] = np.stack([y + shift[0], x + shift[1]], axis=-1)[better]
+    return best
+
+
+def _footprints(
+    basis: RealBasis, weighed: _Weighed, around: NDArray[np.float64]
+) -> tuple[Floats, Floats]:
+    """Fit the entries of t around a place, none negative.
+
+    Returns
+    -------
+    centroid : ndarray, shape (C, 2)
+    excess : ndarray, shape (C,)
+        What the footprint explains, in units of the background, root mean square over answers.
+    """
+    limit = np.array(basis.projector) - 1
+    offsets = _square(REACH)
+    centre = np.clip(np.floor(around + 0.5).astype(np.int64), 0, limit)
+    frequencies = as_array(basis.frequencies)
+    # Two entries overlap by a sum that depends on the offset between them alone.
+    steps = _square(2 * REACH)
+    overlap = np.cos(2 * np.pi * (frequencies @ steps.T)).astype(np.float32)
+    apart = offsets[:, None] - offsets[None] + 2 * REACH
+    number = apart[..., 0] * (4 * REACH + 1) + apart[..., 1]
+    ridge = np.where(np.abs(offsets).max(axis=1) > 1, RIDGE, 0.0).astype(np.float32)
+    places = offsets[:, None] + centre
+    inside: Booleans = np.all((places >= 0) & (places <= limit), axis=-1)
+    flat = np.clip(places, 0, limit) @ np.array([basis.projector.width, 1])
+    scores = _scores_at(basis, weighed.answers, flat)
+    gram = (overlap.T @ weighed.weights.T)[number]
+    entries, left = _nonnegative(scores, gram, inside, ridge)
+    total = entries.sum(axis=0)
+    centroid = centre + (entries.T @ offsets) / np.where(total > 0, total, 1.0)[:, None]
+    # 2 s.w - w.G.w, of which s - G.w is what is left.
+    explained = np.einsum("oc,oc->c", scores + left, entries)
+    return np.clip(centroid, 0, limit), np.sqrt(np.maximum(explained, 0.0) / basis.count)
+
+
+def _square(reach: int) -> NDArray[np.int64]:
+    side = np.arange(-reach, reach + 1)
+    return np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _scores_at(basis: RealBasis, answers: Floats, places: NDArray[np.int64]) -> Floats:
+    """Score of chosen places (O, C) of each pixel, (O, C)."""
+    patterns = basis.patterns
+    return np.stack([np.einsum("cr,rc->c", answers, patterns[:, place]) for place in places])
+
+
+def _nonnegative(
+    scores: Floats, gram: Floats, inside: Booleans, ridge: Floats
+) -> tuple[Floats, Floats]:
+    """Least squares with no negative entry, by coordinate descent over all pixels at once.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (O, C)
+    gram : ndarray, shape (O, O, C)
+    inside : ndarray, shape (O, C)
+        Entries that are on the pattern grid; the others are 0.
+    ridge : ndarray, shape (O,)
+
+    Returns
+    -------
+    entries, left : ndarray, shape (O, C)
+        The solution w, and s - G.w.
+    """
+    entries = np.zeros_like(scores)
+    left = scores.copy()
+    inverse = inside / (gram[0, 0] + 1e-20)
+    for _ in range(SWEEPS):
+        for o in range(len(scores)):
+            change = left[o] * inverse[o] - ridge[o] * entries[o]
+            value = np.maximum(entries[o] + change / (1 + ridge[o]), 0.0)
+            left -= (value - entries[o]) * gram[o]
+            entries[o] = value
+    return entries, left

@@ -1,0 +1,46 @@
+"""The few numbers of a camera pixel that stand out of all expectation, by least squares.
+
+They are the references' error o, the same in every answer, the direct light d, and at depth
+edges direct light of a second surface, d2, d3 ... With K the covariance of all else,
+y = rest + sum_g x_g a_g for their answers a_g. Given K^-1 they are a small least squares with
+what is known of them beforehand: the references' noise, and that direct light is about as bright
+as white at most.
+
+Index convention: arrays are (n, channels, ...); g and h run over the numbers, r over answers.
+"""
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.estimate.joint.pixels import Pixels
+
+# Deviation of direct light expected beforehand, as a share of white: no opinion.
+UNKNOWN = 4.0
+# References that cannot err still need a number.
+LEAST = 1e-12
+
+
+def columns(pixels: Pixels) -> Floats:
+    """Answers a_g of unit o, d, d2 ..., shape (n, R, G)."""
+    two = np.stack([pixels.of_offset, pixels.of_direct], axis=-1)
+    return np.concatenate([two, pixels.of_second], axis=-1)
+
+
+def precision(pixels: Pixels) -> Floats:
+    """Precision of o, d, d2 ... before any answer, shape (n, channels, G), float64."""
+    white = pixels.white.astype(np.float64)
+    offset = 1.0 / np.maximum(pixels.offset_noise, LEAST * white) ** 2
+    direct = 1.0 / (UNKNOWN * white) ** 2
+    return np.stack([offset] + [direct] * (1 + pixels.of_second.shape[-1]), axis=-1)
+
+
+def solve(normal: Floats, right: Floats, known: Floats) -> Floats:
+    """Solve (normal + diag(known)) x = right, float64.
+
+    Parameters
+    ----------
+    normal : ndarray, shape (n, channels, G, G)
+    right, known : ndarray, shape (n, channels, G)
+    """
+    matrix = normal + known[..., None] * np.eye(known.shape[-1])
+    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])

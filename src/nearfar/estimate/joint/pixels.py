@@ -1,0 +1,118 @@
+"""What the estimate of a block of camera pixels needs, re-centred on q.
+
+Index convention: arrays are (n, channels, ...), n camera pixels; r runs over real answers.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats
+from nearfar.estimate.matrices import Band
+from nearfar.illumination.frequencies import DC
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport import near
+from nearfar.transport.direct import Footprint, look_up
+
+# A camera pixel darker than this share of the brightest is treated as if it had as much light.
+DARKEST = 1e-3
+# Measurements without noise are taken to be this exact, as a share of a camera pixel's white.
+EXACT = 1e-6
+
+
+class Pixels(NamedTuple):
+    """A block of camera pixels; each field's first axis runs over them.
+
+    Attributes
+    ----------
+    centres : ndarray of int, shape (n, 2)
+    lit : ndarray of bool, shape (n,)
+    inside : ndarray of bool, shape (n, W^2)
+        Window entries on the projector.
+    answers : ndarray, shape (n, channels, R)
+        Of all frequencies but DC.
+    of_direct : ndarray, shape (n, R)
+        Answers of unit direct light, 8 bits included; 0 at unlit camera pixels.
+    of_second : ndarray, shape (n, R, E)
+        Answers of unit direct light of other surfaces, at single window entries; 0: none.
+    of_offset : ndarray, shape (n, R)
+        What an error of the references adds to the answers.
+    noise : ndarray, shape (n, channels)
+        Standard deviation of an answer that was measured once.
+    offset_noise : ndarray, shape (n, channels)
+        Standard deviation of the references' error.
+    white : ndarray, shape (n, channels)
+        Light under white, the scale of all transport.
+    """
+
+    centres: NDArray[np.int64]
+    lit: Booleans
+    inside: Booleans
+    answers: Floats
+    of_direct: Floats
+    of_second: Floats
+    of_offset: Floats
+    noise: Floats
+    offset_noise: Floats
+    white: Floats
+
+    def only(self, chosen: NDArray[np.int64]) -> "Pixels":
+        """Return some of the camera pixels."""
+        return Pixels._make(values[chosen] for values in self)
+
+
+def dc_place(measurements: Measurements) -> int:
+    """Place of the answer to white among the measurements."""
+    return int(measurements.places([DC])[0])
+
+
+def scale_of(measurements: Measurements) -> Floats:
+    """Light under white, the scale of all transport, (C, channels); never nothing."""
+    white = measurements.answers[..., dc_place(measurements)]
+    brightest = float(np.abs(white).max(initial=0.0))
+    least = max(DARKEST * brightest, float(np.finfo(np.float32).tiny))
+    return np.asarray(np.maximum(white, np.float32(least)))
+
+
+def gather(
+    measurements: Measurements,
+    where: Footprint,
+    lit: Booleans,
+    centres: NDArray[np.int64],
+    block: slice,
+    band: Band,
+    window: int,
+) -> Pixels:
+    """Gather a block of camera pixels.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    where, lit, centres
+        Footprint of the direct light, whether there is any, and the rounded q of all pixels.
+    block : slice
+    band : Band
+        The measured frequencies without DC.
+    window : int
+        W.
+    """
+    where = Footprint(where.pixels[block], where.weights[block])
+    centres, lit = centres[block], lit[block]
+    white = scale_of(measurements)[block]
+    shown = measurements.shown_error[band.places] + band.basis.patterns
+    direct = look_up(shown, where).T * lit[:, None]
+    ones = np.ones((len(lit), 1, band.basis.count), dtype=np.float32)
+    answers = measurements.answers[block][..., band.places]
+    return Pixels(
+        centres=centres,
+        lit=lit,
+        inside=near.inside(centres, window, measurements.projector),
+        answers=band.recentre(answers, centres),
+        of_direct=band.recentre(direct[:, None].astype(np.float32), centres)[:, 0],
+        of_second=np.zeros((len(lit), band.basis.count, 0), dtype=np.float32),
+        of_offset=band.recentre(ones, centres)[:, 0],
+        noise=np.maximum(measurements.noise[block], EXACT * white),
+        offset_noise=np.hypot(measurements.white_noise[block], measurements.black_noise[block]),
+        white=white,
+    )

@@ -1,0 +1,67 @@
+"""A kind's expectation as the measured frequencies see it, the same for every camera pixel.
+
+With n about q of covariance C and f stationary over the pattern grid, of power S, the answers to
+the measured cosines and sines, re-centred on q, have the covariance K = B C B^T + diag(S), B the
+patterns over the window. Measured m times over, in units of one measurement's noise, its
+eigenvectors are those of sqrt(m) K sqrt(m), whatever the strength of the light and the noise.
+
+Index convention: r runs over real answers, w over window entries, i over eigenvectors.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.estimate.matrices import Band
+from nearfar.transport.kinds import Kind, far_power, near_covariance
+
+
+@dataclass(frozen=True)
+class Prior:
+    """One kind for one set of measured frequencies.
+
+    Attributes
+    ----------
+    levels : ndarray, shape (R,), float32
+        Eigenvalues of sqrt(m) K sqrt(m), falling.
+    directions : ndarray, shape (R, R), float32
+        Its eigenvectors, times sqrt(m): from re-centred answers to their coordinates.
+    to_near : ndarray, shape (R, W^2), float32
+        From weights of the eigenvectors to window entries.
+    to_far : ndarray, shape (R, R), float32
+        From weights of the eigenvectors to re-centred answers of f.
+    """
+
+    levels: Floats
+    directions: Floats
+    to_near: Floats
+    to_far: Floats
+
+
+def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
+    """Build a kind's matrices.
+
+    Parameters
+    ----------
+    kind : Kind
+    band : Band
+        The measured frequencies without DC.
+    repeats : ndarray, shape (R,)
+        m, how often each answer was measured.
+    """
+    patterns = band.on_window.astype(np.float64)
+    window = round(np.sqrt(patterns.shape[1]))
+    seen = patterns @ near_covariance(kind, window)
+    power = far_power(band.basis, kind)
+    root = np.sqrt(repeats.astype(np.float64))
+    matrix = (seen @ patterns.T + np.diag(power)) * root[:, None] * root
+    levels, vectors = np.linalg.eigh(matrix)
+    levels, vectors = np.maximum(levels[::-1], 0.0), vectors[:, ::-1]
+    directions = vectors * root[:, None]
+    return Prior(
+        levels=levels.astype(np.float32),
+        directions=np.ascontiguousarray(directions, dtype=np.float32),
+        to_near=np.ascontiguousarray(directions.T @ seen, dtype=np.float32),
+        to_far=np.ascontiguousarray(directions.T * power, dtype=np.float32),
+    )

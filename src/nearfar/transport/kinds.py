@@ -1,0 +1,94 @@
+"""Kinds of camera pixel: what near- and far-range light is expected there before any photo.
+
+A bare wall, wax and a crease differ by orders of magnitude, and no single Gaussian holds them
+all. Each kind is one Gaussian of few numbers; which kind a camera pixel is, and how strong its
+light, its own photos say (the evidence). The kinds were chosen one by one out of 240 (reach 0.8 to
+6 pixels, decay 0.7 to 8 cycles, six shares, with and without spread), each time the one that
+raised the evidence of camera pixels of the scenes cornell, cornell-aside, wedge and corner most;
+docs/decisions/0009 has the figures.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.illumination.frequencies import as_array
+from nearfar.transport import near
+from nearfar.transport.far import RealBasis
+
+# Neighbouring window entries answer alike over about this many projector pixels.
+CORRELATION = 1.0
+# Far-range light has at least this share of its power at every frequency: sharp shadows.
+LEAST_POWER = 1e-6
+
+
+class Kind(NamedTuple):
+    """One Gaussian expectation of a row t about q, of unit strength.
+
+    Attributes
+    ----------
+    reach : float
+        Projector pixels over which the deviation of near-range light falls by e; 0: none.
+    far : float
+        Deviation of far-range light's DC over that of near-range light at q.
+    decay : float
+        Cycles per pattern grid over which the deviation of far-range light falls by e.
+    spread : float
+        Deviation, over that of near-range light at q, of direct light that does not lie as the
+        2 x 2 footprint has it: independent on the 3 x 3 pixels around q.
+    """
+
+    reach: float
+    far: float
+    decay: float
+    spread: float = 0.0
+
+
+# In the order in which they were chosen.
+LIT = (
+    Kind(6.0, 256.0, 1.5),
+    Kind(6.0, 16.0, 3.0),
+    Kind(1.3, 1.0, 3.0),
+    Kind(0.8, 64.0, 1.5),
+    Kind(0.8, 64.0, 3.0),
+    Kind(6.0, 64.0, 1.5),
+    Kind(1.3, 256.0, 1.5),
+    Kind(6.0, 64.0, 3.0),
+    Kind(3.5, 16.0, 1.5),
+    Kind(6.0, 64.0, 8.0),
+    Kind(2.2, 16.0, 1.5, 3.0),
+    Kind(0.8, 256.0, 3.0),
+    Kind(1.3, 1.0, 1.5),
+    Kind(0.8, 256.0, 0.7),
+    Kind(2.2, 16.0, 1.5),
+    Kind(6.0, 16.0, 8.0),
+    Kind(2.2, 16.0, 0.7, 3.0),
+    Kind(3.5, 4.0, 3.0),
+    Kind(0.8, 1.0, 3.0),
+    Kind(3.5, 16.0, 3.0),
+)
+# Without direct light there is far-range light alone.
+UNLIT = tuple(Kind(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0))
+# Deviations of near-range light at q that are tried, as shares of the camera pixel's white.
+STRENGTHS = tuple(2e-4 * 2.0**step for step in range(11))
+
+
+def far_power(basis: RealBasis, kind: Kind) -> Floats:
+    """Power of each real answer of f at unit strength, shape (R,), float64."""
+    cycles = as_array(basis.frequencies) * np.array(basis.projector)
+    power = np.exp(-2 * np.hypot(cycles[:, 0], cycles[:, 1]) / kind.decay) + LEAST_POWER
+    own = np.array([k.is_own_negative for k in basis.frequencies])
+    return np.asarray(kind.far**2 * (power * np.where(own, 1.0, 0.5))[basis.index])
+
+
+def near_covariance(kind: Kind, window: int) -> Floats:
+    """Covariance C of the window entries at unit strength, shape (W^2, W^2), float64."""
+    places = near.offsets(window).astype(np.float64)
+    if kind.reach == 0:
+        return np.zeros((len(places), len(places)))
+    deviation = np.exp(-np.hypot(places[:, 0], places[:, 1]) / kind.reach)
+    apart = np.sum((places[:, None] - places[None]) ** 2, axis=-1)
+    covariance = np.exp(-apart / (2 * CORRELATION**2)) * deviation[:, None] * deviation
+    around = np.abs(places).max(axis=1) <= 1
+    return np.asarray(covariance + np.diag(kind.spread**2 * around))

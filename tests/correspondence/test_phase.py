@@ -1,0 +1,336 @@
+"""Correspondence by phase: exact, robust under global light, honest where there is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.correspondence import correspond_by_phase
+from nearfar.correspondence.ambiguity import MOST_WRONG, expected_wrong
+from nearfar.errors import InputError
+from nearfar.illumination.frequencies import (
+    CHECKERBOARD,
+    DC,
+    far_frequencies,
+    grid,
+    near_frequencies,
+    representatives,
+)
+from nearfar.photometry.measure import measure
+from nearfar.photometry.measurements import Measurements
+from nearfar.plan import paper_plan
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.transport.far import real_basis
+from tests.worlds import ideal_measurements, model_transport
+
+PROJECTOR = Size(24, 30)
+WINDOW, FAR = 7, Size(5, 5)
+# About 60 photos, all on the DFT grid.
+FEW = [
+    *far_frequencies(Size(5, 5), PROJECTOR),
+    *grid(Size(5, 5), Size(4, 5)),
+    *grid(Size(3, 3), Size(8, 10)),
+    CHECKERBOARD,
+]
+
+
+def _world(camera=PROJECTOR, projector=PROJECTOR, near=0.2, **options):
+    window = min(WINDOW, *projector)
+    world = model_transport(projector, camera, window=window, far=Size(3, 3), **options)
+    # Near-range entries well under the direct light's, as light in a candle is.
+    return world.with_gains(near=near)
+
+
+def _answers(world, frequencies, noise=0.0, seed=0):
+    """Answer chosen frequencies, with normal noise."""
+    basis = real_basis(representatives([DC, *frequencies]), world.projector)
+    pixels, channels = world.camera.pixels, world.channels
+    answers = world.rows(slice(0, pixels)).astype(np.float64) @ basis.patterns.T.astype(np.float64)
+    answers += noise * np.random.default_rng(seed).normal(size=answers.shape)
+    level = np.full((pixels, channels), noise, dtype=np.float32)
+    return Measurements(
+        camera=world.camera,
+        basis=basis,
+        answers=answers.astype(np.float32),
+        noise=level,
+        black=np.zeros_like(level),
+        shown_error=np.zeros_like(basis.patterns),
+    )
+
+
+def _with_shade(world, shade):
+    """Take direct and near-range light from the camera pixels in `shade`."""
+    q = np.where(shade[..., None], np.nan, world.correspondence).astype(np.float32)
+    return replace(
+        world,
+        correspondence=q,
+        direct=np.where(shade[..., None], 0, world.direct),
+        near=np.where(shade[..., None, None, None], 0, world.near),
+    )
+
+
+@pytest.mark.parametrize(
+    ("size", "window", "far"),
+    [
+        (Size(24, 30), 7, Size(5, 5)),
+        (Size(16, 16), 8, Size(4, 4)),
+        (Size(19, 13), 6, Size(5, 3)),
+        (Size(9, 31), 9, Size(3, 6)),
+        (Size(1, 20), 1, Size(1, 11)),
+        (Size(12, 1), 1, Size(7, 1)),
+        (Size(8, 8), 1, Size(8, 8)),
+        (Size(2, 3), 2, Size(2, 3)),
+    ],
+)
+def test_the_papers_frequencies_find_whole_pixels(size, window, far):
+    world = model_transport(size, size, window=3, far=Size(1, 1))
+    alone = world.with_gains(near=0, far=0)
+    found = correspond_by_phase(ideal_measurements(alone, window, far, Size(1, 1)))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.01)
+    # Far-range light answers frequencies off the DFT grid as well.
+    lit_by_all = world.with_gains(near=0)
+    found = correspond_by_phase(ideal_measurements(lit_by_all, window, far, Size(1, 1)))
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.3)
+
+
+def test_near_and_far_light_pull_q_by_little():
+    world = _world()
+    found = correspond_by_phase(ideal_measurements(world, WINDOW, FAR, Size(1, 1)))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.35)
+    assert np.median(np.abs(found.pixels - world.correspondence)) < 0.05
+
+
+def test_a_finer_camera_falls_between_pixels():
+    world = _world(Size(61, 77), fractional=True)
+    found = correspond_by_phase(_answers(world.with_gains(near=0), FEW))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.05)
+    found = correspond_by_phase(_answers(world, FEW, noise=0.003))
+    off = np.abs(found.pixels - world.correspondence)
+    assert found.lit.all()
+    assert np.percentile(off, 95) < 0.2
+    assert np.mean(off > 0.5) < 0.005
+
+
+def test_a_coarse_camera_pixel_gets_the_centroid():
+    fine = _world(Size(24, 30), near=0.0)
+    basis = real_basis(representatives([DC, *FEW]), PROJECTOR)
+    measured = _answers(fine, FEW)
+    camera = Size(12, 15)
+    together = measured.answers.reshape(12, 2, 15, 2, 1, -1)
+    coarse = Measurements(
+        camera=camera,
+        basis=basis,
+        answers=together.mean(axis=(1, 3)).reshape(camera.pixels, 1, -1),
+        noise=np.zeros((camera.pixels, 1), dtype=np.float32),
+        black=np.zeros((camera.pixels, 1), dtype=np.float32),
+        shown_error=measured.shown_error,
+    )
+    weight = fine.direct.reshape(12, 2, 15, 2, 1)
+    q = (fine.correspondence.reshape(12, 2, 15, 2, 2) * weight).sum(axis=(1, 3))
+    q /= weight.sum(axis=(1, 3))
+    found = correspond_by_phase(coarse)
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, q, atol=0.25)
+
+
+def test_photos_of_a_noisy_camera_move_nothing_by_half_a_pixel(shoot):
+    world = _world(channels=3)
+    plan = paper_plan(PROJECTOR, WINDOW, FAR, correspondence="none")
+    found = correspond_by_phase(measure(shoot(plan, world, SimulatedCamera())))
+    assert found.lit.all()
+    off = np.abs(found.pixels - world.correspondence)
+    assert off.max() < 0.5
+    assert np.median(off) < 0.05
+
+
+def test_a_channel_without_light_does_no_harm():
+    world = _world(channels=3)
+    dark = np.array([1.0, 0.0, 1e-4], dtype=np.float32)
+    world = replace(
+        world,
+        direct=world.direct * dark,
+        near=world.near * dark[:, None, None],
+        far=world.far * dark[:, None],
+    )
+    found = correspond_by_phase(_answers(world, FEW, noise=0.002))
+    assert found.lit.all()
+    assert np.mean(np.abs(found.pixels - world.correspondence) < 0.5) > 0.999
+
+
+def test_many_times_as_much_global_light_does_not_fool_it():
+    world = _world(near=0.0)
+    world = replace(world, direct=0.04 + 0 * world.direct)
+    found = correspond_by_phase(_answers(world, FEW))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.1)
+
+
+def test_the_stronger_of_two_surfaces_wins():
+    one = replace(_world(near=0.0), far=0 * _world().far)
+    moved = np.roll(one.correspondence, (9, 11), axis=(0, 1))
+    other = replace(one, correspondence=moved, direct=0.5 * one.direct)
+    first, second = _answers(one, FEW), _answers(other, FEW)
+    found = correspond_by_phase(replace(first, answers=first.answers + second.answers))
+    np.testing.assert_allclose(found.pixels, one.correspondence, atol=0.5)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_camera_pixels_without_direct_light_are_marked(noise):
+    shade = np.zeros(PROJECTOR, dtype=bool)
+    shade[5:9, 7:20] = True
+    world = _with_shade(_world(channels=3), shade)
+    found = correspond_by_phase(_answers(world, FEW, noise))
+    np.testing.assert_array_equal(found.lit, ~shade)
+    assert np.all(np.isnan(found.pixels[shade]))
+    assert found.confidence[~shade].min() >= 0.5
+    assert np.median(found.confidence[~shade]) > 0.9
+    assert found.confidence[shade].max() < 0.5
+    assert np.median(found.confidence[shade]) < 0.1
+
+
+def test_near_range_light_that_is_concentrated_is_no_direct_light():
+    """A crease in shade: a third of its light comes from a few pixels of the lit side."""
+    shade = np.zeros(PROJECTOR, dtype=bool)
+    shade[5:9, 7:20] = True
+    world = _world(Size(24, 30))
+    away = np.arange(-3, 4)
+    blob = np.exp(-(away[:, None] ** 2 + away**2) / (2 * 1.5**2))
+    near = np.where(shade[..., None, None, None], 0.1 * blob / blob.sum(), world.near)
+    q = world.correspondence.copy()
+    world = replace(world, direct=np.where(shade[..., None], 0, world.direct), near=near)
+    found = correspond_by_phase(_answers(replace(world, correspondence=q), FEW, noise=0.003))
+    np.testing.assert_array_equal(found.lit, ~shade)
+
+
+def test_light_at_the_border_does_not_wrap_to_the_other_side():
+    """All frequencies are on the DFT grid, for which row 0 follows on the last."""
+    world = replace(_world(near=0.0, fractional=True), far=0 * _world().far)
+    q = world.correspondence.copy()
+    q[0], q[-1] = [0.3, 14.6], [22.6, 0.4]
+    q[:, 0], q[:, -1] = [11.5, 0.0], [6.4, 29.0]
+    world = replace(world, correspondence=q)
+    for noise in (0.0, 0.01):
+        found = correspond_by_phase(_answers(world, FEW, noise))
+        assert found.lit.all()
+        np.testing.assert_allclose(found.pixels, q, atol=0.05 if noise == 0 else 0.5)
+        assert np.nanmin(found.pixels) >= 0
+        assert np.all(found.pixels <= np.array(PROJECTOR) - 1)
+
+
+def test_saturated_photos_still_correspond(shoot):
+    """Half of the camera pixels clip under white and under the brightest sinusoids."""
+    world = _world(near=0.0)
+    plan = paper_plan(PROJECTOR, WINDOW, FAR, correspondence="none")
+    bright = replace(world, direct=world.direct + 0.65, far=1.2 * world.far)
+    found = correspond_by_phase(measure(shoot(plan, bright, SimulatedCamera())))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.5)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_black_photos_show_no_direct_light(noise):
+    world = _world()
+    black = replace(world, direct=0 * world.direct, near=0 * world.near, far=0 * world.far)
+    found = correspond_by_phase(_answers(black, FEW, noise))
+    assert not found.lit.any()
+    assert np.all(np.isnan(found.pixels))
+    assert np.all(np.isfinite(found.confidence))
+    assert found.confidence.max() < 0.5
+
+
+def test_rounding_in_a_black_pixel_is_no_light():
+    measured = _answers(_world(), FEW)
+    answers = measured.answers.copy()
+    answers[37] = 1e-9 * np.random.default_rng(0).uniform(-1, 1, size=answers[37].shape)
+    answers[37, :, measured.places([DC])[0]] = 1e-9
+    found = correspond_by_phase(replace(measured, answers=answers))
+    assert np.flatnonzero(~found.lit).tolist() == [37]
+
+
+@pytest.mark.parametrize("scale", [1e-3, 300.0])
+def test_the_exposure_does_not_matter(scale):
+    measured = _answers(_world(), FEW, noise=0.003)
+    found = correspond_by_phase(measured)
+    scaled = replace(
+        measured,
+        answers=(scale * measured.answers).astype(np.float32),
+        noise=(scale * measured.noise).astype(np.float32),
+    )
+    again = correspond_by_phase(scaled)
+    np.testing.assert_array_equal(again.lit, found.lit)
+    np.testing.assert_allclose(again.pixels, found.pixels, atol=2e-3)
+    np.testing.assert_allclose(again.confidence, found.confidence, atol=1e-3)
+
+
+def test_a_block_of_camera_pixels_corresponds_on_its_own():
+    measured = _answers(_world(), FEW, noise=0.003)
+    whole = correspond_by_phase(measured)
+    part = correspond_by_phase(measured.of_pixels(Size(6, 30), slice(90, 270)))
+    assert part.pixels.dtype == np.float32
+    assert part.confidence.dtype == np.float32
+    np.testing.assert_allclose(part.pixels, whole.pixels[3:9], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "frequencies",
+    [
+        [],
+        [CHECKERBOARD],
+        # Light one window away answers alike.
+        [CHECKERBOARD, *near_frequencies(5, Size(1, 1))],
+        # Neighbours answer all but alike.
+        far_frequencies(Size(3, 3), Size(64, 64)),
+        # Across, nothing is told at all.
+        far_frequencies(Size(31, 1), Size(64, 64)),
+        [
+            CHECKERBOARD,
+            *near_frequencies(3, Size(1, 1)),
+            *far_frequencies(Size(3, 3), Size(64, 64)),
+        ],
+    ],
+)
+def test_frequencies_that_settle_nothing_are_refused(frequencies):
+    size = Size(64, 64)
+    world = model_transport(size, Size(2, 2), window=3, far=Size(1, 1))
+    with pytest.raises(InputError, match=r"pattern grid of 64x64 alike .*: plan with .*\.$"):
+        correspond_by_phase(_answers(world, frequencies))
+
+
+def test_answers_without_white_are_refused():
+    measured = _answers(_world(Size(2, 2)), FEW)
+    kept = measured.places([k for k in measured.basis.frequencies if k != DC])
+    basis = real_basis([k for k in measured.basis.frequencies if k != DC], PROJECTOR)
+    without = replace(measured, basis=basis, answers=measured.answers[..., kept])
+    with pytest.raises(InputError, match=r"no answer to white.*: .*\.$"):
+        correspond_by_phase(without)
+
+
+def test_places_that_few_others_resemble_are_settled():
+    """Only opposite borders are alike: 63 rows apart, which is 9 windows and all but a period."""
+    size = Size(64, 64)
+    frequencies = [CHECKERBOARD, *near_frequencies(7, Size(1, 1))]
+    frequencies += [k for k in far_frequencies(Size(3, 3), size) if k != DC]
+    assert expected_wrong(real_basis(representatives(frequencies), size)) < MOST_WRONG
+
+
+@pytest.mark.parametrize(
+    ("projector", "window", "far"),
+    [
+        (Size(128, 128), 19, Size(13, 13)),
+        (Size(128, 128), 15, Size(13, 13)),
+        (Size(68, 100), 19, Size(7, 10)),
+        (Size(64, 64), 11, Size(7, 7)),
+    ],
+)
+def test_the_papers_plans_settle_every_place(projector, window, far):
+    plan = paper_plan(projector, window, far, correspondence="none")
+    frequencies = representatives(pattern.frequency for pattern in plan.patterns)
+    settled = expected_wrong(real_basis([k for k in frequencies if k != DC], projector))
+    assert settled < 1e-6 < MOST_WRONG
+    # Without far frequencies the near set repeats itself all over the grid.
+    near = representatives(x.frequency for x in plan.patterns if x.purpose != "far")
+    assert expected_wrong(real_basis(near, projector)) > 1

@@ -80,7 +80,7 @@ def main() -> None:
     given = parser.parse_args().capture
     if given is not None:
         started = time.perf_counter()
-        transport, _ = reconstruct(open_capture(given))
+        transport, _ = reconstruct(open_capture(given), method="paper")
         seconds = time.perf_counter() - started
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
         pixels = transport.camera.pixels

@@ -36,7 +36,7 @@ def test_a_scene_is_relit_as_well_as_asked(
     )
     _run(monkeypatch, "plan", "--projector", projector, "--near", window, "--far", far, "-o", plan)
     _run(monkeypatch, "acquire", plan, capture, "--rig", scene)
-    _run(monkeypatch, "reconstruct", capture, found)
+    _run(monkeypatch, "reconstruct", capture, found, "--method", "paper")
     _run(monkeypatch, "render", scene, truth)
     capsys.readouterr()
     _run(monkeypatch, "evaluate", found, "--truth", truth, "--json")

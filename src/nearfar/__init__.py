@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     )
     from nearfar.errors import NearfarError
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
-    from nearfar.plan import Plan, paper_plan, parse_plan, read_plan
+    from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
     from nearfar.rigs.config import open_rig
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_store import load_exact, save_exact
@@ -49,6 +49,7 @@ _HOMES = {
     "natural_picture": "nearfar.illumination.pictures",
     "open_capture": "nearfar.capture",
     "open_rig": "nearfar.rigs.config",
+    "choose_plan": "nearfar.plan",
     "paper_plan": "nearfar.plan",
     "parse_plan": "nearfar.plan",
     "parse_size": "nearfar.arrays",
@@ -76,6 +77,7 @@ __all__ = [
     "Transport",
     "acquire",
     "check_model",
+    "choose_plan",
     "condition_near",
     "correspond_by_stripes",
     "given_correspondence",

@@ -11,6 +11,7 @@ from nearfar.capture import open_capture
 from nearfar.plan import read_plan
 from nearfar.transport.store import load_transport
 from tests.cli.conftest import (
+    BY_PAPER,
     PLAN,
     Job,
     check_done,
@@ -62,7 +63,7 @@ def test_from_plan_to_transport_through_pictures(finished: Job, plan: Path, tmp_
     ran = check_done(run_nearfar("import", plan, photos, capture))
     assert f"{len(shown)} photos" in ran.out
     assert open_capture(capture).plan == made
-    said = check_done(run_nearfar("reconstruct", capture, transport)).out
+    said = check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER)).out
     assert "directly lit" in said
     one, other = (load_transport(path) for path in (transport, finished.transport))
     light = np.load(finished.light)
@@ -82,7 +83,7 @@ def test_a_drift_over_five_per_cent_is_told(
     )
     capture, transport = tmp_path / "capture.zarr", tmp_path / "transport.zarr"
     check_done(run_nearfar("acquire", plan, capture, "--rig", tmp_path / "rig.toml"))
-    ran = run_nearfar("reconstruct", capture, transport)
+    ran = run_nearfar("reconstruct", capture, transport, *BY_PAPER)
     assert ran.status == 0
     told = load_transport(transport).provenance["drift"]
     if not warned:

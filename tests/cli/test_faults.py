@@ -9,7 +9,15 @@ import imagecodecs
 import numpy as np
 import pytest
 
-from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfar
+from tests.cli.conftest import (
+    BY_PAPER,
+    PLAN,
+    PROJECTOR,
+    Job,
+    check_done,
+    check_sentence,
+    run_nearfar,
+)
 
 Untouched = Callable[[], bool]
 RENDER = ("render", "corner", "--projector", "16x20", "--camera", "8x9")
@@ -200,7 +208,7 @@ def test_full_scale_of_fourteen_bits(job: Job, tmp_path: Path):
     for name, options in {"low": (), "right": ("--full-scale", 16383)}.items():
         capture, transport = tmp_path / f"{name}.zarr", tmp_path / f"{name}-t.zarr"
         check_done(run_nearfar("import", job.plan, job.photos, capture, *options))
-        check_done(run_nearfar("reconstruct", capture, transport))
+        check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER))
         check_done(run_nearfar("relight", transport, job.light, tmp_path / f"{name}.npy"))
     low, right = np.load(tmp_path / "low.npy"), np.load(tmp_path / "right.npy")
     np.testing.assert_allclose(right, low * 65535 / 16383, atol=1e-4)
@@ -506,9 +514,12 @@ def test_lights_that_cannot_be_shown(
 # Correspondence
 
 
-def test_no_stripes_needs_a_correspondence(finished: Job, untouched: Untouched, tmp_path: Path):
+def test_photos_that_settle_no_place_need_a_correspondence(
+    finished: Job, untouched: Untouched, tmp_path: Path
+):
     plan, capture = tmp_path / "bare.json", tmp_path / "bare.zarr"
-    check_done(run_nearfar(*PLAN, "--correspondence", "none", "-o", plan))
+    bare = ("plan", "--projector", PROJECTOR, "--near", "1", "--far", "3x3")
+    check_done(run_nearfar(*bare, "--correspondence", "none", "-o", plan))
     check_done(run_nearfar("acquire", plan, capture, "--rig", finished.truth))
     out = tmp_path / "out.zarr"
     check_refused(untouched, ("reconstruct", capture, out), capture, "--correspondence")

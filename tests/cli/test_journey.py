@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from tests.cli.conftest import PLAN, check_done, run_nearfar
+from tests.cli.conftest import BY_PAPER, PLAN, check_done, run_nearfar
 
 # The scene and the camera, which know nothing of the project: photo = ambient + T @ pattern.
 OUTSIDE = """
@@ -65,7 +65,7 @@ def test_from_a_plan_to_pictures_relit_in_photo_units(tmp_path: Path, kind: str,
     subprocess.run(script, check=True)
     brought = check_done(run_nearfar("import", patterns / "plan.json", photos, capture))
     assert f"<- img0.{kind}" in brought.out
-    check_done(run_nearfar("reconstruct", capture, transport))
+    check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER))
 
     dense = np.load(tmp_path / "T.npy")
     pictures = {}
@@ -109,7 +109,9 @@ def test_from_a_plan_to_pictures_relit_in_photo_units(tmp_path: Path, kind: str,
     assert np.abs(inside - wanted).max() < 0.5
 
     again = tmp_path / "again.zarr"
-    given = run_nearfar("reconstruct", capture, again, "--correspondence", tmp_path / "q.npy")
+    given = run_nearfar(
+        "reconstruct", capture, again, *BY_PAPER, "--correspondence", tmp_path / "q.npy"
+    )
     check_done(given)
     check_done(run_nearfar("relight", again, tmp_path / "light.npy", tmp_path / "again.npy"))
     np.testing.assert_allclose(np.load(tmp_path / "again.npy"), pictures["all"], atol=1e-5)
@@ -139,7 +141,7 @@ def _check_unseen_photos(
 
 def test_a_square_transport_is_the_projectors_size(tmp_path: Path, finished):
     out = tmp_path / "square.zarr"
-    check_done(run_nearfar("reconstruct", finished.capture, out, "--square"))
+    check_done(run_nearfar("reconstruct", finished.capture, out, "--square", *BY_PAPER))
     check_done(run_nearfar("relight", out, finished.light, tmp_path / "relit.npy"))
     assert np.load(tmp_path / "relit.npy").shape == (16, 20, 3)
 
@@ -195,7 +197,7 @@ def test_colour_light_on_one_channel_is_its_luminance(tmp_path: Path, finished):
     np.save(tmp_path / "mono.npy", dense)
     capture, transport = tmp_path / "mono.zarr", tmp_path / "t.zarr"
     check_done(run_nearfar("acquire", finished.plan, capture, "--rig", tmp_path / "mono.npy"))
-    check_done(run_nearfar("reconstruct", capture, transport))
+    check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER))
     light = np.random.default_rng(2).uniform(size=(16, 20, 3)).astype(np.float32)
     np.save(tmp_path / "colour.npy", light)
     np.save(tmp_path / "grey.npy", light @ np.float32([0.2126, 0.7152, 0.0722]))
@@ -217,3 +219,18 @@ def test_a_colour_light_lights_channel_by_channel(tmp_path: Path, finished):
         one = tmp_path / f"relit-{i}.npy"
         check_done(run_nearfar("relight", finished.transport, tmp_path / f"{i}.npy", one))
         np.testing.assert_allclose(np.load(out)[..., i], np.load(one)[..., i], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_few_photos_and_nothing_for_correspondence(tmp_path: Path):
+    plan, capture = tmp_path / "plan.json", tmp_path / "capture.zarr"
+    transport, truth = tmp_path / "transport.zarr", tmp_path / "truth.zarr"
+    check_done(run_nearfar("plan", "--projector", "32x32", "--photos", 60, "-o", plan))
+    check_done(run_nearfar("render", "cornell", truth, "--projector", "32x32"))
+    check_done(run_nearfar("acquire", plan, capture, "--rig", truth))
+    said = check_done(run_nearfar("reconstruct", capture, transport)).out
+    assert "100.0% of the camera's directly lit" in said
+    ran = check_done(run_nearfar("evaluate", transport, "--truth", truth, "--json"))
+    assert json.loads(ran.out)["snr_b_pictures"] > 40
+    remembered = check_done(run_nearfar("info", transport)).out
+    assert "joint" in remembered

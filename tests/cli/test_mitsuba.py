@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nearfar.transport.exact_store import load_exact
-from tests.cli.conftest import check_done, check_sentence, run_nearfar
+from tests.cli.conftest import BY_PAPER, check_done, check_sentence, run_nearfar
 from tests.scenes.mitsuba import descriptions as d
 
 # Looked for, not imported: before it loads, nearfar names the LLVM that it shall use.
@@ -46,7 +46,7 @@ def test_a_scene_is_photographed_reconstructed_and_judged(scene: Path, tmp_path:
 
     def judged(source: Path) -> dict:
         check_done(run_nearfar("acquire", plan, capture, "--rig", source, "--force"))
-        check_done(run_nearfar("reconstruct", capture, transport, "--force"))
+        check_done(run_nearfar("reconstruct", capture, transport, "--force", *BY_PAPER))
         ran = check_done(run_nearfar("evaluate", transport, "--truth", truth, "--json"))
         return json.loads(ran.out)
 

@@ -107,3 +107,35 @@ def test_pictures_without_a_plan_are_not_an_export(finished: Job, tmp_path: Path
     (mine / "pattern-1.png").unlink()
     check_done(run_nearfar("export", finished.plan, mine, "--force"))
     check_done(run_nearfar("export", finished.plan, mine, "--force"))
+
+
+def test_a_number_of_photos_is_the_whole_command(tmp_path: Path):
+    plan = tmp_path / "plan.json"
+    ran = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "-o", plan))
+    assert "expected" in ran.out
+    chosen = read_plan(plan)
+    assert 39 <= len(chosen.patterns) <= 40
+    ran = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "--json"))
+    assert json.loads(ran.out) == chosen.summary()
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "said"),
+    [
+        ((), 2, "give --photos N"),
+        (("--near", 5), 2, "give --photos N"),
+        (("--photos", 40, "--far", "3x3"), 2, "paper's plan"),
+        (("--photos", 40, "--offset", "inverse"), 2, "leave --offset out"),
+        (("--photos", 40, "--correspondence", "stripes"), 2, "leave it out"),
+        (("--photos", 0), 2, "photos"),
+        (("--photos", 9), 1, "too few"),
+        (("--photos", 40, "--near", 99), 1, "does not fit"),
+    ],
+)
+def test_half_a_plan_is_refused(tmp_path: Path, options, status, said):
+    plan = tmp_path / "plan.json"
+    ran = run_nearfar("plan", "--projector", "16x20", *options, "-o", plan)
+    assert ran.status == status
+    assert said in ran.err
+    assert "Traceback" not in ran.err
+    assert not plan.exists()

@@ -9,7 +9,7 @@ import pytest
 
 from nearfar.capture import open_capture
 from nearfar.scenes import NAMES
-from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
+from tests.cli.conftest import BY_PAPER, PLAN, check_done, check_sentence, run_nearfar
 
 CORNER = ("render", "corner", "--projector", "16x20", "--camera", "8x9")
 
@@ -58,7 +58,7 @@ def test_every_stored_transport_is_a_rig(finished, tmp_path: Path, kind: str):
             np.save(tmp_path / "stored.npy", dense)
     capture, transport = tmp_path / "capture.zarr", tmp_path / "transport.zarr"
     check_done(run_nearfar("acquire", finished.plan, capture, "--rig", rig))
-    check_done(run_nearfar("reconstruct", capture, transport))
+    check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER))
     found = _evaluated(transport, "--truth", truth)
     assert all(math.isfinite(number) for number in _numbers(found))
     assert found["snr_b"]["white"] > 25
@@ -74,7 +74,7 @@ def test_a_scene_by_name_is_a_rig(tmp_path: Path):
     plan, capture, transport = (tmp_path / name for name in ("p.json", "c.zarr", "t.zarr"))
     check_done(run_nearfar("plan", "--projector", "16x16", *PLAN[3:], "-o", plan))
     check_done(run_nearfar("acquire", plan, capture, "--rig", "corner"))
-    check_done(run_nearfar("reconstruct", capture, transport))
+    check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER))
     truth = tmp_path / "truth.zarr"
     check_done(run_nearfar("render", "corner", truth, "--projector", "16x16"))
     found = _evaluated(transport, "--truth", truth)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,20 +12,23 @@ from nearfar.arrays import Size
 from nearfar.capture import open_capture
 from nearfar.correspondence import given_correspondence
 from nearfar.errors import InputError, PlanError
-from nearfar.plan import paper_plan
+from nearfar.illumination.pictures import natural_picture
+from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.config import open_rig
 from nearfar.rigs.drift import SimulatedDrift
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes.cache import cached_scene
 from nearfar.workflow import reconstruct as reconstruction
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import relighting_snr, snr
 from nearfar.workflow.judge import judge_by_truth
-from nearfar.workflow.reconstruct import reconstruct
 from tests.conftest import QUIET
 from tests.estimate.test_fit import _exact_of
 from tests.worlds import model_transport
+
+reconstruct = partial(reconstruction.reconstruct, method="paper")
 
 PROJECTOR = Size(24, 30)
 PLAN = paper_plan(PROJECTOR, 7, Size(3, 3))
@@ -102,8 +106,6 @@ def test_a_dark_margin_is_no_fault(tmp_path, world, monkeypatch):
 def test_correspondence_can_be_given(tmp_path, world):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
-    with pytest.raises(InputError, match=r"--correspondence Q\.npy"):
-        reconstruct(capture)
     given = given_correspondence(world.correspondence, world.camera, PROJECTOR)
     transport, _ = reconstruct(capture, given)
     light = nearfar.random_pattern(PROJECTOR, 1)
@@ -277,3 +279,34 @@ def test_a_capture_remembers_its_rig(tmp_path, world):
     transport, _ = reconstruct(capture)
     assert transport.provenance["rig"] == capture.rig
     assert transport.provenance["plan"]["window"] == 7
+
+
+def test_a_plan_without_stripes_corresponds_by_phase(tmp_path, world):
+    plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    transport, correspondence = reconstruct(capture)
+    assert np.abs(correspondence.pixels - world.correspondence).max() < 0.5
+    light = nearfar.random_pattern(PROJECTOR, 1)
+    assert snr(world @ light, transport @ light) > 30
+
+
+@pytest.mark.slow
+def test_few_photos_that_were_chosen_relight_as_well_as_many(tmp_path):
+    scene = cached_scene("cornell", Size(32, 32))
+    lights = {
+        "picture": natural_picture(scene.projector, 1),
+        "random": nearfar.random_pattern(scene.projector, 1),
+    }
+
+    def scores(plan, method):
+        rig = SimulatedRig(scene, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+        capture = acquire(plan, tmp_path / f"{method}.zarr", rig)
+        transport, _ = reconstruction.reconstruct(capture, method=method)
+        return relighting_snr(transport, scene, lights)
+
+    many = scores(paper_plan(scene.projector, 7, Size(5, 5)), "paper")
+    few, _ = choose_plan(scene.projector, 52, window=7)
+    found = scores(few, "joint")
+    # 144 photos of transport and 64 of stripes against 52.
+    assert found["picture"] > many["picture"] - 0.3
+    assert found["random"] > many["random"] - 3

@@ -36,10 +36,16 @@ def plan(
         Size,
         typer.Option(parser=size, metavar="HxW", help="Pattern grid, height x width in pixels."),
     ],
-    near: Annotated[int, typer.Option(min=1, help="W of the near-range window.", metavar="W")],
+    photos: Annotated[
+        int | None,
+        typer.Option(min=1, help="Choose the best plan of at most so many photos.", metavar="N"),
+    ] = None,
+    near: Annotated[
+        int | None, typer.Option(min=1, help="W of the near-range window.", metavar="W")
+    ] = None,
     far: Annotated[
-        Size, typer.Option(parser=size, metavar="HxW", help="Far band, height x width.")
-    ],
+        Size | None, typer.Option(parser=size, metavar="HxW", help="Far band, height x width.")
+    ] = None,
     drop: Annotated[
         Size | None,
         typer.Option(
@@ -49,16 +55,19 @@ def plan(
         ),
     ] = None,
     offset: Annotated[
-        Offset,
+        Offset | None,
         typer.Option(
             help="Each pattern with its inverse, or once with white and black at intervals; none "
-            "is for counting and simulation only."
+            "is for counting and simulation only. By default inverse with --far, else reference."
         ),
-    ] = Offset.INVERSE,
+    ] = None,
     correspondence: Annotated[
-        CorrespondenceBy,
-        typer.Option(help="Photos of black stripes, the patterns' own phase, or none."),
-    ] = CorrespondenceBy.STRIPES,
+        CorrespondenceBy | None,
+        typer.Option(
+            help="Photos of black stripes, the patterns' own phase, or none. By default stripes "
+            "with --far, else phase."
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the plan here.", metavar="FILE")
     ] = None,
@@ -66,20 +75,32 @@ def plan(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Plan the patterns of the paper and count the photos.
+    """Plan what to show: the best patterns for a number of photos, or the paper's.
 
-    Example: nearfar plan --projector 128x128 --near 19 --far 13x13 -o plan.json
+    Example: nearfar plan --projector 128x128 --photos 150 -o plan.json
+
+    The paper's: nearfar plan --projector 128x128 --near 19 --far 13x13 -o plan.json
     """
-    from nearfar.plan import paper_plan
+    from nearfar.plan import choose_plan, paper_plan
 
-    made = paper_plan(
-        projector,
-        near,
-        far,
-        dropped=drop,
-        offset=offset.value,
-        correspondence=correspondence.value,
-    )
+    expected = None
+    if photos is not None:
+        _refuse_with_photos(far, drop, offset, correspondence)
+        with progress_bar("choosing patterns", quiet=quiet or as_json) as report:
+            made, expected = choose_plan(
+                projector, photos, window=near, progress=counted(report, "photos", photos)
+            )
+    elif near is None or far is None:
+        raise typer.BadParameter("give --photos N, or --near W and --far HxW for the paper's plan")
+    else:
+        made = paper_plan(
+            projector,
+            near,
+            far,
+            dropped=drop,
+            offset=(offset or Offset.INVERSE).value,
+            correspondence=(correspondence or CorrespondenceBy.STRIPES).value,
+        )
     if output is not None:
         from nearfar.files import new_output
 
@@ -89,8 +110,30 @@ def plan(
         print(json.dumps(made.summary()))
     else:
         say(describe_plan(made), quiet=quiet)
+        if expected is not None:
+            say(
+                f"expected of relighting scenes like the simulated ones, before neighbours help: "
+                f"{expected.pictures:.0f} dB under pictures, {expected.random:.0f} dB under a "
+                f"random light",
+                quiet=quiet,
+            )
         if output is not None:
             say(f"plan written to {output}", quiet=quiet)
+
+
+def _refuse_with_photos(
+    far: Size | None,
+    drop: Size | None,
+    offset: Offset | None,
+    correspondence: CorrespondenceBy | None,
+) -> None:
+    """Refuse what only the paper's plan has a use for."""
+    if far is not None or drop is not None:
+        raise typer.BadParameter("--far and --drop are of the paper's plan: leave --photos out")
+    if offset not in (None, Offset.REFERENCE):
+        raise typer.BadParameter("--photos chooses plans by reference: leave --offset out")
+    if correspondence not in (None, CorrespondenceBy.PHASE):
+        raise typer.BadParameter("--photos needs no photos for correspondence: leave it out")
 
 
 def describe_plan(made: "Plan") -> str:

@@ -24,17 +24,22 @@ NOT_LINEAR = 0.01
 class Method(StrEnum):
     """How the transport is estimated."""
 
+    JOINT = "joint"
     PAPER = "paper"
 
 
 def reconstruct(
     capture: CapturePath,
     output: Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport to make.")],
-    method: Annotated[Method, typer.Option(help="Estimator.")] = Method.PAPER,
+    method: Annotated[
+        Method,
+        typer.Option(help="All in one model with what is known of light, or as the paper does."),
+    ] = Method.JOINT,
     correspondence: Annotated[
         Path | None,
         typer.Option(
-            help="q as a .npy of H x W x 2, (y, x), NaN without direct light; stripes otherwise.",
+            help="q as a .npy of H x W x 2, (y, x), NaN without direct light; from the photos "
+            "otherwise.",
             metavar="Q.npy",
         ),
     ] = None,
@@ -64,7 +69,9 @@ def reconstruct(
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
     with progress_bar("reconstructing", quiet=quiet) as report:
-        transport, found = rebuild(opened, given, square=square, progress=report)
+        transport, found = rebuild(
+            opened, given, method=method.value, square=square, progress=report
+        )
         save_transport(output, transport, force=force)
     _warn_of_faults(opened, transport)
     say(

@@ -101,3 +101,26 @@ class Measurements:
             black_noise=self.black_noise[pixels],
             light_noise=self.light_noise[pixels],
         )
+
+
+def join(parts: Sequence[Measurements]) -> Measurements:
+    """Put measurements of blocks of camera rows together, in order."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    height = sum(part.camera.height for part in parts)
+
+    def joined(name: str) -> Floats:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    return replace(
+        first,
+        camera=Size(height, first.camera.width),
+        excess_of_sums=max((part.excess_of_sums for part in parts), key=abs),
+        answers=joined("answers"),
+        noise=joined("noise"),
+        black=joined("black"),
+        white_noise=joined("white_noise"),
+        black_noise=joined("black_noise"),
+        light_noise=joined("light_noise"),
+    )

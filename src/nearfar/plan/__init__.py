@@ -1,7 +1,17 @@
 """What to project, and why."""
 
+from nearfar.plan.choose import choose_plan
 from nearfar.plan.model import Plan, Sinusoid, Stripe, parse_plan, read_plan
 from nearfar.plan.paper import paper_plan
 from nearfar.plan.references import with_references
 
-__all__ = ["Plan", "Sinusoid", "Stripe", "paper_plan", "parse_plan", "read_plan", "with_references"]
+__all__ = [
+    "Plan",
+    "Sinusoid",
+    "Stripe",
+    "choose_plan",
+    "paper_plan",
+    "parse_plan",
+    "read_plan",
+    "with_references",
+]

@@ -244,8 +244,9 @@ def _weights(frequencies: list[Frequency], projector: Size) -> Floats:
     power = 1.0 / np.sum((points * np.array(projector)) ** 2, axis=1)
     # Low frequencies stand for themselves; those of the coarse grid for all around them.
     low = np.all(np.abs(points) * np.array(projector) <= LOW, axis=1)
-    beyond = projector.pixels / 2 - np.count_nonzero(low)
-    area = np.where(low, 1.0, max(beyond, 0.0) / max(np.count_nonzero(~low), 1))
+    below = int(np.count_nonzero(low))
+    beyond = max(projector.pixels / 2 - below, 0.0)
+    area = np.where(low, 1.0, beyond / max(len(low) - below, 1))
     pictures, even = power * area, area
     return np.stack([REST * pictures / pictures.sum(), even / even.sum() / 12.0])
 
@@ -279,7 +280,7 @@ def choose_frequencies(
     listed = candidates(projector, window)
     cost = np.array([1 if k.is_own_negative else 2 for k in listed])
     beliefs = _Beliefs(listed, projector, window)
-    references: int = max(FEWEST, photos // (INTERVAL + 2))
+    references = max(FEWEST, photos // (INTERVAL + 2))
     left = photos - 2 * references
     chosen: dict[Frequency, int] = {}
 

@@ -86,11 +86,11 @@ def paper_plan(
             f"--drop {dropped} is not a block of near frequencies around DC: both sides must be "
             f"odd, from 1 to W = {window}."
         )
-    sinusoids = _SHAPES[offset]
+    shown = _SHAPES[offset]
     patterns = (
-        *sinusoids([CHECKERBOARD], "direct"),
-        *sinusoids(far_frequencies(far, projector), "far"),
-        *sinusoids(near_frequencies(window, dropped), "near"),
+        *shown([CHECKERBOARD], "direct"),
+        *shown(far_frequencies(far, projector), "far"),
+        *shown(near_frequencies(window, dropped), "near"),
         *(stripes(projector) if correspondence == "stripes" else ()),
     )
     return Plan(
@@ -118,8 +118,11 @@ def _inverse_pairs(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterat
                 yield Sinusoid(kind=kind, frequency=frequency, inverse=inverse, purpose=purpose)
 
 
-def _once(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
-    # The DC frequency's photo is white, which `with_references` brings.
+def sinusoids(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
+    """Yield the cosine and the sine of each frequency, or the one photo that it needs.
+
+    DC is left out: its photo is white, which `with_references` brings.
+    """
     wanted = (frequency for frequency in frequencies if frequency != DC)
     return (shown for shown in _inverse_pairs(wanted, purpose) if not shown.inverse)
 
@@ -128,7 +131,7 @@ _SHAPES: dict[
     Offset, Callable[[Iterable[Frequency], Purpose], Iterator[Exponential | Sinusoid]]
 ] = {
     "inverse": _inverse_pairs,
-    "reference": _once,
+    "reference": sinusoids,
     "none": _exponentials,
 }
 

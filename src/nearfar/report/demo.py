@@ -82,7 +82,7 @@ def run_demo(
                 plan, partial / CAPTURE, rig, progress=lambda n: report("photos", n / count)
             )
         with timed("reconstruction"):
-            transport, correspondence = reconstruct(capture, progress=report)
+            transport, correspondence = reconstruct(capture, method="paper", progress=report)
         save_transport(partial / TRANSPORT, transport)
         with timed("evaluation"):
             judgement = judge_by_truth(transport, truth, progress=report)

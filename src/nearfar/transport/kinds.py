@@ -37,12 +37,15 @@ class Kind(NamedTuple):
     spread : float
         Deviation, over that of near-range light at q, of direct light that does not lie as the
         2 x 2 footprint has it: independent on the 3 x 3 pixels around q.
+    rough : float
+        Deviation of window entries independent of each other, over that of the smooth part.
     """
 
     reach: float
     far: float
     decay: float
     spread: float = 0.0
+    rough: float = 0.0
 
 
 # In the order in which they were chosen.
@@ -67,6 +70,11 @@ LIT = (
     Kind(3.5, 4.0, 3.0),
     Kind(0.8, 1.0, 3.0),
     Kind(3.5, 16.0, 3.0),
+    # Windows without any smoothness, added by hand: none of the scenes has them, but where photos
+    # tell every entry they are to be believed.
+    Kind(6.0, 1.0, 3.0, rough=1.0),
+    Kind(6.0, 16.0, 3.0, rough=1.0),
+    Kind(6.0, 64.0, 8.0, rough=1.0),
 )
 # Without direct light there is far-range light alone.
 UNLIT = tuple(Kind(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0))
@@ -91,4 +99,5 @@ def near_covariance(kind: Kind, window: int) -> Floats:
     apart = np.sum((places[:, None] - places[None]) ** 2, axis=-1)
     covariance = np.exp(-apart / (2 * CORRELATION**2)) * deviation[:, None] * deviation
     around = np.abs(places).max(axis=1) <= 1
-    return np.asarray(covariance + np.diag(kind.spread**2 * around))
+    alone = kind.spread**2 * around + (kind.rough * deviation) ** 2
+    return np.asarray(covariance + np.diag(alone))

@@ -10,16 +10,18 @@ from nearfar.arrays import Floats, blocks
 from nearfar.capture import Capture
 from nearfar.correspondence import (
     Correspondence,
+    correspond_by_phase,
     correspond_by_stripes,
     has_stripes,
     onto_projector,
 )
 from nearfar.errors import InputError, PlanError
+from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.frequencies import CHECKERBOARD, far_frequencies, near_frequencies
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure, measured_frequencies
-from nearfar.photometry.measurements import Measurements
+from nearfar.photometry.measurements import Measurements, join
 from nearfar.photometry.photos import Photos
 from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
@@ -30,7 +32,7 @@ from nearfar.version import version
 HELD = 2**29
 
 Progress = Callable[[str, float], None]
-Method = Literal["paper"]
+Method = Literal["joint", "paper"]
 
 
 def require_paper_plan(plan: Plan) -> None:
@@ -55,11 +57,16 @@ def require_paper_plan(plan: Plan) -> None:
         )
 
 
+def _require_photos(plan: Plan) -> None:
+    plan.require_real("reconstruct")
+    measured_frequencies(plan)
+
+
 def reconstruct(
     capture: Capture,
     correspondence: Correspondence | None = None,
     *,
-    method: Method = "paper",
+    method: Method = "joint",
     square: bool = False,
     progress: Progress | None = None,
 ) -> tuple[Transport, Correspondence]:
@@ -69,8 +76,8 @@ def reconstruct(
     ----------
     capture : Capture
     correspondence : Correspondence, optional
-        By default as the plan says: from the capture's stripes.
-    method : {"paper"}
+        By default from the capture's stripes, or without them by phase.
+    method : {"joint", "paper"}
         Estimator.
     square : bool
         The paper's square T: average the camera pixels that one projector pixel lights.
@@ -86,7 +93,7 @@ def reconstruct(
     Raises
     ------
     PlanError
-        If the plan is not the paper's.
+        If the plan's patterns are complex, or not the paper's for its method.
     InputError
         If there is no correspondence to be had, no light in the photos, or the plan by reference
         has too few whites and blacks.
@@ -95,28 +102,38 @@ def reconstruct(
     estimator = _ESTIMATORS[method]
     estimator.require(capture.plan)
     photos = _without_drift(capture, report)
+    if correspondence is None and has_stripes(photos.plan):
+        correspondence = _by_stripes(photos, report)
+    whole: Measurements | None = None
+    if correspondence is None or estimator.wants_all or square:
+        measured = [measure(photos, rows) for rows in _row_blocks(photos, report, "measuring")]
+        whole = join(measured)
     if correspondence is None:
-        correspondence = _found(photos, str(capture.path), report)
+        assert whole is not None
+        correspondence = _by_phase(whole, str(capture.path))
     if not correspondence.lit.any():
         raise InputError(
             f"{capture.path} shows no direct light at any camera pixel: check that the camera "
             f"sees the projector's light, or give --correspondence Q.npy."
         )
+    pixels = correspondence.pixels
     excesses: list[float] = []
 
     def estimated(rows: slice) -> Transport:
         measurements = measure(photos, rows)
         excesses.append(measurements.excess_of_sums)
-        return estimator.estimate(photos.plan, measurements, correspondence.pixels[rows])
+        return estimator.estimate(photos.plan, measurements, pixels[rows], lambda _share: None)
 
-    if square:
-        parts = [measure(photos, rows) for rows in _row_blocks(photos, report, "measuring")]
-        measurements, pixels = onto_projector(parts, correspondence)
-        excesses = [part.excess_of_sums for part in parts]
-        transport = estimator.estimate(photos.plan, measurements, pixels)
-    else:
+    if whole is None:
         transport = _stacked(
             [estimated(rows) for rows in _row_blocks(photos, report, "reconstructing")]
+        )
+    else:
+        excesses.append(whole.excess_of_sums)
+        if square:
+            whole, pixels = onto_projector([whole], correspondence)
+        transport = estimator.estimate(
+            photos.plan, whole, pixels, lambda share: report("reconstructing", share)
         )
     provenance = _provenance(capture, photos, method=method, square=square)
     provenance["excess_of_sums"] = max(excesses, key=abs)
@@ -132,13 +149,19 @@ def _without_drift(capture: Capture, report: Progress) -> Photos:
     return steady(capture, lambda done: report("references", done / total))
 
 
-def _found(photos: Photos, source: str, report: Progress) -> Correspondence:
-    """Find the correspondence as the plan says."""
-    if has_stripes(photos.plan):
-        return _by_stripes(photos, report)
-    raise InputError(
-        f"{source} has no photos of stripes: give the correspondence with --correspondence Q.npy."
-    )
+def _by_phase(measurements: Measurements, source: str) -> Correspondence:
+    """Find the correspondence in the photos of transport themselves.
+
+    Raises
+    ------
+    InputError
+        If the frequencies that were measured cannot settle it.
+    """
+    try:
+        return correspond_by_phase(measurements)
+    except InputError as error:
+        reason = str(error).rstrip(".")
+        raise InputError(f"{source}: {reason}, or give --correspondence Q.npy.") from None
 
 
 def _by_stripes(photos: Photos, report: Progress) -> Correspondence:
@@ -160,18 +183,32 @@ def _row_blocks(photos: Photos, report: Progress, what: str) -> Iterator[slice]:
         report(what, rows.stop / photos.camera.height)
 
 
-def _as_the_paper(plan: Plan, measurements: Measurements, pixels: Floats) -> Transport:
+Shares = Callable[[float], None]
+
+
+def _as_the_paper(
+    plan: Plan, measurements: Measurements, pixels: Floats, _progress: Shares
+) -> Transport:
     return estimate(measurements, pixels, plan.window, plan.far, plan.dropped)
 
 
+def _jointly(plan: Plan, measurements: Measurements, pixels: Floats, progress: Shares) -> Transport:
+    return estimate_jointly(measurements, pixels, plan.window, plan.far, progress=progress)
+
+
 class _Estimator(NamedTuple):
-    """What plan a method takes, and what it makes of a plan, measurements and q."""
+    """What plan a method takes, what it makes of measurements and q, and of how many at once."""
 
     require: Callable[[Plan], None]
-    estimate: Callable[[Plan, Measurements, Floats], Transport]
+    estimate: Callable[[Plan, Measurements, Floats, Shares], Transport]
+    wants_all: bool
 
 
-_ESTIMATORS: dict[Method, _Estimator] = {"paper": _Estimator(require_paper_plan, _as_the_paper)}
+_ESTIMATORS: dict[Method, _Estimator] = {
+    "paper": _Estimator(require_paper_plan, _as_the_paper, wants_all=False),
+    # Neighbours share what they know.
+    "joint": _Estimator(_require_photos, _jointly, wants_all=True),
+}
 
 
 def _stacked(pieces: Sequence[Transport]) -> Transport:

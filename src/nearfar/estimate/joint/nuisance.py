@@ -31,7 +31,7 @@ def precision(pixels: Pixels) -> Floats:
     white = pixels.white.astype(np.float64)
     offset = 1.0 / np.maximum(pixels.offset_noise, LEAST * white) ** 2
     direct = 1.0 / (UNKNOWN * white) ** 2
-    return np.stack([offset] + [direct] * (1 + pixels.of_second.shape[-1]), axis=-1)
+    return np.stack([offset] + [direct] * (1 + pixels.extra), axis=-1)
 
 
 def solve(normal: Floats, right: Floats, known: Floats) -> Floats:

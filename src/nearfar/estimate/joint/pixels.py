@@ -57,6 +57,11 @@ class Pixels(NamedTuple):
     offset_noise: Floats
     white: Floats
 
+    @property
+    def extra(self) -> int:
+        """Number E of single window entries."""
+        return int(self.of_second.shape[-1])
+
     def only(self, chosen: NDArray[np.int64]) -> "Pixels":
         """Return some of the camera pixels."""
         return Pixels._make(values[chosen] for values in self)

@@ -31,12 +31,18 @@ class Prior:
         From weights of the eigenvectors to window entries.
     to_far : ndarray, shape (R, R), float32
         From weights of the eigenvectors to re-centred answers of f.
+    covariance : ndarray, shape (W^2, W^2), float64
+        C.
+    power : ndarray, shape (R,), float64
+        S.
     """
 
     levels: Floats
     directions: Floats
     to_near: Floats
     to_far: Floats
+    covariance: Floats
+    power: Floats
 
 
 def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
@@ -52,7 +58,8 @@ def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
     """
     patterns = band.on_window.astype(np.float64)
     window = round(np.sqrt(patterns.shape[1]))
-    seen = patterns @ near_covariance(kind, window)
+    covariance = near_covariance(kind, window)
+    seen = patterns @ covariance
     power = far_power(band.basis, kind)
     root = np.sqrt(repeats.astype(np.float64))
     matrix = (seen @ patterns.T + np.diag(power)) * root[:, None] * root
@@ -64,4 +71,6 @@ def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
         directions=np.ascontiguousarray(directions, dtype=np.float32),
         to_near=np.ascontiguousarray(directions.T @ seen, dtype=np.float32),
         to_far=np.ascontiguousarray(directions.T * power, dtype=np.float32),
+        covariance=covariance,
+        power=power,
     )

@@ -95,7 +95,7 @@ def acquire_scene(case: Acquisition, report: Report) -> Data:
             progress=lambda done: report("photos", done / count),
         )
         shot = time.monotonic()
-        transport, correspondence = reconstruct(capture, progress=report)
+        transport, correspondence = reconstruct(capture, method="paper", progress=report)
         done = time.monotonic()
     lights = {"white": white(case.projector), "picture": case.light(case.projector)}
     rows = row_snr(transport, truth, progress=lambda share: report("rows", share))

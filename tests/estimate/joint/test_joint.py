@@ -1,0 +1,300 @@
+"""The joint estimate against dense Gaussian algebra, and on worlds that obey the model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.evidence import best_kind, evidence
+from nearfar.estimate.joint.neighbours import expect_each, expect_together
+from nearfar.estimate.joint.nuisance import precision
+from nearfar.estimate.joint.pixels import gather
+from nearfar.estimate.joint.prior import build_prior
+from nearfar.estimate.joint.solve import solve
+from nearfar.estimate.matrices import Band, band_of
+from nearfar.illumination.frequencies import DC
+from nearfar.illumination.patterns import exponential
+from nearfar.photometry.measurements import Measurements
+from nearfar.plan.choose import choose_frequencies
+from nearfar.transport import near
+from nearfar.transport.direct import footprint
+from nearfar.transport.far import real_basis
+from nearfar.transport.kinds import LIT, STRENGTHS, Kind, far_power, near_covariance
+from tests.worlds import model_transport
+
+PROJECTOR = Size(16, 20)
+WINDOW = 5
+FAR = Size(5, 5)
+KIND = Kind(1.5, 8.0, 2.0)
+
+
+def _frequencies(photos=70):
+    return list(choose_frequencies(PROJECTOR, photos, WINDOW).frequencies)
+
+
+def _band(frequencies):
+    basis = real_basis(frequencies, PROJECTOR)
+    plain = band_of(basis, near.offsets(WINDOW))
+    return Band(basis, np.arange(1, basis.count + 1), plain.on_window, plain.on_corners)
+
+
+def _measure(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=None, offset=0.0):
+    """Measure dense rows (C, channels, P) with DC first; `offset` is the references' deviation."""
+    generator = np.random.default_rng(seed)
+    basis = real_basis([DC, *frequencies], PROJECTOR)
+    count, channels = rows.shape[:2]
+    answers = rows @ basis.patterns.T.astype(np.float64)
+    answers = answers + noise * generator.normal(size=answers.shape)
+    answers[..., 1:] += offset * generator.normal(size=(count, channels, 1))
+    level = np.full((count, channels), noise, dtype=np.float32)
+    return Measurements(
+        camera=camera or Size(1, count),
+        basis=basis,
+        answers=answers.astype(np.float32),
+        noise=level,
+        black=np.zeros_like(level),
+        shown_error=np.zeros((basis.count, PROJECTOR.pixels), dtype=np.float32),
+        white_noise=np.full_like(level, offset),
+    )
+
+
+def _draw(count, centres, strength, seed=0):
+    """Draw rows of KIND about chosen q, (C, 1, P), with direct light of 0.5, and their parts."""
+    generator = np.random.default_rng(seed)
+    covariance = near_covariance(KIND, WINDOW)
+    windows = strength * generator.multivariate_normal(
+        np.zeros(WINDOW**2), covariance, count, method="eigh"
+    )
+    rows = np.zeros((count, PROJECTOR.pixels))
+    inside = near.inside(centres, WINDOW, PROJECTOR)
+    places = near.places_on(centres, WINDOW, PROJECTOR)
+    for c in range(count):
+        np.add.at(rows[c], places[c], windows[c] * inside[c])
+        rows[c, centres[c] @ [PROJECTOR.width, 1]] += 0.5
+    return rows[:, None], windows * inside
+
+
+def _pixels(measurements, centres, band):
+    q = centres.astype(np.float32)[None]
+    where = footprint(q, PROJECTOR)
+    lit = np.ones(len(centres), dtype=bool)
+    return gather(measurements, where, lit, centres, slice(None), band, WINDOW)
+
+
+def _dense(measurements, pixels, band, strength, kind=KIND):
+    """Posterior mean of (o, d, n, f) and the log evidence by plain linear algebra."""
+    results = []
+    window = near_covariance(kind, WINDOW)
+    power = far_power(band.basis, kind)
+    for c in range(len(pixels.white)):
+        white, noise = float(pixels.white[c, 0]), float(pixels.noise[c, 0])
+        cut = band.on_window * pixels.inside[c]
+        s = (strength * white) ** 2
+        shared = np.stack([pixels.of_offset[c], pixels.of_direct[c]], axis=1).astype(np.float64)
+        known = precision(pixels)[c, 0]
+        covariance = (
+            s * (cut @ window @ cut.T + np.diag(power))
+            + shared @ np.diag(1 / known) @ shared.T
+            + noise**2 * np.eye(len(power))
+        )
+        y = pixels.answers[c, 0].astype(np.float64)
+        x = np.linalg.solve(covariance, y)
+        _, logarithm = np.linalg.slogdet(covariance)
+        near_mean = s * (window @ cut.T @ x) * pixels.inside[c]
+        results.append((shared.T @ x / known, near_mean, s * power * x, -0.5 * (y @ x + logarithm)))
+    return [np.stack(part) for part in zip(*results, strict=True)]
+
+
+@pytest.mark.parametrize("offset", [0.0, 3e-3])
+def test_the_mean_is_that_of_dense_algebra_inside_and_at_the_border(offset):
+    # Far inside, at one border, at a corner.
+    centres = np.array([[8, 10], [7, 9], [0, 10], [8, 18], [0, 0], [15, 19], [1, 18]])
+    frequencies = _frequencies()
+    band = _band(frequencies)
+    rows, _ = _draw(len(centres), centres, 0.02)
+    measurements = _measure(rows, frequencies, noise=2e-3, offset=offset)
+    pixels = _pixels(measurements, centres, band)
+    prior = build_prior(KIND, band, measurements.repeats[band.places])
+    found = solve(pixels, prior, np.full(len(centres), 0.05), band)
+    shared, windows, far, _ = _dense(measurements, pixels, band, 0.05)
+    scale, far_scale = np.abs(windows).max(), np.abs(far).max()
+    np.testing.assert_allclose(found.near[:, 0], windows, atol=2e-3 * scale)
+    np.testing.assert_allclose(found.far[:, 0], far, atol=2e-3 * far_scale)
+    np.testing.assert_allclose(found.shared[:, 0, 1], shared[:, 1], atol=1e-4)
+    np.testing.assert_allclose(found.shared[:, 0, 0], shared[:, 0], atol=1e-5)
+
+
+def test_repeats_count_as_less_noise():
+    centres = np.array([[8, 10], [7, 9]])
+    frequencies = _frequencies()
+    band = _band(frequencies)
+    rows, _ = _draw(len(centres), centres, 0.02)
+    measurements = _measure(rows, frequencies, noise=2e-3)
+    nine = np.full_like(measurements.repeats, 9.0)
+    means = [
+        solve(
+            _pixels(m, centres, band),
+            build_prior(KIND, band, m.repeats[band.places]),
+            np.full(2, 0.05),
+            band,
+        )
+        for m in (
+            replace(measurements, repeats=nine),
+            replace(measurements, noise=measurements.noise / 3),
+        )
+    ]
+    np.testing.assert_allclose(means[0].near, means[1].near, atol=1e-5)
+    np.testing.assert_allclose(means[0].shared, means[1].shared, atol=1e-5)
+
+
+def test_the_evidence_is_that_of_dense_algebra():
+    centres = np.array([[8, 10], [7, 9], [6, 12]])
+    frequencies = _frequencies()
+    band = _band(frequencies)
+    rows, _ = _draw(len(centres), centres, 0.02)
+    measurements = _measure(rows, frequencies, noise=2e-3, offset=1e-3)
+    pixels = _pixels(measurements, centres, band)
+    prior = build_prior(KIND, band, measurements.repeats[band.places])
+    found = evidence(pixels, prior, precision(pixels))
+    expected = np.stack(
+        [_dense(measurements, pixels, band, strength)[3] for strength in STRENGTHS], axis=1
+    )
+    # The table rounds (s / sigma)^2 to half a step, which the log evidence feels a little.
+    difference = (found - found[:, :1]) - (expected - expected[:, :1])
+    spread = expected.max(axis=1) - expected.min(axis=1)
+    assert np.abs(difference).max(axis=1) == pytest.approx(0, abs=0.02 * spread.max() + 1.0)
+    assert np.array_equal(found.argmax(axis=1), expected.argmax(axis=1))
+
+
+def test_a_camera_pixel_chooses_the_kind_that_it_was_drawn_from():
+    generator = np.random.default_rng(3)
+    centres = np.stack([generator.integers(4, 12, 200), generator.integers(4, 16, 200)], axis=1)
+    frequencies = _frequencies()
+    band = _band(frequencies)
+    rows, _ = _draw(len(centres), centres, 0.02)
+    measurements = _measure(rows, frequencies, noise=1e-3)
+    pixels = _pixels(measurements, centres, band)
+    far_from = Kind(6.0, 256.0, 0.7)
+    priors = [
+        build_prior(kind, band, measurements.repeats[band.places]) for kind in (KIND, far_from)
+    ]
+    kind, strength, _ = best_kind(pixels, priors)
+    assert np.mean(kind == 0) > 0.95
+    # 0.02 in photo units, of a white that is 0.5 and a little.
+    white = pixels.white[:, 0]
+    assert np.median(strength * white) == pytest.approx(0.02, rel=0.5)
+
+
+def test_a_world_of_the_model_is_relit_by_few_answers():
+    world = model_transport(
+        PROJECTOR, Size(16, 20), window=WINDOW, far=Size(3, 3), channels=2, entries=0, seed=2
+    )
+    world = replace(world, near=np.zeros_like(world.near))
+    frequencies = _frequencies(60)
+    measurements = _measure(
+        world.dense().astype(np.float64), frequencies, noise=1e-5, camera=world.camera
+    )
+    found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR)
+    light = np.random.default_rng(0).random(PROJECTOR)
+    truth = world @ light
+    error = np.linalg.norm(found @ light - truth) / np.linalg.norm(truth)
+    assert error < 3e-3
+    assert np.abs(found.direct - world.direct).max() < 3e-3
+
+
+def test_camera_pixels_without_direct_light_keep_far_light_alone():
+    world = model_transport(PROJECTOR, Size(16, 20), window=WINDOW, far=Size(3, 3), entries=0)
+    q = world.correspondence.copy()
+    q[3:6] = np.nan
+    dark = replace(
+        world,
+        correspondence=q,
+        direct=world.direct * np.isfinite(q[..., :1]),
+        near=np.zeros_like(world.near),
+    )
+    measurements = _measure(
+        dark.dense().astype(np.float64), _frequencies(), noise=1e-4, camera=world.camera
+    )
+    found = estimate_jointly(measurements, q, WINDOW, FAR)
+    assert not found.direct[3:6].any()
+    assert not found.near[3:6].any()
+    for values in (found.direct, found.near, found.far):
+        assert np.isfinite(values).all()
+    light = np.random.default_rng(0).random(PROJECTOR)
+    truth, relit = (dark @ light)[3:6], (found @ light)[3:6]
+    assert np.linalg.norm(truth - relit) < 0.01 * np.linalg.norm(truth)
+
+
+def test_direct_light_of_a_second_surface_is_found():
+    centres = np.full((40, 2), (8, 10))
+    rows, _ = _draw(len(centres), centres, 0.0)
+    second = np.arange(len(centres)) < 20
+    rows[second, 0, 6 * PROJECTOR.width + 12] += 0.2
+    measurements = _measure(rows, _frequencies(140), noise=1e-3)
+    q = centres.astype(np.float32)[None]
+    found = estimate_jointly(measurements, q, WINDOW, FAR, turns=1)
+    entry = found.near[0, :, 0, 0, 4]
+    np.testing.assert_allclose(entry[second], 0.2, atol=0.01)
+    assert np.abs(entry[~second]).max() < 0.01
+
+
+def test_the_offset_of_the_references_is_taken_out():
+    world = model_transport(PROJECTOR, Size(16, 20), window=WINDOW, far=Size(3, 3), entries=0)
+    world = replace(world, near=np.zeros_like(world.near))
+    rows = world.dense().astype(np.float64)
+    frequencies = _frequencies()
+    told = _measure(rows, frequencies, noise=1e-4, offset=0.02, camera=world.camera)
+    untold = replace(told, white_noise=np.zeros_like(told.noise))
+    light = np.asarray(exponential(frequencies[3], PROJECTOR).real)
+    truth = world @ light
+    errors = [
+        np.linalg.norm(estimate_jointly(m, world.correspondence, WINDOW, FAR) @ light - truth)
+        for m in (told, untold)
+    ]
+    assert errors[0] < 0.3 * errors[1]
+
+
+def test_neighbours_that_agree_take_noise_away_and_edges_stay():
+    generator = np.random.default_rng(0)
+    truth = np.zeros((40, 40, 1, 3))
+    truth[:, 20:] = 1.0
+    noisy = truth + 0.05 * generator.normal(size=truth.shape)
+    every = np.ones((40, 40), dtype=bool)
+    found = expect_each(noisy, np.full(truth.shape, 0.05**2), every)
+    flat = np.abs(np.arange(40) - 19.5) > 2
+    assert np.std((found - truth)[:, flat]) < 0.6 * 0.05
+    assert np.abs((found - truth)[:, 19:21]).max() < 4 * 0.05
+    together = expect_together(noisy, np.full((40, 40, 1), 0.05**2), every)
+    assert np.std((together - truth)[:, flat]) < 0.6 * 0.05
+    assert np.abs((together - truth)[:, 19:21]).max() < 4 * 0.05
+
+
+def test_neighbours_without_a_say_are_not_heard():
+    values = np.zeros((9, 9, 1, 2))
+    values[4, 4] = 100.0
+    known = np.ones((9, 9), dtype=bool)
+    known[4, 4] = False
+    found = expect_together(values, np.full((9, 9, 1), 1.0), known)
+    assert not found.any()
+
+
+def test_answers_without_white_are_refused():
+    rows, _ = _draw(1, np.array([[8, 10]]), 0.01)
+    measurements = _measure(rows, _frequencies())
+    basis = real_basis(_frequencies(), PROJECTOR)
+    lacking = replace(
+        measurements,
+        basis=basis,
+        answers=measurements.answers[..., 1:],
+        shown_error=measurements.shown_error[1:],
+        repeats=measurements.repeats[1:],
+    )
+    with pytest.raises(InputError, match="lack white"):
+        estimate_jointly(lacking, np.array([[[8.0, 10.0]]]), WINDOW, FAR)
+
+
+def test_kinds_are_different():
+    assert len(set(LIT)) == len(LIT)

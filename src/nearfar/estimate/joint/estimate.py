@@ -33,6 +33,10 @@ from nearfar.transport.model import Transport
 TURNS = 3
 # Camera pixels at once.
 BLOCK = 4096
+# Direct light this close to a whole projector pixel is taken to be all that pixel's. Noise moves q
+# by as much, and a footprint of 10 % too much beside q cost 1.5 dB under a random light; what
+# really lies beside it, kinds with spread find (cornell and cornell-aside, 117 photos).
+WHOLE = 0.2
 
 
 class _Rows(NamedTuple):
@@ -73,7 +77,7 @@ def estimate_jointly(
     measurements : Measurements
         With white, and at least one other frequency.
     correspondence : ndarray, shape (Cy, Cx, 2)
-        q as (y, x), NaN where there is no direct light.
+        q as (y, x), NaN where there is no direct light; rounded where it is nearly whole.
     window : int
         W: near-range light lies within, however much less far it reaches.
     far : Size
@@ -106,6 +110,8 @@ def estimate_jointly(
     def built(kinds: tuple[Kind, ...]) -> tuple[Prior, ...]:
         return tuple(build_prior(kind, band, repeats) for kind in kinds)
 
+    whole = np.rint(correspondence)
+    correspondence = np.where(np.abs(correspondence - whole) < WHOLE, whole, correspondence)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
     problem = _Problem(
         measurements,

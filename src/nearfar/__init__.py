@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 # Where each public name lives; loaded when first asked for, so that importing stays quick.
 _HOMES = {
     "Correspondence": "nearfar.correspondence",
+    "ErrorBars": "nearfar.estimate.joint",
     "ExactTransport": "nearfar.transport.exact",
     "NearfarError": "nearfar.errors",
     "Plan": "nearfar.plan",
@@ -70,6 +71,7 @@ _HOMES = {
 
 __all__ = [
     "Correspondence",
+    "ErrorBars",
     "ExactTransport",
     "NearfarError",
     "Plan",

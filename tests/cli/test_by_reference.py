@@ -113,3 +113,28 @@ def test_a_plan_with_one_white_is_refused(finished: Job, plan: Path, tmp_path: P
     out = tmp_path / "transport.zarr"
     check_sentence(run_nearfar("reconstruct", capture, out), "white 1", "--offset reference")
     assert not out.exists()
+
+
+def test_a_joint_estimate_tells_its_errors(finished: Job, plan: Path, tmp_path: Path):
+    capture, transport = tmp_path / "capture.zarr", tmp_path / "transport.zarr"
+    check_done(run_nearfar("acquire", plan, capture, "--rig", finished.truth))
+    q = tmp_path / "q.npy"
+    check_done(run_nearfar("convert", finished.transport, q, "--correspondence"))
+    check_done(run_nearfar("reconstruct", capture, transport, "--correspondence", q))
+    picture, bars = tmp_path / "picture.npy", tmp_path / "bars.npy"
+    check_done(run_nearfar("relight", transport, finished.light, picture))
+    ran = check_done(run_nearfar("relight", transport, finished.light, bars, "--error-bars"))
+    assert "standard deviation" in ran.out
+    deviation = np.load(bars)
+    assert deviation.shape == np.load(picture).shape
+    assert (deviation > 0).all()
+    # Gains scale it.
+    twice = tmp_path / "twice.npy"
+    gains = [f"--gain={name}=2" for name in ("direct", "near", "far")]
+    check_done(run_nearfar("relight", transport, finished.light, twice, "--error-bars", *gains))
+    np.testing.assert_allclose(np.load(twice), 2 * deviation, rtol=1e-4)
+    # The paper's estimate has none.
+    ran = run_nearfar(
+        "relight", finished.transport, finished.light, tmp_path / "b.npy", "--error-bars"
+    )
+    check_sentence(ran, "no error bars", "--method joint")

@@ -1,6 +1,7 @@
 """Transports on the disk: round trips, and every damage a sentence."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,12 @@ from nearfar.errors import (
     NearfarError,
     UnreadableFileError,
 )
+from nearfar.transport.belief import Belief
 from nearfar.transport.exact_store import load_exact, save_exact
-from nearfar.transport.store import FACTORS, load_transport, save_transport
+from nearfar.transport.far import real_basis
+from nearfar.transport.kinds import LIT
+from nearfar.transport.model import Transport
+from nearfar.transport.store import BELIEVED, FACTORS, load_transport, save_transport
 from tests.transport.test_operators import CAMERA, PROJECTOR, _exact, _transport
 
 
@@ -39,6 +44,58 @@ def test_a_transport_comes_back(tmp_path, generator):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(transport, name))
     light = generator.random(PROJECTOR)
     np.testing.assert_array_equal(loaded @ light, transport @ light)
+
+
+def _believed(transport: Transport) -> Transport:
+    """Add a belief to a transport."""
+    generator = np.random.default_rng(2)
+    shape = transport.direct.shape
+    values = {
+        name: generator.random(shape).astype(np.float32)
+        for name in ("white", "offset_noise", "light_noise", "share_of_white")
+    }
+    frequencies = transport.far_basis.frequencies[1:]
+    belief = Belief(
+        kinds=LIT[:3],
+        frequencies=frequencies,
+        repeats=np.arange(real_basis(frequencies, PROJECTOR).count, dtype=np.float32),
+        kind=generator.integers(0, 3, shape[:2]).astype(np.uint8),
+        strength=generator.random(shape[:2]).astype(np.float32),
+        **values,
+    )
+    return replace(transport, belief=belief)
+
+
+def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
+    transport = _believed(_transport(generator))
+    save_transport(tmp_path / "t.zarr", transport)
+    loaded = load_transport(tmp_path / "t.zarr").belief
+    assert loaded.kinds == transport.belief.kinds
+    assert loaded.frequencies == transport.belief.frequencies
+    for name in ("repeats", *BELIEVED):
+        values = getattr(loaded, name)
+        np.testing.assert_array_equal(values, getattr(transport.belief, name))
+        assert values.dtype == getattr(transport.belief, name).dtype
+
+
+def test_a_damaged_belief_gets_a_sentence(tmp_path, generator):
+    path = tmp_path / "t.zarr"
+    save_transport(path, _believed(_transport(generator)))
+    belief = json.loads((path / "zarr.json").read_text())["attributes"]["belief"]
+    for change, message in (
+        ({"kinds": belief["kinds"][:1]}, "error bars"),
+        ({"repeats": [1.0]}, "error bars"),
+        ({"frequencies": 3}, "does not describe a transport"),
+        ({"kinds": [[1.0, 2.0]]}, "does not describe a transport"),
+    ):
+        _change_attributes(path, belief={**belief, **change})
+        with pytest.raises(UnreadableFileError, match=message):
+            load_transport(path)
+    _change_attributes(path, belief=belief)
+    chunk = next(p for p in (path / "belief_white").iterdir() if p.name != "zarr.json")
+    chunk.unlink()
+    with pytest.raises(UnreadableFileError, match=r"t\.zarr"):
+        load_transport(path)
 
 
 def test_nothing_is_overwritten_without_force(stored, generator):

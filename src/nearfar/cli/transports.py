@@ -138,6 +138,12 @@ def relight(
     srgb: Annotated[
         bool, typer.Option("--srgb", help="LIGHT is an ordinary sRGB picture.")
     ] = False,
+    error_bars: Annotated[
+        bool,
+        typer.Option(
+            "--error-bars", help="Write the picture's standard deviation instead of the picture."
+        ),
+    ] = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -147,6 +153,7 @@ def relight(
     """
     import numpy as np
 
+    from nearfar.estimate.joint import ErrorBars
     from nearfar.files import (
         check_output,
         check_picture_ending,
@@ -165,9 +172,13 @@ def relight(
         shown = read_light(light, opened.projector, srgb=srgb)
         if shown.ndim == 3 and opened.channels == 1:
             shown = luminance(shown)
-        picture = opened.relight(shown, **gains)
+        if error_bars:
+            picture = ErrorBars(opened).picture(shown, **gains)
+        else:
+            picture = opened.relight(shown, **gains)
         write_picture(output, picture.astype(np.float32), force=force)
-    say(f"relit picture of {opened.camera} written to {output}", quiet=quiet)
+    what = "standard deviation of the relit picture" if error_bars else "relit picture"
+    say(f"{what} of {opened.camera} written to {output}", quiet=quiet)
 
 
 def convert(

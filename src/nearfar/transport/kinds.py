@@ -5,7 +5,7 @@ all. Each kind is one Gaussian of few numbers; which kind a camera pixel is, and
 light, its own photos say (the evidence). The kinds were chosen one by one out of 240 (reach 0.8 to
 6 pixels, decay 0.7 to 8 cycles, six shares, with and without spread), each time the one that
 raised the evidence of camera pixels of the scenes cornell, cornell-aside, wedge and corner most;
-docs/decisions/0009 has the figures.
+docs/decisions/0010 has the figures.
 """
 
 from typing import NamedTuple
@@ -85,9 +85,14 @@ STRENGTHS = tuple(2e-4 * 2.0**step for step in range(11))
 def far_power(basis: RealBasis, kind: Kind) -> Floats:
     """Power of each real answer of f at unit strength, shape (R,), float64."""
     cycles = as_array(basis.frequencies) * np.array(basis.projector)
-    power = np.exp(-2 * np.hypot(cycles[:, 0], cycles[:, 1]) / kind.decay) + LEAST_POWER
+    power = power_at(np.hypot(cycles[:, 0], cycles[:, 1]), kind)
     own = np.array([k.is_own_negative for k in basis.frequencies])
-    return np.asarray(kind.far**2 * (power * np.where(own, 1.0, 0.5))[basis.index])
+    return np.asarray((power * np.where(own, 1.0, 0.5))[basis.index])
+
+
+def power_at(cycles: Floats, kind: Kind) -> Floats:
+    """Mean square |b_k| of f at unit strength, as many cycles per pattern grid from DC."""
+    return np.asarray(kind.far**2 * (np.exp(-2 * cycles / kind.decay) + LEAST_POWER))
 
 
 def near_covariance(kind: Kind, window: int) -> Floats:

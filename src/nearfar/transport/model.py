@@ -13,6 +13,7 @@ from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.errors import InputError
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
+from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis
 
 # Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
@@ -54,6 +55,8 @@ class Transport:
         Standard deviation of one real measurement (a cosine's or sine's answer).
     provenance : mapping
         Plan, estimator, exposure and version: whatever JSON holds.
+    belief : Belief, optional
+        What error bars follow from, where the estimate can tell them.
     """
 
     projector: Size
@@ -65,6 +68,7 @@ class Transport:
     black: Floats
     noise: Floats
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    belief: Belief | None = None
 
     @property
     def camera(self) -> Size:
@@ -114,13 +118,13 @@ class Transport:
         InputError
             If the light has another size than the pattern grid, or other channels.
         """
-        lights = self._lights(light)
+        lights = self.lights(light)
         pictures = (
             self._direct_pictures(lights),
             self._near_pictures(lights),
             self._far_pictures(lights),
         )
-        return Components(*(self._picture(flat) for flat in pictures))
+        return Components(*(self.picture(flat) for flat in pictures))
 
     def relight(
         self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
@@ -132,9 +136,10 @@ class Transport:
     def with_gains(
         self, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
     ) -> "Transport":
-        """Return the transport with its components scaled."""
+        """Return the transport with its components scaled, without error bars."""
         return replace(
             self,
+            belief=None,
             direct=self.direct * np.float32(direct),
             near=self.near * np.float32(near),
             far=self.far * np.float32(far),
@@ -231,7 +236,8 @@ class Transport:
 
     # Lights below are flat: (1, P) for all channels or (channels, P); pictures are (C, channels).
 
-    def _lights(self, light: Floats) -> Floats:
+    def lights(self, light: Floats) -> Floats:
+        """Check a light and lay it flat: (1, P) for all channels, or (channels, P)."""
         light = np.asarray(light)
         if light.dtype.kind in "biu":
             light = light.astype(np.float32)
@@ -251,7 +257,8 @@ class Transport:
             )
         return np.moveaxis(light, 2, 0).reshape(light.shape[2], -1)
 
-    def _picture(self, flat: Floats) -> Floats:
+    def picture(self, flat: Floats) -> Floats:
+        """Shape values (C, channels) as a picture: (Cy, Cx), or (Cy, Cx, channels)."""
         picture = flat.reshape(*self.camera, self.channels)
         return picture[..., 0] if self.channels == 1 else picture
 

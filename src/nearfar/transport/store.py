@@ -10,7 +10,9 @@ from nearfar.arrays import AnyPath, Floats, Size
 from nearfar.errors import UnreadableFileError
 from nearfar.files import add_array, create_store, new_output, open_store, read_array
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
-from nearfar.transport.far import real_basis
+from nearfar.transport.belief import Belief
+from nearfar.transport.far import RealBasis, real_basis
+from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
 
 KIND = "nearfar transport"
@@ -19,6 +21,9 @@ FORMAT_VERSION = 1
 CHUNK_BYTES = 8 * 2**20
 
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
+# Of the belief, where there is one: a mapping of its own in the attributes, and these arrays.
+BELIEF = "belief"
+BELIEVED = ("kind", "strength", "white", "offset_noise", "light_noise", "share_of_white")
 
 
 def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) -> None:
@@ -35,11 +40,41 @@ def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) 
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
         "provenance": json.loads(json.dumps(dict(transport.provenance))),
     }
+    if transport.belief is not None:
+        attributes[BELIEF] = _described(transport.belief)
     with new_output(path, force=force) as partial:
         group = create_store(partial, KIND, FORMAT_VERSION, attributes)
         for name in FACTORS:
             values = np.asarray(getattr(transport, name), dtype=np.float32)
             write_in_rows(group, name, values)
+        for name in BELIEVED if transport.belief else ():
+            write_in_rows(group, f"{BELIEF}_{name}", getattr(transport.belief, name))
+
+
+def _described(belief: Belief) -> dict[str, Any]:
+    """Lay what all camera pixels share of a belief out for JSON."""
+    return {
+        "kinds": [list(kind) for kind in belief.kinds],
+        "frequencies": [frequency_to_text(k) for k in belief.frequencies],
+        "repeats": [float(count) for count in belief.repeats],
+    }
+
+
+def _read_belief(group: Any, described: dict[str, Any]) -> Belief:
+    return Belief(
+        kinds=tuple(Kind(*(float(value) for value in kind)) for kind in described["kinds"]),
+        frequencies=tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
+        repeats=np.array([float(count) for count in described["repeats"]], dtype=np.float32),
+        **{name: read_array(group, f"{BELIEF}_{name}") for name in BELIEVED},
+    )
+
+
+def _belief_fits(belief: Belief, basis: RealBasis, shape: tuple[int, ...]) -> bool:
+    count = real_basis(belief.frequencies, basis.projector).count
+    flat = (belief.kind.shape, belief.strength.shape) == (shape[:2], shape[:2])
+    full = all(getattr(belief, name).shape == shape for name in BELIEVED[2:])
+    places = belief.kind.dtype == np.uint8 and int(belief.kind.max(initial=0)) < len(belief.kinds)
+    return flat and full and places and belief.repeats.shape == (count,)
 
 
 def write_in_rows(group: Any, name: str, values: Floats) -> None:
@@ -64,6 +99,9 @@ def load_transport(path: AnyPath) -> Transport:
         height, width = (int(side) for side in listed(group.attrs["projector"]))
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
+        belief = (
+            _read_belief(group, _mapped(group.attrs[BELIEF])) if BELIEF in group.attrs else None
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise UnreadableFileError(
             f"{path} is damaged: its zarr.json does not describe a transport ({error}); "
@@ -86,7 +124,14 @@ def load_transport(path: AnyPath) -> Transport:
                 f"{path} is damaged: its {name} has shape {factors[name].shape}, not {shape}; "
                 f"reconstruct it again."
             )
-    return Transport(projector=projector, far_basis=basis, provenance=provenance, **factors)
+    if belief is not None and not _belief_fits(belief, basis, camera_and_channels):
+        raise UnreadableFileError(
+            f"{path} is damaged: what its error bars follow from does not fit the transport; "
+            f"reconstruct it again."
+        )
+    return Transport(
+        projector=projector, far_basis=basis, provenance=provenance, belief=belief, **factors
+    )
 
 
 def listed(value: Any) -> list[Any]:

@@ -1,5 +1,6 @@
-"""The joint estimate of direct, near- and far-range transport (ours)."""
+"""The joint estimate of direct, near- and far-range transport, and its error bars (ours)."""
 
 from nearfar.estimate.joint.estimate import estimate_jointly
+from nearfar.estimate.joint.posterior import ErrorBars
 
-__all__ = ["estimate_jointly"]
+__all__ = ["ErrorBars", "estimate_jointly"]

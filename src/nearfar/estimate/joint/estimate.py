@@ -12,18 +12,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.arrays import Booleans, Floats, Integers, Size, blocks
 from nearfar.errors import InputError
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, with_spike
 from nearfar.estimate.joint.evidence import best_kind
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
-from nearfar.estimate.joint.pixels import Pixels, dc_place, gather, scale_of
+from nearfar.estimate.joint.pixels import Pixels, dc_place, gather, offset_noise, scale_of
 from nearfar.estimate.joint.prior import Prior, build_prior
 from nearfar.estimate.joint.solve import Found, solve
 from nearfar.estimate.matrices import Band, band_of
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
+from nearfar.transport.belief import Belief
 from nearfar.transport.direct import Footprint, footprint
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, UNLIT, Kind
@@ -46,6 +47,8 @@ class _Rows(NamedTuple):
     near: Floats  # (C, channels, W^2)
     far: Floats  # (C, channels, R), as measured
     near_noise: Floats  # (C, channels)
+    kind: Integers  # (C,), place in LIT + UNLIT
+    strength: Floats  # (C,), share of white
 
 
 class _Problem(NamedTuple):
@@ -145,6 +148,8 @@ def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], N
         np.zeros((number, channels, problem.window**2), dtype=np.float32),
         np.zeros((number, channels, count), dtype=np.float32),
         np.zeros((number, channels), dtype=np.float32),
+        np.zeros(number, dtype=np.int64),
+        np.zeros(number, dtype=np.float32),
     )
     for block in blocks(number, BLOCK):
         pixels = gather(
@@ -154,23 +159,36 @@ def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], N
             far = band.recentre(expected.far[block], pixels.centres)
             shown = expected.near[block] @ band.on_window.T + far
             pixels = pixels._replace(answers=pixels.answers - shown)
-        for lit, priors in ((True, problem.lit_priors), (False, problem.unlit_priors)):
+        for lit, first, priors in (
+            (True, 0, problem.lit_priors),
+            (False, len(LIT), problem.unlit_priors),
+        ):
             chosen = np.flatnonzero(pixels.lit == lit)
             if len(chosen):
-                found = _by_kind(pixels.only(chosen), priors, band)
-                far = band.uncentre(found.far, pixels.centres[chosen])
-                places = block.start + chosen
-                for values, new in zip(rows, found._replace(far=far), strict=True):
-                    values[places] = new
+                some = pixels.only(chosen)
+                kind, strength, _ = best_kind(some, priors)
+                found = _by_kind(some, priors, kind, strength, band)
+                far = band.uncentre(found.far, some.centres)
+                new = _Rows(*found._replace(far=far), kind + first, strength)
+                for values, estimated in zip(rows, new, strict=True):
+                    values[block.start + chosen] = estimated
         report(block.stop / number)
-    if expected is not None:
-        rows = rows._replace(near=rows.near + expected.near, far=rows.far + expected.far)
-    return rows
+    if expected is None:
+        return rows
+    # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
+    # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
+    return rows._replace(
+        near=rows.near + expected.near,
+        far=rows.far + expected.far,
+        kind=expected.kind,
+        strength=expected.strength,
+    )
 
 
-def _by_kind(pixels: Pixels, priors: tuple[Prior, ...], band: Band) -> Found:
-    """Choose each camera pixel's kind and estimate it."""
-    kind, strength, _ = best_kind(pixels, priors)
+def _by_kind(
+    pixels: Pixels, priors: tuple[Prior, ...], kind: Integers, strength: Floats, band: Band
+) -> Found:
+    """Estimate each camera pixel as of its kind."""
     whole: Found | None = None
     for place, prior in enumerate(priors):
         chosen = np.flatnonzero(kind == place)
@@ -262,6 +280,17 @@ def _transport(problem: _Problem, rows: _Rows, correspondence: Floats, far: Size
         far_basis=basis,
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
+        belief=Belief(
+            kinds=(*LIT, *UNLIT),
+            frequencies=band.basis.frequencies,
+            repeats=measurements.repeats[band.places],
+            kind=rows.kind.astype(np.uint8).reshape(measurements.camera),
+            strength=rows.strength.reshape(measurements.camera),
+            white=scale_of(measurements).reshape(shape),
+            offset_noise=offset_noise(measurements).reshape(shape),
+            light_noise=measurements.light_noise.reshape(shape),
+            share_of_white=_share_of_white(measurements).astype(np.float32).reshape(shape),
+        ),
     )
 
 

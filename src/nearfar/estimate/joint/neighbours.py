@@ -61,8 +61,11 @@ def expect_together(values: Floats, variance: Floats, known: Booleans) -> Floats
     weight = (known[..., None, None] / np.maximum(variance, EXACT**2)[..., None]).astype(
         values.dtype
     )
+    # A running mean leaves traces of what it has passed: without a neighbour there is nothing.
+    alone = uniform_filter(known.astype(np.float32), SIDE, mode="nearest") < 0.5 / SIDE**2
+    weight[alone] = 1.0
     total = np.maximum(_mean(weight), TINY)
-    mean = _mean(weight * values) / total
+    mean = np.where(alone[..., None, None], 0.0, _mean(weight * values) / total)
     scatter = np.mean(_mean(weight * values**2) / total - mean**2, axis=-1, keepdims=True)
     change = np.maximum(scatter - 1.0 / total, 0.0)
     trust = change / np.maximum(change + variance[..., None], TINY)

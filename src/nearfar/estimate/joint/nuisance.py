@@ -28,10 +28,15 @@ def columns(pixels: Pixels) -> Floats:
 
 def precision(pixels: Pixels) -> Floats:
     """Precision of o, d, d2 ... before any answer, shape (n, channels, G), float64."""
-    white = pixels.white.astype(np.float64)
-    offset = 1.0 / np.maximum(pixels.offset_noise, LEAST * white) ** 2
+    return precision_of(pixels.white, pixels.offset_noise, pixels.extra)
+
+
+def precision_of(white: Floats, offset_noise: Floats, extra: int) -> Floats:
+    """Precision of o, d and as many more, for arrays (n, channels) as in `Pixels`."""
+    white = white.astype(np.float64)
+    offset = 1.0 / np.maximum(offset_noise, LEAST * white) ** 2
     direct = 1.0 / (UNKNOWN * white) ** 2
-    return np.stack([offset] + [direct] * (1 + pixels.extra), axis=-1)
+    return np.stack([offset] + [direct] * (1 + extra), axis=-1)
 
 
 def solve(normal: Floats, right: Floats, known: Floats) -> Floats:

@@ -80,6 +80,11 @@ def scale_of(measurements: Measurements) -> Floats:
     return np.asarray(np.maximum(white, np.float32(least)))
 
 
+def offset_noise(measurements: Measurements) -> Floats:
+    """Return the deviation of what the references' error adds to answers, (C, channels)."""
+    return np.hypot(measurements.white_noise, measurements.black_noise)
+
+
 def gather(
     measurements: Measurements,
     where: Footprint,
@@ -118,6 +123,6 @@ def gather(
         of_second=np.zeros((len(lit), band.basis.count, 0), dtype=np.float32),
         of_offset=band.recentre(ones, centres)[:, 0],
         noise=np.maximum(measurements.noise[block], EXACT * white),
-        offset_noise=np.hypot(measurements.white_noise[block], measurements.black_noise[block]),
+        offset_noise=offset_noise(measurements)[block],
         white=white,
     )

@@ -1,0 +1,324 @@
+"""Error bars: the posterior standard deviation of D, of entries of N and F, and of pictures.
+
+All of them are numbers h_o o + h_d d + h_n.n + h_f.f of a camera pixel, f's DC being what d and n
+leave of white. Given the kind, o and d, the posterior is a Gaussian in the kind's eigenvectors; o
+and d add what is not known of them.
+
+Index convention: arrays are (n, channels, ...), n camera pixels or numbers asked of one of them; r
+runs over real answers, w over window entries, i over eigenvectors, g over o and d.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.errors import InputError
+from nearfar.estimate.joint import nuisance
+from nearfar.estimate.joint.pixels import EXACT
+from nearfar.estimate.joint.prior import Prior, build_prior
+from nearfar.estimate.matrices import Band, band_of
+from nearfar.illumination.frequencies import DC
+from nearfar.transport import near
+from nearfar.transport.belief import Belief
+from nearfar.transport.direct import Footprint, footprint, look_up
+from nearfar.transport.far import real_basis
+from nearfar.transport.kinds import Kind, power_at
+from nearfar.transport.model import Components, Transport
+
+BLOCK = 2048
+
+
+class _Asked(NamedTuple):
+    """Numbers asked for; of camera pixels one each, or all of one camera pixel.
+
+    Attributes
+    ----------
+    mean : ndarray, shape (n,)
+        h of white.
+    direct : ndarray, shape (n,)
+    near : ndarray, shape (n, W^2)
+    far : ndarray, shape (n, R)
+        Re-centred.
+    unseen : ndarray, shape (kinds,) or (kinds, n)
+        Variance of the part of f that the transport does not hold, at unit strength.
+    """
+
+    mean: Floats
+    direct: Floats
+    near: Floats
+    far: Floats
+    unseen: Floats
+
+
+class _Of(NamedTuple):
+    """What is known of camera pixels: see `nearfar.estimate.joint.pixels.Pixels`."""
+
+    columns: Floats  # (n, R, 2)
+    precision: Floats  # (n, channels, 2)
+    noise: Floats  # (n, channels)
+    scale: Floats  # s in photo units, (n, channels)
+    white_left: Floats  # variance of white that o does not tell, (n, channels)
+    share: Floats  # (n, channels)
+    kind: Integers  # (n,)
+
+    def only(self, chosen: Integers) -> "_Of":
+        return _Of._make(values[chosen] for values in self)
+
+
+class ErrorBars:
+    """Posterior standard deviations of a transport.
+
+    They hold what the photos' noise and what was never measured leave open, for light as the
+    kinds of `nearfar.transport.kinds` expect it and q as it was found.
+
+    Parameters
+    ----------
+    transport : Transport
+        From a joint estimate.
+
+    Raises
+    ------
+    InputError
+        If the transport does not tell its errors.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        if transport.belief is None:
+            raise InputError(
+                "this transport holds no error bars: reconstruct the capture with --method joint."
+            )
+        self._transport = transport
+        self._belief: Belief = transport.belief
+        basis = real_basis(self._belief.frequencies, transport.projector)
+        self._band: Band = band_of(basis, near.offsets(transport.window))
+        self._priors: dict[int, Prior] = {}
+        self._where = footprint(transport.correspondence, transport.projector)
+        self._centres = near.centre(transport.correspondence, transport.projector)
+        kept = set(transport.far_basis.frequencies)
+        self._held = np.array([basis.frequencies[i] in kept for i in basis.index])
+
+    def picture(
+        self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+    ) -> Floats:
+        """Return the standard deviation of a relit picture.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        direct, near, far : float
+            Gains, as `Transport.relight` takes them.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+            Photo units.
+        """
+        transport = self._transport
+        lights = transport.lights(light)
+        number, channels = transport.camera.pixels, transport.channels
+        found = np.empty((number, channels), dtype=np.float32)
+        for place, flat in enumerate(lights):
+            unseen = self._unseen(flat) * far**2
+            for block in blocks(number, BLOCK):
+                asked = self._of_light(block, flat, unseen, (direct, near, far))
+                deviation = np.sqrt(self._variance(block, asked))
+                if len(lights) == 1:
+                    found[block] = deviation
+                else:
+                    found[block, place] = deviation[:, place]
+        return transport.picture(found)
+
+    def direct(self) -> Floats:
+        """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light."""
+        transport = self._transport
+        found = np.empty((transport.camera.pixels, transport.channels), dtype=np.float32)
+        for block in blocks(len(found), BLOCK):
+            found[block] = np.sqrt(self._variance(block, self._of_direct(len(found[block]))))
+        found *= transport.lit.reshape(-1, 1)
+        return found.reshape(*transport.camera, transport.channels)
+
+    def component_rows(self, pixels: slice) -> Components:
+        """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
+
+        N and F are the model's: n in the window, f at the frequencies of the far band that the
+        transport holds. A millisecond or two for each thousand projector pixels and camera pixel.
+        """
+        chosen = range(*pixels.indices(self._transport.camera.pixels))
+        shape = (0, self._transport.channels, self._transport.projector.pixels)
+        rows = [self._rows_of(c) for c in chosen]
+        if not rows:
+            return Components(*(np.zeros(shape, dtype=np.float32) for _ in Components._fields))
+        return Components(*(np.stack(part) for part in zip(*rows, strict=True)))
+
+    def _rows_of(self, c: int) -> Components:
+        """Of one camera pixel, each (channels, P)."""
+        transport, one = self._transport, slice(c, c + 1)
+        inside = near.inside(self._centres[one], transport.window, transport.projector)[0]
+        d = np.zeros((transport.channels, transport.projector.pixels), dtype=np.float32)
+        n = np.zeros_like(d)
+        if transport.lit.ravel()[c]:
+            deviation = np.sqrt(self._variance(one, self._of_direct(1)))[0]
+            np.add.at(d.T, self._where.pixels[c], self._where.weights[c][:, None] * deviation)
+            entries = np.flatnonzero(inside)
+            places = near.places_on(self._centres[one], transport.window, transport.projector)
+            asked = self._of_entries(entries)
+            n[:, places[0, entries]] = np.sqrt(self._variance(one, asked)).T
+        f = np.sqrt(self._variance(one, self._of_far(one, inside))).T
+        return Components(d, n, f.astype(np.float32))
+
+    def _of_direct(self, number: int) -> _Asked:
+        """Ask for d."""
+        return _Asked(
+            np.zeros(number),
+            np.ones(number),
+            np.zeros((number, self._transport.window**2), dtype=np.float32),
+            np.zeros((number, self._band.basis.count), dtype=np.float32),
+            np.zeros(len(self._belief.kinds)),
+        )
+
+    def _of_entries(self, entries: Integers) -> _Asked:
+        """Ask for window entries of one camera pixel."""
+        return _Asked(
+            np.zeros(len(entries)),
+            np.zeros(len(entries)),
+            np.eye(self._transport.window**2, dtype=np.float32)[entries],
+            np.zeros((len(entries), self._band.basis.count), dtype=np.float32),
+            np.zeros(len(self._belief.kinds)),
+        )
+
+    def _of_far(self, one: slice, inside: Booleans) -> _Asked:
+        """Ask for every entry of a row of F of one camera pixel."""
+        band, total = self._band, self._transport.projector.pixels
+        lit = float(self._transport.lit.ravel()[one][0])
+        patterns = (band.basis.patterns.T * band.basis.weights * self._held).astype(np.float32)
+        centre = np.broadcast_to(self._centres[one], (total, 2))
+        return _Asked(
+            np.full(total, 1.0 / total),
+            np.full(total, -lit / total),
+            np.broadcast_to(-lit / total * inside.astype(np.float32), (total, len(inside))),
+            band.recentre(patterns[:, None], centre)[:, 0],
+            np.zeros(len(self._belief.kinds)),
+        )
+
+    def _of_light(
+        self, block: slice, light: Floats, unseen: Floats, gains: tuple[float, float, float]
+    ) -> _Asked:
+        """Ask for the picture under a light (P,)."""
+        transport, band = self._transport, self._band
+        gain_direct, gain_near, gain_far = gains
+        projector, centres = transport.projector, self._centres[block]
+        where = Footprint(self._where.pixels[block], self._where.weights[block])
+        mean = gain_far * float(light.mean())
+        seen = near.look_up(light.reshape(projector), centres, transport.window, projector)
+        whole = near.inside(centres, transport.window, projector)
+        overlap = (gain_far * band.basis.analyse(light) * self._held).astype(np.float32)
+        turned = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
+        lit = transport.lit.ravel()[block]
+        return _Asked(
+            np.full(len(centres), mean),
+            lit * (gain_direct * look_up(light, where) - mean),
+            (lit[:, None] * (gain_near * seen - mean * whole)).astype(np.float32),
+            band.recentre(turned, centres)[:, 0],
+            unseen,
+        )
+
+    def _unseen(self, light: Floats) -> Floats:
+        """Variance, under a light (P,), of what the transport does not hold of f: (kinds,).
+
+        At unit strength.
+        """
+        transport = self._transport
+        projector = transport.projector
+        power = np.abs(np.fft.fft2(light.reshape(projector).astype(np.float64))) ** 2
+        held = (DC, *(k for k in transport.far_basis.frequencies if k != DC))
+        for k in held:
+            y, x = (round(part * side) for part, side in zip(k, projector, strict=True))
+            power[y % projector.height, x % projector.width] = 0.0
+            power[-y % projector.height, -x % projector.width] = 0.0
+        cycles = [np.fft.fftfreq(side) * side for side in projector]
+        radius = np.hypot(cycles[0][:, None], cycles[1])
+        total = [np.sum(power_at(radius, kind) * power) for kind in self._belief.kinds]
+        return np.array(total) / projector.pixels**2
+
+    def _known(self, block: slice) -> _Of:
+        """Gather camera pixels."""
+        transport, belief, band = self._transport, self._belief, self._band
+        channels = transport.channels
+        white = belief.white.reshape(-1, channels)[block]
+        lit = transport.lit.ravel()[block]
+        centres = self._centres[block]
+        where = Footprint(self._where.pixels[block], self._where.weights[block])
+        direct = (look_up(band.basis.patterns, where).T * lit[:, None]).astype(np.float32)
+        ones = np.ones_like(direct)
+        both = np.stack([ones, direct], axis=1)
+        offset_noise = belief.offset_noise.reshape(-1, channels)[block]
+        share = belief.share_of_white.reshape(-1, channels)[block]
+        light_noise = belief.light_noise.reshape(-1, channels)[block]
+        return _Of(
+            band.recentre(both, centres).transpose(0, 2, 1),
+            nuisance.precision_of(white, offset_noise, 0),
+            np.maximum(transport.noise.reshape(-1, channels)[block], EXACT * white),
+            belief.strength.ravel()[block, None] * white,
+            np.maximum(light_noise**2 - (share * offset_noise) ** 2, 0.0),
+            share,
+            belief.kind.ravel()[block].astype(np.int64),
+        )
+
+    def _variance(self, block: slice, asked: _Asked) -> Floats:
+        """Posterior variance of numbers asked of a block, or many of one camera pixel."""
+        known = self._known(block)
+        number = len(asked.mean)
+        found = np.empty((number, self._transport.channels))
+        each = number == len(known.kind)
+        for place in np.unique(known.kind):
+            chosen = np.flatnonzero(known.kind == place)
+            rows = chosen if each else np.arange(number)
+            found[rows] = _of_kind(
+                self._prior(int(place)),
+                known.only(chosen),
+                _Asked(
+                    asked.mean[rows],
+                    asked.direct[rows],
+                    asked.near[rows],
+                    asked.far[rows],
+                    asked.unseen[place],
+                ),
+            )
+        return found
+
+    def _prior(self, place: int) -> Prior:
+        if place not in self._priors:
+            kind: Kind = self._belief.kinds[place]
+            self._priors[place] = build_prior(kind, self._band, self._belief.repeats)
+        return self._priors[place]
+
+
+def _of_kind(prior: Prior, known: _Of, asked: _Asked) -> Floats:
+    """Posterior variance, (n, channels); `known` has one camera pixel for each number, or one."""
+    squared = (known.scale.astype(np.float64) ** 2)[..., None]
+    weight = 1.0 / (squared * prior.levels + known.noise.astype(np.float64)[..., None] ** 2)
+    told = (asked.near @ prior.to_near.T + asked.far @ prior.to_far.T)[:, None]
+    before = (
+        np.einsum("nw,nw->n", asked.near @ prior.covariance, asked.near)
+        + asked.far.astype(np.float64) ** 2 @ prior.power
+        + asked.unseen
+    )
+    within = squared[..., 0] * (before[:, None] - np.sum(squared * weight * told**2, axis=-1))
+    turned = np.matmul(known.columns.transpose(0, 2, 1), prior.directions)[:, None]
+    weighed = turned * weight[:, :, None]
+    normal = np.matmul(weighed, turned.transpose(0, 1, 3, 2))
+    # o tells of white, d of itself; both of what the answers say of n and f.
+    own = np.stack(
+        [-known.share * asked.mean[:, None], np.broadcast_to(asked.direct[:, None], within.shape)],
+        axis=-1,
+    )
+    left = own - np.matmul(weighed, (squared * told)[..., None])[..., 0]
+    spread = nuisance.solve(
+        np.broadcast_to(normal, (*left.shape, 2)),
+        left,
+        np.broadcast_to(known.precision, left.shape),
+    )
+    variance = within + np.sum(left * spread, axis=-1)
+    variance += asked.mean[:, None] ** 2 * known.white_left
+    return np.asarray(np.maximum(variance, 0.0))

@@ -1,0 +1,260 @@
+"""Error bars: dense Gaussian algebra, and how often the truth lies within them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.estimate.fit import fit_model
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.posterior import ErrorBars
+from nearfar.estimate.matrices import band_of
+from nearfar.illumination.frequencies import DC, far_frequencies
+from nearfar.illumination.pictures import standard_lights
+from nearfar.photometry.measure import measure
+from nearfar.plan import choose_plan
+from nearfar.plan.choose import choose_frequencies
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.transport import near
+from nearfar.transport.belief import Belief
+from nearfar.transport.far import real_basis
+from nearfar.transport.kinds import Kind, far_power, near_covariance, power_at
+from nearfar.transport.model import Transport
+from tests.worlds import Photographed
+
+PROJECTOR = Size(12, 16)
+WINDOW = 5
+KIND = Kind(1.5, 8.0, 2.0)
+NOISE, OFFSET, LIGHT, SHARE = 2e-3, 1e-3, 1.5e-3, 0.4
+STRENGTH, WHITE = 0.05, 0.8
+
+
+def _transport(centres, lit=True):
+    """Build a transport of one kind, all factors 0: error bars do not depend on them."""
+    low = [k for k in far_frequencies(Size(3, 3), PROJECTOR) if k != DC]
+    frequencies = [DC, *(k for i, k in enumerate(low) if -k not in low[:i])]
+    basis = real_basis(frequencies, PROJECTOR)
+    measured = tuple(choose_frequencies(PROJECTOR, 60, WINDOW).frequencies)
+    count = real_basis(measured, PROJECTOR).count
+    shape = (1, len(centres), 1)
+    q = centres[None].astype(np.float32)
+    return Transport(
+        projector=PROJECTOR,
+        correspondence=q if lit else np.full_like(q, np.nan),
+        direct=np.zeros(shape, np.float32),
+        near=np.zeros((*shape, WINDOW, WINDOW), np.float32),
+        far=np.zeros((*shape, basis.count), np.float32),
+        far_basis=basis,
+        black=np.zeros(shape, np.float32),
+        noise=np.full(shape, NOISE, np.float32),
+        belief=Belief(
+            kinds=(Kind(0.0, 1.0, 1.0), KIND),
+            frequencies=measured,
+            repeats=np.random.default_rng(0).integers(1, 4, count).astype(np.float32),
+            kind=np.ones(shape[:2], np.uint8),
+            strength=np.full(shape[:2], STRENGTH, np.float32),
+            white=np.full(shape, WHITE, np.float32),
+            offset_noise=np.full(shape, OFFSET, np.float32),
+            light_noise=np.full(shape, LIGHT, np.float32),
+            share_of_white=np.full(shape, SHARE, np.float32),
+        ),
+    )
+
+
+def _dense(transport, c, ask):
+    """Posterior deviation of ask(o, white's own, d, n, f) by plain linear algebra.
+
+    `ask` holds weights of each; f is its answers to the measured patterns.
+    """
+    belief = transport.belief
+    basis = real_basis(belief.frequencies, PROJECTOR)
+    centre = transport.correspondence[0, c].astype(int)
+    band = band_of(basis, near.offsets(WINDOW) + centre)
+    s = STRENGTH * WHITE
+    ones = np.ones((basis.count, 1))
+    direct = basis.patterns[:, [centre[0] * PROJECTOR.width + centre[1]]]
+    answers = np.concatenate(
+        [ones, 0 * ones, direct, band.on_window, np.eye(basis.count)], axis=1
+    ).astype(np.float64)
+    prior = np.zeros((answers.shape[1], answers.shape[1]))
+    prior[0, 0] = OFFSET**2
+    prior[1, 1] = LIGHT**2 - (SHARE * OFFSET) ** 2
+    prior[2, 2] = (4 * WHITE) ** 2
+    end = 3 + WINDOW**2
+    prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
+    prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
+    noise = np.diag(NOISE**2 / belief.repeats.astype(np.float64))
+    gain = prior @ answers.T @ np.linalg.inv(answers @ prior @ answers.T + noise)
+    posterior = prior - gain @ answers @ prior
+    return np.sqrt(ask @ posterior @ ask)
+
+
+def _weights(transport, c, light, *, far_only_held=True):
+    """Weights of o, white's own error, d, n and f's answers in the picture under a light."""
+    basis = real_basis(transport.belief.frequencies, PROJECTOR)
+    held = np.array([basis.frequencies[i] in transport.far_basis.frequencies for i in basis.index])
+    mean = light.mean()
+    centre = transport.correspondence[:, c].astype(int)
+    seen = near.look_up(light, centre, WINDOW, PROJECTOR)[0]
+    inside = near.inside(centre, WINDOW, PROJECTOR)[0]
+    return np.concatenate(
+        [
+            [-SHARE * mean, mean, light[tuple(centre[0])] - mean],
+            seen - mean * inside,
+            basis.analyse(light.ravel()) * held,
+        ]
+    )
+
+
+def test_a_picture_is_as_uncertain_as_dense_algebra_says():
+    centres = np.array([[6, 8], [5, 7], [2, 13]])
+    transport = _transport(centres)
+    low = np.zeros(PROJECTOR)
+    # A light without what the transport does not hold of f.
+    for k, amount in zip(transport.far_basis.frequencies, (0.5, 0.2, 0.1, 0.15, 0.05), strict=True):
+        y, x = np.indices(PROJECTOR)
+        low += amount * np.cos(2 * np.pi * (float(k.fy) * y + float(k.fx) * x) + amount)
+    found = ErrorBars(transport).picture(low)
+    expected = [_dense(transport, c, _weights(transport, c, low)) for c in range(len(centres))]
+    np.testing.assert_allclose(found[0], expected, rtol=2e-3)
+
+
+def test_what_the_transport_does_not_hold_adds_its_expected_power():
+    transport = _transport(np.array([[6, 8]]))
+    light = np.random.default_rng(1).random(PROJECTOR)
+    spectrum = np.abs(np.fft.fft2(light)) ** 2
+    cycles = [np.fft.fftfreq(side) * side for side in PROJECTOR]
+    radius = np.hypot(cycles[0][:, None], cycles[1])
+    unseen = power_at(radius, KIND) * spectrum
+    unseen[(np.abs(cycles[0])[:, None] <= 1) & (np.abs(cycles[1]) <= 1)] = 0.0
+    extra = (STRENGTH * WHITE) ** 2 * unseen.sum() / PROJECTOR.pixels**2
+    expected = np.hypot(_dense(transport, 0, _weights(transport, 0, light)), np.sqrt(extra))
+    assert ErrorBars(transport).picture(light)[0, 0] == pytest.approx(expected, rel=2e-3)
+
+
+def test_entries_are_as_uncertain_as_dense_algebra_says():
+    transport = _transport(np.array([[6, 8]]))
+    bars = ErrorBars(transport)
+    rows = bars.component_rows(slice(0, 1))
+    count = len(_weights(transport, 0, np.zeros(PROJECTOR)))
+    of_direct = np.zeros(count)
+    of_direct[2] = 1.0
+    assert bars.direct()[0, 0, 0] == pytest.approx(_dense(transport, 0, of_direct), rel=2e-3)
+    at = 6 * PROJECTOR.width + 8
+    assert rows.direct[0, 0, at] == pytest.approx(bars.direct()[0, 0, 0])
+    assert np.count_nonzero(rows.direct) == 1
+    for entry, (y, x) in enumerate(near.offsets(WINDOW)):
+        one = np.zeros(count)
+        one[3 + entry] = 1.0
+        place = (6 + y) * PROJECTOR.width + 8 + x
+        assert rows.near[0, 0, place] == pytest.approx(_dense(transport, 0, one), rel=5e-3)
+    assert np.count_nonzero(rows.near) == WINDOW**2
+    for place in (0, at, 100):
+        # An entry of F: T's, without d and n themselves.
+        light = np.zeros(PROJECTOR)
+        light.flat[place] = 1.0
+        weights = _weights(transport, 0, light)
+        weights[2] = -1.0 / PROJECTOR.pixels
+        weights[3 : 3 + WINDOW**2] = -1.0 / PROJECTOR.pixels
+        expected = _dense(transport, 0, weights)
+        assert rows.far[0, 0, place] == pytest.approx(expected, rel=5e-3)
+
+
+def test_an_unlit_camera_pixel_has_far_light_alone():
+    centres = np.array([[6, 8], [0, 0]])
+    bars = ErrorBars(_transport(centres, lit=False))
+    assert not bars.direct().any()
+    rows = bars.component_rows(slice(0, 2))
+    assert not rows.direct.any()
+    assert not rows.near.any()
+    assert (rows.far > 0).all()
+    light = np.random.default_rng(1).random(PROJECTOR)
+    np.testing.assert_array_equal(bars.picture(light), bars.picture(light, direct=3.0, near=0.0))
+
+
+def test_gains_scale_the_error_of_their_component():
+    transport = _transport(np.array([[6, 8], [5, 7]]))
+    bars = ErrorBars(transport)
+    light = np.random.default_rng(1).random(PROJECTOR)
+    direct = bars.picture(light, near=0.0, far=0.0)
+    q = transport.correspondence[0].astype(int)
+    np.testing.assert_allclose(direct[0], bars.direct()[0, :, 0] * light[q[:, 0], q[:, 1]], 1e-5)
+    whole = bars.picture(light)
+    np.testing.assert_allclose(bars.picture(light, direct=2, near=2, far=2), 2 * whole, rtol=1e-5)
+    none = bars.picture(light, direct=0, near=0, far=0)
+    assert not none.any()
+
+
+def test_colour_lights_go_channel_by_channel():
+    transport = _transport(np.array([[6, 8], [5, 7]]))
+    belief = transport.belief
+
+    def doubled(values):
+        return np.concatenate([values, 2 * values], axis=2)
+
+    both = replace(
+        transport,
+        **{n: doubled(getattr(transport, n)) for n in ("direct", "near", "far", "black", "noise")},
+        belief=replace(
+            belief,
+            **{n: doubled(getattr(belief, n)) for n in ("white", "offset_noise", "light_noise")},
+            share_of_white=np.repeat(belief.share_of_white, 2, axis=2),
+        ),
+    )
+    lights = np.random.default_rng(1).random((*PROJECTOR, 2))
+    found = ErrorBars(both).picture(lights)
+    one, bars = ErrorBars(both), ErrorBars(transport)
+    np.testing.assert_allclose(found[..., 0], bars.picture(lights[..., 0]), rtol=1e-5)
+    np.testing.assert_allclose(found[..., 1], 2 * bars.picture(lights[..., 1]), rtol=1e-5)
+    np.testing.assert_allclose(one.picture(lights[..., 0])[..., 1], found[..., 0] * 2, rtol=1e-5)
+
+
+def test_a_transport_without_belief_says_so():
+    transport = replace(_transport(np.array([[6, 8]])), belief=None)
+    with pytest.raises(InputError, match="--method joint"):
+        ErrorBars(transport)
+    assert _transport(np.array([[6, 8]])).with_gains(near=2.0).belief is None
+
+
+def _within(error, deviation):
+    return float(np.mean(np.abs(error) < deviation))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cornell", "alcove"])
+def test_the_truth_lies_within_one_deviation_as_often_as_it_should(name):
+    scene = cached_scene(name, Size(32, 32))
+    plan, _ = choose_plan(scene.projector, 100)
+    rig = SimulatedRig(scene, name, SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    photos = np.stack(list(rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))))
+    measurements = measure(Photographed(plan, photos, rig.full_scale))
+    found = estimate_jointly(measurements, scene.correspondence, plan.window, plan.far)
+    bars = ErrorBars(found)
+    shares = {}
+    for light, values in standard_lights(scene.projector).items():
+        truth = scene @ values
+        error = (found @ values).reshape(truth.shape) - truth
+        shares[light] = _within(error, bars.picture(values).reshape(truth.shape))
+    pictures = np.mean([share for light, share in shares.items() if light.startswith("picture")])
+    for share in (shares["white"], shares["random"], pictures):
+        assert 0.6 < share < 0.76, shares
+    model = fit_model(scene, plan.window, found.far_basis, found.correspondence)
+    lit = found.lit
+    direct = _within((found.direct - model.direct)[lit], bars.direct()[lit])
+    assert 0.55 < direct < 0.8
+    chosen = np.random.default_rng(0).choice(np.flatnonzero(lit), 60, replace=False)
+    within = {"near": [], "far": []}
+    for c in chosen:
+        pixel = slice(c, c + 1)
+        deviations, mine, truth = (t.component_rows(pixel) for t in (bars, found, model))
+        for part, shares_of in within.items():
+            sigma = getattr(deviations, part)
+            error = getattr(mine, part) - getattr(truth, part)
+            shares_of.append(_within(error[sigma > 0], sigma[sigma > 0]))
+    assert 0.5 < np.mean(within["near"]) < 0.85
+    assert 0.5 < np.mean(within["far"]) < 0.85

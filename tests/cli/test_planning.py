@@ -139,3 +139,19 @@ def test_half_a_plan_is_refused(tmp_path: Path, options, status, said):
     assert said in ran.err
     assert "Traceback" not in ran.err
     assert not plan.exists()
+
+
+def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
+    plan, capture, look = (tmp_path / name for name in ("quick.json", "c.zarr", "look.zarr"))
+    check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "-o", plan))
+    check_done(run_nearfar("acquire", plan, capture, "--rig", finished.truth))
+    check_done(run_nearfar("reconstruct", capture, look))
+    ran = run_nearfar("plan", "--projector", "16x20", "--photos", 60, "--look", look)
+    assert "of relighting this scene" in check_done(ran).out
+    for arguments, said in (
+        (("--projector", "16x24", "--photos", 60, "--look", look), "same pattern grid"),
+        (("--projector", "16x20", "--photos", 60, "--look", finished.transport), "--method joint"),
+    ):
+        check_sentence(run_nearfar("plan", *arguments), said)
+    ran = run_nearfar("plan", "--projector", "16x20", "--near", 5, "--far", "3x3", "--look", look)
+    assert ran.status == 2

@@ -1,13 +1,20 @@
 """Plans that are chosen for a number of photos."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.errors import PlanError
+from nearfar.errors import InputError, PlanError
 from nearfar.illumination.frequencies import CHECKERBOARD, DC
 from nearfar.plan import choose_plan, parse_plan
 from nearfar.plan.choose import LEAST_PHOTOS, candidates, choose_frequencies, default_window
+from nearfar.plan.typical import TYPICAL, noise_of, typical_of
+from nearfar.transport.belief import Belief
+from nearfar.transport.far import real_basis
+from nearfar.transport.kinds import LIT, STRENGTHS, Kind
+from nearfar.transport.model import Transport
 
 
 @pytest.mark.parametrize("photos", [LEAST_PHOTOS, 61, 150])
@@ -81,3 +88,65 @@ def test_the_default_window_is_odd_and_fits(side):
 def test_what_cannot_be_chosen_is_said(projector, photos, window, said):
     with pytest.raises(PlanError, match=said):
         choose_plan(projector, photos, window=window)
+
+
+def _quick_look(kind, strength, noise=0.01, shape=(6, 8, 3)):
+    """Make a transport whose camera pixels are all of one kind."""
+    generator = np.random.default_rng(0)
+    basis = real_basis([DC], Size(24, 24))
+    dark = np.zeros(shape, np.float32)
+    white = generator.uniform(0.2, 1.0, shape).astype(np.float32)
+    return Transport(
+        projector=Size(24, 24),
+        correspondence=np.zeros((*shape[:2], 2), np.float32),
+        direct=dark,
+        near=np.zeros((*shape, 5, 5), np.float32),
+        far=np.zeros((*shape, 1), np.float32),
+        far_basis=basis,
+        black=dark,
+        noise=noise * white,
+        belief=Belief(
+            kinds=(LIT[0], kind),
+            frequencies=(),
+            repeats=np.zeros(0, np.float32),
+            kind=np.ones(shape[:2], np.uint8),
+            strength=np.full(shape[:2], strength, np.float32),
+            white=white,
+            offset_noise=dark,
+            light_noise=dark,
+            share_of_white=dark,
+        ),
+    )
+
+
+def test_a_quick_look_tells_the_kinds_and_the_noise():
+    kind = Kind(6.0, 64.0, 8.0)
+    look = _quick_look(kind, STRENGTHS[4], noise=0.02)
+    found = typical_of(look)
+    assert found.kinds == ((kind, pytest.approx(STRENGTHS[4])),)
+    np.testing.assert_allclose(found.shares, [[1.0]])
+    assert noise_of(look) == pytest.approx(0.02, rel=1e-5)
+
+
+def test_the_plan_follows_what_was_looked_at():
+    def highest(kind, strength):
+        chosen = choose_frequencies(
+            Size(24, 24), 90, 5, typical=typical_of(_quick_look(kind, strength))
+        ).frequencies
+        return np.mean([np.hypot(float(k.fy), float(k.fx)) for k in chosen])
+
+    # Far-range light alone asks for low frequencies, a rough window for all.
+    assert highest(Kind(0.8, 256.0, 3.0), 0.002) < highest(Kind(6.0, 1.0, 3.0, rough=1.0), 0.02)
+
+
+def test_a_look_without_kinds_is_refused():
+    look = replace(_quick_look(LIT[0], 0.01), belief=None)
+    for ask in (typical_of, noise_of):
+        with pytest.raises(InputError, match="--method joint"):
+            ask(look)
+
+
+def test_the_typical_scenes_are_whole():
+    assert np.all(TYPICAL.shares >= 0)
+    assert np.all((TYPICAL.shares.sum(axis=1) > 0.8) & (TYPICAL.shares.sum(axis=1) <= 1.001))
+    assert TYPICAL.shares.shape == (len(TYPICAL.weights), len(TYPICAL.kinds))

@@ -3,13 +3,14 @@
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.options import AsJson, Force, PlanFile, Quiet, size
 from nearfar.cli.progress import counted, progress_bar, say
+from nearfar.errors import InputError
 
 if TYPE_CHECKING:
     from nearfar.plan import Plan
@@ -68,6 +69,14 @@ def plan(
             "with --far, else phase."
         ),
     ] = None,
+    look: Annotated[
+        Path | None,
+        typer.Option(
+            help="Plan for the scene that this transport shows: a quick look, few photos "
+            "reconstructed by --method joint.",
+            metavar="TRANSPORT.zarr",
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the plan here.", metavar="FILE")
     ] = None,
@@ -84,11 +93,14 @@ def plan(
     from nearfar.plan import choose_plan, paper_plan
 
     expected = None
+    if look is not None and photos is None:
+        raise typer.BadParameter("--look is of plans chosen for --photos N")
     if photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
+        known = _looked_at(look, projector) if look is not None else {}
         with progress_bar("choosing patterns", quiet=quiet or as_json) as report:
             made, expected = choose_plan(
-                projector, photos, window=near, progress=counted(report, "photos", photos)
+                projector, photos, window=near, progress=counted(report, "photos", photos), **known
             )
     elif near is None or far is None:
         raise typer.BadParameter("give --photos N, or --near W and --far HxW for the paper's plan")
@@ -111,14 +123,33 @@ def plan(
     else:
         say(describe_plan(made), quiet=quiet)
         if expected is not None:
+            like = "this scene" if look is not None else "scenes like the simulated ones"
             say(
-                f"expected of relighting scenes like the simulated ones, before neighbours help: "
+                f"expected of relighting {like}, before neighbours help: "
                 f"{expected.pictures:.0f} dB under pictures, {expected.random:.0f} dB under a "
                 f"random light",
                 quiet=quiet,
             )
         if output is not None:
             say(f"plan written to {output}", quiet=quiet)
+
+
+def _looked_at(look: Path, projector: Size) -> dict[str, Any]:
+    """Read what a quick look tells of the scene."""
+    from nearfar.plan.typical import noise_of, typical_of
+    from nearfar.transport.store import load_transport
+
+    seen = load_transport(look)
+    if seen.projector != projector:
+        raise InputError(
+            f"{look} is of a projector {seen.projector}, the plan of {projector}: look with the "
+            f"same pattern grid."
+        )
+    if seen.belief is None:
+        raise InputError(
+            f"{look} tells no kinds of camera pixel: reconstruct the quick look by --method joint."
+        )
+    return {"typical": typical_of(seen), "noise": noise_of(seen)}
 
 
 def _refuse_with_photos(

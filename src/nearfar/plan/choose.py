@@ -31,28 +31,16 @@ from nearfar.illumination.frequencies import (
 from nearfar.plan.model import Plan, Purpose
 from nearfar.plan.paper import LARGEST, sinusoids
 from nearfar.plan.references import FEWEST, with_references
+from nearfar.plan.typical import TYPICAL, Typical
 from nearfar.transport import near
 from nearfar.transport.far import real_basis
-from nearfar.transport.kinds import Kind, far_power, near_covariance
+from nearfar.transport.kinds import far_power, near_covariance
 
 # Standard deviation of an answer to a sinusoid, as a share of white: 30 000 electrons at full
 # scale and a scene of middling brightness.
 NOISE = 0.011
 # Direct light before any photo, as a share of white.
 DIRECT = 0.5
-# Kinds of camera pixel, their strengths and how many are so, on three simulated scenes.
-TYPICAL: tuple[tuple[Kind, float, float], ...] = (
-    (Kind(1.3, 256.0, 1.5), 0.0005, 0.22),
-    (Kind(0.8, 256.0, 0.7), 0.0006, 0.18),
-    (Kind(0.8, 256.0, 3.0), 0.0005, 0.10),
-    (Kind(0.8, 64.0, 1.5), 0.0016, 0.10),
-    (Kind(6.0, 256.0, 1.5), 0.0004, 0.10),
-    (Kind(6.0, 64.0, 3.0), 0.0016, 0.09),
-    (Kind(6.0, 64.0, 8.0), 0.001, 0.05),
-    (Kind(3.5, 16.0, 1.5), 0.005, 0.06),
-    (Kind(1.3, 1.0, 3.0), 0.05, 0.05),
-    (Kind(2.2, 16.0, 1.5, 3.0), 0.006, 0.05),
-)
 # All frequencies up to as many cycles per pattern grid are candidates; beyond, one in each of
 # these shares of 1/W: a window's spectrum changes no faster.
 LOW = 8
@@ -66,6 +54,10 @@ SMALLEST = 8
 # but cost white light; at 117 photos of the box, 10 instead of 16 gain 0.6 dB under pictures and
 # lose 0.7 dB under white.
 INTERVAL = 10
+# How much a decibel under pictures and one under a random light count. At 1.5 for the latter,
+# cornell-aside gains 0.9 dB under a random light at 117 photos, corner loses 0.8 dB under pictures
+# at 261.
+COUNTS = np.array([1.0, 1.2])
 # Power of a picture in its mean and in the rest, as shares of white squared.
 MEAN, REST = 0.25, 0.06
 
@@ -99,6 +91,7 @@ def choose_plan(
     photos: int,
     *,
     window: int | None = None,
+    typical: Typical = TYPICAL,
     noise: float = NOISE,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[Plan, Expected]:
@@ -111,6 +104,8 @@ def choose_plan(
         All photos, whites and blacks included.
     window : int, optional
         W, an upper bound of how far near-range light reaches; `default_window` if left out.
+    typical : Typical
+        Kinds of camera pixel to plan for: of the simulated scenes, or of a quick look at this one.
     noise : float
         Standard deviation of an answer to a sinusoid, as a share of white.
     progress : callable, optional
@@ -143,7 +138,9 @@ def choose_plan(
             f"W = {window} does not fit a projector of {projector}: choose --near between 1 and "
             f"{min(projector)}."
         )
-    choice = choose_frequencies(projector, photos, window, noise=noise, progress=progress)
+    choice = choose_frequencies(
+        projector, photos, window, typical=typical, noise=noise, progress=progress
+    )
     band = Size(*(min(BAND, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))
 
@@ -200,13 +197,15 @@ def _on_grid(part: Fraction, side: int) -> Fraction:
 class _Beliefs:
     """What is known of the answers of each typical camera pixel while a plan grows."""
 
-    def __init__(self, frequencies: list[Frequency], projector: Size, window: int) -> None:
+    def __init__(
+        self, frequencies: list[Frequency], projector: Size, window: int, typical: Typical
+    ) -> None:
         basis = real_basis(frequencies, projector)
         angle = 2 * np.pi * (as_array(frequencies) @ near.offsets(window).T)
         cosines, sines = np.cos(angle), np.sin(angle)
         paired = np.array([not k.is_own_negative for k in frequencies])
         parts = []
-        for kind, strength, _ in TYPICAL:
+        for kind, strength in typical.kinds:
             covariance = near_covariance(kind, window)
             far = np.diag(far_power(basis, kind)[~basis.is_sine])
             direct = np.full_like(far, DIRECT**2)
@@ -214,20 +213,19 @@ class _Beliefs:
             parts.append(direct + level * (cosines @ covariance @ cosines.T + far))
             parts.append(level * (sines @ covariance @ sines.T + far) * np.outer(paired, paired))
         self.covariance = np.stack(parts)
-        self.share = np.repeat([share for *_, share in TYPICAL], 2)
+        self.shares = np.repeat(typical.shares, 2, axis=1)
         self.weights = _weights(frequencies, projector)
 
     def errors(self) -> Floats:
-        """Return the expected squared error of pictures and of the random light, (2,)."""
-        variance = np.einsum("j,jkk->k", self.share, self.covariance)
-        return np.asarray(self.weights @ variance)
+        """Return the expected squared errors of pictures and of the random light, (scenes, 2)."""
+        variance = np.einsum("jkk->jk", self.covariance)
+        return np.asarray(self.shares @ variance @ self.weights.T)
 
     def gains(self, noise: float) -> Floats:
-        """Return what each candidate takes off both errors, (2, K)."""
+        """Return what each candidate takes off all errors, (scenes, 2, K)."""
         spent = np.einsum("jkk->jk", self.covariance) + noise**2
-        shares = self.share[:, None] / spent
-        squared = np.einsum("jek,jk->ek", self.covariance**2, shares, optimize=True)
-        return np.asarray(self.weights @ squared)
+        each = np.stack([self.weights @ covariance**2 for covariance in self.covariance])
+        return np.asarray(np.tensordot(self.shares, each / spent[:, None], axes=1))
 
     def learn(self, chosen: int, noise: float) -> None:
         """Take in one measurement of a candidate's photos."""
@@ -256,6 +254,7 @@ def choose_frequencies(
     photos: int,
     window: int,
     *,
+    typical: Typical = TYPICAL,
     noise: float = NOISE,
     progress: Callable[[int], None] | None = None,
 ) -> Choice:
@@ -268,6 +267,8 @@ def choose_frequencies(
         Photos of transport and references together.
     window : int
         W.
+    typical : Typical
+        Kinds of camera pixel to plan for.
     noise : float
         Standard deviation of an answer, as a share of white.
     progress : callable, optional
@@ -279,7 +280,7 @@ def choose_frequencies(
     """
     listed = candidates(projector, window)
     cost = np.array([1 if k.is_own_negative else 2 for k in listed])
-    beliefs = _Beliefs(listed, projector, window)
+    beliefs = _Beliefs(listed, projector, window, typical)
     references = max(FEWEST, photos // (INTERVAL + 2))
     left = photos - 2 * references
     chosen: dict[Frequency, int] = {}
@@ -292,7 +293,8 @@ def choose_frequencies(
 
     take(listed.index(CHECKERBOARD))
     while left > 0:
-        worth = (1.0 / beliefs.errors()) @ beliefs.gains(noise) / cost
+        relative = beliefs.gains(noise) / beliefs.errors()[..., None]
+        worth = typical.weights @ np.einsum("l,slk->sk", COUNTS, relative) / cost
         worth[cost > left] = -np.inf
         if not np.isfinite(worth.max()):
             break
@@ -303,5 +305,6 @@ def choose_frequencies(
     # is in every other answer too.
     shared = 0.5 * noise**2 / references * (MEAN + beliefs.weights.sum(axis=1))
     light = MEAN + np.array([REST, 1.0 / 12.0])
-    expected = 10 * np.log10(light / (beliefs.errors() + shared))
+    decibels = 10 * np.log10(light / (beliefs.errors() + shared))
+    expected = np.average(decibels, axis=0, weights=typical.weights)
     return Choice(chosen, references, Expected(*(float(value) for value in expected)))

@@ -13,7 +13,7 @@ over five natural pictures, under white and under a random pattern, of
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from nearfar.correspondence import correspond_by_stripes
 from nearfar.estimate.fit import fit_model
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
+from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.rigs.camera import SimulatedCamera
@@ -42,19 +43,11 @@ CASES = {
 CLEAN = SimulatedCamera(shot_noise=False, read_noise=0.0, full_well=1e9, bits=16)
 
 
-class Photos:
-    """Photos in memory, read as from a capture."""
-
-    def __init__(self, plan: Plan, scene: ExactTransport, camera: SimulatedCamera) -> None:
-        rig = SimulatedRig(scene, scene.name, SimulatedProjector(), camera, 1.0, 0)
-        patterns = (plan.draw(i) for i in range(len(plan.patterns)))
-        self.plan, self.camera, self.channels = plan, scene.camera, scene.channels
-        self._photos = np.stack(list(rig.shoot(patterns)))
-        self._full_scale = np.float32(rig.full_scale)
-
-    def read(self, photos: Sequence[int], rows: slice) -> Floats:
-        """Read photos in photo units."""
-        return self._photos[list(photos)][:, rows].astype(np.float32) / self._full_scale
+def shoot(plan: Plan, scene: ExactTransport, camera: SimulatedCamera) -> HeldPhotos:
+    """Take the photos of a plan."""
+    rig = SimulatedRig(scene, scene.name, SimulatedProjector(), camera, 1.0, 0)
+    patterns = (plan.draw(i) for i in range(len(plan.patterns)))
+    return HeldPhotos(plan, np.stack(list(rig.shoot(patterns))), rig.full_scale)
 
 
 def scores(truth: Mapping[str, Floats], found: Transport, lights: Mapping[str, Floats]) -> str:
@@ -82,7 +75,7 @@ def run(name: str) -> None:
     lights = standard_lights(scene.projector)
     truth = {light: scene @ values for light, values in lights.items()}
 
-    photos = Photos(plan, scene, SimulatedCamera())
+    photos = shoot(plan, scene, SimulatedCamera())
     started = time.perf_counter()
     pixels = correspond_by_stripes(photos).pixels
     measurements = measure(photos)
@@ -98,7 +91,7 @@ def run(name: str) -> None:
     fitted = fit_model(scene, window, found.far_basis)
     print(f"  ceiling     {scores(truth, fitted, lights)}")
 
-    clean = measure(Photos(plan, scene, CLEAN))
+    clean = measure(shoot(plan, scene, CLEAN))
     laid = answers_of(fitted, measurements) + measurements.answers - clean.answers
     noise_alone = estimate(
         replace(measurements, answers=laid), scene.correspondence, window, far, plan.dropped

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from nearfar import ExactTransport, Plan, Size, paper_plan
+from nearfar import ExactTransport, Size, paper_plan
 from nearfar.arrays import Floats, parse_size
 from nearfar.correspondence import Correspondence, correspond_by_phase, correspond_by_stripes
 from nearfar.illumination import patterns
@@ -35,6 +35,7 @@ from nearfar.illumination.frequencies import (
     representatives,
     wrap,
 )
+from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.rigs.camera import SimulatedCamera
@@ -65,18 +66,6 @@ SPARSE = ((Size(7, 7), 13, 4), (Size(5, 5), 13, 4))
 FINE = 0.16
 REFERENCES = 8
 CAMERA = SimulatedCamera()
-
-
-class Photos:
-    """Photos in memory, read as from a capture."""
-
-    def __init__(self, plan: Plan, scene: ExactTransport) -> None:
-        self.plan, self.camera, self.channels = plan, scene.camera, scene.channels
-        self._photos = shoot(scene, (plan.draw(i) for i in range(len(plan.patterns))), 0)
-
-    def read(self, photos: Sequence[int], rows: slice) -> Floats:
-        """Read photos in photo units."""
-        return self._photos[list(photos)][:, rows].astype(np.float32) / CAMERA.full_scale
 
 
 def shoot(
@@ -204,7 +193,8 @@ def run(name: str, camera: Size | None) -> None:
     titles = ("within .5", "within 1", "of strong", "within 1", "precision", "recall")
     print(f"  {'':<16}{'photos':>7}" + "".join(f"{t:>9}" for t in titles) + "       s")
     plan = paper_plan(projector, *WINDOWS[name])
-    photos = Photos(plan, scene)
+    shown = (plan.draw(i) for i in range(len(plan.patterns)))
+    photos = HeldPhotos(plan, shoot(scene, shown, 0), CAMERA.full_scale)
     started = time.perf_counter()
     found = correspond_by_stripes(photos)
     seconds = time.perf_counter() - started

@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 
-from accuracy import Photos
+from accuracy import shoot
 from fewer_photos import CASES
 from nearfar import ErrorBars, ExactTransport, Transport, choose_plan, paper_plan
 from nearfar.arrays import Floats
@@ -65,7 +65,7 @@ def run(name: str) -> list[dict[str, float]]:
     results = []
     for share in SHARES:
         plan, _ = choose_plan(scene.projector, total // share, window=window)
-        measurements = measure(Photos(plan, scene, SimulatedCamera()))
+        measurements = measure(shoot(plan, scene, SimulatedCamera()))
         pixels = correspond_by_phase(measurements).pixels
         found = estimate_jointly(measurements, pixels, plan.window, plan.far)
         results.append(coverage(scene, found))

@@ -13,13 +13,14 @@ import time
 
 import numpy as np
 
-from accuracy import Photos, scores
+from accuracy import scores, shoot
 from nearfar import ExactTransport, Plan, Size, choose_plan, paper_plan
 from nearfar.arrays import Floats
 from nearfar.correspondence import correspond_by_phase, correspond_by_stripes
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
+from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
@@ -38,13 +39,13 @@ CASES = {
 SHARES = (1, 4, 8, 16)
 
 
-def as_the_paper(plan: Plan, photos: Photos) -> Transport:
+def as_the_paper(plan: Plan, photos: HeldPhotos) -> Transport:
     """Estimate with stripes and the paper's estimator."""
     pixels = correspond_by_stripes(photos).pixels
     return estimate(measure(photos), pixels, plan.window, plan.far, plan.dropped)
 
 
-def jointly(plan: Plan, photos: Photos) -> Transport:
+def jointly(plan: Plan, photos: HeldPhotos) -> Transport:
     """Estimate with phase and the joint estimator."""
     measurements = measure(photos)
     pixels = correspond_by_phase(measurements).pixels
@@ -54,7 +55,7 @@ def jointly(plan: Plan, photos: Photos) -> Transport:
 def report(name: str, plan: Plan, scene: ExactTransport, lights: dict[str, Floats]) -> None:
     """Print how one plan fares."""
     truth = {light: scene @ values for light, values in lights.items()}
-    photos = Photos(plan, scene, SimulatedCamera())
+    photos = shoot(plan, scene, SimulatedCamera())
     started = time.perf_counter()
     found = (jointly if plan.correspondence == "phase" else as_the_paper)(plan, photos)
     seconds = time.perf_counter() - started

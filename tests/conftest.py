@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
-from tests.worlds import Photographed, model_transport
+from tests.worlds import model_transport
 
 # A shell that runs the tests in the background has SIGINT ignored, and commands started from here
 # would inherit that: interrupts are what some tests are about.
@@ -42,7 +43,7 @@ def _scene_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 @pytest.fixture
-def shoot() -> Callable[..., Photographed]:
+def shoot() -> Callable[..., HeldPhotos]:
     """Photograph a plan on a world in memory."""
 
     def photograph(
@@ -51,11 +52,11 @@ def shoot() -> Callable[..., Photographed]:
         camera: SimulatedCamera = QUIET,
         projector: SimulatedProjector | None = None,
         seed: int = 0,
-    ) -> Photographed:
+    ) -> HeldPhotos:
         optics = projector or SimulatedProjector()
         rig = SimulatedRig(world, "test", optics, camera, 1.0, seed)
         photos = np.stack(list(rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))))
-        return Photographed(plan, photos, rig.full_scale)
+        return HeldPhotos(plan, photos, rig.full_scale)
 
     return photograph
 

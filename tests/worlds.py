@@ -1,38 +1,15 @@
 """Transports that obey the model exactly, and photos in memory."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Size
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.theory import measure_in_theory
-from nearfar.plan import Plan, paper_plan
+from nearfar.plan import paper_plan
 from nearfar.transport import near
 from nearfar.transport.far import real_basis
 from nearfar.transport.model import Transport
-
-
-@dataclass(frozen=True)
-class Photographed:
-    """Photos in memory, read as from a capture."""
-
-    plan: Plan
-    photos: np.ndarray
-    full_scale: float
-
-    @property
-    def camera(self) -> Size:
-        return Size(*self.photos.shape[1:3])
-
-    @property
-    def channels(self) -> int:
-        return int(self.photos.shape[3])
-
-    def read(self, photos: Sequence[int], rows: slice) -> Floats:
-        return self.photos[list(photos)][:, rows].astype(np.float32) / np.float32(self.full_scale)
 
 
 def model_transport(

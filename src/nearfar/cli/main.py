@@ -17,6 +17,7 @@ import typer
 from nearfar.cli import (
     acquiring,
     checking,
+    comparing,
     demonstration,
     figuring,
     informing,
@@ -49,6 +50,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "info": informing.info,
     "convert": transports.convert,
     "check": checking.check,
+    "compare": comparing.compare,
     "figures": figuring.figures,
     "separate": separating.separate,
 }

@@ -177,7 +177,7 @@ def _rig(table: RigTable, folder: Path, projector: Size, progress: Progress | No
             f"{name} has a projector of {world.projector}, the plan one of {projector}: make the "
             f"plan with --projector {world.projector}."
         )
-    exposure = _exposure(table.exposure, world, name)
+    exposure = choose_exposure(table.exposure, world, name)
     details = world.describe() if isinstance(world, RenderedWorld) else {}
     return SimulatedRig(world, name, table.projector, table.camera, exposure, table.seed, details)
 
@@ -208,7 +208,8 @@ def load_world(
     return world
 
 
-def _exposure(wanted: float | Literal["auto"] | None, world: World, name: str) -> float:
+def choose_exposure(wanted: float | Literal["auto"] | None, world: World, name: str) -> float:
+    """Return photo units per unit of a transport: as wanted, or so that white fits the sensor."""
     if isinstance(wanted, float):
         return wanted
     peak = brightest(world, name)

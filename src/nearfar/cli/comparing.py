@@ -1,0 +1,95 @@
+"""``nearfar compare``."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nearfar.arrays import Size
+from nearfar.cli.options import AsJson, Force, Quiet, size
+from nearfar.cli.progress import progress_bar, say
+
+
+def compare(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE",
+            help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a transport that "
+            "render wrote.",
+        ),
+    ],
+    output: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Folder to make.")] = None,
+    photos: Annotated[
+        str | None,
+        typer.Option(
+            help="Budgets; by default a sixteenth to all of the paper's photos.", metavar="N,N,..."
+        ),
+    ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="joint, paper, CLT, Hadamard or 'brute force'; all by default; may be repeated.",
+            metavar="NAME",
+        ),
+    ] = None,
+    projector: Annotated[
+        Size | None,
+        typer.Option(parser=size, metavar="HxW", help="Pattern grid; the scene's own if left out."),
+    ] = None,
+    camera: Annotated[
+        Size | None,
+        typer.Option(parser=size, metavar="HxW", help="Photo; the scene's own if left out."),
+    ] = None,
+    near: Annotated[
+        int | None, typer.Option(min=1, metavar="W", help="W of the joint estimate's plans.")
+    ] = None,
+    as_json: AsJson = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run methods side by side on a simulated scene, at equal photos and at equal total exposure.
+
+    Example: nearfar compare cornell comparison --projector 32x32
+    """
+    from nearfar.files import check_output
+    from nearfar.report.comparison import INDEX, is_comparison, winners, write_comparison
+    from nearfar.scenes import NAMES
+    from nearfar.scenes.cache import cached_scene
+    from nearfar.transport.exact_store import load_exact
+    from nearfar.workflow.compare import METHODS
+    from nearfar.workflow.compare import compare as run
+
+    if output is not None:
+        check_output(output, force=force, replaceable=is_comparison)
+    budgets = _budgets(photos)
+    with progress_bar("comparing", quiet=quiet or as_json) as report:
+        if scene in NAMES:
+            truth = cached_scene(scene, projector, camera, progress=report)
+        else:
+            truth = load_exact(Path(scene), projector=projector, camera=camera)
+        found = run(truth, budgets, methods=method or METHODS, window=near, progress=report)
+        if output is not None:
+            write_comparison(output, found, force=force)
+    if as_json:
+        print(json.dumps(found.numbers(), allow_nan=False))
+        return
+    say("SNR_b under pictures at equal photos", quiet=quiet)
+    say("\n".join(f"  {line}" for line in winners(found.equal_photos, "photos")), quiet=quiet)
+    say("at equal total exposure, in photos' worth", quiet=quiet)
+    say("\n".join(f"  {line}" for line in winners(found.equal_exposure, "exposure")), quiet=quiet)
+    if output is not None:
+        say(f"open {output / INDEX}", quiet=quiet)
+
+
+def _budgets(text: str | None) -> list[int] | None:
+    if text is None:
+        return None
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(
+            f"{text!r} is no list of budgets: write numbers with commas, such as 50,100,200.",
+            param_hint="--photos",
+        ) from None

@@ -1,0 +1,147 @@
+"""Methods side by side on a small scene."""
+
+import json
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.baselines.brute_force import BruteForce
+from nearfar.baselines.reference import acquire_reference
+from nearfar.errors import InputError
+from nearfar.plan.choose import LEAST_PHOTOS
+from nearfar.report.comparison import HEAD, comparison_page, is_comparison, rows, write_comparison
+from nearfar.report.comparison import winners as best_of
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.compare import (
+    METHODS,
+    Comparison,
+    Trial,
+    compare,
+    default_budgets,
+    paper_plans,
+)
+
+BUDGETS = (40, 130)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return cached_scene("cornell", Size(16, 16))
+
+
+@pytest.fixture(scope="module")
+def found(scene) -> Comparison:
+    return compare(scene, BUDGETS, window=5)
+
+
+def test_every_method_has_its_trials(found):
+    counts = {name: {t.photos for t in found.equal_photos if t.method == name} for name in METHODS}
+    assert counts["joint"] == set(BUDGETS)
+    assert counts["CLT"] == set(BUDGETS)
+    # The paper's method takes no more than it may, and needs more than 40.
+    assert len(counts["paper"]) == 1
+    assert 80 < min(counts["paper"]) <= 130
+    assert counts["Hadamard"] == {264}
+    assert counts["brute force"] == {256 + 16}
+    for trial in found.equal_photos:
+        assert trial.exposure == trial.photos
+    for method in METHODS:
+        mine = [t for t in found.equal_exposure if t.method == method]
+        assert len({t.photos for t in mine}) == 1
+        totals = [t.exposure for t in mine]
+        allowed = 0.35 if method == "paper" else 0.02
+        np.testing.assert_allclose(totals, (40, 130, 272), rtol=allowed)
+
+
+def test_light_is_worth_decibels(found):
+    for method in METHODS:
+        mine = [t for t in found.equal_exposure if t.method == method]
+        order = sorted(mine, key=lambda t: t.exposure)
+        assert order[0].white < order[-1].white
+
+
+def test_a_brighter_transport_is_compared_alike(scene):
+    from dataclasses import replace
+
+    brighter = replace(
+        scene,
+        direct=tuple(50.0 * part for part in scene.direct),
+        near=tuple(50.0 * part for part in scene.near),
+        far=50.0 * scene.far,
+    )
+    one, other = (compare(s, [60], methods=["joint"], window=5) for s in (scene, brighter))
+    assert other.equal_photos[0].pictures == pytest.approx(one.equal_photos[0].pictures, abs=1.5)
+
+
+def test_more_blacks_help_brute_force_under_white(scene):
+    light = np.ones(scene.projector, dtype=np.float32)
+    errors = []
+    for blacks in (1, 16):
+        rig = SimulatedRig(scene, "box", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+        got = acquire_reference(BruteForce(scene.projector, blacks), rig)
+        errors.append(np.linalg.norm(got @ light - scene @ light))
+    assert errors[1] < 0.5 * errors[0]
+
+
+@pytest.mark.parametrize("projector", [Size(16, 16), Size(33, 20), Size(64, 64)])
+def test_the_papers_plans_fit_and_are_the_largest(projector):
+    for photos in (60, 200, 468):
+        plans = paper_plans(projector, photos)
+        for plan in plans:
+            assert len(plan.patterns) <= photos
+            assert plan.offset == "inverse"
+            assert plan.correspondence == "stripes"
+        assert len({(plan.window, plan.far) for plan in plans}) == len(plans)
+    assert paper_plans(projector, sum(projector)) == []
+
+
+def test_the_default_budgets_end_with_the_papers_photos():
+    assert default_budgets(Size(64, 64)) == (29, 58, 117, 234, 468)
+    assert min(default_budgets(Size(16, 16))) >= LEAST_PHOTOS
+
+
+@pytest.mark.parametrize(
+    ("budgets", "methods", "said"),
+    [
+        ([5, 100], METHODS, "too small"),
+        ([], METHODS, "too small"),
+        ([60], ["magic"], "no method magic"),
+        ([60], [], "no method"),
+    ],
+)
+def test_what_cannot_be_compared_is_said(scene, budgets, methods, said):
+    with pytest.raises(InputError, match=said):
+        compare(scene, budgets, methods=methods)
+
+
+def test_the_page_holds_every_trial(found, tmp_path):
+    folder = tmp_path / "comparison"
+    write_comparison(folder, found)
+    assert is_comparison(folder)
+    assert {path.name for path in folder.iterdir()} == {
+        "index.html", "comparison.png", "comparison.pdf", "comparison.json",
+    }  # fmt: skip
+    data = json.loads((folder / "comparison.json").read_text())
+    assert len(data["equal_photos"]) == len(found.equal_photos)
+    text = comparison_page(found)
+    for row in rows(found.equal_photos) + rows(found.equal_exposure):
+        assert len(row) == len(HEAD)
+        assert f"<td>{row[3]}</td>" in text
+    (folder / "mine.txt").write_text("kept")
+    assert not is_comparison(folder)
+
+
+def test_the_winner_is_the_best_that_was_measured():
+    trials = [
+        Trial("paper", 100, 100.0, 40.0, 50.0, 45.0),
+        Trial("joint", 100, 100.0, 39.0, 60.0, 50.0),
+        Trial("CLT", 50, 50.0, 20.0, 30.0, 25.0),
+    ]
+    assert best_of(trials, "photos") == [
+        "50: compressive (CLT) 20.0 dB",
+        "100: the paper's 40.0 dB, then joint, no stripes 39.0 dB",
+    ]

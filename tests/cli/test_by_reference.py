@@ -138,3 +138,34 @@ def test_a_joint_estimate_tells_its_errors(finished: Job, plan: Path, tmp_path: 
         "relight", finished.transport, finished.light, tmp_path / "b.npy", "--error-bars"
     )
     check_sentence(ran, "no error bars", "--method joint")
+
+
+def test_a_capture_until_it_is_good_enough(finished: Job, tmp_path: Path):
+    plan, capture = tmp_path / "chosen.json", tmp_path / "capture.zarr"
+    check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 90, "-o", plan))
+    shoot = ("acquire", plan, capture, "--rig", finished.truth)
+    said = check_done(run_nearfar(*shoot, "--until", "12dB")).out
+    assert "12 dB is reached after" in said
+    assert len(open_capture(capture).plan.patterns) < 96
+    check_done(run_nearfar("reconstruct", capture, tmp_path / "transport.zarr"))
+    ran = run_nearfar(*shoot, "--until", "90", "--force")
+    assert ran.status == 0
+    assert "90 dB is not reached" in ran.err
+    assert "plan" in ran.err
+    assert len(open_capture(capture).plan.patterns) == 96
+
+
+@pytest.mark.parametrize("text", ["much", "-3dB", "0", "nandB", "500dB"])
+def test_what_is_no_snr_to_reach_is_wrong_usage(finished: Job, plan: Path, tmp_path: Path, text):
+    capture = tmp_path / "capture.zarr"
+    ran = run_nearfar("acquire", plan, capture, "--rig", finished.truth, "--until", text)
+    assert ran.status == 2
+    assert "35dB" in ran.err
+    assert not capture.exists()
+
+
+def test_a_plan_that_cannot_be_checked_on_the_way_is_refused(finished: Job, tmp_path: Path):
+    capture = tmp_path / "capture.zarr"
+    shoot = ("acquire", finished.plan, capture, "--rig", finished.truth)
+    check_sentence(run_nearfar(*shoot, "--until", "30dB"), "--photos")
+    assert not capture.exists()

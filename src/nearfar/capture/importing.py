@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nearfar.capture.store import Capture, write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import list_pictures, read_picture
-from nearfar.plan.model import Plan, Stripe
+from nearfar.plan.model import Picture, Plan, Stripe
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,8 @@ def pairing(plan: Plan, index: int, path: Path) -> Pairing:
     pattern = plan.patterns[index]
     if isinstance(pattern, Stripe):
         return Pairing(index, f"{pattern.kind} {pattern.index}", path)
+    if isinstance(pattern, Picture):
+        return Pairing(index, f"picture {pattern.seed} to check by", path)
     fy, fx = pattern.frequency
     inverse = ", inverse" if getattr(pattern, "inverse", False) else ""
     return Pairing(index, f"{pattern.kind} of frequency ({fy}, {fx}){inverse}", path)

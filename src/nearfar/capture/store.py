@@ -174,6 +174,7 @@ def write_capture(
     names: Sequence[str] | None = None,
     force: bool = False,
     progress: Callable[[int], None] | None = None,
+    enough: Callable[[int, NDArray[Any]], bool] | None = None,
 ) -> Capture:
     """Write the photos of a plan; each is on the disk before the next is asked for.
 
@@ -197,6 +198,9 @@ def write_capture(
         Replace a capture that is there.
     progress : callable, optional
         Told the number of photos written after each.
+    enough : callable, optional
+        Told each photo's number and the photo, (Cy, Cx, channels); where it says so, the capture
+        ends there, and its plan with it.
 
     Returns
     -------
@@ -253,6 +257,13 @@ def write_capture(
             written += 1
             if progress is not None:
                 progress(written)
+            if enough is not None and enough(written - 1, photo) and written < count:
+                plan, count = plan.first(written), written
+                array.resize((count, *first.shape))
+                group.attrs["plan"] = json.loads(plan.to_json())
+                times, saturated, means = times[:count], saturated[:count], means[:count]
+                remaining = iter(())
+                break
         _check_count(written, count, next(remaining, None) is not None)
         _check_order(white_black, means, called)
         if all_equal:

@@ -1,5 +1,7 @@
 """``nearfar acquire`` and ``nearfar import``."""
 
+from functools import partial
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +12,16 @@ from nearfar.cli.progress import SATURATED, counted, progress_bar, say, warn
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
+    from nearfar.workflow.running import Standing
+
+# Beyond this no photo of a real camera tells anything.
+MOST_DECIBELS = 120.0
+LIMITS = {
+    "noise": "Most of the error is the photos' noise: expose longer, or plan for more photos",
+    "model": "Most of the error is light that direct, near and far do not hold as planned: plan "
+    "with a larger --near, and look at edges and moving things in the scene",
+    "photos": "Most of the error is at frequencies that were not measured: plan for more photos",
+}
 
 NewCapture = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Capture to make.")]
 
@@ -25,36 +37,86 @@ def acquire(
             metavar="RIG",
         ),
     ],
+    until: Annotated[
+        str | None,
+        typer.Option(
+            help="Stop as soon as pictures that are shot to check by, and never estimated from, "
+            "are relit this well.",
+            metavar="35dB",
+        ),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Shoot a plan on a simulated rig.
 
-    Example: nearfar acquire plan.json capture.zarr --rig cornell
+    Example: nearfar acquire plan.json capture.zarr --rig cornell --until 35dB
     """
     from nearfar.files import check_output
     from nearfar.plan import read_plan
+    from nearfar.plan.checks import with_checks
     from nearfar.rigs.config import notes_of, open_rig
     from nearfar.workflow.acquire import acquire as shoot
+    from nearfar.workflow.running import RunningCheck
 
+    target = _decibels(until) if until is not None else None
     made = read_plan(plan_file)
     made.require_real("shoot")
+    if target is not None:
+        made = with_checks(made)
     keep_input(output, plan_file, Path(rig))
     check_output(output, force=force)
     with progress_bar("opening the rig", quiet=quiet) as report:
         opened = open_rig(rig, made.projector, progress=report)
         for note in notes_of(opened):
             warn(note)
+        check = None
+        if target is not None:
+            check = RunningCheck(made, target, opened.full_scale, partial(_tell, quiet=quiet))
         taken = shoot(
             made,
             output,
             opened,
             force=force,
             progress=counted(report, "photos", len(made.patterns)),
+            enough=check,
         )
     if opened.exposure != 1.0:
         say(f"transport of {opened.name} exposed by {opened.exposure:.6g}", quiet=quiet)
+    if target is not None and check is not None and check.standing is not None:
+        _say_what_limits(check.standing, target, quiet=quiet)
     _conclude(taken, output, quiet=quiet)
+
+
+def _decibels(text: str) -> float:
+    """Read 35dB or 35."""
+    try:
+        value = float(text.strip().lower().removesuffix("db"))
+    except ValueError:
+        value = nan
+    if not 0 < value < MOST_DECIBELS:
+        raise typer.BadParameter(
+            f"{text!r} is no SNR to reach: write it as 35dB.", param_hint="--until"
+        )
+    return value
+
+
+def _tell(standing: "Standing", *, quiet: bool) -> None:
+    if standing.snr > 0:
+        text = f"{standing.snr:.1f} dB under pictures to check by"
+    else:
+        text = "too few to relight by"
+    say(f"after {standing.photos} photos: {text}", quiet=quiet)
+
+
+def _say_what_limits(standing: "Standing", target: float, *, quiet: bool) -> None:
+    if standing.snr >= target:
+        say(f"{target:g} dB is reached after {standing.photos} photos", quiet=quiet)
+        return
+    warn(
+        f"{target:g} dB is not reached: all {standing.photos} photos relight pictures at "
+        f"{standing.snr:.1f} dB. {LIMITS[standing.limit]}."
+    )
 
 
 def import_photos(

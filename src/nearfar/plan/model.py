@@ -26,13 +26,14 @@ from nearfar.illumination.frequencies import (
     frequency_from_text,
     frequency_to_text,
 )
+from nearfar.illumination.pictures import natural_picture
 
-# Stands in the model as a literal, too. Version 2 knows phase and repeats; all of version 1 is
-# version 2 as well.
+# Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by;
+# all of version 1 is version 2 as well.
 FORMAT_VERSION = 2
 READABLE = (1, 2)
 
-Purpose = Literal["direct", "near", "far", "reference", "correspondence"]
+Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check"]
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
 
 
@@ -89,7 +90,19 @@ class Stripe(_Frozen):
         return patterns.quantise(shape(self.index, size))
 
 
-Pattern = Annotated[Sinusoid | Exponential | Stripe, Field(discriminator="kind")]
+class Picture(_Frozen):
+    """A natural picture that no estimate sees, to check relighting by."""
+
+    kind: Literal["picture"] = "picture"
+    seed: int = Field(ge=0)
+    purpose: Literal["check"] = "check"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        return patterns.quantise(natural_picture(size, self.seed).astype(np.float64))
+
+
+Pattern = Annotated[Sinusoid | Exponential | Stripe | Picture, Field(discriminator="kind")]
 
 
 class Plan(_Frozen):
@@ -110,7 +123,7 @@ class Plan(_Frozen):
         simulation).
     correspondence : {"stripes", "phase", "none"}
         Photos of stripes, the phase of the transport's own photos, or none at all.
-    patterns : tuple of Sinusoid, Exponential or Stripe
+    patterns : tuple of Sinusoid, Exponential, Stripe or Picture
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
@@ -134,9 +147,9 @@ class Plan(_Frozen):
 
     @cached_property
     def counts(self) -> dict[Purpose, int]:
-        """Photos for each purpose."""
-        counted = Counter(pattern.purpose for pattern in self.patterns)
-        return {purpose: counted[purpose] for purpose in PURPOSES}
+        """Photos for each purpose; of checks where there are any."""
+        counted: Counter[Purpose] = Counter(pattern.purpose for pattern in self.patterns)
+        return {**dict.fromkeys(PURPOSES, 0), **counted}
 
     @property
     def transport_photos(self) -> int:
@@ -157,6 +170,10 @@ class Plan(_Frozen):
             "brute_force": self.projector.pixels,
             "savings": self.savings,
         }
+
+    def first(self, count: int) -> "Plan":
+        """Return the plan of the first photos alone."""
+        return self.model_copy(update={"patterns": self.patterns[:count]})
 
     def require_real(self, what: str) -> None:
         """Refuse a plan of complex patterns for anything but simulation by theory.

@@ -54,7 +54,7 @@ def with_references(
     places = max(counts)
     at_white, at_black = (set(_spread(count, places - 1)) for count in counts)
     # How many patterns come before each place.
-    before = _spread(places, len(patterns))
+    before = [_between_pairs(patterns, upto) for upto in _spread(places, len(patterns))]
     found: list[Pattern] = []
     done = 0
     for place, upto in enumerate(before):
@@ -73,6 +73,20 @@ def with_references(
 def _spread(count: int, last: int) -> list[int]:
     """Spread `count` whole numbers evenly from 0 to `last`."""
     return [(2 * i * last + count - 1) // (2 * (count - 1)) for i in range(count)]
+
+
+def _between_pairs(patterns: Sequence[Pattern], upto: int) -> int:
+    """Move a place behind the sine whose cosine it would part it from.
+
+    So whatever has been shown when white and black come by is whole.
+    """
+    if not 0 < upto < len(patterns):
+        return upto
+    one, other = patterns[upto - 1], patterns[upto]
+    if not (isinstance(one, Sinusoid) and isinstance(other, Sinusoid)):
+        return upto
+    parted = (one.kind, other.kind) == ("cosine", "sine") and one.frequency == other.frequency
+    return upto + parted
 
 
 def _uniform(purpose: Purpose, *, black: bool) -> Sinusoid:

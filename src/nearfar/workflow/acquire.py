@@ -2,6 +2,9 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, write_capture
@@ -17,6 +20,7 @@ def acquire(
     *,
     force: bool = False,
     progress: Callable[[int], None] | None = None,
+    enough: Callable[[int, NDArray[Any]], bool] | None = None,
 ) -> Capture:
     """Shoot a plan.
 
@@ -30,6 +34,8 @@ def acquire(
         Replace a capture that is there.
     progress : callable, optional
         Told the number of photos taken after each.
+    enough : callable, optional
+        Told each photo's number and the photo; where it says so, no more are taken.
 
     Returns
     -------
@@ -60,4 +66,5 @@ def acquire(
         rig=rig.describe(),
         force=force,
         progress=progress,
+        enough=enough,
     )

@@ -1,0 +1,181 @@
+"""How well a capture relights while it goes on, and what limits it.
+
+A few pictures are shot that no estimate sees. Whenever white and black have come by again, the
+transport is estimated from the photos so far, for some rows of the camera, and relit under those
+pictures. Each was photographed twice: the errors against both photos have the estimate's own error
+in common and no noise, so their product measures it without a model of the noise.
+
+Index convention: photos are (n, rows, Cx, channels), the chosen rows of the camera only.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Integers, blocks
+from nearfar.correspondence import correspond_by_phase
+from nearfar.errors import InputError
+from nearfar.estimate.joint import ErrorBars, estimate_jointly
+from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.measure import measure
+from nearfar.photometry.measurements import Measurements
+from nearfar.photometry.steady import steady
+from nearfar.plan import Plan
+from nearfar.plan.checks import check_photos, ends
+from nearfar.transport.model import Transport
+
+# Rows of the camera are looked at in bands of so many, so that neighbours can help each other.
+BAND = 8
+# Camera pixels that are looked at.
+PIXELS = 6144
+TURNS = 2
+# The first look needs so many photos.
+FEWEST = 20
+# No twice as many photos gain more than this, dB: how long to wait before looking again.
+FASTEST = 8.0
+# An error beyond what was expected by this factor, in power, is the model's.
+BEYOND = 2.0
+# Without noise in the photos, what is left of the expected error is what was never measured.
+QUIET = 1e-3
+HIGHEST = 300.0
+
+Limit = Literal["noise", "model", "photos"]
+
+
+class Standing(NamedTuple):
+    """What a capture would be worth if it ended now.
+
+    Attributes
+    ----------
+    photos : int
+    snr : float
+        SNR_b in dB, the mean over the pictures that are checked by.
+    limit : {"noise", "model", "photos"}
+        What most of the error comes from: the noise of the photos, light that the model does not
+        hold, or frequencies that were not measured yet.
+    """
+
+    photos: int
+    snr: float
+    limit: Limit
+
+
+class RunningCheck:
+    """Follows a capture photo by photo.
+
+    Parameters
+    ----------
+    plan : Plan
+        With pictures to check by; see `nearfar.plan.checks.with_checks`.
+    target : float
+        SNR_b in dB at which it is enough.
+    full_scale : float
+        Value of full scale of the photos.
+    told : callable, optional
+        Called with each `Standing`.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        target: float,
+        full_scale: float,
+        told: Callable[[Standing], None] | None = None,
+    ) -> None:
+        self.standing: Standing | None = None
+        self._plan, self._target, self._full_scale = plan, target, full_scale
+        self._told = told or (lambda _standing: None)
+        self._photos: list[NDArray[Any]] = []
+        self._rows: Integers = np.zeros(0, dtype=np.int64)
+        self._ends = set(ends(plan))
+        self._next = FEWEST + sum(map(len, check_photos(plan).values()))
+
+    def __call__(self, number: int, photo: NDArray[Any]) -> bool:
+        """Take in a photo, (Cy, Cx, channels); tell whether the capture is good enough now."""
+        if not self._photos:
+            self._rows = some_rows(*photo.shape[:2])
+        self._photos.append(photo[self._rows].copy())
+        taken = number + 1
+        last = taken == len(self._plan.patterns)
+        if taken not in self._ends or (taken < self._next and not last):
+            return False
+        self.standing = self._look(taken)
+        self._told(self.standing)
+        missing = self._target - self.standing.snr
+        self._next = int(taken * 2 ** (max(missing, 0.0) / FASTEST))
+        return missing <= 0
+
+    def _look(self, taken: int) -> Standing:
+        held = HeldPhotos(self._plan.first(taken), np.stack(self._photos), self._full_scale)
+        photos = steady(held)
+        measurements = measure(photos)
+        try:
+            pixels = correspond_by_phase(measurements).pixels
+        except InputError:
+            # Too few frequencies to settle q yet.
+            return Standing(taken, -HIGHEST, "photos")
+        plan = self._plan
+        found = estimate_jointly(measurements, pixels, plan.window, plan.far, turns=TURNS)
+        every = slice(0, held.camera.height)
+        values, errors, expected, unmeasured = [], [], 0.0, 0.0
+        bars, quiet = ErrorBars(found), ErrorBars(_without_noise(found))
+        for numbers in check_photos(held.plan).values():
+            light = self._plan.draw(numbers[0]) / np.float32(255)
+            relit = (found @ light).reshape(*held.camera, -1)
+            shown = photos.read(numbers, every) - _black(measurements)
+            signal, error = (_in_common(part) for part in (shown, shown - relit))
+            values.append(_decibels(signal, error))
+            errors.append(error)
+            expected += float(np.mean(bars.picture(light).astype(np.float64) ** 2))
+            unmeasured += float(np.mean(quiet.picture(light).astype(np.float64) ** 2))
+        limit: Limit = "photos" if unmeasured > expected / 2 else "noise"
+        if sum(errors) > BEYOND * expected:
+            limit = "model"
+        return Standing(taken, float(np.mean(values)), limit)
+
+
+def some_rows(height: int, width: int) -> Integers:
+    """Choose rows of a camera in bands, spread evenly, about `PIXELS` camera pixels in all."""
+    wanted = min(height, max(BAND, PIXELS // width))
+    bands = max(1, wanted // BAND)
+    if wanted == height:
+        return np.arange(height)
+    starts = [block.start for block in blocks(height, max(1, height // bands))][:bands]
+    rows = [np.arange(start, min(start + BAND, height)) for start in starts]
+    return np.concatenate(rows)
+
+
+def _black(measurements: Measurements) -> Floats:
+    return measurements.black.reshape(*measurements.camera, measurements.channels)
+
+
+def _in_common(photos: Floats) -> float:
+    """Mean product of different photos of one picture, (n, rows, Cx, channels), noise left out."""
+    flat = photos.reshape(len(photos), -1).astype(np.float64)
+    count = len(flat)
+    together = np.sum(flat.sum(axis=0) ** 2) - np.sum(flat**2)
+    return float(together / (count * (count - 1) * flat.shape[1]))
+
+
+def _decibels(signal: float, error: float) -> float:
+    if signal <= 0:
+        return -HIGHEST
+    return float(np.clip(10 * np.log10(signal / max(error, 1e-300)), -HIGHEST, HIGHEST))
+
+
+def _without_noise(found: Transport) -> Transport:
+    """Return what the estimate would believe if its photos had no noise."""
+    belief = found.belief
+    assert belief is not None
+    return replace(
+        found,
+        noise=QUIET * found.noise,
+        belief=replace(
+            belief,
+            offset_noise=QUIET * belief.offset_noise,
+            light_noise=QUIET * belief.light_noise,
+        ),
+    )

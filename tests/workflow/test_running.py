@@ -1,0 +1,148 @@
+"""Captures that end when they are good enough, and what is said to limit them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.capture import open_capture
+from nearfar.errors import PlanError
+from nearfar.plan import choose_plan, paper_plan, parse_plan
+from nearfar.plan.checks import SEEDS, TIMES, check_photos, ends, is_reference, with_checks
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.evaluate import snr
+from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.running import RunningCheck, some_rows
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return cached_scene("cornell", Size(32, 32))
+
+
+def _rig(scene, **camera):
+    return SimulatedRig(scene, "cornell", SimulatedProjector(), SimulatedCamera(**camera), 1.0, 0)
+
+
+def _run(scene, path, photos, target, **camera):
+    plan = with_checks(choose_plan(scene.projector, photos)[0])
+    rig = _rig(scene, **camera)
+    told = []
+    check = RunningCheck(plan, target, rig.full_scale, told.append)
+    capture = acquire(plan, path, rig, enough=check)
+    return plan, capture, told
+
+
+def test_a_capture_ends_when_it_is_good_enough_and_is_whole(scene, tmp_path):
+    plan, capture, told = _run(scene, tmp_path / "c.zarr", 150, 39.0)
+    assert len(capture.plan.patterns) < len(plan.patterns)
+    assert told[-1].snr >= 39.0
+    assert all(standing.snr < 39.0 for standing in told[:-1])
+    assert told[-1].photos == len(capture.plan.patterns) == capture.photos.shape[0]
+    # On the disk it is a capture like any other.
+    again = open_capture(tmp_path / "c.zarr")
+    assert again.plan == plan.first(told[-1].photos)
+    transport, _ = reconstruct(again)
+    # What was said is what the estimate does under pictures that it never saw.
+    values = []
+    for numbers in check_photos(plan).values():
+        light = plan.draw(numbers[0]) / np.float32(255)
+        values.append(snr(scene @ light, transport @ light))
+    assert np.mean(values) == pytest.approx(told[-1].snr, abs=1.0)
+
+
+def test_the_check_is_not_fooled_by_noise(scene, tmp_path):
+    # The photos of the checks are far noisier than the SNR that is told.
+    _, capture, told = _run(scene, tmp_path / "c.zarr", 150, 90.0, full_well=1000.0)
+    transport, _ = reconstruct(capture)
+    values = []
+    for numbers in check_photos(capture.plan).values():
+        light = capture.plan.draw(numbers[0]) / np.float32(255)
+        values.append(snr(scene @ light, transport @ light))
+    assert np.mean(values) == pytest.approx(told[-1].snr, abs=1.0)
+    assert told[-1].photos == len(capture.plan.patterns)
+    assert told[-1].limit == "noise"
+
+
+def test_too_few_photos_are_said_to_limit(scene, tmp_path):
+    _, _, told = _run(scene, tmp_path / "c.zarr", 30, 90.0, full_well=3e7)
+    assert told[-1].limit == "photos"
+
+
+def test_a_scene_that_the_model_does_not_hold_is_said_to_limit(tmp_path):
+    # Rows of pure chance: no direct light, window or band holds them.
+    projector = Size(16, 16)
+    generator = np.random.default_rng(0)
+    base = cached_scene("cornell", projector)
+    rough = replace(base, far=base.far + 2e-3 * generator.random(base.far.shape, dtype=np.float32))
+    _, _, told = _run(rough, tmp_path / "c.zarr", 120, 90.0, full_well=3e6)
+    assert told[-1].limit in {"model", "photos"}
+    assert told[-1].snr < 45
+
+
+def test_looks_grow_rarer_as_the_target_is_far(scene, tmp_path):
+    _, _, far = _run(scene, tmp_path / "far.zarr", 100, 90.0)
+    _, _, close = _run(scene, tmp_path / "close.zarr", 100, 43.5)
+    assert len(far) < len(close)
+
+
+def test_checks_stand_behind_the_first_references_and_twice():
+    plan = choose_plan(Size(16, 20), 60)[0]
+    checked = with_checks(plan)
+    assert len(checked.patterns) == len(plan.patterns) + TIMES * len(SEEDS)
+    assert checked.counts["check"] == TIMES * len(SEEDS)
+    assert "check" not in plan.counts
+    assert all(len(numbers) == TIMES for numbers in check_photos(checked).values())
+    first = min(n for numbers in check_photos(checked).values() for n in numbers)
+    assert all(is_reference(pattern) for pattern in checked.patterns[:first])
+    assert tuple(p for p in checked.patterns if p.purpose != "check") == plan.patterns
+    assert parse_plan(checked.to_json()) == checked
+    shown = checked.draw(first)
+    assert shown.dtype == np.uint8
+    assert shown.std() > 10
+
+
+@pytest.mark.parametrize("photos", [40, 61, 100, 150])
+@pytest.mark.parametrize("side", [16, 24])
+def test_a_plan_may_end_whenever_white_and_black_come_by(side, photos):
+    plan = with_checks(choose_plan(Size(side, side), photos)[0])
+    found = ends(plan)
+    places = [
+        i + 1
+        for i, pattern in enumerate(plan.patterns)
+        if is_reference(pattern)
+        and (i + 1 == len(plan.patterns) or not is_reference(plan.patterns[i + 1]))
+    ]
+    assert found == places[1:]
+    for end in found:
+        kinds = {}
+        for pattern in plan.first(end).patterns:
+            if pattern.purpose not in {"check", "reference"}:
+                kinds.setdefault(pattern.frequency, set()).add(pattern.kind)
+        assert all(len(kind) == 1 + (not k.is_own_negative) for k, kind in kinds.items())
+
+
+def test_a_plan_of_pairs_or_stripes_is_refused():
+    for offset, by in (("inverse", "none"), ("reference", "stripes")):
+        plan = paper_plan(Size(16, 20), 5, Size(3, 3), offset=offset, correspondence=by)
+        with pytest.raises(PlanError, match="--photos"):
+            with_checks(plan)
+
+
+@pytest.mark.parametrize(
+    ("height", "width"), [(4, 9), (64, 64), (1000, 2000), (3000, 12), (7, 9000)]
+)
+def test_some_rows_are_few_and_spread(height, width):
+    rows = some_rows(height, width)
+    assert len(np.unique(rows)) == len(rows)
+    assert rows.min() >= 0
+    assert rows.max() < height
+    assert len(rows) * width <= max(6144, 8 * width)
+    assert len(rows) >= min(height, 8)
+    if len(rows) < height and len(rows) > 8:
+        assert rows.max() - rows.min() > 0.6 * height

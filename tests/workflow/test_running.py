@@ -7,7 +7,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
-from nearfar.errors import PlanError
+from nearfar.errors import InputError, PlanError
 from nearfar.plan import choose_plan, paper_plan, parse_plan
 from nearfar.plan.checks import SEEDS, TIMES, check_photos, ends, is_reference, with_checks
 from nearfar.rigs.camera import SimulatedCamera
@@ -81,8 +81,28 @@ def test_a_scene_that_the_model_does_not_hold_is_said_to_limit(tmp_path):
     base = cached_scene("cornell", projector)
     rough = replace(base, far=base.far + 2e-3 * generator.random(base.far.shape, dtype=np.float32))
     _, _, told = _run(rough, tmp_path / "c.zarr", 120, 90.0, full_well=3e6)
-    assert told[-1].limit in {"model", "photos"}
-    assert told[-1].snr < 45
+    assert told[-1].limit == "model"
+    assert told[-1].snr < 35
+
+
+def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_not(scene, tmp_path):
+    # White is at full scale from the start.
+    bright = replace(scene, far=scene.far + 1.0)
+    with pytest.raises(InputError, match="full scale"):
+        _run(bright, tmp_path / "c.zarr", 150, 90.0)
+    assert not (tmp_path / "c.zarr").exists()
+    # The lamp fails after the first look: every photo is asked for all the same.
+    plan = with_checks(choose_plan(scene.projector, 60)[0])
+    rig = _rig(scene)
+    told = []
+    check = RunningCheck(plan, 90.0, rig.full_scale, told.append)
+    shown = (plan.draw(i) for i in range(len(plan.patterns)))
+    for number, photo in enumerate(rig.shoot(shown)):
+        failed = told and number < len(plan.patterns)
+        assert not check(number, np.zeros_like(photo) if failed else photo)
+    assert told[0].fault == ""
+    assert told[-1].fault.endswith(".")
+    assert told[-1].photos == len(plan.patterns)
 
 
 def test_looks_grow_rarer_as_the_target_is_far(scene, tmp_path):

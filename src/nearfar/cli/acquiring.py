@@ -102,7 +102,9 @@ def _decibels(text: str) -> float:
 
 
 def _tell(standing: "Standing", *, quiet: bool) -> None:
-    if standing.snr > 0:
+    if standing.fault:
+        text = standing.fault
+    elif standing.snr > 0:
         text = f"{standing.snr:.1f} dB under pictures to check by"
     else:
         text = "too few to relight by"
@@ -112,6 +114,9 @@ def _tell(standing: "Standing", *, quiet: bool) -> None:
 def _say_what_limits(standing: "Standing", target: float, *, quiet: bool) -> None:
     if standing.snr >= target:
         say(f"{target:g} dB is reached after {standing.photos} photos", quiet=quiet)
+        return
+    if standing.fault:
+        warn(f"{target:g} dB could not be checked to the end: {standing.fault}")
         return
     warn(
         f"{target:g} dB is not reached: all {standing.photos} photos relight pictures at "

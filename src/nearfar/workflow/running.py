@@ -36,6 +36,8 @@ TURNS = 2
 FEWEST = 20
 # No twice as many photos gain more than this, dB: how long to wait before looking again.
 FASTEST = 8.0
+# After a look that told nothing the next comes at twice the photos.
+FARTHEST = 8.0
 # An error beyond what was expected by this factor, in power, is the model's.
 BEYOND = 2.0
 # Without noise in the photos, what is left of the expected error is what was never measured.
@@ -56,11 +58,14 @@ class Standing(NamedTuple):
     limit : {"noise", "model", "photos"}
         What most of the error comes from: the noise of the photos, light that the model does not
         hold, or frequencies that were not measured yet.
+    fault : str
+        Why nothing could be told of the photos so far, a sentence; else nothing.
     """
 
     photos: int
     snr: float
     limit: Limit
+    fault: str = ""
 
 
 class RunningCheck:
@@ -94,7 +99,14 @@ class RunningCheck:
         self._next = FEWEST + sum(map(len, check_photos(plan).values()))
 
     def __call__(self, number: int, photo: NDArray[Any]) -> bool:
-        """Take in a photo, (Cy, Cx, channels); tell whether the capture is good enough now."""
+        """Take in a photo, (Cy, Cx, channels); tell whether the capture is good enough now.
+
+        Raises
+        ------
+        InputError
+            If the photos of the first look cannot be measured. Later faults are told in the
+            standing: no photo is given up for them.
+        """
         if not self._photos:
             self._rows = some_rows(*photo.shape[:2])
         self._photos.append(photo[self._rows].copy())
@@ -102,10 +114,15 @@ class RunningCheck:
         last = taken == len(self._plan.patterns)
         if taken not in self._ends or (taken < self._next and not last):
             return False
-        self.standing = self._look(taken)
+        try:
+            self.standing = self._look(taken)
+        except InputError as error:
+            if self.standing is None:
+                raise
+            self.standing = Standing(taken, -HIGHEST, "photos", str(error))
         self._told(self.standing)
         missing = self._target - self.standing.snr
-        self._next = int(taken * 2 ** (max(missing, 0.0) / FASTEST))
+        self._next = int(taken * 2 ** (np.clip(missing, 0.0, FARTHEST) / FASTEST))
         return missing <= 0
 
     def _look(self, taken: int) -> Standing:

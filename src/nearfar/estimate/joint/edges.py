@@ -3,14 +3,15 @@
 The model has direct light around one q. What a camera pixel sees of another surface is a second
 spike, most often within the window. It is looked for where the answers, less what is explained,
 agree with light at a single window entry: adding it must raise the evidence by far more than the
-choice among all entries could by chance.
+choice among all entries could by chance. Where a neighbour's own q lies on another surface, light
+around that place is likely, and less evidence will do.
 
 Index convention: arrays are (n, channels, ...); w runs over window entries, r over answers.
 """
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior
@@ -24,6 +25,11 @@ MOST = 4
 # fits well look like spikes too: at 12 false ones cost the coaxial box 0.2 dB under random light,
 # at 80 true ones are missed.
 SURE = 30.0
+# The same where neighbours see another surface there.
+LIKELY = 6.0
+# Neighbours' q at least so far from a camera pixel's own, in projector pixels, lies on another
+# surface.
+APART = 1.5
 # A spike of less than this share of white is not worth its place.
 FAINTEST = 0.01
 
@@ -37,8 +43,8 @@ def likeliest_spike(
     -------
     entry : ndarray of int, shape (n,)
     gain : ndarray, shape (n,)
-        What it adds to the log evidence, less the logarithm of the number of entries; -inf
-        where the spike would be faint or dark.
+        What it adds to the log evidence, less the logarithm of the number of entries, and as
+        much more as likely places need less; -inf where the spike would be faint or dark.
     """
     s = (strength[:, None] * pixels.white).astype(np.float32)[..., None]
     explained = found.near @ band.on_window.T + found.far
@@ -54,9 +60,41 @@ def likeliest_spike(
     height = gradient.sum(axis=1) / curvature.sum(axis=1)
     allowed &= height > FAINTEST * pixels.white.mean(axis=1, keepdims=True)
     gain = 0.5 * np.sum(gradient**2 / curvature, axis=1) - np.log(len(places))
-    gain = np.where(allowed, gain, -np.inf)
+    gain = np.where(allowed, gain + (SURE - LIKELY) * pixels.likely, -np.inf)
     entry = np.argmax(gain, axis=1)
     return entry, gain[np.arange(len(gain)), entry]
+
+
+def seen_beside(correspondence: Floats, window: int) -> Booleans:
+    """Tell where in each window neighbours see another surface's direct light.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (Cy, Cx, 2)
+    window : int
+        W.
+
+    Returns
+    -------
+    ndarray of bool, shape (C, W^2)
+        Entries within one of the q of a neighbour, where that is on another surface.
+    """
+    height, width = correspondence.shape[:2]
+    reach = window // 2
+    padded = np.pad(correspondence, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
+    # A border of one for the entries around, cut off in the end.
+    found = np.zeros((height, width, window + 2, window + 2), dtype=bool)
+    for dy in range(3):
+        for dx in range(3):
+            off = padded[dy : dy + height, dx : dx + width] - correspondence
+            apart = np.abs(off).max(axis=-1)
+            y, x = np.nonzero((apart > APART) & (apart < reach + 1))
+            place = np.rint(off[y, x]).astype(np.int64) + reach + 1
+            for down in (-1, 0, 1):
+                for across in (-1, 0, 1):
+                    at = np.clip(place + np.array([down, across]), 0, window + 1)
+                    found[y, x, at[:, 0], at[:, 1]] = True
+    return found[:, :, 1:-1, 1:-1].reshape(height * width, window**2)
 
 
 def with_spike(pixels: Pixels, entry: Integers, band: Band) -> Pixels:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, Size, blocks
 from nearfar.errors import InputError
-from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, with_spike
+from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, seen_beside, with_spike
 from nearfar.estimate.joint.evidence import best_kind
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.pixels import Pixels, dc_place, gather, offset_noise, scale_of
@@ -60,6 +60,7 @@ class _Problem(NamedTuple):
     centres: NDArray[np.int64]
     band: Band
     window: int
+    likely: Booleans
     lit_priors: tuple[Prior, ...]
     unlit_priors: tuple[Prior, ...]
 
@@ -123,6 +124,7 @@ def estimate_jointly(
         near.centre(correspondence, measurements.projector),
         band,
         window,
+        seen_beside(correspondence, window),
         built(LIT),
         built(UNLIT) if not lit.all() else (),
     )
@@ -153,7 +155,14 @@ def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], N
     )
     for block in blocks(number, BLOCK):
         pixels = gather(
-            measurements, problem.where, problem.lit, problem.centres, block, band, problem.window
+            measurements,
+            problem.where,
+            problem.lit,
+            problem.centres,
+            block,
+            band,
+            problem.window,
+            problem.likely,
         )
         if expected is not None:
             far = band.recentre(expected.far[block], pixels.centres)

@@ -44,6 +44,8 @@ class Pixels(NamedTuple):
         Standard deviation of the references' error.
     white : ndarray, shape (n, channels)
         Light under white, the scale of all transport.
+    likely : ndarray of bool, shape (n, W^2)
+        Window entries where neighbours see another surface's direct light.
     """
 
     centres: NDArray[np.int64]
@@ -56,6 +58,7 @@ class Pixels(NamedTuple):
     noise: Floats
     offset_noise: Floats
     white: Floats
+    likely: Booleans
 
     @property
     def extra(self) -> int:
@@ -93,6 +96,7 @@ def gather(
     block: slice,
     band: Band,
     window: int,
+    likely: Booleans | None = None,
 ) -> Pixels:
     """Gather a block of camera pixels.
 
@@ -106,6 +110,8 @@ def gather(
         The measured frequencies without DC.
     window : int
         W.
+    likely : ndarray of bool, shape (C, W^2), optional
+        Where neighbours see another surface; nowhere by default.
     """
     where = Footprint(where.pixels[block], where.weights[block])
     centres, lit = centres[block], lit[block]
@@ -125,4 +131,5 @@ def gather(
         noise=np.maximum(measurements.noise[block], EXACT * white),
         offset_noise=offset_noise(measurements)[block],
         white=white,
+        likely=np.zeros((len(lit), window**2), dtype=bool) if likely is None else likely[block],
     )

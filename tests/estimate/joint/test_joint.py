@@ -8,6 +8,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.edges import seen_beside
 from nearfar.estimate.joint.evidence import best_kind, evidence
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import precision
@@ -20,7 +21,6 @@ from nearfar.illumination.patterns import exponential
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose import choose_frequencies
 from nearfar.transport import near
-from nearfar.transport.direct import footprint
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, STRENGTHS, Kind, far_power, near_covariance
 from tests.worlds import model_transport
@@ -78,10 +78,8 @@ def _draw(count, centres, strength, seed=0):
 
 
 def _pixels(measurements, centres, band):
-    q = centres.astype(np.float32)[None]
-    where = footprint(q, PROJECTOR)
     lit = np.ones(len(centres), dtype=bool)
-    return gather(measurements, where, lit, centres, slice(None), band, WINDOW)
+    return gather(measurements, centres.astype(float), lit, centres, slice(None), band, WINDOW)
 
 
 def _dense(measurements, pixels, band, strength, kind=KIND):
@@ -94,7 +92,7 @@ def _dense(measurements, pixels, band, strength, kind=KIND):
         cut = band.on_window * pixels.inside[c]
         s = (strength * white) ** 2
         shared = np.stack([pixels.of_offset[c], pixels.of_direct[c]], axis=1).astype(np.float64)
-        known = precision(pixels)[c, 0]
+        known = precision(pixels)[c, 0, :2]
         covariance = (
             s * (cut @ window @ cut.T + np.diag(power))
             + shared @ np.diag(1 / known) @ shared.T
@@ -239,6 +237,48 @@ def test_direct_light_of_a_second_surface_is_found():
     entry = found.near[0, :, 0, 0, 4]
     np.testing.assert_allclose(entry[second], 0.2, atol=0.01)
     assert np.abs(entry[~second]).max() < 0.01
+
+
+def test_less_evidence_will_do_where_a_neighbour_sees_the_second_surface():
+    # A row of camera pixels, the right ones on a surface that lies 4 pixels away.
+    q = np.zeros((3, 10, 2))
+    q[..., 0] = 8.0
+    q[..., 1] = np.where(np.arange(10) < 5, 6.0, 10.0)
+    likely = seen_beside(q, 9).reshape(3, 10, 9, 9)
+    assert not likely[:, :4].any()
+    assert not likely[:, 6:].any()
+    around = np.zeros((9, 9), dtype=bool)
+    around[3:6, 7:9] = True
+    np.testing.assert_array_equal(likely[1, 4], around)
+    np.testing.assert_array_equal(likely[1, 5], around[:, ::-1])
+    # Too far for the window, or of camera pixels without direct light: nothing.
+    q[:, 5:, 1] = 15.0
+    assert not seen_beside(q, 9).any()
+    q[:, 5:] = np.nan
+    assert not seen_beside(q, 9).any()
+
+
+def test_steps_of_a_camera_that_is_as_fine_are_no_other_surface():
+    y, x = np.meshgrid(np.arange(6.0), np.arange(7.0), indexing="ij")
+    assert not seen_beside(np.stack([y, x], axis=-1), 5).any()
+
+
+def test_a_q_that_is_a_little_off_is_put_right():
+    generator = np.random.default_rng(4)
+    camera = Size(12, 14)
+    y, x = np.meshgrid(np.arange(2.0, 14.0), np.arange(3.0, 17.0), indexing="ij")
+    true = np.stack([y, x], axis=-1) + generator.uniform(0.2, 0.45, (*camera, 2))
+    world = model_transport(PROJECTOR, camera, window=WINDOW, far=Size(3, 3), entries=0)
+    world = replace(world, correspondence=true.astype(np.float32), near=np.zeros_like(world.near))
+    off = true + 0.03 * generator.normal(size=true.shape)
+    measurements = _measure(
+        world.dense().astype(np.float64), _frequencies(), noise=1e-3, camera=camera
+    )
+    found = estimate_jointly(measurements, off, WINDOW, FAR)
+    before, after = (np.abs(q - true).mean() for q in (off, found.correspondence))
+    assert after < 0.35 * before
+    # It stays where it was rounded to.
+    np.testing.assert_array_equal(np.rint(found.correspondence), np.rint(off))
 
 
 def test_the_offset_of_the_references_is_taken_out():

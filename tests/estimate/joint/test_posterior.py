@@ -214,6 +214,42 @@ def test_colour_lights_go_channel_by_channel():
     np.testing.assert_allclose(one.picture(lights[..., 0])[..., 1], found[..., 0] * 2, rtol=1e-5)
 
 
+def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
+    part = 0.4
+    transport = _transport(np.array([[6.0, 8.0 + part]]))
+    belief = transport.belief
+    basis = real_basis(belief.frequencies, PROJECTOR)
+    at = 6 * PROJECTOR.width + 8
+    one, other = basis.patterns[:, at], basis.patterns[:, at + 1]
+    band = band_of(basis, near.offsets(WINDOW) + np.array([6, 8]))
+    own = np.stack([np.ones(basis.count), (1 - part) * one + part * other, other - one], axis=1)
+    answers = np.concatenate([own, band.on_window, np.eye(basis.count)], axis=1).astype(float)
+    end = 3 + WINDOW**2
+    s = STRENGTH * WHITE
+    prior = np.zeros((answers.shape[1], answers.shape[1]))
+    # What moving q adds is known beforehand to 0.015 projector pixels of white.
+    prior[:3, :3] = np.diag([OFFSET**2, (4 * WHITE) ** 2, (0.015 * WHITE) ** 2])
+    prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
+    prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
+    noise = np.diag(NOISE**2 / belief.repeats.astype(np.float64))
+    gain = prior @ answers.T @ np.linalg.inv(answers @ prior @ answers.T + noise)
+    posterior = prior - gain @ answers @ prior
+    light = np.zeros(PROJECTOR)
+    light[:, 9:] = 1.0
+    weights = _weights(transport, 0, light)
+    # White's own error stands apart: nothing else tells of it.
+    ask = np.concatenate([weights[:1], [part - light.mean(), 1.0], weights[3:]])
+    own_of_white = LIGHT**2 - (SHARE * OFFSET) ** 2
+    spectrum = np.abs(np.fft.fft2(light)) ** 2
+    cycles = [np.fft.fftfreq(side) * side for side in PROJECTOR]
+    unseen = power_at(np.hypot(cycles[0][:, None], cycles[1]), KIND) * spectrum
+    unseen[(np.abs(cycles[0])[:, None] <= 1) & (np.abs(cycles[1]) <= 1)] = 0.0
+    variance = ask @ posterior @ ask + light.mean() ** 2 * own_of_white
+    variance += s**2 * unseen.sum() / PROJECTOR.pixels**2
+    found = ErrorBars(transport).picture(light)[0, 0]
+    assert found == pytest.approx(np.sqrt(variance), rel=2e-3)
+
+
 def test_a_transport_without_belief_says_so():
     transport = replace(_transport(np.array([[6, 8]])), belief=None)
     with pytest.raises(InputError, match="--method joint"):

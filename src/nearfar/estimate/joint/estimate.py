@@ -17,6 +17,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, seen_beside, with_spike
 from nearfar.estimate.joint.evidence import best_kind
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
+from nearfar.estimate.joint.nuisance import KEPT
 from nearfar.estimate.joint.pixels import Pixels, dc_place, gather, offset_noise, scale_of
 from nearfar.estimate.joint.prior import Prior, build_prior
 from nearfar.estimate.joint.solve import Found, solve
@@ -25,7 +26,6 @@ from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
 from nearfar.transport.belief import Belief
-from nearfar.transport.direct import Footprint, footprint
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, UNLIT, Kind
 from nearfar.transport.model import Transport
@@ -34,16 +34,19 @@ from nearfar.transport.model import Transport
 TURNS = 3
 # Camera pixels at once.
 BLOCK = 4096
-# Direct light this close to a whole projector pixel is taken to be all that pixel's. Noise moves q
-# by as much, and a footprint of 10 % too much beside q cost 1.5 dB under a random light; what
-# really lies beside it, kinds with spread find (cornell and cornell-aside, 117 photos).
-WHOLE = 0.2
+# Direct light this close to a whole projector pixel is taken to be all that pixel's: noise moves q
+# by as much, and a footprint of 10 % too much beside q cost 1.5 dB under a random light. What
+# really lies beside it, kinds with spread find.
+WHOLE = 0.1
+# q moves by no more than this in one turn, and stays where it was rounded to.
+FURTHEST = 0.25
+HALF = 0.499
 
 
 class _Rows(NamedTuple):
     """Rows of all camera pixels, photo units."""
 
-    shared: Floats  # o and d, (C, channels, 2)
+    shared: Floats  # o, d and d times what q is off by, (C, channels, 4)
     near: Floats  # (C, channels, W^2)
     far: Floats  # (C, channels, R), as measured
     near_noise: Floats  # (C, channels)
@@ -55,7 +58,7 @@ class _Problem(NamedTuple):
     """What all turns share."""
 
     measurements: Measurements
-    where: Footprint
+    correspondence: Floats  # (C, 2)
     lit: Booleans
     centres: NDArray[np.int64]
     band: Band
@@ -119,7 +122,7 @@ def estimate_jointly(
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
     problem = _Problem(
         measurements,
-        footprint(correspondence, measurements.projector),
+        correspondence.reshape(-1, 2),
         lit,
         near.centre(correspondence, measurements.projector),
         band,
@@ -136,8 +139,9 @@ def estimate_jointly(
                 progress((turn + share) / turns)
 
         rows = _turn(problem, None if rows is None else _expected(problem, rows), report)
+        problem = problem._replace(correspondence=_moved(problem, rows))
     assert rows is not None
-    return _transport(problem, rows, correspondence, far)
+    return _transport(problem, rows, far)
 
 
 def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], None]) -> _Rows:
@@ -146,7 +150,7 @@ def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], N
     number, channels = measurements.answers.shape[:2]
     count = band.basis.count
     rows = _Rows(
-        np.zeros((number, channels, 2), dtype=np.float32),
+        np.zeros((number, channels, KEPT), dtype=np.float32),
         np.zeros((number, channels, problem.window**2), dtype=np.float32),
         np.zeros((number, channels, count), dtype=np.float32),
         np.zeros((number, channels), dtype=np.float32),
@@ -156,7 +160,7 @@ def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], N
     for block in blocks(number, BLOCK):
         pixels = gather(
             measurements,
-            problem.where,
+            problem.correspondence,
             problem.lit,
             problem.centres,
             block,
@@ -234,10 +238,10 @@ def _with_edges(pixels: Pixels, prior: Prior, strength: Floats, band: Band) -> F
                 np.arange(windows.shape[1]),
                 entries[:, spike, None],
             )
-            windows[at] += found.shared[..., 2 + spike]
+            windows[at] += found.shared[..., KEPT + spike]
         whole.near[number] = windows
         whole.far[number] = found.far
-        whole.shared[number] = found.shared[..., :2]
+        whole.shared[number] = found.shared[..., :KEPT]
     return whole
 
 
@@ -266,7 +270,17 @@ def _expected(problem: _Problem, rows: _Rows) -> _Rows:
     )
 
 
-def _transport(problem: _Problem, rows: _Rows, correspondence: Floats, far: Size) -> Transport:
+def _moved(problem: _Problem, rows: _Rows) -> Floats:
+    """Move q by what it was found to be off, but no further than its rounding allows."""
+    direct = rows.shared[..., 1].astype(np.float64)
+    energy = np.maximum(np.sum(direct**2, axis=1), np.finfo(np.float32).tiny)
+    off = np.sum(rows.shared[..., 2:KEPT] * direct[..., None], axis=1) / energy[:, None]
+    off = np.where((direct.sum(axis=1) > 0)[:, None], np.clip(off, -FURTHEST, FURTHEST), 0.0)
+    q = problem.correspondence + off
+    return np.clip(q, problem.centres - HALF, problem.centres + HALF)
+
+
+def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
     """Put the factors together: f at the far band's frequencies, its DC what d and n leave."""
     measurements, band = problem.measurements, problem.band
     wanted = set(far_frequencies(far, measurements.projector))
@@ -282,7 +296,7 @@ def _transport(problem: _Problem, rows: _Rows, correspondence: Floats, far: Size
     shape = (*measurements.camera, measurements.channels)
     return Transport(
         projector=measurements.projector,
-        correspondence=correspondence.astype(np.float32),
+        correspondence=problem.correspondence.reshape(*measurements.camera, 2).astype(np.float32),
         direct=direct.reshape(shape),
         near=rows.near.reshape(*shape, problem.window, problem.window),
         far=np.concatenate([rest[..., None], rows.far[..., kept]], axis=-1).reshape(*shape, -1),

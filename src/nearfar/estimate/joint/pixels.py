@@ -8,15 +8,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.estimate.matrices import Band
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.direct import Footprint, look_up
+from nearfar.transport.direct import footprint, look_up
 
 # A camera pixel darker than this share of the brightest is treated as if it had as much light.
 DARKEST = 1e-3
+# Projector pixels by which q is moved to see what that changes.
+STEP = 0.02
 # Measurements without noise are taken to be this exact, as a share of a camera pixel's white.
 EXACT = 1e-6
 
@@ -34,6 +36,9 @@ class Pixels(NamedTuple):
         Of all frequencies but DC.
     of_direct : ndarray, shape (n, R)
         Answers of unit direct light, 8 bits included; 0 at unlit camera pixels.
+    of_shift : ndarray, shape (n, R, 2)
+        What moving unit direct light by a projector pixel down, or across, adds to the answers;
+        0 where q is whole or there is no direct light.
     of_second : ndarray, shape (n, R, E)
         Answers of unit direct light of other surfaces, at single window entries; 0: none.
     of_offset : ndarray, shape (n, R)
@@ -53,6 +58,7 @@ class Pixels(NamedTuple):
     inside: Booleans
     answers: Floats
     of_direct: Floats
+    of_shift: Floats
     of_second: Floats
     of_offset: Floats
     noise: Floats
@@ -88,9 +94,38 @@ def offset_noise(measurements: Measurements) -> Floats:
     return np.hypot(measurements.white_noise, measurements.black_noise)
 
 
+def answers_of_direct(correspondence: Floats, lights: Floats, projector: Size) -> Floats:
+    """Answers of unit direct light to lights, and what moving it by a projector pixel adds.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (n, 2)
+    lights : ndarray, shape (R, P)
+    projector : Size
+
+    Returns
+    -------
+    ndarray, shape (n, 3, R), float32
+        Answers, and their change down and across; 0 along an axis on which q is whole, where
+        direct light is all one projector pixel's.
+    """
+
+    def answered(places: Floats) -> Floats:
+        return look_up(lights, footprint(places, projector)).T
+
+    found = np.zeros((len(correspondence), 3, len(lights)), dtype=np.float32)
+    found[:, 0] = answered(correspondence)
+    for axis, step in enumerate(STEP * np.eye(2)):
+        place = correspondence[:, axis]
+        moving = np.flatnonzero(np.isfinite(place) & (place != np.rint(place)))
+        some = correspondence[moving]
+        found[moving, 1 + axis] = (answered(some + step) - answered(some - step)) / (2 * STEP)
+    return found
+
+
 def gather(
     measurements: Measurements,
-    where: Footprint,
+    correspondence: Floats,
     lit: Booleans,
     centres: NDArray[np.int64],
     block: slice,
@@ -103,8 +138,8 @@ def gather(
     Parameters
     ----------
     measurements : Measurements
-    where, lit, centres
-        Footprint of the direct light, whether there is any, and the rounded q of all pixels.
+    correspondence, lit, centres
+        q, (C, 2), whether there is any, and what it was rounded to, of all pixels.
     block : slice
     band : Band
         The measured frequencies without DC.
@@ -113,11 +148,12 @@ def gather(
     likely : ndarray of bool, shape (C, W^2), optional
         Where neighbours see another surface; nowhere by default.
     """
-    where = Footprint(where.pixels[block], where.weights[block])
+    q = correspondence[block]
     centres, lit = centres[block], lit[block]
     white = scale_of(measurements)[block]
     shown = measurements.shown_error[band.places] + band.basis.patterns
-    direct = look_up(shown, where).T * lit[:, None]
+
+    direct = answers_of_direct(q, shown, measurements.projector)
     ones = np.ones((len(lit), 1, band.basis.count), dtype=np.float32)
     answers = measurements.answers[block][..., band.places]
     return Pixels(
@@ -125,7 +161,8 @@ def gather(
         lit=lit,
         inside=near.inside(centres, window, measurements.projector),
         answers=band.recentre(answers, centres),
-        of_direct=band.recentre(direct[:, None].astype(np.float32), centres)[:, 0],
+        of_direct=band.recentre(direct[:, :1], centres)[:, 0],
+        of_shift=band.recentre(direct[:, 1:], centres).transpose(0, 2, 1),
         of_second=np.zeros((len(lit), band.basis.count, 0), dtype=np.float32),
         of_offset=band.recentre(ones, centres)[:, 0],
         noise=np.maximum(measurements.noise[block], EXACT * white),

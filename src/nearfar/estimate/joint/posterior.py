@@ -1,8 +1,8 @@
 """Error bars: the posterior standard deviation of D, of entries of N and F, and of pictures.
 
 All of them are numbers h_o o + h_d d + h_n.n + h_f.f of a camera pixel, f's DC being what d and n
-leave of white. Given the kind, o and d, the posterior is a Gaussian in the kind's eigenvectors; o
-and d add what is not known of them.
+leave of white. Given the kind, o, d and q, the posterior is a Gaussian in the kind's eigenvectors;
+o, d and q add what is not known of them.
 
 Index convention: arrays are (n, channels, ...), n camera pixels or numbers asked of one of them; r
 runs over real answers, w over window entries, i over eigenvectors, g over o and d.
@@ -15,13 +15,13 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.errors import InputError
 from nearfar.estimate.joint import nuisance
-from nearfar.estimate.joint.pixels import EXACT
+from nearfar.estimate.joint.pixels import EXACT, answers_of_direct
 from nearfar.estimate.joint.prior import Prior, build_prior
 from nearfar.estimate.matrices import Band, band_of
 from nearfar.illumination.frequencies import DC
 from nearfar.transport import near
 from nearfar.transport.belief import Belief
-from nearfar.transport.direct import Footprint, footprint, look_up
+from nearfar.transport.direct import footprint
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, power_at
 from nearfar.transport.model import Components, Transport
@@ -36,7 +36,8 @@ class _Asked(NamedTuple):
     ----------
     mean : ndarray, shape (n,)
         h of white.
-    direct : ndarray, shape (n,)
+    direct : ndarray, shape (n, 3)
+        h of d, and of d times what q is off down and across.
     near : ndarray, shape (n, W^2)
     far : ndarray, shape (n, R)
         Re-centred.
@@ -54,8 +55,8 @@ class _Asked(NamedTuple):
 class _Of(NamedTuple):
     """What is known of camera pixels: see `nearfar.estimate.joint.pixels.Pixels`."""
 
-    columns: Floats  # (n, R, 2)
-    precision: Floats  # (n, channels, 2)
+    columns: Floats  # (n, R, 4)
+    precision: Floats  # (n, channels, 4)
     noise: Floats  # (n, channels)
     scale: Floats  # s in photo units, (n, channels)
     white_left: Floats  # variance of white that o does not tell, (n, channels)
@@ -171,7 +172,7 @@ class ErrorBars:
         """Ask for d."""
         return _Asked(
             np.zeros(number),
-            np.ones(number),
+            np.broadcast_to([1.0, 0.0, 0.0], (number, 3)),
             np.zeros((number, self._transport.window**2), dtype=np.float32),
             np.zeros((number, self._band.basis.count), dtype=np.float32),
             np.zeros(len(self._belief.kinds)),
@@ -181,7 +182,7 @@ class ErrorBars:
         """Ask for window entries of one camera pixel."""
         return _Asked(
             np.zeros(len(entries)),
-            np.zeros(len(entries)),
+            np.zeros((len(entries), 3)),
             np.eye(self._transport.window**2, dtype=np.float32)[entries],
             np.zeros((len(entries), self._band.basis.count), dtype=np.float32),
             np.zeros(len(self._belief.kinds)),
@@ -195,7 +196,7 @@ class ErrorBars:
         centre = np.broadcast_to(self._centres[one], (total, 2))
         return _Asked(
             np.full(total, 1.0 / total),
-            np.full(total, -lit / total),
+            np.broadcast_to([-lit / total, 0.0, 0.0], (total, 3)),
             np.broadcast_to(-lit / total * inside.astype(np.float32), (total, len(inside))),
             band.recentre(patterns[:, None], centre)[:, 0],
             np.zeros(len(self._belief.kinds)),
@@ -208,16 +209,18 @@ class ErrorBars:
         transport, band = self._transport, self._band
         gain_direct, gain_near, gain_far = gains
         projector, centres = transport.projector, self._centres[block]
-        where = Footprint(self._where.pixels[block], self._where.weights[block])
+        q = transport.correspondence.reshape(-1, 2)[block]
         mean = gain_far * float(light.mean())
         seen = near.look_up(light.reshape(projector), centres, transport.window, projector)
         whole = near.inside(centres, transport.window, projector)
         overlap = (gain_far * band.basis.analyse(light) * self._held).astype(np.float32)
         turned = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
         lit = transport.lit.ravel()[block]
+        direct = gain_direct * answers_of_direct(q, light[None], projector)[..., 0]
+        direct[:, 0] -= mean * lit
         return _Asked(
             np.full(len(centres), mean),
-            lit * (gain_direct * look_up(light, where) - mean),
+            direct,
             (lit[:, None] * (gain_near * seen - mean * whole)).astype(np.float32),
             band.recentre(turned, centres)[:, 0],
             unseen,
@@ -246,18 +249,16 @@ class ErrorBars:
         transport, belief, band = self._transport, self._belief, self._band
         channels = transport.channels
         white = belief.white.reshape(-1, channels)[block]
-        lit = transport.lit.ravel()[block]
         centres = self._centres[block]
-        where = Footprint(self._where.pixels[block], self._where.weights[block])
-        direct = (look_up(band.basis.patterns, where).T * lit[:, None]).astype(np.float32)
-        ones = np.ones_like(direct)
-        both = np.stack([ones, direct], axis=1)
+        q = transport.correspondence.reshape(-1, 2)[block]
+        direct = answers_of_direct(q, band.basis.patterns, transport.projector)
+        both = np.concatenate([np.ones_like(direct[:, :1]), direct], axis=1)
         offset_noise = belief.offset_noise.reshape(-1, channels)[block]
         share = belief.share_of_white.reshape(-1, channels)[block]
         light_noise = belief.light_noise.reshape(-1, channels)[block]
         return _Of(
             band.recentre(both, centres).transpose(0, 2, 1),
-            nuisance.precision_of(white, offset_noise, 0),
+            nuisance.precision_of(white, offset_noise),
             np.maximum(transport.noise.reshape(-1, channels)[block], EXACT * white),
             belief.strength.ravel()[block, None] * white,
             np.maximum(light_noise**2 - (share * offset_noise) ** 2, 0.0),
@@ -308,14 +309,18 @@ def _of_kind(prior: Prior, known: _Of, asked: _Asked) -> Floats:
     turned = np.matmul(known.columns.transpose(0, 2, 1), prior.directions)[:, None]
     weighed = turned * weight[:, :, None]
     normal = np.matmul(weighed, turned.transpose(0, 1, 3, 2))
-    # o tells of white, d of itself; both of what the answers say of n and f.
+    # o tells of white, d and q of direct light; all of what the answers say of n and f.
+    shape = within.shape
     own = np.stack(
-        [-known.share * asked.mean[:, None], np.broadcast_to(asked.direct[:, None], within.shape)],
+        [
+            -known.share * asked.mean[:, None],
+            *(np.broadcast_to(asked.direct[:, None, part], shape) for part in range(3)),
+        ],
         axis=-1,
     )
     left = own - np.matmul(weighed, (squared * told)[..., None])[..., 0]
     spread = nuisance.solve(
-        np.broadcast_to(normal, (*left.shape, 2)),
+        np.broadcast_to(normal, (*left.shape, nuisance.KEPT)),
         left,
         np.broadcast_to(known.precision, left.shape),
     )

@@ -30,7 +30,8 @@ class Found(NamedTuple):
     Attributes
     ----------
     shared : ndarray, shape (n, channels, G)
-        o, what the references' error adds to the answers; d; and d2 ... of other surfaces.
+        o, what the references' error adds to the answers; d; by how much q is off down and
+        across, times d; and d2 ... of other surfaces.
     near : ndarray, shape (n, channels, W^2)
     far : ndarray, shape (n, channels, R)
         Answers of f, re-centred.
@@ -113,7 +114,7 @@ def _cut(pixels: Pixels, prior: Prior, s: Floats, band: Band) -> Found:
             noise = np.diag(1.0 / repeats) * some.noise[..., None, None].astype(np.float64) ** 2
             columns = np.broadcast_to(
                 nuisance.columns(some)[:, None],
-                (len(chosen), channels, len(repeats), 2 + some.extra),
+                (len(chosen), channels, len(repeats), nuisance.KEPT + some.extra),
             )
             right = np.concatenate([some.answers[..., None], columns], axis=-1)
             solved = np.linalg.solve(squared * covariance + noise, right)

@@ -1,9 +1,9 @@
 """Correspondence by phase and by stripes against the truth on the exact scenes.
 
 Run ``python benchmarks/correspondence.py [SCENE[:HxW] ...]``, HxW being a camera's size. Photos
-are those of the default simulated camera: the paper's plan in inverse pairs, and two sparse plans
-of which every sinusoid is shown once, against the mean of 8 white and 8 black photos. For each it
-prints the photos used (for stripes their own), and in percent
+are those of the default simulated camera: the paper's plan in inverse pairs, and plans that were
+chosen for a quarter and an eighth of its photos. For each it prints the photos used (for stripes
+their own), and in percent
 
 - how many lit camera pixels (at least half of their area lit directly) have q within 0.5 and
   1 pixel of the centroid of their direct light, and of the centroid of their stronger surface,
@@ -16,31 +16,17 @@ and the seconds of the correspondence alone.
 
 import sys
 import time
-from collections.abc import Iterable, Sequence
-from fractions import Fraction
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from nearfar import ExactTransport, Size, paper_plan
+from accuracy import shoot
+from nearfar import ExactTransport, Size, choose_plan, paper_plan
 from nearfar.arrays import Floats, parse_size
 from nearfar.correspondence import Correspondence, correspond_by_phase, correspond_by_stripes
-from nearfar.illumination import patterns
-from nearfar.illumination.frequencies import (
-    CHECKERBOARD,
-    DC,
-    Frequency,
-    far_frequencies,
-    representatives,
-    wrap,
-)
-from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
-from nearfar.photometry.measurements import Measurements
 from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
 from nearfar.scenes import sizes
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.camera import gather
@@ -49,7 +35,6 @@ from nearfar.scenes.optics import pinhole
 from nearfar.scenes.patches import build_patches
 from nearfar.scenes.rays import surface
 from nearfar.scenes.render import SAMPLES
-from nearfar.transport.far import real_basis
 
 CASES = (
     *("cornell", "cornell:32x32", "cornell:48x48", "cornell:128x128"),
@@ -60,76 +45,12 @@ WINDOWS = {
     "cornell-aside": (11, Size(7, 7)),
     "wedge": (19, Size(7, 11)),
     "corner": (15, Size(13, 13)),
+    "alcove": (11, Size(7, 7)),
+    "shelf": (13, Size(7, 9)),
 }
-# Far band, and spacings of a fine near grid up to 0.16 cycles per pixel and of a coarse one.
-SPARSE = ((Size(7, 7), 13, 4), (Size(5, 5), 13, 4))
-FINE = 0.16
-REFERENCES = 8
+# Chosen plans take these shares of the paper's photos.
+SHARES = (4, 8)
 CAMERA = SimulatedCamera()
-
-
-def shoot(
-    scene: ExactTransport, shown: Iterable[NDArray[np.uint8]], seed: int
-) -> NDArray[np.uint16]:
-    """Photograph 8-bit patterns."""
-    rig = SimulatedRig(scene, scene.name, SimulatedProjector(), CAMERA, 1.0, seed)
-    return np.stack([np.asarray(photo, dtype=np.uint16) for photo in rig.shoot(shown)])
-
-
-def sparse_frequencies(projector: Size, far: Size, fine: int, coarse: int) -> list[Frequency]:
-    """List a low band, a fine near grid, a coarse one, rounded to the DFT grid."""
-    half, zero = Fraction(1, 2), Fraction(0)
-    chosen = [
-        DC,
-        *far_frequencies(far, projector),
-        CHECKERBOARD,
-        wrap(half, zero),
-        wrap(zero, half),
-    ]
-    for spacing, highest in ((fine, FINE), (coarse, 0.5)):
-        steps = range(-round(highest * spacing), round(highest * spacing) + 1)
-        on_grid = [
-            [Fraction(round(step * side / spacing), side) for step in steps] for side in projector
-        ]
-        chosen += [wrap(y, x) for y in on_grid[0] for x in on_grid[1]]
-    return representatives(chosen)
-
-
-def measure_by_reference(
-    scene: ExactTransport, frequencies: Sequence[Frequency]
-) -> tuple[Measurements, int]:
-    """Show every sinusoid once: b = 2 photo - (white + black). Returns the photos used, too."""
-    basis = real_basis(frequencies, scene.projector)
-    drawn = [
-        patterns.quantise(
-            (patterns.sine if sine else patterns.cosine)(basis.frequencies[i], scene.projector)
-        )
-        for i, sine in zip(basis.index, basis.is_sine, strict=True)
-    ]
-    dc = basis.frequencies.index(DC)
-    once = [pattern for i, pattern in zip(basis.index, drawn, strict=True) if i != dc]
-    white = np.full(scene.projector, 255, dtype=np.uint8)
-    shown = [*[white] * REFERENCES, *[patterns.invert(white)] * REFERENCES, *once]
-    photos = shoot(scene, shown, 1).reshape(len(shown), scene.camera.pixels, scene.channels)
-    units = photos.astype(np.float32) / CAMERA.full_scale
-    bright, black = units[:REFERENCES].mean(axis=0), units[REFERENCES:][:REFERENCES].mean(axis=0)
-    answers = np.empty((*black.shape, basis.count), dtype=np.float32)
-    answers[..., basis.index == dc] = (bright - black)[..., None]
-    answers[..., basis.index != dc] = (
-        np.moveaxis(2 * units[2 * REFERENCES :], 0, -1) - ((bright + black)[..., None])
-    )
-    electrons = np.maximum((bright + black) / 2 - CAMERA.black_level, 0.0) * CAMERA.full_well
-    noise = 2 * np.sqrt(electrons + CAMERA.read_noise**2) / CAMERA.full_well
-    error = np.stack([pattern.ravel() for pattern in drawn]) * np.float32(2 / 255) - 1
-    measurements = Measurements(
-        camera=scene.camera,
-        basis=basis,
-        answers=answers,
-        noise=noise.astype(np.float32),
-        black=black,
-        shown_error=error - basis.patterns,
-    )
-    return measurements, len(shown)
 
 
 def lit_area(name: str, projector: Size, camera: Size) -> Floats:
@@ -193,16 +114,17 @@ def run(name: str, camera: Size | None) -> None:
     titles = ("within .5", "within 1", "of strong", "within 1", "precision", "recall")
     print(f"  {'':<16}{'photos':>7}" + "".join(f"{t:>9}" for t in titles) + "       s")
     plan = paper_plan(projector, *WINDOWS[name])
-    shown = (plan.draw(i) for i in range(len(plan.patterns)))
-    photos = HeldPhotos(plan, shoot(scene, shown, 0), CAMERA.full_scale)
+    photos = shoot(plan, scene, CAMERA)
     started = time.perf_counter()
     found = correspond_by_stripes(photos)
     seconds = time.perf_counter() - started
     report("stripes", plan.counts["correspondence"], found, truths, area, seconds)
     measured = [("phase, pairs", measure(photos), plan.transport_photos)]
-    for sparse in SPARSE:
-        frequencies = sparse_frequencies(projector, *sparse)
-        measured.append(("phase, reference", *measure_by_reference(scene, frequencies)))
+    for share in SHARES:
+        window, _ = WINDOWS[name]
+        chosen, _ = choose_plan(projector, len(plan.patterns) // share, window=window)
+        count = len(chosen.patterns)
+        measured.append((f"phase, 1/{share}", measure(shoot(chosen, scene, CAMERA)), count))
     for label, measurements, count in measured:
         started = time.perf_counter()
         found = correspond_by_phase(measurements)

@@ -75,6 +75,8 @@ def draw(found: Comparison) -> Figure:
         (right, found.equal_exposure, "exposure"),
     ):
         _draw_lines(axes, trials, across)
+    # Both share the axis, so it is cut when all is drawn.
+    left.set_ylim(bottom=max(LOWEST, left.get_ylim()[0]))
     left.set_xlabel("photos in all, each exposed alike")
     right.set_xlabel("total exposure, photos' worth")
     left.set_ylabel("SNR$_b$, mean over pictures, dB")
@@ -98,7 +100,6 @@ def _draw_lines(axes: Axes, trials: Sequence[Trial], across: str) -> None:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.minorticks_off()
     axes.tick_params(axis="x", rotation=45)
-    axes.set_ylim(bottom=max(LOWEST, axes.get_ylim()[0]))
     axes.grid(linewidth=0.3, color="#cccccc")
 
 

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, Quiet, size
+from nearfar.cli.options import AsJson, Force, Quiet, ScenesCamera, ScenesProjector
 from nearfar.cli.progress import progress_bar, say
 
 
@@ -34,14 +33,8 @@ def compare(
             metavar="NAME",
         ),
     ] = None,
-    projector: Annotated[
-        Size | None,
-        typer.Option(parser=size, metavar="HxW", help="Pattern grid; the scene's own if left out."),
-    ] = None,
-    camera: Annotated[
-        Size | None,
-        typer.Option(parser=size, metavar="HxW", help="Photo; the scene's own if left out."),
-    ] = None,
+    projector: ScenesProjector = None,
+    camera: ScenesCamera = None,
     near: Annotated[
         int | None, typer.Option(min=1, metavar="W", help="W of the joint estimate's plans.")
     ] = None,

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, Quiet, TransportPath, keep_input, size
+from nearfar.cli.options import (
+    AsJson,
+    Force,
+    Quiet,
+    ScenesCamera,
+    ScenesProjector,
+    TransportPath,
+    keep_input,
+)
 from nearfar.cli.progress import Report, progress_bar, say, warn
 
 if TYPE_CHECKING:
@@ -79,14 +87,8 @@ def render(
         ),
     ],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr to make.")],
-    projector: Annotated[
-        Size | None,
-        typer.Option(parser=size, metavar="HxW", help="Pattern grid; the scene's own if left out."),
-    ] = None,
-    camera: Annotated[
-        Size | None,
-        typer.Option(parser=size, metavar="HxW", help="Photo; the scene's own if left out."),
-    ] = None,
+    projector: ScenesProjector = None,
+    camera: ScenesCamera = None,
     samples: Annotated[
         int | None,
         typer.Option(

@@ -40,3 +40,18 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdo
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
 TransportPath = Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport.")]
+ScenesProjector = Annotated[
+    Size | None,
+    typer.Option(
+        "--projector",
+        parser=size,
+        metavar="HxW",
+        help="Pattern grid; the scene's own if left out.",
+    ),
+]
+ScenesCamera = Annotated[
+    Size | None,
+    typer.Option(
+        "--camera", parser=size, metavar="HxW", help="Photo; the scene's own if left out."
+    ),
+]

@@ -1,13 +1,16 @@
 """What camera pixels to plan for: kinds, their strengths, and how many in each scene are so."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.transport.kinds import STRENGTHS, Kind
-from nearfar.transport.model import Transport
+
+if TYPE_CHECKING:
+    # A plan needs none of what a transport computes with.
+    from nearfar.transport.model import Transport
 
 # Strengths of a kind in a scene that was looked at are put together in so many octaves.
 OCTAVES = 2
@@ -79,7 +82,7 @@ TYPICAL = _scenes(
 )
 
 
-def typical_of(transport: Transport) -> Typical:
+def typical_of(transport: "Transport") -> Typical:
     """Return the kinds of camera pixel that a joint estimate found.
 
     Parameters
@@ -112,7 +115,7 @@ def typical_of(transport: Transport) -> Typical:
     return Typical(kinds, (shares[kept] / shares[kept].sum())[None], np.ones(1))
 
 
-def noise_of(transport: Transport) -> float:
+def noise_of(transport: "Transport") -> float:
     """Return the noise of an answer in a joint estimate, as a share of white, over all pixels."""
     if transport.belief is None:
         raise InputError(

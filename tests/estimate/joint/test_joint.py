@@ -270,7 +270,7 @@ def test_a_q_that_is_a_little_off_is_put_right():
     true = np.stack([y, x], axis=-1) + generator.uniform(0.2, 0.45, (*camera, 2))
     world = model_transport(PROJECTOR, camera, window=WINDOW, far=Size(3, 3), entries=0)
     world = replace(world, correspondence=true.astype(np.float32), near=np.zeros_like(world.near))
-    off = true + 0.03 * generator.normal(size=true.shape)
+    off = true + 0.01 * generator.normal(size=true.shape)
     measurements = _measure(
         world.dense().astype(np.float64), _frequencies(), noise=1e-3, camera=camera
     )

@@ -9,6 +9,7 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
 from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.nuisance import OFF
 from nearfar.estimate.joint.posterior import ErrorBars
 from nearfar.estimate.matrices import band_of
 from nearfar.illumination.frequencies import DC, far_frequencies
@@ -227,8 +228,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     end = 3 + WINDOW**2
     s = STRENGTH * WHITE
     prior = np.zeros((answers.shape[1], answers.shape[1]))
-    # What moving q adds is known beforehand to 0.015 projector pixels of white.
-    prior[:3, :3] = np.diag([OFFSET**2, (4 * WHITE) ** 2, (0.015 * WHITE) ** 2])
+    prior[:3, :3] = np.diag([OFFSET**2, (4 * WHITE) ** 2, (OFF * WHITE) ** 2])
     prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
     prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
     noise = np.diag(NOISE**2 / belief.repeats.astype(np.float64))

@@ -19,6 +19,7 @@ from nearfar.estimate.joint.evidence import best_kind
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import KEPT
 from nearfar.estimate.joint.pixels import Pixels, dc_place, gather, offset_noise, scale_of
+from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.prior import Prior, build_prior
 from nearfar.estimate.joint.solve import Found, solve
 from nearfar.estimate.matrices import Band, band_of
@@ -291,15 +292,17 @@ def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
         measurements.answers[..., dc_place(measurements)]
         - _share_of_white(measurements) * rows.shared[..., 0]
     )
-    direct = rows.shared[..., 1] * problem.lit[:, None]
+    direct = np.maximum(rows.shared[..., 1], 0.0) * problem.lit[:, None]
     rest = white - direct - rows.near.sum(axis=-1)
+    far_range = np.concatenate([rest[..., None], rows.far[..., kept]], axis=-1)
+    windows = _positive(problem, rows.near, far_range, band_of(basis, near.offsets(problem.window)))
     shape = (*measurements.camera, measurements.channels)
     return Transport(
         projector=measurements.projector,
         correspondence=problem.correspondence.reshape(*measurements.camera, 2).astype(np.float32),
         direct=direct.reshape(shape),
-        near=rows.near.reshape(*shape, problem.window, problem.window),
-        far=np.concatenate([rest[..., None], rows.far[..., kept]], axis=-1).reshape(*shape, -1),
+        near=windows.reshape(*shape, problem.window, problem.window),
+        far=far_range.reshape(*shape, -1),
         far_basis=basis,
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
@@ -315,6 +318,21 @@ def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
             share_of_white=_share_of_white(measurements).astype(np.float32).reshape(shape),
         ),
     )
+
+
+def _positive(problem: _Problem, windows: Floats, far_range: Floats, band: Band) -> Floats:
+    """Raise window entries to where n and f together are not negative, white kept."""
+    apart = np.abs(near.offsets(problem.window)).max(axis=1) > 1
+    inside = near.inside(problem.centres, problem.window, problem.measurements.projector)
+    free = inside & apart & problem.lit[:, None]
+    found = np.empty_like(windows)
+    weights = band.basis.weights.astype(np.float32)
+    for block in blocks(len(windows), BLOCK):
+        turned = band.recentre(far_range[block] * weights, problem.centres[block])
+        least = -(turned @ band.on_window)
+        mine = np.broadcast_to(free[block, None], least.shape)
+        found[block] = raise_to(windows[block], least, mine)
+    return found
 
 
 def _share_of_white(measurements: Measurements) -> Floats:

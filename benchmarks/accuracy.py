@@ -32,6 +32,7 @@ from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
 from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.acquire import hold
 
 # Scene, W, far band, and the least mean over pictures that is asked for.
 CASES = {
@@ -46,8 +47,7 @@ CLEAN = SimulatedCamera(shot_noise=False, read_noise=0.0, full_well=1e9, bits=16
 def shoot(plan: Plan, scene: ExactTransport, camera: SimulatedCamera) -> HeldPhotos:
     """Take the photos of a plan."""
     rig = SimulatedRig(scene, scene.name, SimulatedProjector(), camera, 1.0, 0)
-    patterns = (plan.draw(i) for i in range(len(plan.patterns)))
-    return HeldPhotos(plan, np.stack(list(rig.shoot(patterns))), rig.full_scale)
+    return hold(plan, rig)
 
 
 def scores(truth: Mapping[str, Floats], found: Transport, lights: Mapping[str, Floats]) -> str:

@@ -22,6 +22,7 @@ import numpy as np
 from scipy import ndimage
 
 from accuracy import shoot
+from fewer_photos import CASES as PAPER
 from nearfar import ExactTransport, Size, choose_plan, paper_plan
 from nearfar.arrays import Floats, parse_size
 from nearfar.correspondence import Correspondence, correspond_by_phase, correspond_by_stripes
@@ -40,14 +41,6 @@ CASES = (
     *("cornell", "cornell:32x32", "cornell:48x48", "cornell:128x128"),
     *("cornell-aside", "cornell-aside:64x64", "wedge", "wedge:34x50", "corner", "corner:64x64"),
 )
-WINDOWS = {
-    "cornell": (11, Size(7, 7)),
-    "cornell-aside": (11, Size(7, 7)),
-    "wedge": (19, Size(7, 11)),
-    "corner": (15, Size(13, 13)),
-    "alcove": (11, Size(7, 7)),
-    "shelf": (13, Size(7, 9)),
-}
 # Chosen plans take these shares of the paper's photos.
 SHARES = (4, 8)
 CAMERA = SimulatedCamera()
@@ -113,7 +106,7 @@ def run(name: str, camera: Size | None) -> None:
     print(f"{name}: projector {projector}, camera {camera}, {np.mean(area == 0):.1%} unlit")
     titles = ("within .5", "within 1", "of strong", "within 1", "precision", "recall")
     print(f"  {'':<16}{'photos':>7}" + "".join(f"{t:>9}" for t in titles) + "       s")
-    plan = paper_plan(projector, *WINDOWS[name])
+    plan = paper_plan(projector, *PAPER[name])
     photos = shoot(plan, scene, CAMERA)
     started = time.perf_counter()
     found = correspond_by_stripes(photos)
@@ -121,7 +114,7 @@ def run(name: str, camera: Size | None) -> None:
     report("stripes", plan.counts["correspondence"], found, truths, area, seconds)
     measured = [("phase, pairs", measure(photos), plan.transport_photos)]
     for share in SHARES:
-        window, _ = WINDOWS[name]
+        window, _ = PAPER[name]
         chosen, _ = choose_plan(projector, len(plan.patterns) // share, window=window)
         count = len(chosen.patterns)
         measured.append((f"phase, 1/{share}", measure(shoot(chosen, scene, CAMERA)), count))

@@ -5,7 +5,6 @@ import signal
 from collections.abc import Callable, Generator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from nearfar.arrays import Size
@@ -14,6 +13,7 @@ from nearfar.plan import Plan
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
+from nearfar.workflow.acquire import hold
 from tests.worlds import model_transport
 
 # A shell that runs the tests in the background has SIGINT ignored, and commands started from here
@@ -55,8 +55,7 @@ def shoot() -> Callable[..., HeldPhotos]:
     ) -> HeldPhotos:
         optics = projector or SimulatedProjector()
         rig = SimulatedRig(world, "test", optics, camera, 1.0, seed)
-        photos = np.stack(list(rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))))
-        return HeldPhotos(plan, photos, rig.full_scale)
+        return hold(plan, rig)
 
     return photograph
 

@@ -69,9 +69,9 @@ def compare(
         print(json.dumps(found.numbers(), allow_nan=False))
         return
     say("SNR_b under pictures at equal photos", quiet=quiet)
-    say("\n".join(f"  {line}" for line in winners(found.equal_photos, "photos")), quiet=quiet)
+    say("\n".join(f"  {line}" for line in winners(found.equal_photos)), quiet=quiet)
     say("at equal total exposure, in photos' worth", quiet=quiet)
-    say("\n".join(f"  {line}" for line in winners(found.equal_exposure, "exposure")), quiet=quiet)
+    say("\n".join(f"  {line}" for line in winners(found.equal_exposure)), quiet=quiet)
     if output is not None:
         say(f"open {output / INDEX}", quiet=quiet)
 

@@ -3,7 +3,7 @@
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,7 @@ from nearfar.errors import InputError
 
 if TYPE_CHECKING:
     from nearfar.plan import Plan
+    from nearfar.plan.typical import Typical
 
 
 class Offset(StrEnum):
@@ -91,16 +92,23 @@ def plan(
     The paper's: nearfar plan --projector 128x128 --near 19 --far 13x13 -o plan.json
     """
     from nearfar.plan import choose_plan, paper_plan
+    from nearfar.plan.choose import NOISE
+    from nearfar.plan.typical import TYPICAL
 
     expected = None
     if look is not None and photos is None:
         raise typer.BadParameter("--look is of plans chosen for --photos N")
     if photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
-        known = _looked_at(look, projector) if look is not None else {}
+        typical, noise = (TYPICAL, NOISE) if look is None else _looked_at(look, projector)
         with progress_bar("choosing patterns", quiet=quiet or as_json) as report:
             made, expected = choose_plan(
-                projector, photos, window=near, progress=counted(report, "photos", photos), **known
+                projector,
+                photos,
+                window=near,
+                typical=typical,
+                noise=noise,
+                progress=counted(report, "photos", photos),
             )
     elif near is None or far is None:
         raise typer.BadParameter("give --photos N, or --near W and --far HxW for the paper's plan")
@@ -134,8 +142,8 @@ def plan(
             say(f"plan written to {output}", quiet=quiet)
 
 
-def _looked_at(look: Path, projector: Size) -> dict[str, Any]:
-    """Read what a quick look tells of the scene."""
+def _looked_at(look: Path, projector: Size) -> "tuple[Typical, float]":
+    """Read the kinds of camera pixel and the noise that a quick look tells of."""
     from nearfar.plan.typical import noise_of, typical_of
     from nearfar.transport.store import load_transport
 
@@ -145,11 +153,10 @@ def _looked_at(look: Path, projector: Size) -> dict[str, Any]:
             f"{look} is of a projector {seen.projector}, the plan of {projector}: look with the "
             f"same pattern grid."
         )
-    if seen.belief is None:
-        raise InputError(
-            f"{look} tells no kinds of camera pixel: reconstruct the quick look by --method joint."
-        )
-    return {"typical": typical_of(seen), "noise": noise_of(seen)}
+    try:
+        return typical_of(seen), noise_of(seen)
+    except InputError as error:
+        raise InputError(f"{look}: {error}") from None
 
 
 def _refuse_with_photos(

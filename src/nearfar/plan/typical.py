@@ -10,6 +10,7 @@ from nearfar.transport.kinds import STRENGTHS, Kind
 
 if TYPE_CHECKING:
     # A plan needs none of what a transport computes with.
+    from nearfar.transport.belief import Belief
     from nearfar.transport.model import Transport
 
 # Strengths of a kind in a scene that was looked at are put together in so many octaves.
@@ -93,14 +94,9 @@ def typical_of(transport: "Transport") -> Typical:
     Raises
     ------
     InputError
-        If the transport was not estimated jointly, or all is dark.
+        If the transport was not estimated jointly.
     """
-    belief = transport.belief
-    if belief is None:
-        raise InputError(
-            "this transport tells no kinds of camera pixel: reconstruct the quick look with "
-            "--method joint."
-        )
+    belief = _believed(transport)
     power = np.mean(belief.white.astype(np.float64) ** 2, axis=-1).ravel()
     octave = np.rint(np.log2(belief.strength.ravel() / STRENGTHS[0])).astype(np.int64)
     group = belief.kind.ravel().astype(np.int64) * len(STRENGTHS) + octave // OCTAVES
@@ -117,11 +113,15 @@ def typical_of(transport: "Transport") -> Typical:
 
 def noise_of(transport: "Transport") -> float:
     """Return the noise of an answer in a joint estimate, as a share of white, over all pixels."""
+    belief = _believed(transport)
+    noise = transport.noise.astype(np.float64)
+    return float(np.sqrt(np.mean(noise**2) / np.mean(belief.white.astype(np.float64) ** 2)))
+
+
+def _believed(transport: "Transport") -> "Belief":
     if transport.belief is None:
         raise InputError(
-            "this transport was not estimated jointly: reconstruct it by --method joint."
+            "this transport tells no kinds of camera pixel: reconstruct the quick look by --method "
+            "joint."
         )
-    noise = transport.noise.astype(np.float64)
-    return float(
-        np.sqrt(np.mean(noise**2) / np.mean(transport.belief.white.astype(np.float64) ** 2))
-    )
+    return transport.belief

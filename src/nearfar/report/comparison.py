@@ -70,11 +70,11 @@ def draw(found: Comparison) -> Figure:
     """Draw SNR_b under pictures against photos and against total exposure."""
     figure = new_figure(3.2)
     left, right = figure.subplots(1, 2, sharey=True)
-    for axes, trials, across in (
-        (left, found.equal_photos, "photos"),
-        (right, found.equal_exposure, "exposure"),
+    for axes, trials in (
+        (left, found.equal_photos),
+        (right, found.equal_exposure),
     ):
-        _draw_lines(axes, trials, across)
+        _draw_lines(axes, trials)
     # Both share the axis, so it is cut when all is drawn.
     left.set_ylim(bottom=max(LOWEST, left.get_ylim()[0]))
     left.set_xlabel("photos in all, each exposed alike")
@@ -85,18 +85,15 @@ def draw(found: Comparison) -> Figure:
     return figure
 
 
-def _draw_lines(axes: Axes, trials: Sequence[Trial], across: str) -> None:
+def _draw_lines(axes: Axes, trials: Sequence[Trial]) -> None:
     for method in METHODS:
-        mine = sorted(
-            (float(getattr(trial, across)), trial.pictures)
-            for trial in trials
-            if trial.method == method
-        )
+        # Where each photo is exposed alike, the total exposure is their number.
+        mine = sorted((t.exposure, t.pictures) for t in trials if t.method == method)
         if mine:
             places, values = zip(*mine, strict=True)
             axes.plot(places, values, label=NAMES[method], markersize=3.5, **LINES[method])
     axes.set_xscale("log")
-    axes.set_xticks(_apart(sorted({round(trial.exposure) for trial in trials})))
+    axes.set_xticks(_apart(sorted({trial.budget for trial in trials})))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.minorticks_off()
     axes.tick_params(axis="x", rotation=45)
@@ -112,16 +109,12 @@ def _apart(places: Sequence[int]) -> list[int]:
     return kept
 
 
-def winners(trials: Sequence[Trial], across: str) -> list[str]:
+def winners(trials: Sequence[Trial]) -> list[str]:
     """Say for each budget which method came out best, and by how much."""
     lines = []
-    for budget in sorted({round(getattr(trial, across)) for trial in trials}):
-        mine = sorted(
-            (trial for trial in trials if round(getattr(trial, across)) == budget),
-            key=lambda trial: trial.pictures,
-            reverse=True,
-        )
-        best, *others = mine
+    for budget in sorted({trial.budget for trial in trials}):
+        mine = (trial for trial in trials if trial.budget == budget)
+        best, *others = sorted(mine, key=lambda trial: trial.pictures, reverse=True)
         text = f"{budget}: {NAMES[best.method]} {best.pictures:.1f} dB"
         if others:
             text += f", then {NAMES[others[0].method]} {others[0].pictures:.1f} dB"

@@ -1,16 +1,18 @@
-"""Show a plan's patterns on a rig and keep the photos."""
+"""Show a plan's patterns on a rig and keep the photos, on the disk or in memory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, write_capture
 from nearfar.errors import InputError
+from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
-from nearfar.rigs.base import Rig
+from nearfar.rigs.base import Photo, Rig
 
 
 def acquire(
@@ -51,20 +53,34 @@ def acquire(
         As `nearfar.capture.write_capture`.
     """
     path = Path(path)
-    plan.require_real("shoot")
-    if rig.projector != plan.projector:
-        raise InputError(
-            f"the plan is for a projector of {plan.projector}, the rig has {rig.projector}: make "
-            f"the plan with --projector {rig.projector}."
-        )
-    patterns = (plan.draw(i) for i in range(len(plan.patterns)))
     return write_capture(
         path,
         plan,
-        rig.shoot(patterns),
+        _photos(plan, rig),
         full_scale=rig.full_scale,
         rig=rig.describe(),
         force=force,
         progress=progress,
         enough=enough,
     )
+
+
+def hold(plan: Plan, rig: Rig) -> HeldPhotos:
+    """Shoot a plan and hold its photos in memory: for simulations.
+
+    Raises
+    ------
+    PlanError, InputError
+        As `acquire`.
+    """
+    return HeldPhotos(plan, np.stack(list(_photos(plan, rig))), rig.full_scale)
+
+
+def _photos(plan: Plan, rig: Rig) -> Iterator[Photo]:
+    plan.require_real("shoot")
+    if rig.projector != plan.projector:
+        raise InputError(
+            f"the plan is for a projector of {plan.projector}, the rig has {rig.projector}: make "
+            f"the plan with --projector {rig.projector}."
+        )
+    return rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))

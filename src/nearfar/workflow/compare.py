@@ -24,7 +24,6 @@ from nearfar.errors import InputError, PlanError
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
-from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, choose_plan, paper_plan
 from nearfar.plan.choose import LEAST_PHOTOS, NOISE, default_window
@@ -33,6 +32,7 @@ from nearfar.rigs.config import choose_exposure
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
 from nearfar.transport.exact import ExactTransport
+from nearfar.workflow.acquire import hold
 from nearfar.workflow.evaluate import snr
 
 METHODS = ("joint", "paper", "CLT", "Hadamard", "brute force")
@@ -42,8 +42,6 @@ BANDS = (1.0, 1.2, 2.0)
 SHARES = (16, 8, 4, 2, 1)
 # Brute force takes black once for so many projector pixels.
 BLACK_EVERY = 16
-# Photos that compressive sensing needs for anything at all.
-LEAST_RANDOM = 8
 
 Report = Callable[[str, float], None]
 
@@ -63,6 +61,8 @@ class Trial(NamedTuple):
     ----------
     method : str
         Of `METHODS`.
+    budget : int
+        Photos, or total exposure, that were allowed.
     photos : int
         All that were taken.
     exposure : float
@@ -72,6 +72,7 @@ class Trial(NamedTuple):
     """
 
     method: str
+    budget: int
     photos: int
     exposure: float
     pictures: float
@@ -126,7 +127,7 @@ class _Bench(NamedTuple):
         camera = self.camera.model_copy(update={"full_well": self.camera.full_well * exposure})
         return SimulatedRig(self.scene, self.scene.name, SimulatedProjector(), camera, self.gain, 0)
 
-    def trial(self, method: str, photos: int, exposure: float, found: Linear) -> Trial:
+    def trial(self, job: "_Job", photos: int, found: Linear) -> Trial:
         """Relight under all lights."""
         values = {
             name: snr(self.truth[name], (found @ light).reshape(self.truth[name].shape))
@@ -134,13 +135,33 @@ class _Bench(NamedTuple):
         }
         pictures = [value for name, value in values.items() if name.startswith("picture")]
         return Trial(
-            method,
+            job.method,
+            job.budget,
             photos,
-            photos * exposure,
+            photos * job.exposure(photos),
             float(np.mean(pictures)),
             values["white"],
             values["random"],
         )
+
+
+class _Job(NamedTuple):
+    """A method, the photos that it may take, and the total exposure that they share.
+
+    Without a total each photo is exposed alike.
+    """
+
+    method: str
+    photos: int
+    total: int | None = None
+
+    @property
+    def budget(self) -> int:
+        return self.photos if self.total is None else self.total
+
+    def exposure(self, photos: int) -> float:
+        """Exposure of each of the photos that are really taken."""
+        return 1.0 if self.total is None else self.total / photos
 
 
 def default_budgets(projector: Size) -> tuple[int, ...]:
@@ -210,71 +231,73 @@ def compare(
         gain,
     )
     report = progress or (lambda _what, _share: None)
-    jobs = _jobs(bench, methods, budgets)
-    done: list[list[Trial]] = [[], []]
-    for number, (part, method, photos, exposure) in enumerate(jobs):
-        report(method, number / len(jobs))
-        trial = _RUN[method](bench, photos, exposure)
+    jobs = _jobs(scene.projector, methods, budgets)
+    done: list[tuple[_Job, Trial]] = []
+    for number, job in enumerate(jobs):
+        report(job.method, number / len(jobs))
+        trial = _RUN[job.method](bench, job)
         if trial is not None:
-            done[part].append(trial)
+            done.append((job, trial))
     report("compared", 1.0)
-    return Comparison(scene.name, scene.projector, scene.camera, tuple(done[0]), tuple(done[1]))
+    return Comparison(
+        scene.name,
+        scene.projector,
+        scene.camera,
+        tuple(trial for job, trial in done if job.total is None),
+        tuple(trial for job, trial in done if job.total is not None),
+    )
 
 
-def _jobs(
-    bench: _Bench, methods: Sequence[str], budgets: Sequence[int]
-) -> list[tuple[int, str, int, float]]:
-    """List part, method, photos and exposure of each photo."""
-    jobs: list[tuple[int, str, int, float]] = []
-    fixed = {m: _FIXED[m](bench.scene.projector).photos for m in methods if m in _FIXED}
+def _jobs(projector: Size, methods: Sequence[str], budgets: Sequence[int]) -> list[_Job]:
+    """List what to run: at equal photos, and each method's longest plan at equal exposure."""
+    fixed = {m: _FIXED[m](projector).photos for m in methods if m in _FIXED}
     totals = sorted({*budgets, *([max(fixed.values())] if fixed else [])})
+    jobs = []
     for method in methods:
         counts = [fixed[method]] if method in fixed else budgets
-        jobs += [(0, method, photos, 1.0) for photos in counts]
-        jobs += [(1, method, counts[-1], total / counts[-1]) for total in totals]
+        jobs += [_Job(method, photos) for photos in counts]
+        jobs += [_Job(method, counts[-1], total) for total in totals]
     return jobs
 
 
-def _jointly(bench: _Bench, photos: int, exposure: float) -> Trial:
-    noise = NOISE / np.sqrt(exposure)
-    plan, _ = choose_plan(bench.scene.projector, photos, window=bench.window, noise=float(noise))
-    measurements = measure(_photos(bench, plan, exposure))
+def _jointly(bench: _Bench, job: _Job) -> Trial:
+    noise = NOISE / np.sqrt(job.exposure(job.photos))
+    projector = bench.scene.projector
+    plan, _ = choose_plan(projector, job.photos, window=bench.window, noise=float(noise))
+    photos = len(plan.patterns)
+    measurements = measure(hold(plan, bench.rig(job.exposure(photos))))
     pixels = correspond_by_phase(measurements).pixels
     found = estimate_jointly(measurements, pixels, plan.window, plan.far)
-    return bench.trial("joint", len(plan.patterns), exposure, found)
+    return bench.trial(job, photos, found)
 
 
-def _as_the_paper(bench: _Bench, photos: int, exposure: float) -> Trial | None:
+def _as_the_paper(bench: _Bench, job: _Job) -> Trial | None:
     best: Trial | None = None
-    for plan in paper_plans(bench.scene.projector, photos):
-        held = _photos(bench, plan, exposure)
+    for plan in paper_plans(bench.scene.projector, job.photos):
+        photos = len(plan.patterns)
+        held = hold(plan, bench.rig(job.exposure(photos)))
         pixels = correspond_by_stripes(held).pixels
         if not np.isfinite(pixels).any():
             continue
         found = estimate(measure(held), pixels, plan.window, plan.far, plan.dropped)
-        trial = bench.trial("paper", len(plan.patterns), exposure, found)
+        trial = bench.trial(job, photos, found)
         if best is None or trial.pictures > best.pictures:
             best = trial
     return best
 
 
-def _compressively(bench: _Bench, photos: int, exposure: float) -> Trial | None:
-    if photos < LEAST_RANDOM:
-        return None
-    patterns = bernoulli_patterns(bench.scene.projector, photos - 1, 0)
-    measurements = measure_by_rig(bench.rig(exposure), patterns)
+def _compressively(bench: _Bench, job: _Job) -> Trial:
+    patterns = bernoulli_patterns(bench.scene.projector, job.photos - 1, 0)
+    measurements = measure_by_rig(bench.rig(job.exposure(job.photos)), patterns)
     choice = best_share(measurements, bench.scene, exposure=bench.gain)
     found = reconstruct_compressive(measurements, choice.share, refitted=choice.is_refitted)
-    return bench.trial("CLT", measurements.photos, exposure, found)
+    return bench.trial(job, measurements.photos, found)
 
 
-def _by_reference(method: str) -> Callable[[_Bench, int, float], Trial]:
-    def run(bench: _Bench, _photos: int, exposure: float) -> Trial:
-        acquisition = _FIXED[method](bench.scene.projector)
-        found = acquire_reference(acquisition, bench.rig(exposure))
-        return bench.trial(method, acquisition.photos, exposure, found)
-
-    return run
+def _by_reference(bench: _Bench, job: _Job) -> Trial:
+    acquisition = _FIXED[job.method](bench.scene.projector)
+    found = acquire_reference(acquisition, bench.rig(job.exposure(acquisition.photos)))
+    return bench.trial(job, acquisition.photos, found)
 
 
 def _brute_force(projector: Size) -> Acquisition:
@@ -286,18 +309,12 @@ _FIXED: Mapping[str, Callable[[Size], Acquisition]] = {
     "Hadamard": Hadamard,
     "brute force": _brute_force,
 }
-_RUN: Mapping[str, Callable[[_Bench, int, float], Trial | None]] = {
+_RUN: Mapping[str, Callable[[_Bench, _Job], Trial | None]] = {
     "joint": _jointly,
     "paper": _as_the_paper,
     "CLT": _compressively,
-    **{method: _by_reference(method) for method in _FIXED},
+    **dict.fromkeys(_FIXED, _by_reference),
 }
-
-
-def _photos(bench: _Bench, plan: Plan, exposure: float) -> HeldPhotos:
-    rig = bench.rig(exposure)
-    patterns = (plan.draw(i) for i in range(len(plan.patterns)))
-    return HeldPhotos(plan, np.stack(list(rig.shoot(patterns))), rig.full_scale)
 
 
 def paper_plans(projector: Size, photos: int) -> list[Plan]:

@@ -33,10 +33,11 @@ def snr(truth: Floats, estimate: Floats) -> float:
     """
     signal = float(np.linalg.norm(truth.astype(np.float64).ravel()))
     error = float(np.linalg.norm((truth.astype(np.float64) - estimate).ravel()))
-    return _decibels(signal**2, error**2)
+    return decibels(signal**2, error**2)
 
 
-def _decibels(signal: float, error: float) -> float:
+def decibels(signal: float, error: float) -> float:
+    """Turn energies of the truth and of the error into dB, between -HIGHEST and HIGHEST."""
     if signal <= 0.0:
         return -HIGHEST if error > 0.0 else HIGHEST
     return float(np.clip(10 * np.log10(signal / max(error, 1e-300)), -HIGHEST, HIGHEST))
@@ -145,8 +146,8 @@ def row_snr(
             parts[name] = (parts[name][0] + one, parts[name][1] + other)
         if progress is not None:
             progress(block.stop / pixels)
-    components = {"T": _decibels(float(signal.sum()), float(error.sum()))}
-    components |= {name: _decibels(*pair) for name, pair in parts.items()}
+    components = {"T": decibels(float(signal.sum()), float(error.sum()))}
+    components |= {name: decibels(*pair) for name, pair in parts.items()}
     with np.errstate(divide="ignore", invalid="ignore"):
         snr_t = 10 * np.log10(signal / np.maximum(error, 1e-300))
         snr_k = 10 * np.log10(signal_k / np.maximum(error_k, 1e-300))
@@ -218,7 +219,7 @@ def split_snr(transport: Transport, model: Transport) -> dict[str, float]:
         for name, values, mine in pairs:
             one, other = energies(values, mine)
             totals[name] = (totals[name][0] + one, totals[name][1] + other)
-    return {name: _decibels(*pair) for name, pair in totals.items()}
+    return {name: decibels(*pair) for name, pair in totals.items()}
 
 
 def floodlit_snr(transport: Transport, truth: ExactTransport) -> dict[str, float]:

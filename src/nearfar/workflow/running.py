@@ -26,6 +26,7 @@ from nearfar.photometry.steady import steady
 from nearfar.plan import Plan
 from nearfar.plan.checks import check_photos, ends
 from nearfar.transport.model import Transport
+from nearfar.workflow.evaluate import HIGHEST, decibels
 
 # Rows of the camera are looked at in bands of so many, so that neighbours can help each other.
 BAND = 8
@@ -42,7 +43,6 @@ FARTHEST = 8.0
 BEYOND = 2.0
 # Without noise in the photos, what is left of the expected error is what was never measured.
 QUIET = 1e-3
-HIGHEST = 300.0
 
 Limit = Literal["noise", "model", "photos"]
 
@@ -144,7 +144,7 @@ class RunningCheck:
             relit = (found @ light).reshape(*held.camera, -1)
             shown = photos.read(numbers, every) - _black(measurements)
             signal, error = (_in_common(part) for part in (shown, shown - relit))
-            values.append(_decibels(signal, error))
+            values.append(decibels(signal, max(error, 0.0)))
             errors.append(error)
             expected += float(np.mean(bars.picture(light).astype(np.float64) ** 2))
             unmeasured += float(np.mean(quiet.picture(light).astype(np.float64) ** 2))
@@ -175,12 +175,6 @@ def _in_common(photos: Floats) -> float:
     count = len(flat)
     together = np.sum(flat.sum(axis=0) ** 2) - np.sum(flat**2)
     return float(together / (count * (count - 1) * flat.shape[1]))
-
-
-def _decibels(signal: float, error: float) -> float:
-    if signal <= 0:
-        return -HIGHEST
-    return float(np.clip(10 * np.log10(signal / max(error, 1e-300)), -HIGHEST, HIGHEST))
 
 
 def _without_noise(found: Transport) -> Transport:

@@ -258,6 +258,25 @@ def test_less_evidence_will_do_where_a_neighbour_sees_the_second_surface():
     assert not seen_beside(q, 9).any()
 
 
+def test_a_faint_second_surface_is_believed_beside_its_edge_alone():
+    # Two surfaces 4 projector pixels apart; every camera pixel of the left one also sees the place
+    # of the right one, too faintly to be believed by its own photos.
+    camera, faint = Size(8, 10), 0.08
+    q = np.full((*camera, 2), 8.0)
+    q[..., 1] = np.where(np.arange(camera.width) < 5, 7.0, 11.0)
+    rows = np.zeros((camera.pixels, 1, PROJECTOR.pixels))
+    flat = (q[..., 0] * PROJECTOR.width + q[..., 1]).astype(int).ravel()
+    rows[np.arange(camera.pixels), 0, flat] = 0.5
+    left = (q[..., 1] == 7.0).ravel()
+    rows[left, 0, 8 * PROJECTOR.width + 11] = faint
+    measurements = _measure(rows, _frequencies(140), noise=0.06, camera=camera)
+    found = estimate_jointly(measurements, q, 9, FAR, turns=1)
+    entry = found.near[:, :, 0, 4, 8]
+    beside, inner = entry[:, 4], entry[:, :3]
+    assert np.mean(beside > 0.5 * faint) > 0.7
+    assert np.mean(inner > 0.5 * faint) < 0.3
+
+
 def test_steps_of_a_camera_that_is_as_fine_are_no_other_surface():
     y, x = np.meshgrid(np.arange(6.0), np.arange(7.0), indexing="ij")
     assert not seen_beside(np.stack([y, x], axis=-1), 5).any()

@@ -14,7 +14,6 @@ from nearfar.estimate.joint.posterior import ErrorBars
 from nearfar.estimate.matrices import band_of
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.pictures import standard_lights
-from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.plan.choose import choose_frequencies
@@ -27,6 +26,7 @@ from nearfar.transport.belief import Belief
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, far_power, near_covariance, power_at
 from nearfar.transport.model import Transport
+from nearfar.workflow.acquire import hold
 
 PROJECTOR = Size(12, 16)
 WINDOW = 5
@@ -267,8 +267,7 @@ def test_the_truth_lies_within_one_deviation_as_often_as_it_should(name):
     scene = cached_scene(name, Size(32, 32))
     plan, _ = choose_plan(scene.projector, 100)
     rig = SimulatedRig(scene, name, SimulatedProjector(), SimulatedCamera(), 1.0, 0)
-    photos = np.stack(list(rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))))
-    measurements = measure(HeldPhotos(plan, photos, rig.full_scale))
+    measurements = measure(hold(plan, rig))
     found = estimate_jointly(measurements, scene.correspondence, plan.window, plan.far)
     bars = ErrorBars(found)
     shares = {}

@@ -85,7 +85,8 @@ def estimate_jointly(
     measurements : Measurements
         With white, and at least one other frequency.
     correspondence : ndarray, shape (Cy, Cx, 2)
-        q as (y, x), NaN where there is no direct light; rounded where it is nearly whole.
+        q as (y, x), NaN where there is no direct light. The transport's own is rounded where it
+        is nearly whole, and else moved by the little that the photos ask for.
     window : int
         W: near-range light lies within, however much less far it reaches.
     far : Size
@@ -277,8 +278,9 @@ def _moved(problem: _Problem, rows: _Rows) -> Floats:
     energy = np.maximum(np.sum(direct**2, axis=1), np.finfo(np.float32).tiny)
     off = np.sum(rows.shared[..., 2:KEPT] * direct[..., None], axis=1) / energy[:, None]
     off = np.where((direct.sum(axis=1) > 0)[:, None], np.clip(off, -FURTHEST, FURTHEST), 0.0)
-    q = problem.correspondence + off
-    return np.clip(q, problem.centres - HALF, problem.centres + HALF)
+    last = np.array(problem.measurements.projector) - 1
+    lowest = np.maximum(problem.centres - HALF, 0)
+    return np.clip(problem.correspondence + off, lowest, np.minimum(problem.centres + HALF, last))
 
 
 def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:

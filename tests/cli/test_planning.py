@@ -7,7 +7,10 @@ import imagecodecs
 import numpy as np
 import pytest
 
-from nearfar.plan import read_plan
+from nearfar.plan import choose_plan, read_plan
+from nearfar.plan.choose import NOISE
+from nearfar.plan.typical import noise_of, typical_of
+from nearfar.transport.store import load_transport
 from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfar
 
 
@@ -146,8 +149,16 @@ def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
     check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "-o", plan))
     check_done(run_nearfar("acquire", plan, capture, "--rig", finished.truth))
     check_done(run_nearfar("reconstruct", capture, look))
-    ran = run_nearfar("plan", "--projector", "16x20", "--photos", 60, "--look", look)
+    chosen = tmp_path / "chosen.json"
+    wanted = ("--projector", "16x20", "--photos", 60)
+    ran = run_nearfar("plan", *wanted, "--look", look, "-o", chosen)
     assert "of relighting this scene" in check_done(ran).out
+    seen = load_transport(look)
+    by_noise = [
+        choose_plan(seen.projector, 60, typical=typical_of(seen), noise=noise)[0]
+        for noise in (noise_of(seen), NOISE)
+    ]
+    assert read_plan(chosen) == by_noise[0] != by_noise[1]
     for arguments, said in (
         (("--projector", "16x24", "--photos", 60, "--look", look), "same pattern grid"),
         (("--projector", "16x20", "--photos", 60, "--look", finished.transport), "--method joint"),

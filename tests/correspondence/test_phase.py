@@ -272,7 +272,26 @@ def test_a_block_of_camera_pixels_corresponds_on_its_own():
     part = correspond_by_phase(measured.of_pixels(Size(6, 30), slice(90, 270)))
     assert part.pixels.dtype == np.float32
     assert part.confidence.dtype == np.float32
-    np.testing.assert_allclose(part.pixels, whole.pixels[3:9], atol=2e-3)
+    # Its first and last rows lack neighbours, which may tell that light is not direct.
+    np.testing.assert_allclose(part.pixels[1:-1], whole.pixels[4:8], atol=2e-3)
+    both = part.lit & whole.lit[3:9]
+    assert both.mean() > 0.9
+    np.testing.assert_allclose(part.pixels[both], whole.pixels[3:9][both], atol=2e-3)
+
+
+def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
+    # Beyond a crease, at x = 15, light may come as a mirror's image of this side of it, faint
+    # over white as light between surfaces is.
+    camera = Size(20, 26)
+    y, x = np.meshgrid(np.arange(2.0, 22.0), np.arange(2.0, 28.0), indexing="ij")
+    world = _world(camera, near=0.0, entries=0)
+    direct = np.where(x > 15, 0.045, 0.25)[..., None].astype(np.float32)
+    for beyond, seen in ((x, True), (30 - x, False)):
+        q = np.stack([y, np.where(x > 15, beyond, x)], axis=-1).astype(np.float32)
+        shown = replace(world, correspondence=q, direct=direct)
+        found = correspond_by_phase(_answers(shown, FEW, noise=0.003))
+        assert found.lit[:, :12].all()
+        assert np.mean(found.lit[:, 15:-1] == seen) > 0.95
 
 
 @pytest.mark.parametrize(

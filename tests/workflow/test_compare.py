@@ -1,6 +1,7 @@
 """Methods side by side on a small scene."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,17 +66,17 @@ def test_light_is_worth_decibels(found):
         assert order[0].white < order[-1].white
 
 
-def test_a_brighter_transport_is_compared_alike(scene):
-    from dataclasses import replace
-
-    brighter = replace(
+@pytest.mark.parametrize("gain", [0.02, 50.0])
+def test_the_units_of_transport_do_not_count(scene, gain):
+    other = replace(
         scene,
-        direct=tuple(50.0 * part for part in scene.direct),
-        near=tuple(50.0 * part for part in scene.near),
-        far=50.0 * scene.far,
+        direct=tuple(gain * part for part in scene.direct),
+        near=tuple(gain * part for part in scene.near),
+        far=gain * scene.far,
     )
-    one, other = (compare(s, [60], methods=["joint"], window=5) for s in (scene, brighter))
-    assert other.equal_photos[0].pictures == pytest.approx(one.equal_photos[0].pictures, abs=1.5)
+    trials = (compare(s, [60], methods=["joint", "CLT"], window=5) for s in (scene, other))
+    for one, same in zip(*(found.equal_photos for found in trials), strict=True):
+        assert same.pictures == pytest.approx(one.pictures, abs=1.0)
 
 
 def test_more_blacks_help_brute_force_under_white(scene):

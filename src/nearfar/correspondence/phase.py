@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.correspondence.ambiguity import require_settled
 from nearfar.correspondence.background import SEARCH, SHARP, STRONG, Background
+from nearfar.correspondence.orientation import turned_round
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC, as_array
@@ -45,6 +46,9 @@ RIDGE = 1.0
 # the answers. Between the 98th percentile of unlit and the 0.05th of lit camera pixels of a
 # Cornell box seen from aside, by plans of 79 to 340 photos (benchmarks/correspondence.py).
 SEEN = 2.25
+# By how much more where q turns round, which light by way of another surface does: so much leaves
+# the fewest wrong, lit and unlit together, on the same box.
+TURNED = 1.35
 
 
 class _Weighed(NamedTuple):
@@ -71,7 +75,8 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     Correspondence
         q is the centroid of the direct light within 2 pixels of its peak: where one camera pixel
         sees two surfaces, that of the stronger. NaN where no direct light stands above near-range
-        light. Confidence is 1/2 at that border.
+        light; where neighbours see q turn round it must stand further above. Confidence is 1/2 at
+        that border.
 
     Raises
     ------
@@ -83,17 +88,19 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     camera = measurements.camera
     brightest = measurements.answers[..., measurements.places([DC])[0]].max(initial=0.0)
     pixels = np.empty((camera.pixels, 2), dtype=np.float32)
-    confidence = np.empty(camera.pixels, dtype=np.float32)
+    excess = np.empty(camera.pixels, dtype=np.float32)
     for block in blocks(camera.pixels, BLOCK):
         part = measurements.of_pixels(Size(1, block.stop - block.start), block)
         answers, variance = _relative(part, BLACK * brightest)
         found = _search(basis, _weigh(basis, answers, variance, SEARCH))
-        q, _ = _footprints(basis, _weigh(basis, answers, variance, SHARP), found)
-        _, excess = _footprints(basis, _weigh(basis, answers, variance, STRONG), found)
-        pixels[block] = np.where((excess > SEEN)[:, None], q, np.nan)
-        power = (excess / SEEN) ** 4
-        confidence[block] = power / (1 + power)
-    return Correspondence(pixels.reshape(*camera, 2), confidence.reshape(camera))
+        pixels[block], _ = _footprints(basis, _weigh(basis, answers, variance, SHARP), found)
+        _, excess[block] = _footprints(basis, _weigh(basis, answers, variance, STRONG), found)
+    pixels[excess <= SEEN] = np.nan
+    q = pixels.reshape(*camera, 2)
+    ratio = excess.reshape(camera) / np.where(turned_round(q), TURNED * SEEN, SEEN)
+    q[ratio <= 1] = np.nan
+    power = ratio**4
+    return Correspondence(q, (power / (1 + power)).astype(np.float32))
 
 
 def answer_variance(measurements: Measurements) -> Floats:

@@ -18,6 +18,7 @@ from nearfar.errors import (
     StorageError,
 )
 from nearfar.files.kinds import kind_of_store
+from nearfar.files.writes import abandon
 
 _CURES = {
     errno.ENOSPC: "the disk is full: free space and run the command again",
@@ -86,6 +87,9 @@ def new_output(
             yield partial
             synchronise(partial)
             _move_into_place(partial, target)
+    except BaseException:
+        abandon(partial)
+        raise
     finally:
         _remove(partial)
 
@@ -174,7 +178,7 @@ def _move_into_place(partial: Path, target: Path) -> None:
 
 
 def _remove(path: Path) -> None:
-    # The threads of an interrupted write may still be adding to the folder: look again.
+    # Others than our own stores may still be adding to the folder: look again.
     for _ in range(100):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)

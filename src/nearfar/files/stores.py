@@ -1,8 +1,8 @@
 """Zarr groups (version 3) in which a missing or damaged chunk is an error, never zeros."""
 
-import asyncio
 import contextlib
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from zarr.storage import LocalStore
 
 from nearfar.errors import InputError, MissingFileError, NearfarError, UnreadableFileError
 from nearfar.files.output import synchronise_entry
+from nearfar.files.writes import write_into
 
 _METADATA = "zarr.json"
 
@@ -41,7 +42,7 @@ class _FolderStore(LocalStore):
 
     async def set(self, key: str, value: Buffer) -> None:
         """Write a file whole or not at all."""
-        await asyncio.to_thread(_write, self.root / key, value)
+        await write_into(self.root, partial(_write, self.root / key, value))
 
 
 class _DurableStore(LocalStore):
@@ -49,26 +50,26 @@ class _DurableStore(LocalStore):
 
     async def set(self, key: str, value: Buffer) -> None:
         """Write a file whole or not at all, and wait for the disk."""
-        await asyncio.to_thread(_write_durably, self.root / key, value)
+        await write_into(self.root, partial(_write_durably, self.root / key, value))
 
 
 def _write(path: Path, value: Buffer) -> None:
-    _write_partial(path, value).replace(path)
+    _written_beside(path, value).replace(path)
 
 
 def _write_durably(path: Path, value: Buffer) -> None:
-    partial = _write_partial(path, value)
-    synchronise_entry(partial)
-    partial.replace(path)
+    beside = _written_beside(path, value)
+    synchronise_entry(beside)
+    beside.replace(path)
     synchronise_entry(path.parent)
 
 
-def _write_partial(path: Path, value: Buffer) -> Path:
+def _written_beside(path: Path, value: Buffer) -> Path:
     if path.name == _METADATA:
         path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_bytes(value.as_buffer_like())
-    return partial
+    beside = path.with_name(f".{path.name}.partial")
+    beside.write_bytes(value.as_buffer_like())
+    return beside
 
 
 class _WholeStore(LocalStore):

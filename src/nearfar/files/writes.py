@@ -1,0 +1,39 @@
+"""Writes by a store's own threads, into a folder that may be given up while they are under way.
+
+An interrupt reaches the main thread alone: what it had asked the store's event loop to write goes
+on. Before the folder is removed the loop is waited for, and what has not begun by then is dropped,
+so that nobody hears of files that vanished under them, or of tasks that never ended.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+
+# Seconds that writes under way may take to end; those to a disk that hangs are not waited for.
+PATIENCE = 2.0
+
+_loops: dict[Path, asyncio.AbstractEventLoop] = {}
+_abandoned: set[Path] = set()
+
+
+async def write_into(folder: Path, write: Callable[[], None]) -> None:
+    """Call `write`, which adds to `folder`, in a thread; do nothing once that is abandoned."""
+    if folder not in _abandoned:
+        _loops[folder] = asyncio.get_running_loop()
+        await asyncio.to_thread(write)
+
+
+def abandon(folder: Path) -> None:
+    """Let writes into `folder` that are under way end, and no other begin."""
+    _abandoned.add(folder)
+    loop = _loops.pop(folder, None)
+    if loop is not None and loop.is_running():
+        with contextlib.suppress(TimeoutError):
+            asyncio.run_coroutine_threadsafe(_others(), loop).result(2 * PATIENCE)
+
+
+async def _others() -> None:
+    tasks = asyncio.all_tasks() - {asyncio.current_task()}
+    if tasks:
+        await asyncio.wait(tasks, timeout=PATIENCE)

@@ -75,6 +75,12 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
+def product(values: Floats, matrix: Floats) -> Floats:
+    """Return (..., a) times (a, b) as one product, where NumPy makes one for each first axis."""
+    flat = values.reshape(-1, values.shape[-1]) @ matrix
+    return np.asarray(flat.reshape(*values.shape[:-1], matrix.shape[1]))
+
+
 def blocks(count: int, length: int) -> Iterator[slice]:
     """Cut ``range(count)`` into slices of at most `length`."""
     for start in range(0, count, max(1, length)):

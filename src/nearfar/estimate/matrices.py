@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Booleans, Complexes, Floats, Size
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
     Frequency,
@@ -52,18 +53,64 @@ class Band:
         return self._turn(answers, centres, -1)
 
     def _turn(self, answers: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
+        down, across = self._phases
+        phase = down[centres[:, 0]] * across[centres[:, 1]]
         cosine = np.flatnonzero(~self.basis.is_sine)
-        paired = np.flatnonzero(self.basis.is_sine)
-        partner = paired - 1
-        angle = 2 * np.pi * (centres @ as_array(self.basis.frequencies).T % 1.0)
-        c = np.cos(angle).astype(np.float32)[:, None, :]
-        s = (sign * np.sin(angle)).astype(np.float32)[:, None, self.basis.index[paired]]
+        # Frequencies that are their own negative answer no sine: their phase is 1 or -1.
+        own = np.diff(np.append(cosine, self.basis.count)) == 1
         turned = np.empty_like(answers)
-        turned[..., cosine] = answers[..., cosine] * c
-        turned[..., partner] += answers[..., paired] * s
-        turned[..., paired] = answers[..., paired] * c[..., self.basis.index[paired]]
-        turned[..., paired] -= answers[..., partner] * s
+        turned[..., cosine[own]] = answers[..., cosine[own]] * phase.real[:, None, own]
+        first = np.flatnonzero(~own)
+        if not len(first):
+            return turned
+        # Views where the pairs stand side by side, as they do but for the few above.
+        for run in np.split(first, np.flatnonzero(np.diff(first) != 1) + 1):
+            start, stop = cosine[run[0]], cosine[run[-1]] + 2
+            c = phase.real[:, None, run[0] : run[-1] + 1]
+            s = sign * phase.imag[:, None, run[0] : run[-1] + 1]
+            even, odd = answers[..., start:stop:2], answers[..., start + 1 : stop : 2]
+            turned[..., start:stop:2] = even * c + odd * s
+            turned[..., start + 1 : stop : 2] = odd * c - even * s
         return turned
+
+    @cached_property
+    def _phases(self) -> tuple[Complexes, Complexes]:
+        """Phase of each frequency at every row and column of the pattern grid, complex64."""
+        sides = (
+            np.exp(2j * np.pi * (np.arange(side)[:, None] * cycles % 1.0)).astype(np.complex64)
+            for side, cycles in zip(
+                self.basis.projector, as_array(self.basis.frequencies).T, strict=True
+            )
+        )
+        down, across = sides
+        return down, across
+
+
+def corner_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats:
+    """Weights over `CORNERS` of direct light at q, and what moving q down and across adds.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (n, 2)
+        q; NaN where there is no direct light, which gets weights of 0.
+    centres : ndarray, shape (n, 2)
+        q rounded.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 9), float32
+        The bilinear footprint, and its derivatives by q; 0 along an axis on which q is whole.
+    """
+    off = np.nan_to_num(correspondence - centres)
+    lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
+    weights = np.stack([np.maximum(-off, 0.0), 1 - np.abs(off), np.maximum(off, 0.0)], axis=-1)
+    sign = np.sign(off)
+    steps = np.stack([np.minimum(sign, 0.0), -sign, np.maximum(sign, 0.0)], axis=-1)
+    sides = ((weights, weights), (steps, weights), (weights, steps))
+    found = [
+        np.einsum("ny,nx->nyx", of_y[:, 0], of_x[:, 1]).reshape(len(off), 9) for of_y, of_x in sides
+    ]
+    return np.where(lit[:, None, None], np.stack(found, axis=1), 0.0).astype(np.float32)
 
 
 def _band(measurements: Measurements, frequencies: Sequence[Frequency], window: int) -> Band:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from nearfar.arrays import Floats, blocks
+from nearfar.parallel import side_by_side
 from nearfar.scenes.geometry import Medium
-from nearfar.scenes.parallel import side_by_side
 from nearfar.scenes.patches import Patches
 
 ROWS = 16

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.parallel import side_by_side
 from nearfar.scenes.geometry import Part
-from nearfar.scenes.parallel import side_by_side
 from nearfar.scenes.patches import Patches
 from nearfar.scenes.rays import OFFSET, Surface, blocked
 

@@ -95,14 +95,44 @@ def power_at(cycles: Floats, kind: Kind) -> Floats:
     return np.asarray(kind.far**2 * (np.exp(-2 * cycles / kind.decay) + LEAST_POWER))
 
 
+class NearCovariance(NamedTuple):
+    """C = diag(deviation) (smooth + diag(alone)) diag(deviation) over window entries.
+
+    Attributes
+    ----------
+    deviation : ndarray, shape (W^2,), float64
+    smooth : ndarray, shape (W, W), float64
+        Along one axis: over the window it is the Kronecker product with itself.
+    alone : ndarray, shape (W^2,), float64
+    """
+
+    deviation: Floats
+    smooth: Floats
+    alone: Floats
+
+
+def smooth_side(correlation: float, entries: int) -> Floats:
+    """Covariance of neighbouring window entries along one axis, (entries, entries), float64."""
+    side = np.arange(entries)
+    return np.asarray(np.exp(-((side[:, None] - side) ** 2) / (2 * correlation**2)))
+
+
+def near_factors(kind: Kind, window: int) -> NearCovariance:
+    """Factors of the covariance C of the window entries at unit strength; 0 without reach."""
+    places = near.offsets(window).astype(np.float64)
+    smooth = smooth_side(CORRELATION, window)
+    if kind.reach == 0:
+        nothing = np.zeros(len(places))
+        return NearCovariance(nothing, smooth, nothing)
+    deviation = np.exp(-np.hypot(places[:, 0], places[:, 1]) / kind.reach)
+    around = np.abs(places).max(axis=1) <= 1
+    return NearCovariance(
+        deviation, smooth, (kind.spread / deviation) ** 2 * around + kind.rough**2
+    )
+
+
 def near_covariance(kind: Kind, window: int) -> Floats:
     """Covariance C of the window entries at unit strength, shape (W^2, W^2), float64."""
-    places = near.offsets(window).astype(np.float64)
-    if kind.reach == 0:
-        return np.zeros((len(places), len(places)))
-    deviation = np.exp(-np.hypot(places[:, 0], places[:, 1]) / kind.reach)
-    apart = np.sum((places[:, None] - places[None]) ** 2, axis=-1)
-    covariance = np.exp(-apart / (2 * CORRELATION**2)) * deviation[:, None] * deviation
-    around = np.abs(places).max(axis=1) <= 1
-    alone = kind.spread**2 * around + (kind.rough * deviation) ** 2
-    return np.asarray(covariance + np.diag(alone))
+    deviation, smooth, alone = near_factors(kind, window)
+    middle = np.kron(smooth, smooth) + np.diag(alone)
+    return np.asarray(deviation[:, None] * middle * deviation)

@@ -6,17 +6,15 @@ agree with light at a single window entry: adding it must raise the evidence by 
 choice among all entries could by chance. Where a neighbour's own q lies on another surface, light
 around that place is likely, and less evidence will do.
 
-Index convention: arrays are (n, channels, ...); w runs over window entries, r over answers.
+Index convention: arrays are (n, channels, ...); w runs over window entries.
 """
 
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
-from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior
 from nearfar.estimate.joint.solve import Found
-from nearfar.estimate.matrices import Band
 from nearfar.transport import near
 
 # Spikes at most: a second surface's footprint is up to four entries.
@@ -35,7 +33,7 @@ FAINTEST = 0.01
 
 
 def likeliest_spike(
-    pixels: Pixels, prior: Prior, strength: Floats, found: Found, band: Band
+    pixels: Pixels, prior: Prior, ratio: Floats, found: Found
 ) -> tuple[Integers, Floats]:
     """Find the window entry at which a spike explains most of what is left.
 
@@ -46,23 +44,21 @@ def likeliest_spike(
         What it adds to the log evidence, less the logarithm of the number of entries, and as
         much more as likely places need less; -inf where the spike would be faint or dark.
     """
-    s = (strength[:, None] * pixels.white).astype(np.float32)[..., None]
-    explained = found.near @ band.on_window.T + found.far
-    explained += np.matmul(found.shared, nuisance.columns(pixels).transpose(0, 2, 1))
-    # K^-1 y: what noise and expectation together leave, as gradient for each entry.
-    weight = 1.0 / pixels.noise[..., None] ** 2
-    repeats = np.sum(prior.directions**2, axis=1)
-    gradient = ((pixels.answers - explained) * weight * repeats) @ band.on_window
-    squared = (prior.directions.T @ band.on_window) ** 2
-    curvature = (1.0 / (s * s * prior.levels + pixels.noise[..., None] ** 2)) @ squared
-    places = near.offsets(round(np.sqrt(band.on_window.shape[1])))
-    allowed = pixels.inside & (np.abs(places).max(axis=1) > 1)
-    height = gradient.sum(axis=1) / curvature.sum(axis=1)
+    step = np.rint(2 * np.log2(ratio / prior.ratios[0])).astype(np.int64)
+    table = prior.curvatures[np.clip(step, 0, len(prior.ratios) - 1)]
+    curvature = table / pixels.noise[..., None] ** 2
+    height = found.pull.sum(axis=1) / curvature.sum(axis=1)
+    allowed = pixels.inside & _apart(pixels.inside.shape[1])
     allowed &= height > FAINTEST * pixels.white.mean(axis=1, keepdims=True)
-    gain = 0.5 * np.sum(gradient**2 / curvature, axis=1) - np.log(len(places))
+    gain = 0.5 * np.sum(found.pull**2 / curvature, axis=1) - np.log(pixels.inside.shape[1])
     gain = np.where(allowed, gain + (SURE - LIKELY) * pixels.likely, -np.inf)
     entry = np.argmax(gain, axis=1)
     return entry, gain[np.arange(len(gain)), entry]
+
+
+def _apart(entries: int) -> Booleans:
+    """Window entries that are not next to q, shape (W^2,)."""
+    return np.asarray(np.abs(near.offsets(round(np.sqrt(entries)))).max(axis=1) > 1)
 
 
 def seen_beside(correspondence: Floats, window: int) -> Booleans:
@@ -97,7 +93,6 @@ def seen_beside(correspondence: Floats, window: int) -> Booleans:
     return found[:, :, 1:-1, 1:-1].reshape(height * width, window**2)
 
 
-def with_spike(pixels: Pixels, entry: Integers, band: Band) -> Pixels:
+def with_spike(pixels: Pixels, entry: Integers) -> Pixels:
     """Add a spike at a window entry of each camera pixel to what is solved for."""
-    column = band.on_window[:, entry].T[..., None]
-    return pixels._replace(of_second=np.concatenate([pixels.of_second, column], axis=-1))
+    return pixels._replace(spikes=np.concatenate([pixels.spikes, entry[:, None]], axis=1))

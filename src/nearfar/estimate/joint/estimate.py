@@ -6,35 +6,47 @@ mean. Then, in turns, each starts from what its neighbours expect and estimates 
 Index convention: arrays are (C, channels, ...); r runs over real answers, w over window entries.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, blocks
+from nearfar.arrays import Floats, Integers, Size, blocks, product
 from nearfar.errors import InputError
+from nearfar.estimate.joint.cut import rounded, solve_cut
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, seen_beside, with_spike
-from nearfar.estimate.joint.evidence import best_kind
+from nearfar.estimate.joint.evidence import best_kind, sketch_band
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import KEPT
-from nearfar.estimate.joint.pixels import Pixels, dc_place, gather, offset_noise, scale_of
+from nearfar.estimate.joint.pixels import (
+    EXACT,
+    Pixels,
+    Whole,
+    dc_place,
+    gather,
+    offset_noise,
+    scale_of,
+)
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.prior import Prior, build_prior
-from nearfar.estimate.joint.solve import Found, solve
+from nearfar.estimate.joint.solve import Found, ratio_of, solve_whole
 from nearfar.estimate.matrices import Band, band_of
-from nearfar.illumination.frequencies import DC, far_frequencies
+from nearfar.illumination.frequencies import DC, Frequency, far_frequencies
+from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
 from nearfar.transport.belief import Belief
+from nearfar.transport.direct import footprint
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, UNLIT, Kind
 from nearfar.transport.model import Transport
 
 # Turns: one alone, the rest with the neighbours.
 TURNS = 3
-# Camera pixels at once.
-BLOCK = 4096
+# Camera pixels at once; and where the border cuts their windows.
+BLOCK = 2048
+CUT = 512
 # Direct light this close to a whole projector pixel is taken to be all that pixel's: noise moves q
 # by as much, and a footprint of 10 % too much beside q cost 1.5 dB under a random light. What
 # really lies beside it, kinds with spread find.
@@ -55,18 +67,25 @@ class _Rows(NamedTuple):
     strength: Floats  # (C,), share of white
 
 
+class _Model(NamedTuple):
+    """Kinds for a set of measured frequencies."""
+
+    band: Band
+    repeats: Floats
+    sketched: NDArray[np.int64]  # answers that the kind is chosen by
+    lit: tuple[Prior, ...]
+    unlit: tuple[Prior, ...]
+    lit_sketches: tuple[Prior, ...]
+    unlit_sketches: tuple[Prior, ...]
+
+
 class _Problem(NamedTuple):
     """What all turns share."""
 
     measurements: Measurements
-    correspondence: Floats  # (C, 2)
-    lit: Booleans
-    centres: NDArray[np.int64]
-    band: Band
+    model: _Model
+    whole: Whole
     window: int
-    likely: Booleans
-    lit_priors: tuple[Prior, ...]
-    unlit_priors: tuple[Prior, ...]
 
 
 def estimate_jointly(
@@ -111,28 +130,7 @@ def estimate_jointly(
             "these measurements lack white, or all but white: plan with --photos, or --near and "
             "--far."
         )
-    basis = real_basis(frequencies, measurements.projector)
-    plain = band_of(basis, near.offsets(window))
-    band = Band(basis, measurements.places(frequencies), plain.on_window, plain.on_corners)
-    repeats = measurements.repeats[band.places]
-
-    def built(kinds: tuple[Kind, ...]) -> tuple[Prior, ...]:
-        return tuple(build_prior(kind, band, repeats) for kind in kinds)
-
-    whole = np.rint(correspondence)
-    correspondence = np.where(np.abs(correspondence - whole) < WHOLE, whole, correspondence)
-    lit = np.isfinite(correspondence).all(axis=-1).ravel()
-    problem = _Problem(
-        measurements,
-        correspondence.reshape(-1, 2),
-        lit,
-        near.centre(correspondence, measurements.projector),
-        band,
-        window,
-        seen_beside(correspondence, window),
-        built(LIT),
-        built(UNLIT) if not lit.all() else (),
-    )
+    problem = _problem(measurements, correspondence, window, frequencies)
     rows = None
     for turn in range(turns):
 
@@ -140,17 +138,56 @@ def estimate_jointly(
             if progress is not None:
                 progress((turn + share) / turns)
 
-        rows = _turn(problem, None if rows is None else _expected(problem, rows), report)
-        problem = problem._replace(correspondence=_moved(problem, rows))
+        rows = _turn(problem, rows, report)
+        whole = problem.whole._replace(correspondence=_moved(problem, rows))
+        problem = problem._replace(whole=whole)
     assert rows is not None
     return _transport(problem, rows, far)
 
 
-def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], None]) -> _Rows:
+def _problem(
+    measurements: Measurements, correspondence: Floats, window: int, frequencies: list[Frequency]
+) -> _Problem:
+    # Pairs of a cosine and a sine side by side, those that answer no sine at the end.
+    frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
+    basis = real_basis(frequencies, measurements.projector)
+    plain = band_of(basis, near.offsets(window))
+    band = Band(basis, measurements.places(frequencies), plain.on_window, plain.on_corners)
+    rounded = np.rint(correspondence)
+    close = np.abs(correspondence - rounded) < WHOLE
+    correspondence = np.where(close, rounded, correspondence).astype(np.float64)
+    lit = np.isfinite(correspondence).all(axis=-1).ravel()
+    white = scale_of(measurements)
+    whole = Whole(
+        answers=measurements.answers[..., band.places],
+        correspondence=correspondence.reshape(-1, 2),
+        centres=near.centre(correspondence, measurements.projector),
+        lit=lit,
+        noise=np.maximum(measurements.noise, EXACT * white),
+        offset_noise=offset_noise(measurements),
+        white=white,
+        likely=seen_beside(correspondence, window),
+    )
+    repeats = measurements.repeats[band.places]
+    sketched, chosen = sketch_band(band)
+
+    def built(kinds: tuple[Kind, ...]) -> tuple[tuple[Prior, ...], tuple[Prior, ...]]:
+        full = tuple(build_prior(kind, band, repeats) for kind in kinds)
+        if len(chosen) == len(repeats):
+            return full, full
+        return full, tuple(build_prior(kind, sketched, repeats[chosen]) for kind in kinds)
+
+    (of_lit, lit_sketches) = built(LIT)
+    (of_unlit, unlit_sketches) = built(UNLIT) if not lit.all() else ((), ())
+    model = _Model(band, repeats, chosen, of_lit, of_unlit, lit_sketches, unlit_sketches)
+    return _Problem(measurements, model, whole, window)
+
+
+def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], None]) -> _Rows:
     """Estimate every camera pixel once."""
-    measurements, band = problem.measurements, problem.band
-    number, channels = measurements.answers.shape[:2]
-    count = band.basis.count
+    whole, model = problem.whole, problem.model
+    band, projector = model.band, problem.measurements.projector
+    number, channels, count = whole.answers.shape
     rows = _Rows(
         np.zeros((number, channels, KEPT), dtype=np.float32),
         np.zeros((number, channels, problem.window**2), dtype=np.float32),
@@ -159,87 +196,124 @@ def _turn(problem: _Problem, expected: _Rows | None, report: Callable[[float], N
         np.zeros(number, dtype=np.int64),
         np.zeros(number, dtype=np.float32),
     )
-    for block in blocks(number, BLOCK):
-        pixels = gather(
-            measurements,
-            problem.correspondence,
-            problem.lit,
-            problem.centres,
-            block,
-            band,
-            problem.window,
-            problem.likely,
+    expected = None if before is None else _expected(problem, before)
+    misdrawn = _misdrawn(problem)
+    cut = whole.lit & ~near.inside(whole.centres, problem.window, projector).all(axis=1)
+
+    def shown(chosen: slice | NDArray[np.int64]) -> Floats | None:
+        """Answers that are expected, and what 8 bits made of direct light."""
+        if expected is None or before is None:
+            return None
+        near_range = band.uncentre(
+            product(expected.near[chosen], band.on_window.T), whole.centres[chosen]
         )
-        if expected is not None:
-            far = band.recentre(expected.far[block], pixels.centres)
-            shown = expected.near[block] @ band.on_window.T + far
-            pixels = pixels._replace(answers=pixels.answers - shown)
-        for lit, first, priors in (
-            (True, 0, problem.lit_priors),
-            (False, len(LIT), problem.unlit_priors),
+        near_range += expected.far[chosen]
+        near_range += before.shared[chosen, :, 1, None] * misdrawn(chosen)[:, None]
+        return near_range
+
+    def put(chosen: NDArray[np.int64], pixels: Pixels, found: Found) -> None:
+        rows.shared[chosen] = found.shared[..., :KEPT]
+        rows.near[chosen] = found.near
+        rows.far[chosen] = band.uncentre(found.far, pixels.centres)
+        rows.near_noise[chosen] = found.near_noise
+
+    done = [0]
+
+    def choose(block: slice) -> None:
+        """Choose the kinds of a block, and estimate those whose windows are whole."""
+        pixels = gather(whole, block, band, projector, shown(block))
+        for lit, first, priors, sketches in (
+            (True, 0, model.lit, model.lit_sketches),
+            (False, len(LIT), model.unlit, model.unlit_sketches),
         ):
-            chosen = np.flatnonzero(pixels.lit == lit)
-            if len(chosen):
-                some = pixels.only(chosen)
-                kind, strength, _ = best_kind(some, priors)
-                found = _by_kind(some, priors, kind, strength, band)
-                far = band.uncentre(found.far, some.centres)
-                new = _Rows(*found._replace(far=far), kind + first, strength)
-                for values, estimated in zip(rows, new, strict=True):
-                    values[block.start + chosen] = estimated
-        report(block.stop / number)
-    if expected is None:
+            mine = np.flatnonzero(pixels.lit == lit)
+            if not len(mine):
+                continue
+            kind, strength, _ = best_kind(pixels.only(mine), sketches, model.sketched)
+            rows.kind[block.start + mine] = kind + first
+            rows.strength[block.start + mine] = strength
+            uncut = ~cut[block.start + mine]
+            for place in np.unique(kind[uncut]):
+                of_kind = np.flatnonzero(uncut & (kind == place))
+                some = pixels.only(mine[of_kind])
+                ratio = ratio_of(some, strength[of_kind])
+                put(
+                    block.start + mine[of_kind],
+                    some,
+                    _with_edges(some, priors[place], ratio, solve_whole, band),
+                )
+        done[0] += block.stop - block.start
+        report(done[0] / number)
+
+    def estimate_cut(chosen: NDArray[np.int64]) -> None:
+        """Estimate camera pixels of one kind whose windows the border cuts."""
+        pixels = gather(whole, chosen, band, projector, shown(chosen))
+        prior = model.lit[rows.kind[chosen[0]]]
+        ratio = rounded(ratio_of(pixels, rows.strength[chosen]))
+        put(chosen, pixels, _with_edges(pixels, prior, ratio, solve_cut, band))
+
+    side_by_side(choose, blocks(number, BLOCK))
+    side_by_side(estimate_cut, _cut_alike(whole, rows.kind, np.flatnonzero(cut)))
+    if expected is None or before is None:
         return rows
     # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
     # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
     return rows._replace(
         near=rows.near + expected.near,
         far=rows.far + expected.far,
-        kind=expected.kind,
-        strength=expected.strength,
+        kind=before.kind,
+        strength=before.strength,
     )
 
 
-def _by_kind(
-    pixels: Pixels, priors: tuple[Prior, ...], kind: Integers, strength: Floats, band: Band
+def _cut_alike(whole: Whole, kind: Integers, cut: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Cut camera pixels into groups of one kind, those whose windows are cut alike together."""
+    centres = whole.centres[cut]
+    order = cut[np.lexsort((centres[:, 1], centres[:, 0], kind[cut]))]
+    for group in np.split(order, np.flatnonzero(np.diff(kind[order])) + 1):
+        for part in blocks(len(group), CUT):
+            yield group[part]
+
+
+def _misdrawn(problem: _Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
+    """Return what tells the answers (n, R) of unit direct light to what 8 bits got wrong."""
+    # A row for each projector pixel, so that a camera pixel's lie side by side.
+    error = np.ascontiguousarray(problem.measurements.shown_error[problem.model.band.places].T)
+    where = footprint(problem.whole.correspondence, problem.measurements.projector)
+
+    def of(chosen: slice | NDArray[np.int64]) -> Floats:
+        pixels, weights = where.pixels[chosen], where.weights[chosen]
+        found = error[pixels[:, 0]] * weights[:, :1]
+        for corner in range(1, 4):
+            if weights[:, corner].any():
+                found += error[pixels[:, corner]] * weights[:, corner, None]
+        return np.asarray(found)
+
+    return of
+
+
+def _with_edges(
+    pixels: Pixels,
+    prior: Prior,
+    ratio: Floats,
+    solve: Callable[[Pixels, Prior, Floats, Band], Found],
+    band: Band,
 ) -> Found:
-    """Estimate each camera pixel as of its kind."""
-    whole: Found | None = None
-    for place, prior in enumerate(priors):
-        chosen = np.flatnonzero(kind == place)
-        if len(chosen):
-            found = _with_edges(pixels.only(chosen), prior, strength[chosen], band)
-            if whole is None:
-                whole = Found._make(
-                    np.empty((len(kind), *values.shape[1:]), dtype=np.float32) for values in found
-                )
-            for values, new in zip(whole, found, strict=True):
-                values[chosen] = new
-    assert whole is not None
-    return whole
-
-
-def _with_edges(pixels: Pixels, prior: Prior, strength: Floats, band: Band) -> Found:
     """Estimate camera pixels of one kind, direct light of second surfaces in their windows."""
-    whole = solve(pixels, prior, strength, band)
-    number = np.arange(len(strength))
-    found, entries = whole, np.empty((len(number), 0), dtype=np.int64)
+    whole = solve(pixels, prior, ratio, band)
+    number = np.arange(len(ratio))
+    found = whole
     for _ in range(MOST if pixels.lit.any() else 0):
-        entry, gain = likeliest_spike(pixels, prior, strength, found, band)
+        entry, gain = likeliest_spike(pixels, prior, ratio, found)
         sure = np.flatnonzero(gain > SURE)
         if not len(sure):
             break
-        number, strength = number[sure], strength[sure]
-        entries = np.concatenate([entries[sure], entry[sure, None]], axis=1)
-        pixels = with_spike(pixels.only(sure), entry[sure], band)
-        found = solve(pixels, prior, strength, band)
+        number, ratio = number[sure], ratio[sure]
+        pixels = with_spike(pixels.only(sure), entry[sure])
+        found = solve(pixels, prior, ratio, band)
         windows = found.near.copy()
-        for spike in range(entries.shape[1]):
-            at = (
-                np.arange(len(number))[:, None],
-                np.arange(windows.shape[1]),
-                entries[:, spike, None],
-            )
+        for spike, entries in enumerate(pixels.spikes.T):
+            at = (np.arange(len(number))[:, None], np.arange(windows.shape[1]), entries[:, None])
             windows[at] += found.shared[..., KEPT + spike]
         whole.near[number] = windows
         whole.far[number] = found.far
@@ -249,26 +323,24 @@ def _with_edges(pixels: Pixels, prior: Prior, strength: Floats, band: Band) -> F
 
 def _expected(problem: _Problem, rows: _Rows) -> _Rows:
     """Ask the neighbours of each camera pixel what they expect of it."""
-    measurements = problem.measurements
+    whole, measurements = problem.whole, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     shape = (*camera, channels)
-    white = scale_of(measurements).reshape(*shape, 1)
-    variance = (measurements.noise.reshape(shape)[..., None] / white) ** 2
-    repeats = measurements.repeats[problem.band.places]
-    every = np.ones(camera, dtype=bool)
+    white = whole.white.reshape(*shape, 1)
     tiny = np.finfo(np.float32).tiny ** 0.5
-    far = expect_each(
-        rows.far.reshape(*shape, -1) / white, np.maximum(variance / repeats, tiny), every
-    )
+    variance = np.maximum((measurements.noise.reshape(shape) / white[..., 0]) ** 2, tiny)
+    far = expect_each(rows.far.reshape(*shape, -1) / white, variance, problem.model.repeats)
     windows = expect_together(
         rows.near.reshape(*shape, -1) / white,
         rows.near_noise.reshape(shape) / white[..., 0] ** 2,
-        problem.lit.reshape(camera),
+        whole.lit.reshape(camera),
     )
-    inside = near.inside(problem.centres, problem.window, measurements.projector)
+    inside = near.inside(whole.centres, problem.window, measurements.projector)
+    windows *= white
+    far *= white
     return rows._replace(
-        near=(windows * white).reshape(rows.near.shape) * inside[:, None],
-        far=(far * white).reshape(rows.far.shape),
+        near=windows.reshape(rows.near.shape) * inside[:, None],
+        far=far.reshape(rows.far.shape),
     )
 
 
@@ -278,14 +350,14 @@ def _moved(problem: _Problem, rows: _Rows) -> Floats:
     energy = np.maximum(np.sum(direct**2, axis=1), np.finfo(np.float32).tiny)
     off = np.sum(rows.shared[..., 2:KEPT] * direct[..., None], axis=1) / energy[:, None]
     off = np.where((direct.sum(axis=1) > 0)[:, None], np.clip(off, -FURTHEST, FURTHEST), 0.0)
-    last = np.array(problem.measurements.projector) - 1
-    lowest = np.maximum(problem.centres - HALF, 0)
-    return np.clip(problem.correspondence + off, lowest, np.minimum(problem.centres + HALF, last))
+    whole, last = problem.whole, np.array(problem.measurements.projector) - 1
+    lowest = np.maximum(whole.centres - HALF, 0)
+    return np.clip(whole.correspondence + off, lowest, np.minimum(whole.centres + HALF, last))
 
 
 def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
     """Put the factors together: f at the far band's frequencies, its DC what d and n leave."""
-    measurements, band = problem.measurements, problem.band
+    measurements, band, whole = problem.measurements, problem.model.band, problem.whole
     wanted = set(far_frequencies(far, measurements.projector))
     low = [k for k in band.basis.frequencies if k in wanted or -k in wanted]
     basis = real_basis([DC, *low], measurements.projector)
@@ -294,14 +366,14 @@ def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
         measurements.answers[..., dc_place(measurements)]
         - _share_of_white(measurements) * rows.shared[..., 0]
     )
-    direct = np.maximum(rows.shared[..., 1], 0.0) * problem.lit[:, None]
+    direct = np.maximum(rows.shared[..., 1], 0.0) * problem.whole.lit[:, None]
     rest = white - direct - rows.near.sum(axis=-1)
     far_range = np.concatenate([rest[..., None], rows.far[..., kept]], axis=-1)
     windows = _positive(problem, rows.near, far_range, band_of(basis, near.offsets(problem.window)))
     shape = (*measurements.camera, measurements.channels)
     return Transport(
         projector=measurements.projector,
-        correspondence=problem.correspondence.reshape(*measurements.camera, 2).astype(np.float32),
+        correspondence=whole.correspondence.reshape(*measurements.camera, 2).astype(np.float32),
         direct=direct.reshape(shape),
         near=windows.reshape(*shape, problem.window, problem.window),
         far=far_range.reshape(*shape, -1),
@@ -311,11 +383,11 @@ def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
         belief=Belief(
             kinds=(*LIT, *UNLIT),
             frequencies=band.basis.frequencies,
-            repeats=measurements.repeats[band.places],
+            repeats=problem.model.repeats,
             kind=rows.kind.astype(np.uint8).reshape(measurements.camera),
             strength=rows.strength.reshape(measurements.camera),
-            white=scale_of(measurements).reshape(shape),
-            offset_noise=offset_noise(measurements).reshape(shape),
+            white=whole.white.reshape(shape),
+            offset_noise=whole.offset_noise.reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),
             share_of_white=_share_of_white(measurements).astype(np.float32).reshape(shape),
         ),
@@ -325,15 +397,18 @@ def _transport(problem: _Problem, rows: _Rows, far: Size) -> Transport:
 def _positive(problem: _Problem, windows: Floats, far_range: Floats, band: Band) -> Floats:
     """Raise window entries to where n and f together are not negative, white kept."""
     apart = np.abs(near.offsets(problem.window)).max(axis=1) > 1
-    inside = near.inside(problem.centres, problem.window, problem.measurements.projector)
-    free = inside & apart & problem.lit[:, None]
+    inside = near.inside(problem.whole.centres, problem.window, problem.measurements.projector)
+    free = inside & apart & problem.whole.lit[:, None]
     found = np.empty_like(windows)
     weights = band.basis.weights.astype(np.float32)
-    for block in blocks(len(windows), BLOCK):
-        turned = band.recentre(far_range[block] * weights, problem.centres[block])
-        least = -(turned @ band.on_window)
+
+    def work(block: slice) -> None:
+        turned = band.recentre(far_range[block] * weights, problem.whole.centres[block])
+        least = -product(turned, band.on_window)
         mine = np.broadcast_to(free[block, None], least.shape)
         found[block] = raise_to(windows[block], least, mine)
+
+    side_by_side(work, blocks(len(windows), BLOCK))
     return found
 
 

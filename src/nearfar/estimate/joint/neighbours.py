@@ -9,41 +9,42 @@ Index convention: arrays are (Cy, Cx, channels, j), j over coefficients.
 """
 
 import numpy as np
-from scipy.ndimage import uniform_filter
 
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.parallel import side_by_side
 
-# Side of the neighbourhood, camera pixels.
-SIDE = 3
 # Light is never known better than to this share of white.
 EXACT = 1e-6
-TINY = 1e-30
+TINY = np.float32(1e-30)
+# Bytes of coefficients filtered at once.
+HELD = 2**22
 
 
-def _mean(values: Floats) -> Floats:
-    """Mean over the neighbourhood."""
-    size = (SIDE, SIDE) + (1,) * (values.ndim - 2)
-    return np.asarray(uniform_filter(values, size, mode="nearest"))
-
-
-def expect_each(values: Floats, variance: Floats, known: Booleans) -> Floats:
+def expect_each(values: Floats, variance: Floats, repeats: Floats) -> Floats:
     """Expect each coefficient by itself.
 
     Parameters
     ----------
     values : ndarray, shape (Cy, Cx, channels, J)
         As shares of white.
-    variance : ndarray, shape (Cy, Cx, channels, J)
-        Of their noise, above 0.
-    known : ndarray of bool, shape (Cy, Cx)
-        Camera pixels that have a say.
+    variance : ndarray, shape (Cy, Cx, channels)
+        Of their noise where they were measured once, above 0.
+    repeats : ndarray, shape (J,)
+        How often each was measured.
     """
-    weight = known[..., None, None] / variance
-    total = np.maximum(_mean(weight), TINY)
-    mean = _mean(weight * values) / total
-    scatter = _mean(weight * values**2) / total - mean**2
-    change = np.maximum(scatter - 1.0 / total, 0.0)
-    return np.asarray(mean + change / (change + variance) * (values - mean))
+    found = np.empty_like(values)
+    whole = (1.0 / variance[..., None]).astype(values.dtype)
+
+    def work(rows: slice) -> None:
+        some, weight, core = _with_neighbours(values, rows), _with_neighbours(whole, rows), rows
+        total = _sum(weight)
+        mean, scatter = _mean_and_scatter(some, weight, total)
+        change = np.maximum(scatter - 1.0 / (total * repeats), 0.0)
+        trust = change / (change + variance[core, ..., None] / repeats)
+        found[core] = mean + trust * (values[core] - mean)
+
+    side_by_side(work, _row_blocks(values))
+    return found
 
 
 def expect_together(values: Floats, variance: Floats, known: Booleans) -> Floats:
@@ -58,15 +59,46 @@ def expect_together(values: Floats, variance: Floats, known: Booleans) -> Floats
     known : ndarray of bool, shape (Cy, Cx)
         Camera pixels that have a say; the rest expect nothing.
     """
-    weight = (known[..., None, None] / np.maximum(variance, EXACT**2)[..., None]).astype(
-        values.dtype
-    )
-    # A running mean leaves traces of what it has passed: without a neighbour there is nothing.
-    alone = uniform_filter(known.astype(np.float32), SIDE, mode="nearest") < 0.5 / SIDE**2
-    weight[alone] = 1.0
-    total = np.maximum(_mean(weight), TINY)
-    mean = np.where(alone[..., None, None], 0.0, _mean(weight * values) / total)
-    scatter = np.mean(_mean(weight * values**2) / total - mean**2, axis=-1, keepdims=True)
-    change = np.maximum(scatter - 1.0 / total, 0.0)
-    trust = change / np.maximum(change + variance[..., None], TINY)
-    return np.asarray((mean + trust * (values - mean)) * known[..., None, None])
+    found = np.zeros_like(values)
+    whole = (known[..., None] / np.maximum(variance, EXACT**2))[..., None].astype(values.dtype)
+
+    def work(rows: slice) -> None:
+        some, weight = _with_neighbours(values, rows), _with_neighbours(whole, rows)
+        total = np.maximum(_sum(weight), TINY)
+        mean, scatter = _mean_and_scatter(some, weight, total)
+        change = np.maximum(np.mean(scatter, axis=-1, keepdims=True) - 1.0 / total, 0.0)
+        trust = change / np.maximum(change + variance[rows, ..., None], TINY)
+        expected = mean + trust * (values[rows] - mean)
+        found[rows] = np.where(known[rows, :, None, None], expected, 0.0)
+
+    side_by_side(work, _row_blocks(values))
+    return found
+
+
+def _row_blocks(values: Floats) -> list[slice]:
+    return list(blocks(len(values), HELD // max(1, values[:1].nbytes)))
+
+
+def _with_neighbours(values: Floats, rows: slice) -> Floats:
+    """Rows and one more on every side; at the camera's border the last is repeated."""
+    some = values[max(rows.start - 1, 0) : rows.stop + 1]
+    above, below = int(rows.start == 0), int(rows.stop == len(values))
+    sides = ((above, below), (1, 1), *(((0, 0),) * (values.ndim - 2)))
+    return np.pad(some, sides, mode="edge")
+
+
+def _sum(values: Floats) -> Floats:
+    """Sum over the 3 x 3 neighbourhood of all but the outermost."""
+    down = values[:-2] + values[1:-1]
+    down += values[2:]
+    across = down[:, :-2] + down[:, 1:-1]
+    across += down[:, 2:]
+    return across
+
+
+def _mean_and_scatter(values: Floats, weight: Floats, total: Floats) -> tuple[Floats, Floats]:
+    """Weighted mean over the neighbourhood, and what the neighbours scatter about it."""
+    weighed = weight * values
+    mean = _sum(weighed) / total
+    weighed *= values
+    return mean, _sum(weighed) / total - mean**2

@@ -1,18 +1,22 @@
-"""The few numbers of a camera pixel that stand out of all expectation, by least squares.
+"""What answers besides n and f: o, d, shifts of q, and direct light of other surfaces.
 
-They are the references' error o, the same in every answer, the direct light d, by how much q is
-off, times d, down and across, and at depth edges direct light of a second surface, d2, d3 ...
-With K the covariance of all else, y = rest + sum_g x_g a_g for their answers a_g. Given K^-1 they
-are a small least squares with what is known of them beforehand: the references' noise, that direct
-light is about as bright as white at most, and that q was found well.
+o is the error that the references add to every answer; d is direct light at q, and with it go how
+far q is off down and across, times d; d2 ... are spikes of direct light at single window entries.
+Their answers are combinations of a few vectors that all camera pixels share, but for o's. Where
+no camera pixel of a block can tell one of them, it is left out.
+
+Their precision is known beforehand: the references' noise, that direct light is about as bright as
+white at most, and that q was found well.
 
 Index convention: arrays are (n, channels, ...); g and h run over the numbers, r over answers.
 """
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, product
 from nearfar.estimate.joint.pixels import Pixels
+from nearfar.estimate.joint.prior import Prior
+from nearfar.estimate.matrices import Band
 
 # Deviation of direct light expected beforehand, as a share of white: no opinion.
 UNKNOWN = 4.0
@@ -26,16 +30,35 @@ KEPT = 4
 LEAST = 1e-12
 
 
-def columns(pixels: Pixels) -> Floats:
-    """Answers a_g of unit o, d, shifts, d2 ..., shape (n, R, G)."""
-    two = np.stack([pixels.of_offset, pixels.of_direct], axis=-1)
-    return np.concatenate([two, pixels.of_shift, pixels.of_second], axis=-1)
+def columns(pixels: Pixels, band: Band) -> Floats:
+    """Return answers a_g of unit o, d, shifts, d2 ..., those that are there: (n, G, R)."""
+    return np.concatenate(
+        [
+            pixels.of_offset,
+            product(pixels.corners, band.on_corners.T),
+            band.on_window.T[pixels.spikes],
+        ],
+        axis=1,
+    )
+
+
+def turned(pixels: Pixels, prior: Prior) -> Floats:
+    """Return the same in the coordinates of a kind's eigenvectors."""
+    return np.concatenate(
+        [
+            product(pixels.of_offset, prior.directions),
+            product(pixels.corners, prior.of_corners),
+            prior.of_window[pixels.spikes],
+        ],
+        axis=1,
+    )
 
 
 def precision(pixels: Pixels) -> Floats:
-    """Precision of o, d, shifts, d2 ... before any answer, shape (n, channels, G), float64."""
+    """Precision, before any answer, of those that are there, shape (n, channels, G), float64."""
     known = precision_of(pixels.white, pixels.offset_noise)
-    return np.concatenate([known, np.repeat(known[..., 1:2], pixels.extra, axis=-1)], axis=-1)
+    spikes = np.repeat(known[..., 1:2], pixels.spikes.shape[1], axis=-1)
+    return np.concatenate([known[..., _places(pixels)], spikes], axis=-1)
 
 
 def precision_of(white: Floats, offset_noise: Floats) -> Floats:
@@ -45,6 +68,21 @@ def precision_of(white: Floats, offset_noise: Floats) -> Floats:
     direct = 1.0 / (UNKNOWN * white) ** 2
     shift = 1.0 / (OFF * white) ** 2
     return np.stack([offset, direct, shift, shift], axis=-1)
+
+
+def laid_out(shared: Floats, pixels: Pixels) -> Floats:
+    """Lay numbers out as o, d, two shifts, d2 ...: 0 for those that are not there, float32."""
+    places = _places(pixels)
+    found = np.zeros((*shared.shape[:2], KEPT + pixels.spikes.shape[1]), dtype=np.float32)
+    found[..., places] = shared[..., : len(places)]
+    found[..., KEPT:] = shared[..., len(places) :]
+    return found
+
+
+def _places(pixels: Pixels) -> list[int]:
+    """Tell which of o, d and the shifts are there."""
+    offset = [0] if pixels.of_offset.shape[1] else []
+    return offset + list(range(1, 1 + pixels.corners.shape[1]))
 
 
 def solve(normal: Floats, right: Floats, known: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Size
-from nearfar.estimate.matrices import Band
+from nearfar.estimate.matrices import Band, corner_weights
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
@@ -34,15 +34,14 @@ class Pixels(NamedTuple):
         Window entries on the projector.
     answers : ndarray, shape (n, channels, R)
         Of all frequencies but DC.
-    of_direct : ndarray, shape (n, R)
-        Answers of unit direct light, 8 bits included; 0 at unlit camera pixels.
-    of_shift : ndarray, shape (n, R, 2)
-        What moving unit direct light by a projector pixel down, or across, adds to the answers;
-        0 where q is whole or there is no direct light.
-    of_second : ndarray, shape (n, R, E)
-        Answers of unit direct light of other surfaces, at single window entries; 0: none.
-    of_offset : ndarray, shape (n, R)
-        What an error of the references adds to the answers.
+    corners : ndarray, shape (n, 1 or 3, 9)
+        Unit direct light over `nearfar.estimate.matrices.CORNERS`, and what moving it by a
+        projector pixel down, or across, adds, which is left out where all q are whole; 0 at unlit
+        camera pixels.
+    of_offset : ndarray, shape (n, 0 or 1, R)
+        What an error of the references adds to the answers; left out where they cannot err.
+    spikes : ndarray of int, shape (n, E)
+        Window entries at which direct light of other surfaces is believed.
     noise : ndarray, shape (n, channels)
         Standard deviation of an answer that was measured once.
     offset_noise : ndarray, shape (n, channels)
@@ -57,19 +56,13 @@ class Pixels(NamedTuple):
     lit: Booleans
     inside: Booleans
     answers: Floats
-    of_direct: Floats
-    of_shift: Floats
-    of_second: Floats
+    corners: Floats
     of_offset: Floats
+    spikes: NDArray[np.int64]
     noise: Floats
     offset_noise: Floats
     white: Floats
     likely: Booleans
-
-    @property
-    def extra(self) -> int:
-        """Number E of single window entries."""
-        return int(self.of_second.shape[-1])
 
     def only(self, chosen: NDArray[np.int64]) -> "Pixels":
         """Return some of the camera pixels."""
@@ -123,50 +116,68 @@ def answers_of_direct(correspondence: Floats, lights: Floats, projector: Size) -
     return found
 
 
+class Whole(NamedTuple):
+    """All camera pixels, of which `gather` takes some; each field's first axis runs over them.
+
+    Attributes
+    ----------
+    answers : ndarray, shape (C, channels, R)
+        Of all frequencies but DC, in the order of the band.
+    correspondence : ndarray, shape (C, 2)
+        q.
+    centres, lit
+        q rounded, and whether there is any.
+    noise, offset_noise, white : ndarray, shape (C, channels)
+        As in `Pixels`.
+    likely : ndarray of bool, shape (C, W^2)
+        As in `Pixels`.
+    """
+
+    answers: Floats
+    correspondence: Floats
+    centres: NDArray[np.int64]
+    lit: Booleans
+    noise: Floats
+    offset_noise: Floats
+    white: Floats
+    likely: Booleans
+
+
 def gather(
-    measurements: Measurements,
-    correspondence: Floats,
-    lit: Booleans,
-    centres: NDArray[np.int64],
-    block: slice,
+    whole: Whole,
+    chosen: slice | NDArray[np.int64],
     band: Band,
-    window: int,
-    likely: Booleans | None = None,
+    projector: Size,
+    shown: Floats | None = None,
 ) -> Pixels:
-    """Gather a block of camera pixels.
+    """Gather some camera pixels, re-centred.
 
     Parameters
     ----------
-    measurements : Measurements
-    correspondence, lit, centres
-        q, (C, 2), whether there is any, and what it was rounded to, of all pixels.
-    block : slice
+    whole : Whole
+    chosen : slice or ndarray of int
     band : Band
         The measured frequencies without DC.
-    window : int
-        W.
-    likely : ndarray of bool, shape (C, W^2), optional
-        Where neighbours see another surface; nowhere by default.
+    projector : Size
+    shown : ndarray, shape (n, channels, R), optional
+        What is known of the answers already, as measured: it is taken out of them.
     """
-    q = correspondence[block]
-    centres, lit = centres[block], lit[block]
-    white = scale_of(measurements)[block]
-    shown = measurements.shown_error[band.places] + band.basis.patterns
-
-    direct = answers_of_direct(q, shown, measurements.projector)
-    ones = np.ones((len(lit), 1, band.basis.count), dtype=np.float32)
-    answers = measurements.answers[block][..., band.places]
+    some = Whole._make(values[chosen] for values in whole)
+    answers = some.answers if shown is None else some.answers - shown
+    corners = corner_weights(some.correspondence, some.centres)
+    if not corners[:, 1:].any():
+        corners = corners[:, :1]
+    ones = np.ones((len(some.lit), 1 if some.offset_noise.any() else 0, band.basis.count))
     return Pixels(
-        centres=centres,
-        lit=lit,
-        inside=near.inside(centres, window, measurements.projector),
-        answers=band.recentre(answers, centres),
-        of_direct=band.recentre(direct[:, :1], centres)[:, 0],
-        of_shift=band.recentre(direct[:, 1:], centres).transpose(0, 2, 1),
-        of_second=np.zeros((len(lit), band.basis.count, 0), dtype=np.float32),
-        of_offset=band.recentre(ones, centres)[:, 0],
-        noise=np.maximum(measurements.noise[block], EXACT * white),
-        offset_noise=offset_noise(measurements)[block],
-        white=white,
-        likely=np.zeros((len(lit), window**2), dtype=bool) if likely is None else likely[block],
+        centres=some.centres,
+        lit=some.lit,
+        inside=near.inside(some.centres, round(np.sqrt(some.likely.shape[1])), projector),
+        answers=band.recentre(answers, some.centres),
+        corners=corners,
+        of_offset=band.recentre(ones.astype(np.float32), some.centres),
+        spikes=np.zeros((len(some.lit), 0), dtype=np.int64),
+        noise=some.noise,
+        offset_noise=some.offset_noise,
+        white=some.white,
+        likely=some.likely,
     )

@@ -5,7 +5,8 @@ the measured cosines and sines, re-centred on q, have the covariance K = B C B^T
 patterns over the window. Measured m times over, in units of one measurement's noise, its
 eigenvectors are those of sqrt(m) K sqrt(m), whatever the strength of the light and the noise.
 
-Index convention: r runs over real answers, w over window entries, i over eigenvectors.
+Index convention: r runs over real answers, w over window entries, i over eigenvectors,
+t over tabulated ratios.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,16 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.estimate.matrices import Band
-from nearfar.transport.kinds import Kind, far_power, near_covariance
+from nearfar.transport.kinds import (
+    Kind,
+    NearCovariance,
+    far_power,
+    near_covariance,
+    near_factors,
+)
+
+# Ratios of strength to noise, squared: from light far below the noise to photos without any.
+RATIOS = 2.0 ** np.arange(-16.0, 41.0, 0.5)
 
 
 @dataclass(frozen=True)
@@ -31,6 +41,17 @@ class Prior:
         From weights of the eigenvectors to window entries.
     to_far : ndarray, shape (R, R), float32
         From weights of the eigenvectors to re-centred answers of f.
+    of_window : ndarray, shape (W^2, R), float32
+        Coordinates of the answers of unit light at each window entry.
+    of_corners : ndarray, shape (9, R), float32
+        The same at the entries around q.
+    ratios : ndarray, shape (T,)
+        (s / sigma)^2, for which is tabulated:
+    curvatures : ndarray, shape (T, W^2), float32
+        Information about a spike at each window entry, in units of one measurement's noise.
+    shaken : ndarray, shape (T,)
+        Mean variance of a window entry that noise causes, in units of one measurement's.
+    factors : NearCovariance
     covariance : ndarray, shape (W^2, W^2), float64
         C.
     power : ndarray, shape (R,), float64
@@ -41,6 +62,12 @@ class Prior:
     directions: Floats
     to_near: Floats
     to_far: Floats
+    of_window: Floats
+    of_corners: Floats
+    ratios: Floats
+    curvatures: Floats
+    shaken: Floats
+    factors: NearCovariance
     covariance: Floats
     power: Floats
 
@@ -66,11 +93,20 @@ def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
     levels, vectors = np.linalg.eigh(matrix)
     levels, vectors = np.maximum(levels[::-1], 0.0), vectors[:, ::-1]
     directions = vectors * root[:, None]
+    to_near = directions.T @ seen
+    of_window = directions.T @ patterns
+    told = 1.0 / (RATIOS[:, None] * levels + 1.0)
     return Prior(
         levels=levels.astype(np.float32),
         directions=np.ascontiguousarray(directions, dtype=np.float32),
-        to_near=np.ascontiguousarray(directions.T @ seen, dtype=np.float32),
+        to_near=np.ascontiguousarray(to_near, dtype=np.float32),
         to_far=np.ascontiguousarray(directions.T * power, dtype=np.float32),
+        of_window=np.ascontiguousarray(of_window.T, dtype=np.float32),
+        of_corners=np.ascontiguousarray(band.on_corners.T @ directions, dtype=np.float32),
+        ratios=RATIOS,
+        curvatures=(told @ of_window**2).astype(np.float32),
+        shaken=(RATIOS[:, None] * told) ** 2 @ np.sum(to_near**2, axis=1) / to_near.shape[1],
+        factors=near_factors(kind, window),
         covariance=covariance,
         power=power,
     )

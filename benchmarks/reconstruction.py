@@ -3,7 +3,7 @@
 Run ``python benchmarks/reconstruction.py``. A capture of 1060 photos of transport and 256 of
 stripes is made from a simple world first; then a process of its own reconstructs it, and its time
 and peak memory are printed, beside one float32 product of (49152 x 530) x (530 x 530) in the same
-run, since machines differ.
+run, since machines differ. Both methods, the paper's and the joint one.
 """
 
 import argparse
@@ -30,18 +30,18 @@ WORLD_WINDOW = 3
 CHANNELS = 3
 
 
-def world() -> Transport:
+def random_transport(projector: Size, window: int, far_band: Size) -> Transport:
     """Draw a transport with direct, near and far light at every camera pixel."""
     generator = np.random.default_rng(0)
-    shape = (*PROJECTOR, CHANNELS)
-    y, x = np.indices(PROJECTOR, dtype=np.float32)
-    basis = real_basis(representatives(far_frequencies(FAR, PROJECTOR)), PROJECTOR)
+    shape = (*projector, CHANNELS)
+    y, x = np.indices(projector, dtype=np.float32)
+    basis = real_basis(representatives(far_frequencies(far_band, projector)), projector)
     far = 0.002 * generator.normal(size=(*shape, basis.count))
     far[..., 0] += 0.1
-    window = generator.uniform(0, 0.01, size=(*shape, WORLD_WINDOW, WORLD_WINDOW))
+    window = generator.uniform(0, 0.01, size=(*shape, window, window))
     nothing = np.zeros(shape, dtype=np.float32)
     return Transport(
-        projector=PROJECTOR,
+        projector=projector,
         correspondence=np.stack([y, x], axis=-1),
         direct=generator.uniform(0.1, 0.5, size=shape).astype(np.float32),
         near=window.astype(np.float32),
@@ -55,7 +55,14 @@ def world() -> Transport:
 def make(folder: Path) -> Path:
     """Shoot the capture."""
     plan = paper_plan(PROJECTOR, WINDOW, FAR)
-    rig = SimulatedRig(world(), "benchmark", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    rig = SimulatedRig(
+        random_transport(PROJECTOR, WORLD_WINDOW, FAR),
+        "benchmark",
+        SimulatedProjector(),
+        SimulatedCamera(),
+        1.0,
+        0,
+    )
     acquire(plan, folder / "capture.zarr", rig)
     return folder / "capture.zarr"
 
@@ -77,24 +84,27 @@ def main() -> None:
     """Make a capture, or reconstruct one that is there."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--capture", type=Path, help="reconstruct this capture and say how")
-    given = parser.parse_args().capture
+    parser.add_argument("--method", choices=("paper", "joint"), default="paper")
+    given, method = parser.parse_args().capture, parser.parse_args().method
     if given is not None:
         started = time.perf_counter()
-        transport, _ = reconstruct(open_capture(given), method="paper")
+        transport, _ = reconstruct(open_capture(given), method=method)
         seconds = time.perf_counter() - started
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
         pixels = transport.camera.pixels
         print(
-            f"{pixels} camera pixels x {transport.channels} channels, W = {transport.window}: "
-            f"{seconds:.1f} s, {pixels / seconds:.0f} camera pixels a second, "
-            f"peak memory {peak:.2f} GiB"
+            f"{method}: {pixels} camera pixels x {transport.channels} channels, "
+            f"W = {transport.window}: {seconds:.1f} s, "
+            f"{pixels / seconds:.0f} camera pixels a second, peak memory {peak:.2f} GiB"
         )
         product = one_product()
         print(f"one product {product:.2f} s: reconstruction takes {seconds / product:.1f} of them")
         return
     with tempfile.TemporaryDirectory() as folder:
         capture = make(Path(folder))
-        subprocess.run([sys.executable, __file__, "--capture", str(capture)], check=True)
+        for each in ("paper", "joint"):
+            command = [sys.executable, __file__, "--capture", str(capture), "--method", each]
+            subprocess.run(command, check=True)
 
 
 if __name__ == "__main__":

@@ -283,3 +283,18 @@ def test_footprint_weights_are_the_centroid(generator):
     np.testing.assert_allclose(where.weights.sum(axis=1), lit, atol=1e-6)
     centroid = np.stack([(where.weights * y).sum(1), (where.weights * x).sum(1)], axis=1)
     np.testing.assert_allclose(centroid[lit], q.reshape(-1, 2)[lit], atol=2e-4)
+
+
+@pytest.mark.parametrize("count", [1, 3, 20])
+@pytest.mark.parametrize("colours", [(), (2,)])
+def test_many_lights_at_once_are_each_by_itself(count, colours, generator):
+    transport = _transport(generator)
+    lights = generator.random((count, *PROJECTOR, *colours)).astype(np.float32)
+    together = transport.pictures(lights)
+    assert together.shape == (count, *CAMERA, 2)
+    assert together.dtype == np.float32
+    for light, picture in zip(lights, together, strict=True):
+        np.testing.assert_allclose(picture, transport @ light, atol=1e-5)
+    assert transport.pictures(lights[:0]).shape == (0, *CAMERA, 2)
+    with pytest.raises(InputError, match="projector"):
+        transport.pictures(lights[:, :5])

@@ -76,7 +76,8 @@ class RealBasis:
     def analyse(self, light: Floats) -> Floats:
         """Return weights times the light's overlap with each pattern: (..., P) to (..., M)."""
         kind = np.result_type(light.dtype, np.float32)
-        return np.asarray((light.astype(kind) @ self.patterns.T.astype(kind)) * self.weights)
+        overlaps = light.astype(kind, copy=False) @ self.patterns.T.astype(kind, copy=False)
+        return np.asarray(overlaps * self.weights)
 
     def synthesise(self, coefficients: Floats) -> Floats:
         """Adjoint of `analyse`, and the rows of F: (..., M) to (..., P)."""

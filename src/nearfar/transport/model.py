@@ -15,6 +15,7 @@ from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis
+from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 
 # Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
 BLOCK = 8192
@@ -118,13 +119,9 @@ class Transport:
         InputError
             If the light has another size than the pattern grid, or other channels.
         """
-        lights = self.lights(light)
-        pictures = (
-            self._direct_pictures(lights),
-            self._near_pictures(lights),
-            self._far_pictures(lights),
+        return Components(
+            *(self.picture(flat[0]) for flat in self._components(self.lights(light)[None]))
         )
-        return Components(*(self.picture(flat) for flat in pictures))
 
     def relight(
         self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
@@ -146,8 +143,29 @@ class Transport:
         )
 
     def pictures(self, lights: Floats) -> Floats:
-        """Relight under many lights (n, Py, Px): (n, Cy, Cx, channels)."""
-        return np.stack([(self @ light).reshape(*self.camera, self.channels) for light in lights])
+        """Relight under many lights at once, several times as fast as one by one.
+
+        Parameters
+        ----------
+        lights : ndarray, shape (n, Py, Px) or (n, Py, Px, channels)
+            float32 takes half the time of float64.
+
+        Returns
+        -------
+        ndarray, shape (n, Cy, Cx, channels)
+
+        Raises
+        ------
+        InputError
+            As `components`.
+        """
+        if not len(lights):
+            return np.zeros((0, *self.camera, self.channels), dtype=np.float32)
+        flat = np.stack([self.lights(light) for light in lights])
+        direct, near, far = self._components(flat)
+        direct += near
+        direct += far
+        return direct.reshape(len(flat), *self.camera, self.channels)
 
     def adjoint(self, image: Floats) -> Floats:
         """Send an image back: T^T per channel.
@@ -219,22 +237,24 @@ class Transport:
         if not 0 <= channel < self.channels:
             raise InputError(f"channel {channel} is not one of this transport's {self.channels}.")
 
+        one = replace(
+            self,
+            belief=None,
+            **{
+                name: getattr(self, name)[:, :, channel : channel + 1]
+                for name in ("direct", "near", "far", "black", "noise")
+            },
+        )
+
         def matvec(light: Floats) -> Floats:
-            lights = np.reshape(light, (1, -1)).astype(np.float64)
-            parts = (
-                self._direct_pictures(lights, (channel,)),
-                self._near_pictures(lights, (channel,)),
-                self._far_pictures(lights, (channel,)),
-            )
-            return np.asarray(parts[0] + parts[1] + parts[2])[:, 0]
+            lights = np.reshape(light, (1, 1, -1)).astype(np.float64)
+            return np.asarray(sum(one._components(lights)))[0, :, 0]
 
         def rmatvec(image: Floats) -> Floats:
             return self._adjoint_channel(np.ravel(image), channel).ravel()
 
         shape = (self.camera.pixels, self.projector.pixels)
         return LinearOperator(shape, matvec=matvec, rmatvec=rmatvec, dtype=np.float64)
-
-    # Lights below are flat: (1, P) for all channels or (channels, P); pictures are (C, channels).
 
     def lights(self, light: Floats) -> Floats:
         """Check a light and lay it flat: (1, P) for all channels, or (channels, P)."""
@@ -262,33 +282,16 @@ class Transport:
         picture = flat.reshape(*self.camera, self.channels)
         return picture[..., 0] if self.channels == 1 else picture
 
-    def _direct_pictures(self, lights: Floats, channels: tuple[int, ...] | None = None) -> Floats:
-        d = self.direct.reshape(-1, self.channels)
-        chosen = d if channels is None else d[:, list(channels)]
-        return np.asarray(chosen * footprints.look_up(lights, self._footprint).T)
-
-    def _near_pictures(self, lights: Floats, channels: tuple[int, ...] | None = None) -> Floats:
-        chosen = range(self.channels) if channels is None else channels
-        n = self.near.reshape(-1, self.channels, self.window**2)
-        kind = np.result_type(lights, self.near)
-        pictures = np.empty((self.camera.pixels, len(chosen)), dtype=kind)
-        for block in blocks(self.camera.pixels, BLOCK):
-            for number, light in enumerate(lights):
-                seen = windows.look_up(
-                    light.reshape(self.projector), self._centres[block], self.window, self.projector
-                )
-                for i, channel in enumerate(chosen):
-                    if len(lights) == 1 or i == number:
-                        pictures[block, i] = np.einsum("cw,cw->c", n[block, channel], seen)
-        return pictures
-
-    def _far_pictures(self, lights: Floats, channels: tuple[int, ...] | None = None) -> Floats:
-        chosen = range(self.channels) if channels is None else channels
-        f = self.far.reshape(-1, self.channels, self.far_basis.count)
-        overlaps = self.far_basis.analyse(lights)
-        overlaps = np.broadcast_to(overlaps, (len(chosen), self.far_basis.count))
-        pictures = [f[:, channel] @ overlaps[i] for i, channel in enumerate(chosen)]
-        return np.stack(pictures, axis=1).astype(np.result_type(lights, self.far), copy=False)
+    def _components(self, lights: Floats) -> Components:
+        """Pictures (L, C, channels) under lights (L, 1 or channels, P)."""
+        count, channels = self.camera.pixels, self.channels
+        return Components(
+            direct_pictures(self.direct.reshape(count, channels), self._footprint, lights),
+            near_pictures(
+                self.near.reshape(count, channels, -1), self._centres, self.projector, lights
+            ),
+            far_pictures(self.far.reshape(count, channels, -1), self.far_basis, lights),
+        )
 
     def _adjoint_channel(self, image: Floats, channel: int) -> Floats:
         d = self.direct.reshape(-1, self.channels)[:, channel]

@@ -50,8 +50,19 @@ def _places(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray
 
 def look_up(light: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:
     """Read a light (Py, Px) over every window, shape (C, W^2); 0 beyond the border."""
-    padded = np.pad(light, window)
-    return np.asarray(padded.ravel()[_places(centres, window, projector)])
+    return read(pad(light.reshape(projector), window), centres, window)
+
+
+def pad(lights: Floats, window: int) -> Floats:
+    """Lay a dark border of W around lights (..., Py, Px), for `read`."""
+    return np.pad(lights, [(0, 0)] * (lights.ndim - 2) + [(window, window)] * 2)
+
+
+def read(padded: Floats, centres: NDArray[np.int64], window: int) -> Floats:
+    """Read one padded light over every window, shape (C, W^2)."""
+    views = np.lib.stride_tricks.sliding_window_view(padded, (window, window))
+    first = centres + window - window // 2
+    return np.asarray(views[first[:, 0], first[:, 1]].reshape(len(centres), -1))
 
 
 def spread(values: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:

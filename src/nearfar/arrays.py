@@ -4,6 +4,7 @@ Everywhere: images are [y, x] or [y, x, channel], a size AxB is height x width, 
 projector pixels are flattened row by row.
 """
 
+import math
 import os
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -68,6 +69,30 @@ def parse_size(text: str, *, name: str = "size") -> Size:
     return Size(height, width)
 
 
+# Bytes in each unit of memory.
+_UNITS = {"KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+
+
+def parse_bytes(text: str, *, name: str = "memory") -> int:
+    """Read an amount of memory written as ``2GB`` or ``500MB``.
+
+    Raises
+    ------
+    InputError
+        If the text is no amount above 0 in KB, MB, GB or TB.
+    """
+    plain = text.strip().upper()
+    try:
+        amount = float(plain[:-2]) * _UNITS[plain[-2:]]
+    except (ValueError, KeyError):
+        amount = -1.0
+    if not 0 < amount < math.inf:
+        raise InputError(
+            f"{name} {text!r} is not an amount of memory: write for instance 2GB or 500MB."
+        )
+    return int(amount)
+
+
 def processors() -> int:
     """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -77,7 +102,7 @@ def processors() -> int:
 
 def product(values: Floats, matrix: Floats) -> Floats:
     """Return (..., a) times (a, b) as one product, where NumPy makes one for each first axis."""
-    flat = values.reshape(-1, values.shape[-1]) @ matrix
+    flat = values.reshape(math.prod(values.shape[:-1]), values.shape[-1]) @ matrix
     return np.asarray(flat.reshape(*values.shape[:-1], matrix.shape[1]))
 
 

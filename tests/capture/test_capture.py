@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nearfar.arrays import Size
-from nearfar.capture import open_capture, white_and_black, write_capture
+from nearfar.capture import open_capture, store, white_and_black, write_capture
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -260,6 +260,24 @@ def test_a_damaged_photo_gets_a_sentence(tmp_path: Path) -> None:
         (path / name / "zarr.json").unlink()
         with pytest.raises(UnreadableFileError, match=rf"array {name}"):
             open_capture(path)
+
+
+def test_rows_of_large_photos_are_read_without_the_rest(tmp_path: Path, monkeypatch) -> None:
+    photos = list(photos_of(PLAN))
+    height, row = photos[0].shape[0], photos[0][0].nbytes
+    assert height % 3
+    monkeypatch.setattr(store, "CHUNK_BYTES", 3 * row + 1)
+    path = tmp_path / "a.zarr"
+    capture = write_capture(path, PLAN, photos)
+    assert (path / "photos" / "c.0.1.0.0").exists()
+    np.testing.assert_array_equal(
+        capture.read(slice(None)) * capture.full_scale, np.stack([np.atleast_3d(p) for p in photos])
+    )
+    rows = capture.read([4], slice(3, 5))
+    (path / "photos" / "c.4.0.0.0").unlink()
+    np.testing.assert_array_equal(capture.read([4], slice(3, 5)), rows)
+    with pytest.raises(UnreadableFileError, match=r"photos/c\.4\.0\.0\.0 is missing"):
+        capture.read([4], slice(2, 5))
 
 
 def test_other_things_are_no_captures(tmp_path: Path) -> None:

@@ -529,6 +529,24 @@ def test_photos_that_settle_no_place_need_a_correspondence(
 
 
 @pytest.mark.parametrize(
+    ("memory", "word"),
+    [
+        ("lots", "2GB or 500MB"),
+        ("2", "2GB or 500MB"),
+        ("-1GB", "2GB or 500MB"),
+        ("nanGB", "2GB or 500MB"),
+        ("infGB", "2GB or 500MB"),
+        ("1MB", "too few for one row"),
+    ],
+)
+def test_a_memory_that_cannot_be(
+    finished: Job, untouched: Untouched, tmp_path: Path, memory: str, word: str
+):
+    arguments = ("reconstruct", finished.capture, tmp_path / "out.zarr", "--memory", memory)
+    check_refused(untouched, arguments, "--memory", word)
+
+
+@pytest.mark.parametrize(
     ("q", "word"),
     [
         (np.zeros((9, 8, 2)), "8x9"),

@@ -20,6 +20,8 @@ from nearfar.rigs.drift import SimulatedDrift
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
 from nearfar.scenes.cache import cached_scene
+from nearfar.transport.rows import BELIEVED, FACTORS
+from nearfar.transport.store import load_transport, write_transport
 from nearfar.workflow import reconstruct as reconstruction
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import relighting_snr, snr
@@ -37,6 +39,15 @@ BY_REFERENCE = paper_plan(PROJECTOR, 7, Size(3, 3), offset="reference")
 
 def _rig(world, camera=QUIET):
     return SimulatedRig(world, "test", SimulatedProjector(), camera, 1.0, 0)
+
+
+def _memory_for(rows, plan, method="paper", width=30, channels=3):
+    """Memory in which so many rows of the camera are worked at."""
+    estimator = reconstruction._ESTIMATORS[method]
+    shared, pixel = estimator.bytes_of(plan, channels)
+    beside = 2 * (estimator.halo + 1) if estimator.halo else 0
+    row = reconstruction.SLACK * pixel * width
+    return int(reconstruction.LIBRARIES + shared + row * (rows + beside + 0.5))
 
 
 @pytest.fixture
@@ -68,11 +79,10 @@ def test_more_noise_makes_it_worse_and_none_makes_it_exact(tmp_path, world):
     assert found[2] > 65
 
 
-def test_blocks_of_rows_change_next_to_nothing(tmp_path, world, monkeypatch):
+def test_blocks_of_rows_change_next_to_nothing(tmp_path, world):
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
     whole, _ = reconstruct(capture)
-    monkeypatch.setattr(reconstruction, "HELD", 4 * len(PLAN.patterns) * 30 * 3 * 12)
-    parts, _ = reconstruct(capture)
+    parts, _ = reconstruct(capture, memory=_memory_for(12, PLAN))
     # The noise model is fitted in each block on its own: what differs is far below the noise.
     for name in ("direct", "far", "near"):
         one, other = getattr(parts, name), getattr(whole, name)
@@ -81,7 +91,7 @@ def test_blocks_of_rows_change_next_to_nothing(tmp_path, world, monkeypatch):
     np.testing.assert_allclose(parts.noise, whole.noise, rtol=0.05)
 
 
-def test_a_dark_margin_is_no_fault(tmp_path, world, monkeypatch):
+def test_a_dark_margin_is_no_fault(tmp_path, world):
     q = world.correspondence.copy()
     q[:12] = np.nan
     dark = replace(
@@ -94,8 +104,8 @@ def test_a_dark_margin_is_no_fault(tmp_path, world, monkeypatch):
     )
     camera = SimulatedCamera(black_level=0.0, ambient=0.0, read_noise=0.0)
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(dark, camera))
-    monkeypatch.setattr(reconstruction, "HELD", 4 * len(PLAN.patterns) * 30 * 3 * 6)
-    transport, correspondence = reconstruct(capture)
+    memory = _memory_for(6, PLAN)
+    transport, correspondence = reconstruct(capture, memory=memory)
     np.testing.assert_array_equal(correspondence.lit, np.isfinite(q[..., 0]))
     assert np.all(np.isfinite(transport.near))
     light = nearfar.natural_picture(PROJECTOR, 1)
@@ -178,14 +188,69 @@ def test_drift_is_taken_out_told_and_kept_from_stripes(tmp_path, world):
     assert transport.provenance["drift"]["lamp"] == pytest.approx(expected, rel=0.1)
 
 
-def test_blocks_of_rows_change_nothing_by_reference(tmp_path, world, monkeypatch):
+def test_blocks_of_rows_change_nothing_by_reference(tmp_path, world):
     capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
     whole, _ = reconstruct(capture)
-    monkeypatch.setattr(reconstruction, "HELD", 4 * len(BY_REFERENCE.patterns) * 30 * 3 * 5)
-    parts, _ = reconstruct(capture)
+    memory = _memory_for(5, BY_REFERENCE)
+    parts, _ = reconstruct(capture, memory=memory)
     # Drift and noise are those of the whole camera; matrix products round by blocks.
     for name in ("direct", "far", "near", "noise", "black"):
         np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), atol=2e-5)
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
+    plan, _ = choose_plan(PROJECTOR, 60, window=7)
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+    known = given_correspondence(world.correspondence, world.camera, PROJECTOR) if given else None
+    whole, q = reconstruction.reconstruct(capture, known)
+    for rows in (11, 5):
+        memory = _memory_for(rows, plan, "joint")
+        blocks = list(reconstruction.reconstruct_in_blocks(capture, known, memory=memory))
+        assert len(blocks) == -(-24 // rows)
+        parts, found = reconstruction.reconstruct(capture, known, memory=memory)
+        np.testing.assert_array_equal(found.lit, q.lit)
+        # Matrix products round by blocks, and a camera pixel between two kinds may take the other.
+        same = parts.belief.kind == whole.belief.kind
+        assert same.mean() > 0.99
+        for name in ("correspondence", "direct", "near", "far", "noise", "black"):
+            one, other = getattr(parts, name), getattr(whole, name)
+            assert np.mean(np.abs(one - other) > 1e-4) < 0.01, name
+
+
+def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
+    plan, _ = choose_plan(PROJECTOR, 60, window=7)
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+    memory = _memory_for(5, plan, "joint")
+    parts = reconstruction.reconstruct_in_blocks(capture, memory=memory)
+    write_transport(tmp_path / "t.zarr", (part.transport for part in parts), 24)
+    stored = load_transport(tmp_path / "t.zarr")
+    whole, _ = reconstruction.reconstruct(capture, memory=memory)
+    for name in (*FACTORS, "provenance"):
+        np.testing.assert_array_equal(getattr(stored, name), getattr(whole, name))
+    for name in BELIEVED:
+        np.testing.assert_array_equal(getattr(stored.belief, name), getattr(whole.belief, name))
+
+
+def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
+    plan, _ = choose_plan(PROJECTOR, 60, window=7)
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    parts = reconstruction.reconstruct_in_blocks(capture, memory=_memory_for(5, plan, "joint"))
+
+    def faulty():
+        yield next(parts).transport
+        raise InputError("a photo is damaged")
+
+    with pytest.raises(InputError, match="a photo is damaged"):
+        write_transport(tmp_path / "t.zarr", faulty(), 24)
+    assert [path.name for path in tmp_path.iterdir()] == ["c.zarr"]
+
+
+@pytest.mark.parametrize("method", ["joint", "paper"])
+def test_too_little_memory_is_said_before_any_work(tmp_path, world, method):
+    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world))
+    with pytest.raises(InputError, match=r"too few for one row.*--memory 0\.\dGB or more"):
+        reconstruction.reconstruct(capture, method=method, memory=10**6)
 
 
 def test_the_square_transport_by_reference(tmp_path):

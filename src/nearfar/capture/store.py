@@ -1,4 +1,4 @@
-"""A capture: the raw photos of a plan on the disk, one chunk each."""
+"""A capture: the raw photos of a plan on the disk, one chunk each, large ones in rows."""
 
 import json
 import math
@@ -30,6 +30,8 @@ from nearfar.illumination.frequencies import DC
 from nearfar.plan.model import Plan, Sinusoid, parse_plan
 from nearfar.version import version
 
+# Bytes of a chunk at most: rows of a large camera are read without the rest of it.
+CHUNK_BYTES = 2**22
 KIND = "nearfar capture"
 FORMAT_VERSION = 1
 DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
@@ -91,8 +93,8 @@ class Capture:
         photos : slice or integers
             Which photos.
         rows : slice
-            Which rows of the camera. A photo is one chunk, so a few rows cost as much time as
-            all (but less memory).
+            Which rows of the camera. A photo of more than `CHUNK_BYTES` lies in chunks of rows, of
+            which only those asked for are read.
 
         Returns
         -------
@@ -243,7 +245,9 @@ def write_capture(
                 "nearfar": version(),
             },
         )
-        array = add_array(group, "photos", (count, *first.shape), first.dtype, (1, *first.shape))
+        rows = max(1, min(len(first), CHUNK_BYTES // max(1, first[0].nbytes)))
+        chunk = (1, rows, *first.shape[1:])
+        array = add_array(group, "photos", (count, *first.shape), first.dtype, chunk)
         times, saturated, means = np.zeros(count), np.zeros(count), np.full(count, np.nan)
         written, all_equal, white_black = 0, True, white_and_black(plan)
         for photo in _with_first(first, islice(remaining, count - 1)):

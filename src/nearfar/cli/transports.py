@@ -1,18 +1,21 @@
 """``nearfar reconstruct``, ``nearfar relight`` and ``nearfar convert``."""
 
+from collections.abc import Mapping
 from enum import StrEnum
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nearfar.arrays import Size, parse_bytes
 from nearfar.cli.options import CapturePath, Force, Quiet, TransportPath, keep_input
 from nearfar.cli.progress import SATURATED, progress_bar, say, warn
 from nearfar.errors import InputError
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
+    from nearfar.correspondence import Correspondence
     from nearfar.transport.model import Transport
 
 # Lamp or ambient light that changed by more than this share of the lamp's is worth a warning.
@@ -49,6 +52,10 @@ def reconstruct(
             "--square", help="Average the camera pixels of each projector pixel: the paper's T."
         ),
     ] = False,
+    memory: Annotated[
+        str,
+        typer.Option(help="Memory to work in: the camera is cut into blocks of rows that fit."),
+    ] = "2GB",
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -59,42 +66,70 @@ def reconstruct(
     from nearfar.capture import open_capture
     from nearfar.correspondence import read_correspondence
     from nearfar.files import check_output
-    from nearfar.transport.store import save_transport
+    from nearfar.transport.store import save_transport, write_transport
     from nearfar.workflow.reconstruct import reconstruct as rebuild
+    from nearfar.workflow.reconstruct import reconstruct_in_blocks
 
+    available = parse_bytes(memory, name="--memory")
     keep_input(output, capture, *([correspondence] if correspondence else []))
     check_output(output, force=force)
     opened = open_capture(capture)
     given = None
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
+    seen = _Seen()
     with progress_bar("reconstructing", quiet=quiet) as report:
-        transport, found = rebuild(
-            opened, given, method=method.value, square=square, progress=report
-        )
-        save_transport(output, transport, force=force)
-    _warn_of_faults(opened, transport)
+        if square:
+            transport, found = rebuild(
+                opened, given, method=method.value, square=True, progress=report
+            )
+            seen.add(transport, found)
+            save_transport(output, transport, force=force)
+        else:
+            parts = reconstruct_in_blocks(
+                opened, given, method=method.value, memory=available, progress=report
+            )
+            transports = (seen.add(*part) for part in parts)
+            write_transport(output, transports, opened.camera.height, force=force)
+    _warn_of_faults(opened, seen.provenance)
     say(
-        f"transport of {transport.camera} camera pixels with {transport.channels} "
-        f"channel{'s' if transport.channels > 1 else ''}, "
-        f"{found.lit.mean():.1%} of the camera's directly lit, written to {output}",
+        f"transport of {seen.camera} camera pixels with {opened.channels} "
+        f"channel{'s' if opened.channels > 1 else ''}, "
+        f"{seen.lit / seen.pixels:.1%} of the camera's directly lit, written to {output}",
         quiet=quiet,
     )
+
+
+class _Seen:
+    """What is said of a transport that goes by in blocks."""
+
+    def __init__(self) -> None:
+        self.provenance: Mapping[str, Any] = {}
+        self.camera, self.lit, self.pixels = Size(0, 0), 0, 0
+
+    def add(self, transport: "Transport", correspondence: "Correspondence") -> "Transport":
+        """Take note of a block, and hand its transport on."""
+        self.provenance = transport.provenance
+        camera = transport.camera
+        self.camera = Size(self.camera.height + camera.height, camera.width)
+        self.lit += int(correspondence.lit.sum())
+        self.pixels += correspondence.lit.size
+        return transport
 
 
 COMPONENTS = ("direct", "near", "far")
 
 
-def _warn_of_faults(capture: "Capture", transport: "Transport") -> None:
+def _warn_of_faults(capture: "Capture", provenance: Mapping[str, Any]) -> None:
     """Say what the photos themselves tell of a rig that is not linear or not steady."""
-    excess = float(transport.provenance["excess_of_sums"])
+    excess = float(provenance["excess_of_sums"])
     if abs(excess) > NOT_LINEAR:
         warn(
             f"in {capture.path} a pattern and its inverse sum to {abs(excess):.1%} "
             f"{'more' if excess > 0 else 'less'} than white and black: projector or camera is not "
             f"linear, or the lamp drifts; relighting will be wrong by about as much."
         )
-    drift = transport.provenance["drift"]
+    drift = provenance["drift"]
     if drift is not None and max(drift.values()) > DRIFT:
         warn(
             f"in {capture.path} the lamp changed by {drift['lamp']:.1%}, and ambient light by "

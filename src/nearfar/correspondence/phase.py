@@ -86,7 +86,8 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     basis = _without_dc(measurements)
     require_settled(basis)
     camera = measurements.camera
-    brightest = measurements.answers[..., measurements.places([DC])[0]].max(initial=0.0)
+    white = measurements.answers[..., measurements.places([DC])[0]]
+    brightest = measurements.brightest or float(white.max(initial=0.0))
     pixels = np.empty((camera.pixels, 2), dtype=np.float32)
     excess = np.empty(camera.pixels, dtype=np.float32)
     for block in blocks(camera.pixels, BLOCK):

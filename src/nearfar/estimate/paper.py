@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.arrays import Booleans, Floats, Size, blocks, product
 from nearfar.estimate.matrices import CORNERS, Band, Matrices, build_matrices
 from nearfar.estimate.sparse import least_risk, solve
 from nearfar.illumination.frequencies import as_array
+from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
 from nearfar.transport.direct import Footprint, footprint
@@ -36,7 +37,7 @@ FAINT = 0.1
 # What strays beyond the border by less than this share of a window's peak is rounding.
 DEPARTS = 1e-3
 # Camera pixels at once: keeps a block's windows near the processor.
-BLOCK = 512
+BLOCK = 1024
 # Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
 HIGH = 0.3
 
@@ -79,12 +80,17 @@ def estimate(
     direct = np.empty((number, channels), dtype=np.float32)
     windows = np.empty((number, channels, window**2), dtype=np.float32)
     low = np.empty((number, channels, matrices.far.basis.count), dtype=np.float32)
-    for block in blocks(number, BLOCK):
+    done = [0]
+
+    def work(block: slice) -> None:
         pixels = _pixels(measurements, where, lit, centres, block, matrices)
         found = _estimate_block(pixels, matrices, rounds)
         direct[block], windows[block], low[block] = found.direct, found.near, found.far
+        done[0] += block.stop - block.start
         if progress is not None:
-            progress(block.stop)
+            progress(done[0])
+
+    side_by_side(work, blocks(number, BLOCK))
     shape = (*measurements.camera, channels)
     return Transport(
         projector=measurements.projector,
@@ -187,8 +193,8 @@ def _no_leaks(pixels: _Pixels) -> _Leaks:
 
 def _leaks(far: Floats, pixels: _Pixels, matrices: Matrices) -> _Leaks:
     return _Leaks(
-        matrices.checkerboard.recentre(far @ matrices.checkerboard_leak, pixels.centres),
-        matrices.near.recentre(far @ matrices.near_leak, pixels.centres),
+        matrices.checkerboard.recentre(product(far, matrices.checkerboard_leak), pixels.centres),
+        matrices.near.recentre(product(far, matrices.near_leak), pixels.centres),
     )
 
 
@@ -199,7 +205,7 @@ def _round(pixels: _Pixels, start: Floats | None, leaks: _Leaks, matrices: Matri
     near_answers -= direct[..., None] * pixels.near_of_direct
     windows, unseen = _near(near_answers, pixels, matrices, start)
     far = pixels.far - direct[..., None] * pixels.far_of_direct
-    far -= matrices.far.uncentre(windows @ matrices.far.on_window.T, pixels.centres)
+    far -= matrices.far.uncentre(product(windows, matrices.far.on_window.T), pixels.centres)
     return _Estimate(direct, windows, far, unseen)
 
 
@@ -283,7 +289,7 @@ def _near(
 ) -> tuple[Floats, Floats]:
     """Equation (10): windows n, shape (n, channels, W^2), and the unseen part z."""
     number, channels = answers.shape[:2]
-    n0 = (answers @ matrices.near_inverse).reshape(-1, matrices.window**2)
+    n0 = product(answers, matrices.near_inverse).reshape(-1, matrices.window**2)
     # A window entry is a mean of W^2 answers, cosine and sine of each pair.
     entry_noise = pixels.noise.reshape(-1) * np.float32(np.sqrt(2.0) / matrices.window)
     inside = np.repeat(pixels.inside, channels, axis=0)

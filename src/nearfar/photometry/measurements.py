@@ -47,6 +47,8 @@ class Measurements:
         default, where each was taken against its own inverse.
     light_noise : ndarray, shape (C, channels), float32
         Standard deviation of DC's answer, white - black, whatever its repeats; by default `noise`.
+    brightest : float
+        Largest answer to DC of the camera of which these are some rows; 0, the default: of these.
     """
 
     camera: Size
@@ -60,6 +62,7 @@ class Measurements:
     white_noise: Floats = field(default_factory=_left_out)
     black_noise: Floats = field(default_factory=_left_out)
     light_noise: Floats = field(default_factory=_left_out)
+    brightest: float = 0.0
 
     def __post_init__(self) -> None:
         defaults = {

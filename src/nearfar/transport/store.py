@@ -1,6 +1,7 @@
 """Transports on the disk: factors in chunks of camera rows."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +15,15 @@ from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
+from nearfar.transport.rows import BELIEVED, FACTORS
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
 # Bytes of a chunk: large enough for the disk, small enough to read a few rows.
 CHUNK_BYTES = 8 * 2**20
 
-FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
-# Of the belief, where there is one: a mapping of its own in the attributes, and these arrays.
+# Of the belief, where there is one: a mapping of its own in the attributes, and arrays.
 BELIEF = "belief"
-BELIEVED = ("kind", "strength", "white", "offset_noise", "light_noise", "share_of_white")
 
 
 def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) -> None:
@@ -34,21 +34,59 @@ def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) 
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`.
     """
-    path = Path(path)
+    write_transport(path, [transport], transport.camera.height, force=force)
+
+
+def write_transport(
+    path: AnyPath, parts: Iterable[Transport], height: int, *, force: bool = False
+) -> None:
+    """Write a transport block by block, whole or not at all; each is asked for in its turn.
+
+    Parameters
+    ----------
+    path : str or Path
+    parts : iterable of Transport
+        Blocks of camera rows, in order, at least one. Provenance is the last one's.
+    height : int
+        Rows of the whole camera.
+    force : bool
+        Replace a transport that is there.
+
+    Raises
+    ------
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`.
+    """
+    with new_output(Path(path), force=force) as partial:
+        arrays: dict[str, Any] = {}
+        first = 0
+        for part in parts:
+            values = {name: np.asarray(getattr(part, name), np.float32) for name in FACTORS}
+            if part.belief is not None:
+                believed = {f"{BELIEF}_{name}": getattr(part.belief, name) for name in BELIEVED}
+                values |= believed
+            if not arrays:
+                group = create_store(partial, KIND, FORMAT_VERSION, _attributes(part))
+                for name, one in values.items():
+                    rows = rows_of_chunk(one)
+                    whole = (height, *one.shape[1:])
+                    chunk = (min(rows, height), *one.shape[1:])
+                    arrays[name] = add_array(group, name, whole, one.dtype, chunk)
+            for name, one in values.items():
+                arrays[name][first : first + len(one)] = one
+            first += part.camera.height
+            group.attrs["provenance"] = json.loads(json.dumps(dict(part.provenance)))
+
+
+def _attributes(transport: Transport) -> dict[str, Any]:
+    """Lay out for JSON what all camera pixels share."""
     attributes = {
         "projector": list(transport.projector),
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
-        "provenance": json.loads(json.dumps(dict(transport.provenance))),
     }
     if transport.belief is not None:
         attributes[BELIEF] = _described(transport.belief)
-    with new_output(path, force=force) as partial:
-        group = create_store(partial, KIND, FORMAT_VERSION, attributes)
-        for name in FACTORS:
-            values = np.asarray(getattr(transport, name), dtype=np.float32)
-            write_in_rows(group, name, values)
-        for name in BELIEVED if transport.belief else ():
-            write_in_rows(group, f"{BELIEF}_{name}", getattr(transport.belief, name))
+    return attributes
 
 
 def _described(belief: Belief) -> dict[str, Any]:
@@ -77,10 +115,14 @@ def _belief_fits(belief: Belief, basis: RealBasis, shape: tuple[int, ...]) -> bo
     return flat and full and places and belief.repeats.shape == (count,)
 
 
+def rows_of_chunk(values: Floats) -> int:
+    """Rows of an array that make some megabytes."""
+    return max(1, CHUNK_BYTES // max(1, values[:1].nbytes))
+
+
 def write_in_rows(group: Any, name: str, values: Floats) -> None:
     """Write an array in chunks of rows of some megabytes."""
-    row = max(1, values[:1].nbytes)
-    rows = max(1, min(len(values), CHUNK_BYTES // row))
+    rows = min(len(values), rows_of_chunk(values))
     add_array(group, name, values.shape, values.dtype, (rows, *values.shape[1:]))[:] = values
 
 

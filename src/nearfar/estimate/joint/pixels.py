@@ -77,7 +77,7 @@ def dc_place(measurements: Measurements) -> int:
 def scale_of(measurements: Measurements) -> Floats:
     """Light under white, the scale of all transport, (C, channels); never nothing."""
     white = measurements.answers[..., dc_place(measurements)]
-    brightest = float(np.abs(white).max(initial=0.0))
+    brightest = measurements.brightest or float(np.abs(white).max(initial=0.0))
     least = max(DARKEST * brightest, float(np.finfo(np.float32).tiny))
     return np.asarray(np.maximum(white, np.float32(least)))
 

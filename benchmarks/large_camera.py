@@ -1,0 +1,78 @@
+"""A large camera in little memory: 2 megapixels, a projector of 128 x 128, 300 photos.
+
+Run ``python benchmarks/large_camera.py [HxW ...]``, cameras (1225x1633 by default); give several
+to see that the cost grows with their pixels. A capture is made from a simple world, block by block;
+then a process of its own runs ``nearfar reconstruct --memory 2GB`` on it, and its time, camera
+pixels a second and peak memory are printed.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from nearfar import Size, choose_plan
+from nearfar.arrays import Floats, Integers, parse_size
+from nearfar.capture import write_capture
+from nearfar.plan import Plan
+
+PROJECTOR = Size(128, 128)
+PHOTOS = 300
+WINDOW = 19
+FULL_WELL = 20_000.0
+# Runs the command and says how much memory it took at most.
+COMMAND = """
+import resource, sys
+from nearfar.cli import main
+try:
+    main()
+finally:
+    print("peak", resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, end=" ")
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def photos_of(plan: Plan, camera: Size) -> Iterator[Integers]:
+    """Yield photos of a flat scene with a little light from beside and from everywhere."""
+    generator = np.random.default_rng(0)
+    q = [
+        np.linspace(1, p - 2, c).round().astype(int) for p, c in zip(PROJECTOR, camera, strict=True)
+    ]
+    beside = np.exp(-(np.arange(-4, 5) ** 2) / 4.0)
+    for number in range(len(plan.patterns)):
+        light = plan.draw(number).astype(np.float32) / 255
+        blurred: Floats = light
+        for axis in (0, 1):
+            blurred = np.apply_along_axis(np.convolve, axis, blurred, beside / beside.sum(), "same")
+        seen = 0.5 * light + 0.2 * blurred + 0.2 * light.mean()
+        electrons = FULL_WELL * (0.02 + seen[np.ix_(*q)])
+        electrons += np.sqrt(electrons) * generator.standard_normal(electrons.shape, np.float32)
+        yield np.clip(electrons * (65535 / FULL_WELL), 0, 65535).astype(np.uint16)
+
+
+def run(camera: Size, folder: Path) -> None:
+    """Print one camera's row."""
+    plan, _ = choose_plan(PROJECTOR, PHOTOS, window=WINDOW)
+    capture = folder / f"{camera}.zarr"
+    write_capture(capture, plan, photos_of(plan, camera))
+    command = [sys.executable, "-c", COMMAND, "reconstruct", str(capture), str(folder / "t.zarr")]
+    started = time.perf_counter()
+    said = subprocess.run([*command, "--force"], check=True, capture_output=True, text=True)
+    seconds = time.perf_counter() - started
+    peak = int(said.stdout.split()[-1]) / 1e6
+    print(
+        f"{camera}: {camera.pixels / 1e6:.2f} megapixels, {len(plan.patterns)} photos: "
+        f"{seconds:.0f} s, {camera.pixels / seconds:.0f} camera pixels a second, "
+        f"peak memory {peak:.2f} GB",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    for size in sys.argv[1:] or ["1225x1633"]:
+        with tempfile.TemporaryDirectory() as made:
+            run(parse_size(size), Path(made))

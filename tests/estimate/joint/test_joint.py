@@ -10,7 +10,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.cut import solve_cut
 from nearfar.estimate.joint.edges import seen_beside, with_spike
-from nearfar.estimate.joint.evidence import best_kind, evidence, sketch_band
+from nearfar.estimate.joint.evidence import Told, best_kind, evidence, sketch_band
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import columns, precision
 from nearfar.estimate.joint.pixels import Whole, gather, offset_noise, scale_of
@@ -177,16 +177,23 @@ def test_repeats_count_as_less_noise():
     np.testing.assert_allclose(means[0].shared, means[1].shared, atol=1e-5)
 
 
-def test_the_evidence_is_that_of_dense_algebra():
+@pytest.mark.parametrize("offset", [0.0, 1e-3, 1e-2])
+def test_the_evidence_is_that_of_dense_algebra(offset):
     centres = np.array([[8, 10], [7, 9], [6, 12]])
     frequencies = _frequencies()
     band = _band(frequencies)
     rows, _ = _draw(len(centres), centres, 0.02)
-    measurements = _measure(rows, frequencies, noise=2e-3)
+    measurements = _measure(rows, frequencies, noise=2e-3, offset=offset)
     pixels = _pixels(measurements, centres, band)
     prior = build_prior(KIND, band, measurements.repeats[band.places])
-    answers = pixels.answers / pixels.noise[..., None]
-    found = evidence(answers, pixels.white / pixels.noise, pixels.corners[:, 0], prior)
+    told = Told(
+        answers=pixels.answers / pixels.noise[..., None],
+        ratio=pixels.white / pixels.noise,
+        offset_ratio=pixels.offset_noise / pixels.noise,
+        corners=pixels.corners[:, 0],
+        of_offset=pixels.of_offset,
+    )
+    found = evidence(told, prior)
     expected = np.stack(
         [_dense(measurements, pixels, band, strength)[3] for strength in STRENGTHS], axis=1
     )

@@ -1,8 +1,8 @@
 """Which kind a camera pixel is, and how strong its light: what its photos make most probable.
 
 The log of the evidence of a kind at strength s, noise sigma and eigenvalues l_i is, but for a
-constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with d integrated out. v_i
-depends on s and sigma through their ratio alone, so every camera pixel shares one table over
+constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with o and d integrated out.
+v_i depends on s and sigma through their ratio alone, so every camera pixel shares one table over
 ratios, and the sums over i are matrix products.
 
 A few answers tell the kind as well as all of them: `sketch_band` chooses some. Channels do not
@@ -13,6 +13,7 @@ Index convention: arrays are (n, channels, ...); i runs over eigenvectors.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,10 +84,15 @@ def best_kind(
     best = np.full(number, -np.inf, dtype=np.float32)
     kind = np.zeros(number, dtype=np.int64)
     strength = np.full(number, STRENGTHS[0])
-    answers = pixels.answers[..., chosen] / pixels.noise[..., None]
-    ratio = pixels.white / pixels.noise
+    told = Told(
+        answers=pixels.answers[..., chosen] / pixels.noise[..., None],
+        ratio=pixels.white / pixels.noise,
+        offset_ratio=pixels.offset_noise / pixels.noise,
+        corners=pixels.corners[:, 0],
+        of_offset=pixels.of_offset[..., chosen],
+    )
     for place, prior in enumerate(priors):
-        found = evidence(answers, ratio, pixels.corners[:, 0], prior)
+        found = evidence(told, prior)
         top = np.argmax(found, axis=1)
         value = found[np.arange(number), top]
         better = value > best
@@ -96,22 +102,34 @@ def best_kind(
     return kind, strength, best
 
 
-def evidence(answers: Floats, ratio: Floats, corners: Floats, prior: Prior) -> Floats:
-    """Log evidence of one kind at every strength, all channels together, (n, strengths), float32.
+class Told(NamedTuple):
+    """What chosen answers of camera pixels tell.
 
-    Parameters
+    Attributes
     ----------
     answers : ndarray, shape (n, channels, R)
         In units of their noise.
-    ratio : ndarray, shape (n, channels)
-        White over that noise.
+    ratio, offset_ratio : ndarray, shape (n, channels)
+        White, and the deviation of the references' error, over that noise.
     corners : ndarray, shape (n, 9)
         Unit direct light around q.
-    prior : Prior
+    of_offset : ndarray, shape (n, 0 or 1, R)
+        Answers of a unit error of the references; left out where they cannot err.
     """
-    level = np.rint(STEPS * np.log2(ratio.astype(np.float64) * STRENGTHS[0])).astype(np.int64)
-    y = product(answers, prior.directions)
-    u = corners @ prior.of_corners
+
+    answers: Floats
+    ratio: Floats
+    offset_ratio: Floats
+    corners: Floats
+    of_offset: Floats
+
+
+def evidence(told: Told, prior: Prior) -> Floats:
+    """Return the log evidence of one kind at every strength, of all channels, (n, strengths)."""
+    level = np.rint(STEPS * np.log2(told.ratio.astype(np.float64) * STRENGTHS[0])).astype(np.int64)
+    y = product(told.answers, prior.directions)
+    u = told.corners @ prior.of_corners
+    v = product(told.of_offset, prior.directions)[:, 0] if told.of_offset.shape[1] else None
     found = np.zeros((len(y), len(STRENGTHS)), dtype=np.float32)
     for first in np.unique(level):
         table = 4.0 ** ((first + STEPS * np.arange(len(STRENGTHS))) / STEPS)
@@ -123,7 +141,20 @@ def evidence(answers: Floats, ratio: Floats, corners: Floats, prior: Prior) -> F
             of_y, of_u = y[mine, i], u[mine]
             yy, uy, uu = ((a * b) @ weight for a, b in ((of_y, of_y), (of_u, of_y), (of_u, of_u)))
             # d in units of the noise: UNKNOWN times white, beforehand.
-            before = (UNKNOWN * ratio[mine, i, None]) ** 2
+            before = (UNKNOWN * told.ratio[mine, i, None]) ** 2
+            if v is not None:
+                # o first, so that what is left of y and u knows nothing of it.
+                of_v = v[mine]
+                vy, vu, vv = (
+                    (a * b) @ weight for a, b in ((of_v, of_y), (of_v, of_u), (of_v, of_v))
+                )
+                known = told.offset_ratio[mine, i, None] ** 2
+                free = 1.0 + known * vv
+                yy, uy, uu = (
+                    whole - known * of * by / free
+                    for whole, of, by in ((yy, vy, vy), (uy, vu, vy), (uu, vu, vu))
+                )
+                found[mine] -= 0.5 * np.log(free)
             free = 1.0 + before * uu
             found[mine] -= 0.5 * (yy - before * uy**2 / free + spread + np.log(free))
     return found

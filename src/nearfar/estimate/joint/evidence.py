@@ -27,7 +27,7 @@ from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import STRENGTHS
 
 # Answers that are looked at, at most.
-ANSWERS = 160
+ANSWERS = 1000
 # Steps of the table in (s / sigma)^2, between two strengths: they are 2 apart.
 STEPS = 4
 

@@ -54,7 +54,7 @@ def reconstruct(
     ] = False,
     memory: Annotated[
         str,
-        typer.Option(help="Memory to work in: the camera is cut into blocks of rows that fit."),
+        typer.Option(help="Memory to work in, but for --square: blocks of camera rows that fit."),
     ] = "2GB",
     force: Force = False,
     quiet: Quiet = False,

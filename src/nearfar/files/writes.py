@@ -9,26 +9,26 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
+from weakref import WeakSet
 
 # Seconds that writes under way may take to end; those to a disk that hangs are not waited for.
 PATIENCE = 2.0
 
-_loops: dict[Path, asyncio.AbstractEventLoop] = {}
+_loops: WeakSet[asyncio.AbstractEventLoop] = WeakSet()
 _abandoned: set[Path] = set()
 
 
 async def write_into(folder: Path, write: Callable[[], None]) -> None:
     """Call `write`, which adds to `folder`, in a thread; do nothing once that is abandoned."""
     if folder not in _abandoned:
-        _loops[folder] = asyncio.get_running_loop()
+        _loops.add(asyncio.get_running_loop())
         await asyncio.to_thread(write)
 
 
 def abandon(folder: Path) -> None:
     """Let writes into `folder` that are under way end, and no other begin."""
     _abandoned.add(folder)
-    loop = _loops.pop(folder, None)
-    if loop is not None and loop.is_running():
+    for loop in [loop for loop in _loops if loop.is_running()]:
         with contextlib.suppress(TimeoutError):
             asyncio.run_coroutine_threadsafe(_others(), loop).result(2 * PATIENCE)
 

@@ -10,7 +10,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.cut import solve_cut
 from nearfar.estimate.joint.edges import seen_beside, with_spike
-from nearfar.estimate.joint.evidence import Told, best_kind, evidence, sketch_band
+from nearfar.estimate.joint.evidence import Told, best_kind, evidence
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import columns, precision
 from nearfar.estimate.joint.pixels import Whole, gather, offset_noise, scale_of
@@ -216,24 +216,11 @@ def test_a_camera_pixel_chooses_the_kind_that_it_was_drawn_from():
     priors = [
         build_prior(kind, band, measurements.repeats[band.places]) for kind in (KIND, far_from)
     ]
-    kind, strength, _ = best_kind(pixels, priors, np.arange(band.basis.count))
+    kind, strength, _ = best_kind(pixels, priors)
     assert np.mean(kind == 0) > 0.95
     # 0.02 in photo units, of a white that is 0.5 and a little.
     white = pixels.white[:, 0]
     assert np.median(strength * white) == pytest.approx(0.02, rel=0.5)
-
-
-def test_a_kind_is_told_by_some_of_many_answers(monkeypatch):
-    monkeypatch.setattr("nearfar.estimate.joint.evidence.ANSWERS", 60)
-    band = _band(_frequencies(240))
-    sketched, chosen = sketch_band(band)
-    assert 50 < len(chosen) == sketched.basis.count <= 60 < band.basis.count
-    np.testing.assert_array_equal(sketched.on_window, band.on_window[chosen])
-    # Whole pairs, from the lowest frequencies to the highest.
-    assert sketched.basis.frequencies[0] == band.basis.frequencies[0]
-    assert sketched.basis.frequencies[-1] == band.basis.frequencies[-1]
-    few = _band(_frequencies(40))
-    assert len(sketch_band(few)[1]) == few.basis.count
 
 
 @pytest.mark.parametrize("kind", [KIND, Kind(2.0, 8.0, 2.0, 3.0), Kind(2.0, 8.0, 2.0, rough=1.0)])
@@ -267,6 +254,33 @@ def test_cut_windows_of_every_kind_are_those_of_dense_algebra(kind, uneven):
             (found.pull[c, 0], band.on_window.T @ x),
         ):
             np.testing.assert_allclose(got, dense, atol=1e-3 * np.abs(dense).max())
+
+
+@pytest.mark.parametrize(
+    ("projector", "window"),
+    [(Size(1, 20), 1), (Size(1, 20), 5), (Size(20, 2), 4), (Size(16, 20), 2)],
+)
+def test_narrow_projectors_and_windows_are_reconstructed(projector, window):
+    world = model_transport(projector, projector, window=3, far=Size(1, 1), entries=0)
+    world = replace(world, near=np.zeros_like(world.near))
+    frequencies = list(choose_frequencies(projector, 40, window).frequencies)
+    basis = real_basis([DC, *frequencies], projector)
+    rows = world.dense().astype(np.float64)
+    answers = rows @ basis.patterns.T.astype(np.float64)
+    noise = np.full(rows.shape[:2], 1e-4, dtype=np.float32)
+    answers += 1e-4 * np.random.default_rng(0).normal(size=answers.shape)
+    measurements = Measurements(
+        camera=world.camera,
+        basis=basis,
+        answers=answers.astype(np.float32),
+        noise=noise,
+        black=np.zeros_like(noise),
+        shown_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
+    )
+    found = estimate_jointly(measurements, world.correspondence, window, Size(1, 1))
+    light = np.random.default_rng(1).random(projector)
+    truth = world @ light
+    assert np.linalg.norm(found @ light - truth) < 0.01 * np.linalg.norm(truth)
 
 
 def test_whole_and_cut_agree_where_nothing_is_cut():

@@ -135,7 +135,8 @@ def _information(band: Band, weight: Floats) -> Callable[[Booleans], Floats]:
             (down, across, -down, -across),
             writeable=False,
         )
-        return view.reshape(height * width, height * width)
+        # A window of one row would come as a view of itself.
+        return np.array(view).reshape(height * width, height * width)
 
     return among
 

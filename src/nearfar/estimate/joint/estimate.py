@@ -16,7 +16,7 @@ from nearfar.arrays import Floats, Integers, Size, blocks, product
 from nearfar.errors import InputError
 from nearfar.estimate.joint.cut import rounded, solve_cut
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, seen_beside, with_spike
-from nearfar.estimate.joint.evidence import best_kind, sketch_band
+from nearfar.estimate.joint.evidence import best_kind
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import KEPT
 from nearfar.estimate.joint.pixels import (
@@ -67,16 +67,21 @@ class _Rows(NamedTuple):
     strength: Floats  # (C,), share of white
 
 
+class _Known(NamedTuple):
+    """What a turn starts from."""
+
+    before: _Rows
+    expected: _Rows  # by the neighbours
+    misdrawn: Callable[[slice | NDArray[np.int64]], Floats]  # see `_misdrawn`
+
+
 class _Model(NamedTuple):
     """Kinds for a set of measured frequencies."""
 
     band: Band
     repeats: Floats
-    sketched: NDArray[np.int64]  # answers that the kind is chosen by
     lit: tuple[Prior, ...]
     unlit: tuple[Prior, ...]
-    lit_sketches: tuple[Prior, ...]
-    unlit_sketches: tuple[Prior, ...]
 
 
 class _Problem(NamedTuple):
@@ -169,17 +174,11 @@ def _problem(
         likely=seen_beside(correspondence, window),
     )
     repeats = measurements.repeats[band.places]
-    sketched, chosen = sketch_band(band)
 
-    def built(kinds: tuple[Kind, ...]) -> tuple[tuple[Prior, ...], tuple[Prior, ...]]:
-        full = tuple(build_prior(kind, band, repeats) for kind in kinds)
-        if len(chosen) == len(repeats):
-            return full, full
-        return full, tuple(build_prior(kind, sketched, repeats[chosen]) for kind in kinds)
+    def built(kinds: tuple[Kind, ...]) -> tuple[Prior, ...]:
+        return tuple(build_prior(kind, band, repeats) for kind in kinds)
 
-    (of_lit, lit_sketches) = built(LIT)
-    (of_unlit, unlit_sketches) = built(UNLIT) if not lit.all() else ((), ())
-    model = _Model(band, repeats, chosen, of_lit, of_unlit, lit_sketches, unlit_sketches)
+    model = _Model(band, repeats, built(LIT), () if lit.all() else built(UNLIT))
     return _Problem(measurements, model, whole, window)
 
 
@@ -196,20 +195,20 @@ def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], Non
         np.zeros(number, dtype=np.int64),
         np.zeros(number, dtype=np.float32),
     )
-    expected = None if before is None else _expected(problem, before)
-    misdrawn = _misdrawn(problem)
+    known = None
+    if before is not None:
+        known = _Known(before, _expected(problem, before), _misdrawn(problem))
     cut = whole.lit & ~near.inside(whole.centres, problem.window, projector).all(axis=1)
 
     def shown(chosen: slice | NDArray[np.int64]) -> Floats | None:
         """Answers that are expected, and what 8 bits made of direct light."""
-        if expected is None or before is None:
+        if known is None:
             return None
-        near_range = band.uncentre(
-            product(expected.near[chosen], band.on_window.T), whole.centres[chosen]
-        )
-        near_range += expected.far[chosen]
-        near_range += before.shared[chosen, :, 1, None] * misdrawn(chosen)[:, None]
-        return near_range
+        answers = product(known.expected.near[chosen], band.on_window.T)
+        answers = band.uncentre(answers, whole.centres[chosen])
+        answers += known.expected.far[chosen]
+        answers += known.before.shared[chosen, :, 1, None] * known.misdrawn(chosen)[:, None]
+        return answers
 
     def put(chosen: NDArray[np.int64], pixels: Pixels, found: Found) -> None:
         rows.shared[chosen] = found.shared[..., :KEPT]
@@ -222,14 +221,11 @@ def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], Non
     def choose(block: slice) -> None:
         """Choose the kinds of a block, and estimate those whose windows are whole."""
         pixels = gather(whole, block, band, projector, shown(block))
-        for lit, first, priors, sketches in (
-            (True, 0, model.lit, model.lit_sketches),
-            (False, len(LIT), model.unlit, model.unlit_sketches),
-        ):
+        for lit, first, priors in ((True, 0, model.lit), (False, len(LIT), model.unlit)):
             mine = np.flatnonzero(pixels.lit == lit)
             if not len(mine):
                 continue
-            kind, strength, _ = best_kind(pixels.only(mine), sketches, model.sketched)
+            kind, strength, _ = best_kind(pixels.only(mine), priors)
             rows.kind[block.start + mine] = kind + first
             rows.strength[block.start + mine] = strength
             uncut = ~cut[block.start + mine]
@@ -254,15 +250,15 @@ def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], Non
 
     side_by_side(choose, blocks(number, BLOCK))
     side_by_side(estimate_cut, _cut_alike(whole, rows.kind, np.flatnonzero(cut)))
-    if expected is None or before is None:
+    if known is None:
         return rows
     # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
     # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
     return rows._replace(
-        near=rows.near + expected.near,
-        far=rows.far + expected.far,
-        kind=before.kind,
-        strength=before.strength,
+        near=rows.near + known.expected.near,
+        far=rows.far + known.expected.far,
+        kind=known.before.kind,
+        strength=known.before.strength,
     )
 
 
@@ -277,7 +273,7 @@ def _cut_alike(whole: Whole, kind: Integers, cut: NDArray[np.int64]) -> Iterator
 
 def _misdrawn(problem: _Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return what tells the answers (n, R) of unit direct light to what 8 bits got wrong."""
-    # A row for each projector pixel, so that a camera pixel's lie side by side.
+    # A row for each projector pixel, so that what a camera pixel asks for lies side by side.
     error = np.ascontiguousarray(problem.measurements.shown_error[problem.model.band.places].T)
     where = footprint(problem.whole.correspondence, problem.measurements.projector)
 

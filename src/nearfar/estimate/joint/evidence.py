@@ -5,71 +5,34 @@ constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with o an
 v_i depends on s and sigma through their ratio alone, so every camera pixel shares one table over
 ratios, and the sums over i are matrix products.
 
-A few answers tell the kind as well as all of them: `sketch_band` chooses some. Channels do not
-tell what their mean would: that costs 1.2 dB under a random light on shelves of coloured books.
+Channels are not put together first: of their mean, the shelf's coloured books lose 1.2 dB under a
+random light.
 
 Index convention: arrays are (n, channels, ...); i runs over eigenvectors.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers, product
 from nearfar.estimate.joint.nuisance import UNKNOWN
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior
-from nearfar.estimate.matrices import Band
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import STRENGTHS
 
-# Answers that are looked at, at most.
-ANSWERS = 1000
 # Steps of the table in (s / sigma)^2, between two strengths: they are 2 apart.
 STEPS = 4
 
 
-def sketch_band(band: Band) -> tuple[Band, NDArray[np.int64]]:
-    """Choose answers that tell the kind: evenly among the frequencies, in their order.
-
-    Returns
-    -------
-    band : Band
-        Its places are among those of the band given.
-    chosen : ndarray of int
-        The same places.
-    """
-    frequencies = band.basis.frequencies
-    parts = np.bincount(band.basis.index)
-    count = min(len(frequencies), max(1, ANSWERS // int(parts.max())))
-    kept = np.unique(np.linspace(0, len(frequencies) - 1, count).round().astype(np.int64))
-    chosen = np.flatnonzero(np.isin(band.basis.index, kept))
-    basis = real_basis([frequencies[k] for k in kept], band.basis.projector)
-    sketched = replace(
-        band,
-        basis=basis,
-        places=chosen,
-        on_window=band.on_window[chosen],
-        on_corners=band.on_corners[chosen],
-    )
-    return sketched, chosen
-
-
-def best_kind(
-    pixels: Pixels, priors: Sequence[Prior], chosen: NDArray[np.int64]
-) -> tuple[Integers, Floats, Floats]:
+def best_kind(pixels: Pixels, priors: Sequence[Prior]) -> tuple[Integers, Floats, Floats]:
     """Choose a kind and a strength for each camera pixel, the same for all channels.
 
     Parameters
     ----------
     pixels : Pixels
     priors : sequence of Prior
-        Of the chosen answers.
-    chosen : ndarray of int
-        Answers that are looked at.
 
     Returns
     -------
@@ -85,11 +48,11 @@ def best_kind(
     kind = np.zeros(number, dtype=np.int64)
     strength = np.full(number, STRENGTHS[0])
     told = Told(
-        answers=pixels.answers[..., chosen] / pixels.noise[..., None],
+        answers=pixels.answers / pixels.noise[..., None],
         ratio=pixels.white / pixels.noise,
         offset_ratio=pixels.offset_noise / pixels.noise,
         corners=pixels.corners[:, 0],
-        of_offset=pixels.of_offset[..., chosen],
+        of_offset=pixels.of_offset,
     )
     for place, prior in enumerate(priors):
         found = evidence(told, prior)
@@ -103,7 +66,7 @@ def best_kind(
 
 
 class Told(NamedTuple):
-    """What chosen answers of camera pixels tell.
+    """What the answers of camera pixels tell.
 
     Attributes
     ----------

@@ -18,6 +18,8 @@ from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import save_exact
 from tests.worlds import model_transport
 
+Untouched = Callable[[], bool]
+
 PROJECTOR = "16x20"
 # The worlds of these tests obey the paper's model, which its own estimator recovers exactly.
 BY_PAPER = ("--method", "paper")
@@ -141,7 +143,7 @@ def job(finished: Job, tmp_path: Path) -> Job:
 
 
 @pytest.fixture
-def untouched(tmp_path: Path) -> Callable[[], bool]:
+def untouched(tmp_path: Path) -> Untouched:
     """Tell whether the test's folder is byte for byte as when first asked."""
     seen: list[dict[str, bytes | None]] = []
 
@@ -155,3 +157,11 @@ def untouched(tmp_path: Path) -> Callable[[], bool]:
         return seen[0] == seen[-1]
 
     return ask
+
+
+def check_refused(untouched: Untouched, arguments: tuple[object, ...], *names: object) -> str:
+    """Assert that a command fails in a sentence that names things, and touches nothing."""
+    untouched()
+    sentence = check_sentence(run_nearfar(*arguments), *names)
+    assert untouched(), "something was left behind or changed"
+    return sentence

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from nearfar.version import version
     from nearfar.workflow.acquire import acquire
     from nearfar.workflow.check import check_model
+    from nearfar.workflow.cluster import reconstruct_on
     from nearfar.workflow.conditioning import condition_near
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruct import reconstruct
@@ -59,6 +60,7 @@ _HOMES = {
     "read_correspondence": "nearfar.correspondence",
     "read_plan": "nearfar.plan",
     "reconstruct": "nearfar.workflow.reconstruct",
+    "reconstruct_on": "nearfar.workflow.cluster",
     "relighting_snr": "nearfar.workflow.evaluate",
     "row_snr": "nearfar.workflow.evaluate",
     "save_exact": "nearfar.transport.exact_store",
@@ -96,6 +98,7 @@ __all__ = [
     "read_correspondence",
     "read_plan",
     "reconstruct",
+    "reconstruct_on",
     "relighting_snr",
     "row_snr",
     "save_exact",

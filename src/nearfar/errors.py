@@ -36,3 +36,7 @@ class StorageError(NearfarError, OSError):
 
 class MissingPackageError(NearfarError, ImportError):
     """A package that an optional part needs and that is not installed."""
+
+
+class ClusterError(NearfarError, ConnectionError):
+    """A scheduler that is not there, or workers that cannot do the work."""

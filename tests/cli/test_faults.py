@@ -74,6 +74,11 @@ def test_a_memory_that_cannot_be(
     check_refused(untouched, arguments, "--memory", word)
 
 
+def test_a_scheduler_that_cannot_be(finished: Job, untouched: Untouched, tmp_path: Path):
+    arguments = ("reconstruct", finished.capture, tmp_path / "out.zarr", "--scheduler", "far://x")
+    check_refused(untouched, arguments, "no scheduler at far://x", "dask scheduler")
+
+
 @pytest.mark.parametrize(
     ("q", "word"),
     [

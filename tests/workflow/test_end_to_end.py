@@ -28,6 +28,7 @@ from nearfar.workflow.evaluate import relighting_snr, snr
 from nearfar.workflow.judge import judge_by_truth
 from tests.conftest import QUIET
 from tests.estimate.test_fit import _exact_of
+from tests.workflow.memory import memory_for
 from tests.worlds import model_transport
 
 reconstruct = partial(reconstruction.reconstruct, method="paper")
@@ -39,15 +40,6 @@ BY_REFERENCE = paper_plan(PROJECTOR, 7, Size(3, 3), offset="reference")
 
 def _rig(world, camera=QUIET):
     return SimulatedRig(world, "test", SimulatedProjector(), camera, 1.0, 0)
-
-
-def _memory_for(rows, plan, method="paper", width=30, channels=3):
-    """Memory in which so many rows of the camera are worked at."""
-    estimator = reconstruction._ESTIMATORS[method]
-    shared, pixel = estimator.bytes_of(plan, channels)
-    beside = 2 * (estimator.halo + 1) if estimator.halo else 0
-    row = reconstruction.SLACK * pixel * width
-    return int(reconstruction.LIBRARIES + shared + row * (rows + beside + 0.5))
 
 
 @pytest.fixture
@@ -82,7 +74,7 @@ def test_more_noise_makes_it_worse_and_none_makes_it_exact(tmp_path, world):
 def test_blocks_of_rows_change_next_to_nothing(tmp_path, world):
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
     whole, _ = reconstruct(capture)
-    parts, _ = reconstruct(capture, memory=_memory_for(12, PLAN))
+    parts, _ = reconstruct(capture, memory=memory_for(12, PLAN, PROJECTOR))
     # The noise model is fitted in each block on its own: what differs is far below the noise.
     for name in ("direct", "far", "near"):
         one, other = getattr(parts, name), getattr(whole, name)
@@ -104,13 +96,18 @@ def test_a_dark_margin_is_no_fault(tmp_path, world):
     )
     camera = SimulatedCamera(black_level=0.0, ambient=0.0, read_noise=0.0)
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(dark, camera))
-    memory = _memory_for(6, PLAN)
+    memory = memory_for(6, PLAN, PROJECTOR)
     transport, correspondence = reconstruct(capture, memory=memory)
     np.testing.assert_array_equal(correspondence.lit, np.isfinite(q[..., 0]))
     assert np.all(np.isfinite(transport.near))
     light = nearfar.natural_picture(PROJECTOR, 1)
     assert np.all((transport @ light)[:12] == 0)
     assert snr(dark @ light, transport @ light) > 35
+    # What counts as dark does so beside the whole camera, not beside the dark rows alone.
+    parts, _ = reconstruct(capture, method="joint", memory=memory_for(5, PLAN, PROJECTOR, "joint"))
+    whole, _ = reconstruct(capture, method="joint")
+    np.testing.assert_array_equal(parts.belief.white[:12], whole.belief.white[:12])
+    assert whole.belief.white[:12].min() > 0
 
 
 def test_correspondence_can_be_given(tmp_path, world):
@@ -191,7 +188,7 @@ def test_drift_is_taken_out_told_and_kept_from_stripes(tmp_path, world):
 def test_blocks_of_rows_change_nothing_by_reference(tmp_path, world):
     capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
     whole, _ = reconstruct(capture)
-    memory = _memory_for(5, BY_REFERENCE)
+    memory = memory_for(5, BY_REFERENCE, PROJECTOR)
     parts, _ = reconstruct(capture, memory=memory)
     # Drift and noise are those of the whole camera; matrix products round by blocks.
     for name in ("direct", "far", "near", "noise", "black"):
@@ -205,9 +202,9 @@ def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
     known = given_correspondence(world.correspondence, world.camera, PROJECTOR) if given else None
     whole, q = reconstruction.reconstruct(capture, known)
     for rows in (11, 5):
-        memory = _memory_for(rows, plan, "joint")
-        blocks = list(reconstruction.reconstruct_in_blocks(capture, known, memory=memory))
-        assert len(blocks) == -(-24 // rows)
+        memory = memory_for(rows, plan, PROJECTOR, "joint")
+        cut = list(reconstruction.reconstruct_in_blocks(capture, known, memory=memory))
+        assert len(cut) == -(-24 // rows)
         parts, found = reconstruction.reconstruct(capture, known, memory=memory)
         np.testing.assert_array_equal(found.lit, q.lit)
         # Matrix products round by blocks, and a camera pixel between two kinds may take the other.
@@ -221,7 +218,7 @@ def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
 def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
     plan, _ = choose_plan(PROJECTOR, 60, window=7)
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
-    memory = _memory_for(5, plan, "joint")
+    memory = memory_for(5, plan, PROJECTOR, "joint")
     parts = reconstruction.reconstruct_in_blocks(capture, memory=memory)
     write_transport(tmp_path / "t.zarr", (part.transport for part in parts), 24)
     stored = load_transport(tmp_path / "t.zarr")
@@ -235,7 +232,8 @@ def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
 def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
     plan, _ = choose_plan(PROJECTOR, 60, window=7)
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
-    parts = reconstruction.reconstruct_in_blocks(capture, memory=_memory_for(5, plan, "joint"))
+    memory = memory_for(5, plan, PROJECTOR, "joint")
+    parts = reconstruction.reconstruct_in_blocks(capture, memory=memory)
 
     def faulty():
         yield next(parts).transport

@@ -56,6 +56,13 @@ def reconstruct(
         str,
         typer.Option(help="Memory to work in, but for --square: blocks of camera rows that fit."),
     ] = "2GB",
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="Dask scheduler whose workers do the work; they see both files by these names.",
+            metavar="ADDRESS",
+        ),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -70,6 +77,8 @@ def reconstruct(
     from nearfar.workflow.reconstruct import reconstruct as rebuild
     from nearfar.workflow.reconstruct import reconstruct_in_blocks
 
+    if square and scheduler is not None:
+        raise typer.BadParameter("is not for --square.", param_hint="--scheduler")
     available = parse_bytes(memory, name="--memory")
     keep_input(output, capture, *([correspondence] if correspondence else []))
     check_output(output, force=force)
@@ -79,7 +88,22 @@ def reconstruct(
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
     seen = _Seen()
     with progress_bar("reconstructing", quiet=quiet) as report:
-        if square:
+        if scheduler is not None:
+            from nearfar.workflow.cluster import reconstruct_on
+
+            done = reconstruct_on(
+                scheduler,
+                opened,
+                output,
+                given,
+                method=method.value,
+                memory=available,
+                force=force,
+                progress=report,
+            )
+            seen.lit, seen.pixels, seen.provenance = done
+            seen.camera = opened.camera
+        elif square:
             transport, found = rebuild(
                 opened, given, method=method.value, square=True, progress=report
             )

@@ -4,6 +4,7 @@ from nearfar.correspondence.phase import correspond_by_phase
 from nearfar.correspondence.result import (
     Correspondence,
     given_correspondence,
+    joined,
     read_correspondence,
 )
 from nearfar.correspondence.square import onto_projector
@@ -15,6 +16,7 @@ __all__ = [
     "correspond_by_stripes",
     "given_correspondence",
     "has_stripes",
+    "joined",
     "onto_projector",
     "read_correspondence",
 ]

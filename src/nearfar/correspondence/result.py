@@ -1,5 +1,6 @@
 """Correspondence: where each camera pixel's direct light comes from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +30,18 @@ class Correspondence:
     def lit(self) -> Booleans:
         """Camera pixels with direct light, shape (Cy, Cx)."""
         return np.isfinite(self.pixels[..., 0])
+
+    def of_rows(self, rows: slice) -> "Correspondence":
+        """Return that of some rows of the camera, as views."""
+        return Correspondence(self.pixels[rows], self.confidence[rows])
+
+
+def joined(parts: Sequence[Correspondence]) -> Correspondence:
+    """Put those of blocks of camera rows together, in order."""
+    return Correspondence(
+        np.concatenate([part.pixels for part in parts]),
+        np.concatenate([part.confidence for part in parts]),
+    )
 
 
 def given_correspondence(

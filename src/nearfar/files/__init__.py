@@ -18,6 +18,7 @@ from nearfar.files.kinds import kind_of_store
 from nearfar.files.output import check_output, new_output
 from nearfar.files.stores import (
     add_array,
+    add_to_store,
     create_durable_store,
     create_store,
     open_array,
@@ -28,6 +29,7 @@ from nearfar.files.stores import (
 
 __all__ = [
     "add_array",
+    "add_to_store",
     "check_output",
     "check_picture_ending",
     "create_durable_store",

@@ -1,6 +1,7 @@
 """Zarr groups (version 3) in which a missing or damaged chunk is an error, never zeros."""
 
 import contextlib
+import secrets
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -44,6 +45,11 @@ class _FolderStore(LocalStore):
         """Write a file whole or not at all."""
         await write_into(self.root, partial(_write, self.root / key, value))
 
+    async def set_if_not_exists(self, key: str, value: Buffer) -> None:
+        """Write a file that is not there; zarr does so with a group's metadata for its arrays."""
+        if not (self.root / key).exists():
+            await self.set(key, value)
+
 
 class _DurableStore(LocalStore):
     """A folder store for writing, in which what is set is on the disk when the call returns."""
@@ -67,7 +73,8 @@ def _write_durably(path: Path, value: Buffer) -> None:
 def _written_beside(path: Path, value: Buffer) -> Path:
     if path.name == _METADATA:
         path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.partial")
+    # Other processes may write the same file, and the same into it.
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
     beside.write_bytes(value.as_buffer_like())
     return beside
 
@@ -122,6 +129,15 @@ def create_durable_store(
     return _create(_DurableStore(path), kind, version, attributes)
 
 
+def add_to_store(
+    path: Path, kind: str, version: int, attributes: Mapping[str, Any] | None = None
+) -> zarr.Group:
+    """Open a group that `create_store` made, to go on writing; make it where it is not there."""
+    if (path / _METADATA).exists():
+        return zarr.open_group(_FolderStore(path), mode="r+", zarr_format=3)
+    return create_store(path, kind, version, attributes)
+
+
 def _create(
     store: LocalStore, kind: str, version: int, attributes: Mapping[str, Any] | None
 ) -> zarr.Group:
@@ -139,7 +155,15 @@ def add_array(
     dtype: np.dtype[Any] | type[np.generic] | str,
     chunks: tuple[int, ...],
 ) -> zarr.Array[Any]:
-    """Add an array of checksummed chunks, all of which are written, zeros too."""
+    """Add an array of checksummed chunks, all of which are written, zeros too.
+
+    An array that was laid out in the same way is opened instead.
+    """
+    if (_root(group.store) / name / _METADATA).exists():
+        found = group[name]
+        if not isinstance(found, zarr.Array) or (found.shape, found.chunks) != (shape, chunks):
+            raise ValueError(f"{name} is laid out otherwise in {_root(group.store)}")
+        return found
     return group.create_array(
         name,
         shape=shape,

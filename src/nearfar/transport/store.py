@@ -1,7 +1,7 @@
 """Transports on the disk: factors in chunks of camera rows."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from nearfar.arrays import AnyPath, Floats, Size
 from nearfar.errors import UnreadableFileError
-from nearfar.files import add_array, create_store, new_output, open_store, read_array
+from nearfar.files import add_array, add_to_store, new_output, open_store, read_array
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis, real_basis
@@ -46,7 +46,8 @@ def write_transport(
     ----------
     path : str or Path
     parts : iterable of Transport
-        Blocks of camera rows, in order, at least one. Provenance is the last one's.
+        Blocks of camera rows, in order, at least one, all but the last of one height. Provenance
+        is the last one's.
     height : int
         Rows of the whole camera.
     force : bool
@@ -58,24 +59,45 @@ def write_transport(
         As `nearfar.files.new_output`.
     """
     with new_output(Path(path), force=force) as partial:
-        arrays: dict[str, Any] = {}
-        first = 0
+        first, rows = 0, 0
         for part in parts:
-            values = {name: np.asarray(getattr(part, name), np.float32) for name in FACTORS}
-            if part.belief is not None:
-                believed = {f"{BELIEF}_{name}": getattr(part.belief, name) for name in BELIEVED}
-                values |= believed
-            if not arrays:
-                group = create_store(partial, KIND, FORMAT_VERSION, _attributes(part))
-                for name, one in values.items():
-                    rows = rows_of_chunk(one)
-                    whole = (height, *one.shape[1:])
-                    chunk = (min(rows, height), *one.shape[1:])
-                    arrays[name] = add_array(group, name, whole, one.dtype, chunk)
-            for name, one in values.items():
-                arrays[name][first : first + len(one)] = one
+            rows = rows or part.camera.height
+            write_rows(partial, part, first, rows=rows, height=height)
             first += part.camera.height
-            group.attrs["provenance"] = json.loads(json.dumps(dict(part.provenance)))
+            write_provenance(partial, part.provenance)
+
+
+def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: int) -> None:
+    """Write some rows of a transport into a folder within `nearfar.files.new_output`.
+
+    Several may do so at once, from other processes and machines too: whoever is first lays the
+    arrays out, all in the same way, and every chunk belongs to one block of rows.
+
+    Parameters
+    ----------
+    folder : Path
+    part : Transport
+    first : int
+        Its first row, a multiple of `rows`.
+    rows : int
+        Rows of all blocks but the last.
+    height : int
+        Rows of the whole camera.
+    """
+    values = {name: np.asarray(getattr(part, name), np.float32) for name in FACTORS}
+    if part.belief is not None:
+        values |= {f"{BELIEF}_{name}": getattr(part.belief, name) for name in BELIEVED}
+    group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
+    for name, one in values.items():
+        chunk = (_rows_of_chunk(one, rows), *one.shape[1:])
+        array = add_array(group, name, (height, *one.shape[1:]), one.dtype, chunk)
+        array[first : first + len(one)] = one
+
+
+def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Say of a transport, all rows of which are written, how it was made."""
+    group = add_to_store(folder, KIND, FORMAT_VERSION)
+    group.attrs["provenance"] = json.loads(json.dumps(dict(provenance)))
 
 
 def _attributes(transport: Transport) -> dict[str, Any]:
@@ -118,6 +140,12 @@ def _belief_fits(belief: Belief, basis: RealBasis, shape: tuple[int, ...]) -> bo
 def rows_of_chunk(values: Floats) -> int:
     """Rows of an array that make some megabytes."""
     return max(1, CHUNK_BYTES // max(1, values[:1].nbytes))
+
+
+def _rows_of_chunk(values: Floats, rows: int) -> int:
+    """Rows of a chunk of some megabytes that divide `rows`."""
+    most = min(rows, rows_of_chunk(values))
+    return next(count for count in range(most, 0, -1) if rows % count == 0)
 
 
 def write_in_rows(group: Any, name: str, values: Floats) -> None:

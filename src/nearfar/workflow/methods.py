@@ -1,0 +1,101 @@
+"""The estimators by name: what plan each takes, and what memory."""
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from nearfar.arrays import Floats
+from nearfar.errors import PlanError
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.estimate import TURNS
+from nearfar.estimate.joint.prior import RATIOS
+from nearfar.estimate.paper import estimate
+from nearfar.illumination.frequencies import CHECKERBOARD, far_frequencies, near_frequencies
+from nearfar.photometry.measure import measured_frequencies
+from nearfar.photometry.measurements import Measurements
+from nearfar.plan import Plan
+from nearfar.transport.kinds import LIT, UNLIT
+from nearfar.transport.model import Transport
+
+Method = Literal["joint", "paper"]
+Shares = Callable[[float], None]
+
+
+def require_paper_plan(plan: Plan) -> None:
+    """Refuse a plan that lacks a photo the paper's estimation needs.
+
+    Raises
+    ------
+    PlanError
+    """
+    plan.require_real("reconstruct")
+    shot = measured_frequencies(plan)
+    wanted = [
+        CHECKERBOARD,
+        *far_frequencies(plan.far, plan.projector),
+        *near_frequencies(plan.window, plan.dropped),
+    ]
+    missing = [k for k in wanted if k not in shot and -k not in shot]
+    if missing:
+        raise PlanError(
+            f"the plan of this capture is not the paper's: {len(missing)} of its frequencies were "
+            f"not shot, ({missing[0].fy}, {missing[0].fx}) first; plan with --near and --far."
+        )
+
+
+def _require_photos(plan: Plan) -> None:
+    plan.require_real("reconstruct")
+    measured_frequencies(plan)
+
+
+def _as_the_paper(
+    plan: Plan, measurements: Measurements, pixels: Floats, _progress: Shares
+) -> Transport:
+    return estimate(measurements, pixels, plan.window, plan.far, plan.dropped)
+
+
+def _jointly(plan: Plan, measurements: Measurements, pixels: Floats, progress: Shares) -> Transport:
+    return estimate_jointly(measurements, pixels, plan.window, plan.far, progress=progress)
+
+
+def _bytes_of_paper(plan: Plan, channels: int) -> tuple[int, int]:
+    photos, entries = len(plan.patterns), plan.window**2
+    # Differences and sums of the pairs, answers, windows.
+    return 4 * entries**2, 4 * channels * (2 * photos + 2 * entries)
+
+
+def _bytes_of_joint(plan: Plan, channels: int) -> tuple[int, int]:
+    answers = 2 * len(measured_frequencies(plan))
+    entries = plan.window**2
+    kinds = len(LIT) + len(UNLIT)
+    prior = 4 * (2 * answers**2 + 2 * answers * entries + len(RATIOS) * entries + 2 * entries**2)
+    # Answers, re-ordered; what a turn begins with, what neighbours expect, what it finds, the sum.
+    rows = 4 * channels * (2 * answers + 4 * (answers + entries))
+    # Inverse pairs are held while they are measured.
+    pairs = 4 * channels * len(plan.patterns) if plan.offset == "inverse" else 0
+    return kinds * prior, rows + entries + pairs
+
+
+class Estimator(NamedTuple):
+    """What plan a method takes, and what it makes of measurements and q.
+
+    Attributes
+    ----------
+    require : callable
+    estimate : callable
+    halo : int
+        Rows of the camera beside those wanted that tell something of them.
+    bytes_of : callable
+        From a plan and a number of channels: bytes that all share, and those of a camera pixel.
+    """
+
+    require: Callable[[Plan], None]
+    estimate: Callable[[Plan, Measurements, Floats, Shares], Transport]
+    halo: int
+    bytes_of: Callable[[Plan, int], tuple[int, int]]
+
+
+ESTIMATORS: dict[Method, Estimator] = {
+    "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper),
+    # Each turn but the first hears the neighbours, and the first sees their q.
+    "joint": Estimator(_require_photos, _jointly, TURNS, _bytes_of_joint),
+}

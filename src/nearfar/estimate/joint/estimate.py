@@ -16,7 +16,7 @@ from nearfar.arrays import Floats, Integers, Size, blocks, product
 from nearfar.errors import InputError
 from nearfar.estimate.joint.cut import rounded, solve_cut
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, seen_beside, with_spike
-from nearfar.estimate.joint.evidence import best_kind
+from nearfar.estimate.joint.evidence import Kinds, best_kind, screened
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import KEPT
 from nearfar.estimate.joint.pixels import (
@@ -80,8 +80,8 @@ class _Model(NamedTuple):
 
     band: Band
     repeats: Floats
-    lit: tuple[Prior, ...]
-    unlit: tuple[Prior, ...]
+    lit: Kinds
+    unlit: Kinds | None
 
 
 class _Problem(NamedTuple):
@@ -175,10 +175,10 @@ def _problem(
     )
     repeats = measurements.repeats[band.places]
 
-    def built(kinds: tuple[Kind, ...]) -> tuple[Prior, ...]:
-        return tuple(build_prior(kind, band, repeats) for kind in kinds)
+    def built(kinds: tuple[Kind, ...]) -> Kinds:
+        return screened(tuple(build_prior(kind, band, repeats) for kind in kinds), band, repeats)
 
-    model = _Model(band, repeats, built(LIT), () if lit.all() else built(UNLIT))
+    model = _Model(band, repeats, built(LIT), None if lit.all() else built(UNLIT))
     return _Problem(measurements, model, whole, window)
 
 
@@ -221,11 +221,11 @@ def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], Non
     def choose(block: slice) -> None:
         """Choose the kinds of a block, and estimate those whose windows are whole."""
         pixels = gather(whole, block, band, projector, shown(block))
-        for lit, first, priors in ((True, 0, model.lit), (False, len(LIT), model.unlit)):
+        for lit, first, kinds in ((True, 0, model.lit), (False, len(LIT), model.unlit)):
             mine = np.flatnonzero(pixels.lit == lit)
-            if not len(mine):
+            if not len(mine) or kinds is None:
                 continue
-            kind, strength, _ = best_kind(pixels.only(mine), priors)
+            kind, strength, _ = best_kind(pixels.only(mine), kinds)
             rows.kind[block.start + mine] = kind + first
             rows.strength[block.start + mine] = strength
             uncut = ~cut[block.start + mine]
@@ -236,7 +236,7 @@ def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], Non
                 put(
                     block.start + mine[of_kind],
                     some,
-                    _with_edges(some, priors[place], ratio, solve_whole, band),
+                    _with_edges(some, kinds.priors[place], ratio, solve_whole, band),
                 )
         done[0] += block.stop - block.start
         report(done[0] / number)
@@ -244,7 +244,7 @@ def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], Non
     def estimate_cut(chosen: NDArray[np.int64]) -> None:
         """Estimate camera pixels of one kind whose windows the border cuts."""
         pixels = gather(whole, chosen, band, projector, shown(chosen))
-        prior = model.lit[rows.kind[chosen[0]]]
+        prior = model.lit.priors[rows.kind[chosen[0]]]
         ratio = rounded(ratio_of(pixels, rows.strength[chosen]))
         put(chosen, pixels, _with_edges(pixels, prior, ratio, solve_cut, band))
 

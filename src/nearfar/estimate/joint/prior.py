@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Integers
 from nearfar.estimate.matrices import Band
 from nearfar.transport.kinds import (
     Kind,
@@ -28,8 +28,8 @@ RATIOS = 2.0 ** np.arange(-16.0, 41.0, 0.5)
 
 
 @dataclass(frozen=True)
-class Prior:
-    """One kind for one set of measured frequencies.
+class Spectrum:
+    """What tells how probable answers are under a kind.
 
     Attributes
     ----------
@@ -37,14 +37,27 @@ class Prior:
         Eigenvalues of sqrt(m) K sqrt(m), falling.
     directions : ndarray, shape (R, R), float32
         Its eigenvectors, times sqrt(m): from re-centred answers to their coordinates.
+    of_corners : ndarray, shape (9, R), float32
+        Coordinates of the answers of unit light at the entries around q.
+    """
+
+    levels: Floats
+    directions: Floats
+    of_corners: Floats
+
+
+@dataclass(frozen=True)
+class Prior(Spectrum):
+    """One kind for one set of measured frequencies.
+
+    Attributes
+    ----------
     to_near : ndarray, shape (R, W^2), float32
         From weights of the eigenvectors to window entries.
     to_far : ndarray, shape (R, R), float32
         From weights of the eigenvectors to re-centred answers of f.
     of_window : ndarray, shape (W^2, R), float32
         Coordinates of the answers of unit light at each window entry.
-    of_corners : ndarray, shape (9, R), float32
-        The same at the entries around q.
     ratios : ndarray, shape (T,)
         (s / sigma)^2, for which is tabulated:
     curvatures : ndarray, shape (T, W^2), float32
@@ -58,18 +71,33 @@ class Prior:
         S.
     """
 
-    levels: Floats
-    directions: Floats
     to_near: Floats
     to_far: Floats
     of_window: Floats
-    of_corners: Floats
     ratios: Floats
     curvatures: Floats
     shaken: Floats
     factors: NearCovariance
     covariance: Floats
     power: Floats
+
+    def told_by(self, chosen: Integers, band: Band, repeats: Floats) -> Spectrum:
+        """Return the spectrum of some answers alone."""
+        patterns = band.on_window[chosen].astype(np.float64)
+        matrix = patterns @ self.covariance @ patterns.T + np.diag(self.power[chosen])
+        levels, directions = _decomposed(matrix, repeats[chosen])
+        return Spectrum(
+            levels=levels.astype(np.float32),
+            directions=np.ascontiguousarray(directions, dtype=np.float32),
+            of_corners=(band.on_corners[chosen].T @ directions).astype(np.float32),
+        )
+
+
+def _decomposed(matrix: Floats, repeats: Floats) -> tuple[Floats, Floats]:
+    """Levels and directions of K, as `Spectrum` has them."""
+    root = np.sqrt(repeats.astype(np.float64))
+    levels, vectors = np.linalg.eigh(matrix * root[:, None] * root)
+    return np.maximum(levels[::-1], 0.0), vectors[:, ::-1] * root[:, None]
 
 
 def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
@@ -88,11 +116,7 @@ def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
     covariance = near_covariance(kind, window)
     seen = patterns @ covariance
     power = far_power(band.basis, kind)
-    root = np.sqrt(repeats.astype(np.float64))
-    matrix = (seen @ patterns.T + np.diag(power)) * root[:, None] * root
-    levels, vectors = np.linalg.eigh(matrix)
-    levels, vectors = np.maximum(levels[::-1], 0.0), vectors[:, ::-1]
-    directions = vectors * root[:, None]
+    levels, directions = _decomposed(seen @ patterns.T + np.diag(power), repeats)
     to_near = directions.T @ seen
     of_window = directions.T @ patterns
     told = 1.0 / (RATIOS[:, None] * levels + 1.0)

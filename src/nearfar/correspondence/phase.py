@@ -8,10 +8,11 @@ used. A weak background finds the place, for every answer helps to tell one plac
 strong one then measures the footprint, the 5 x 5 entries of t around it, and tells direct light
 from near-range light that is concentrated, as in a crease.
 
-Sums over places replace an inverse FFT, so that frequencies may lie off the DFT grid.
+Sums over places, first along rows and then down, replace an inverse FFT, so that frequencies may
+lie off the DFT grid.
 
-Index convention: c runs over camera pixels, r over real answers, k over frequencies, p over the
-pattern grid row by row, o and i over the offsets of a footprint.
+Index convention: c runs over camera pixels, r over real answers, k over frequencies, g over
+frequencies of one fy, o and i over the offsets of a footprint.
 """
 
 from typing import NamedTuple
@@ -26,6 +27,7 @@ from nearfar.correspondence.orientation import turned_round
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC, as_array
+from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport.far import RealBasis
 
@@ -90,12 +92,16 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     brightest = measurements.brightest or float(white.max(initial=0.0))
     pixels = np.empty((camera.pixels, 2), dtype=np.float32)
     excess = np.empty(camera.pixels, dtype=np.float32)
-    for block in blocks(camera.pixels, BLOCK):
+    waves = _waves(basis)
+
+    def work(block: slice) -> None:
         part = measurements.of_pixels(Size(1, block.stop - block.start), block)
         answers, variance = _relative(part, BLACK * brightest)
-        found = _search(basis, _weigh(basis, answers, variance, SEARCH))
+        found = _search(basis, waves, _weigh(basis, answers, variance, SEARCH))
         pixels[block], _ = _footprints(basis, _weigh(basis, answers, variance, SHARP), found)
         _, excess[block] = _footprints(basis, _weigh(basis, answers, variance, STRONG), found)
+
+    side_by_side(work, blocks(camera.pixels, BLOCK))
     pixels[excess <= SEEN] = np.nan
     q = pixels.reshape(*camera, 2)
     ratio = excess.reshape(camera) / np.where(turned_round(q), TURNED * SEEN, SEEN)
@@ -142,37 +148,112 @@ def _weigh(basis: RealBasis, answers: Floats, variance: Floats, background: Back
     return _Weighed(summed.astype(np.float32), weights.sum(axis=1).astype(np.float32))
 
 
-def _search(basis: RealBasis, weighed: _Weighed) -> NDArray[np.float64]:
+class _Group(NamedTuple):
+    """Frequencies of one fy.
+
+    Attributes
+    ----------
+    cosines, sines : ndarray of int
+        Their answers; what is its own negative has no sine.
+    along : ndarray, shape (len(cosines) + len(sines), 2 Px), float32
+        From these answers to real and imaginary parts of their sum along a row.
+    """
+
+    cosines: NDArray[np.int64]
+    sines: NDArray[np.int64]
+    along: Floats
+
+
+class _Waves(NamedTuple):
+    """Scores of all places from answers.
+
+    Attributes
+    ----------
+    groups : tuple of _Group
+    down : ndarray, shape (Py, 2 G), float32
+        From the sums along rows to scores.
+    """
+
+    groups: tuple[_Group, ...]
+    down: Floats
+
+
+def _waves(basis: RealBasis) -> _Waves:
+    """Split exp(j 2 pi k.p) into a factor along rows and one down."""
+    frequencies = as_array(basis.frequencies)
+    height, width = (np.arange(side) for side in basis.projector)
+    cosine = np.flatnonzero(~basis.is_sine)
+    paired = np.diff(np.append(cosine, basis.count)) == 2
+    groups = []
+    levels = np.unique(frequencies[:, 0])
+    for level in levels:
+        mine = np.flatnonzero(frequencies[:, 0] == level)
+        wave = np.exp(2j * np.pi * (np.outer(frequencies[mine, 1], width) % 1.0))
+        # The answer to a cosine less j times that to its sine.
+        waves = np.concatenate([wave, -1j * wave[paired[mine]]])
+        along = np.concatenate([waves.real, waves.imag], axis=1).astype(np.float32)
+        groups.append(_Group(cosine[mine], cosine[mine][paired[mine]] + 1, along))
+    angle = 2 * np.pi * (np.outer(height, levels) % 1.0)
+    down = np.stack([np.cos(angle), -np.sin(angle)], axis=-1).reshape(len(height), -1)
+    return _Waves(tuple(groups), down.astype(np.float32))
+
+
+def _scores(answers: Floats, waves: _Waves) -> Floats:
+    """Scores of all places, (n, Py, Px), of answers (n, R)."""
+    width = waves.groups[0].along.shape[1] // 2
+    sums = np.empty((len(answers), len(waves.groups), 2, width), dtype=np.float32)
+    for g, group in enumerate(waves.groups):
+        chosen = np.concatenate([group.cosines, group.sines])
+        sums[:, g] = (answers[:, chosen] @ group.along).reshape(-1, 2, width)
+    return np.asarray(np.matmul(waves.down, sums.reshape(len(answers), -1, width)))
+
+
+def _search(basis: RealBasis, waves: _Waves, weighed: _Weighed) -> NDArray[np.float64]:
     """Find the place, to half a pixel, at which direct light explains the answers best: (C, 2).
 
     Light at half a pixel is shared by the pixels around it, which adds half of both scores.
     """
-    height, width = basis.projector
-    frequencies = as_array(basis.frequencies)
-    # Squares of a cosine and its sine add up to 1 at every whole place, and lose this between.
-    down, across = (np.cos(np.pi * frequencies[:, axis]) ** 2 for axis in (0, 1))
-    best = np.zeros((len(weighed.answers), 2))
-    for block in blocks(len(weighed.answers), HELD // basis.projector.pixels):
-        whole = (weighed.answers[block] @ basis.patterns).reshape(-1, height, width)
-        beside = 0.5 * (whole[:, :, 1:] + whole[:, :, :-1])
-        highest = np.full(len(whole), -np.inf)
-        for score, shift, energy in (
-            (whole, (0.0, 0.0), np.ones(len(frequencies))),
-            (beside, (0.0, 0.5), across),
-            (0.5 * (whole[:, 1:] + whole[:, :-1]), (0.5, 0.0), down),
-            (0.5 * (beside[:, 1:] + beside[:, :-1]), (0.5, 0.5), down * across),
-        ):
-            if score[0].size == 0:
-                continue
-            flat = score.reshape(len(score), -1)
-            place = flat.argmax(axis=1)
-            scale = np.sqrt(weighed.weights[block] @ energy) + 1e-12
-            deviations = flat[np.arange(len(flat)), place] / scale
-            better = deviations > highest
-            highest[better] = deviations[better]
-            y, x = np.divmod(place, score.shape[2])
-            best[block][better] = np.stack([y + shift[0], x + shift[1]], axis=-1)[better]
+    best = np.empty((len(weighed.answers), 2))
+    for block in blocks(len(weighed.answers), max(1, HELD // basis.projector.pixels)):
+        score = _scores(weighed.answers[block], waves)
+        best[block] = _highest(basis, score, weighed.weights[block])
     return best
+
+
+def _highest(basis: RealBasis, score: Floats, weights: Floats) -> NDArray[np.float64]:
+    """Return the places of the highest scores, in units of their deviation: (n, 2)."""
+    number, (height, width) = np.arange(len(score)), basis.projector
+    flat = score.reshape(len(score), -1)
+    place = flat.argmax(axis=1)
+    peak = flat[number, place]
+    # Squares of a cosine and its sine add up to 1 at every whole place, and lose this between.
+    frequencies = as_array(basis.frequencies)
+    down, across = (np.cos(np.pi * frequencies[:, axis]) ** 2 for axis in (0, 1))
+    whole = np.sqrt(weights.sum(axis=1)) + 1e-12
+    between = np.sqrt(weights @ np.stack([across, down, down * across], axis=1)) + 1e-12
+    found = np.stack(np.divmod(place, width), axis=-1).astype(np.float64)
+    # Half a pixel off is better only beside a score that is above this.
+    bound = peak * between.min(axis=1) / whole
+    above = np.flatnonzero(flat > np.where(peak > 0, bound, np.inf)[:, None])
+    c, y, x = np.unravel_index(above, score.shape)
+    of, places, deviations = [], [], []
+    for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
+        there = (y + dy >= 0) & (y + dy < height) & (x + dx >= 0) & (x + dx < width)
+        pixel, down_from, across_from = c[there], y[there], x[there]
+        down_to, across_to = down_from + dy, across_from + dx
+        mean = 0.5 * (score[pixel, down_from, across_from] + score[pixel, down_to, across_to])
+        if dy and dx:
+            aside = score[pixel, down_to, across_from] + score[pixel, down_from, across_to]
+            mean = 0.5 * mean + 0.25 * aside
+        of.append(pixel)
+        deviations.append(mean / between[pixel, int(dy != 0) + int(dy * dx != 0)])
+        places.append(np.stack([down_from + dy / 2, across_from + dx / 2], axis=-1))
+    pixel, deviation = np.concatenate(of), np.concatenate(deviations)
+    order = np.lexsort((deviation, pixel))
+    last = order[np.flatnonzero(np.diff(pixel[order], append=-1))]
+    last = last[deviation[last] > (peak / whole)[pixel[last]]]
+    found[pixel[last]] = np.concatenate(places)[last]
+    return found
 
 
 def _footprints(
@@ -198,8 +279,8 @@ def _footprints(
     ridge = np.where(np.abs(offsets).max(axis=1) > 1, RIDGE, 0.0).astype(np.float32)
     places = offsets[:, None] + centre
     inside: Booleans = np.all((places >= 0) & (places <= limit), axis=-1)
-    flat = np.clip(places, 0, limit) @ np.array([basis.projector.width, 1])
-    scores = _scores_at(basis, weighed.answers, flat)
+    turned = basis.recentre(weighed.answers[:, None], centre)[:, 0]
+    scores = np.ascontiguousarray((turned @ basis.drawn_at(offsets)).T)
     gram = (overlap.T @ weighed.weights.T)[number]
     entries, left = _nonnegative(scores, gram, inside, ridge)
     total = entries.sum(axis=0)
@@ -212,12 +293,6 @@ def _footprints(
 def _square(reach: int) -> NDArray[np.int64]:
     side = np.arange(-reach, reach + 1)
     return np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _scores_at(basis: RealBasis, answers: Floats, places: NDArray[np.int64]) -> Floats:
-    """Score of chosen places (O, C) of each pixel, (O, C)."""
-    patterns = basis.patterns
-    return np.stack([np.einsum("cr,rc->c", answers, patterns[:, place]) for place in places])
 
 
 def _nonnegative(

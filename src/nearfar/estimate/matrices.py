@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Complexes, Floats, Size
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
     Frequency,
-    as_array,
     far_frequencies,
     grid,
     near_frequencies,
@@ -46,44 +44,11 @@ class Band:
 
     def recentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
         """Turn answers (n, channels, R) about each pixel's centre (n, 2)."""
-        return self._turn(answers, centres, +1)
+        return self.basis.recentre(answers, centres)
 
     def uncentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
         """Inverse of `recentre`."""
-        return self._turn(answers, centres, -1)
-
-    def _turn(self, answers: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
-        down, across = self._phases
-        phase = down[centres[:, 0]] * across[centres[:, 1]]
-        cosine = np.flatnonzero(~self.basis.is_sine)
-        # Frequencies that are their own negative answer no sine: their phase is 1 or -1.
-        own = np.diff(np.append(cosine, self.basis.count)) == 1
-        turned = np.empty_like(answers)
-        turned[..., cosine[own]] = answers[..., cosine[own]] * phase.real[:, None, own]
-        first = np.flatnonzero(~own)
-        if not len(first):
-            return turned
-        # Views where the pairs stand side by side, as they do but for the few above.
-        for run in np.split(first, np.flatnonzero(np.diff(first) != 1) + 1):
-            start, stop = cosine[run[0]], cosine[run[-1]] + 2
-            c = phase.real[:, None, run[0] : run[-1] + 1]
-            s = sign * phase.imag[:, None, run[0] : run[-1] + 1]
-            even, odd = answers[..., start:stop:2], answers[..., start + 1 : stop : 2]
-            turned[..., start:stop:2] = even * c + odd * s
-            turned[..., start + 1 : stop : 2] = odd * c - even * s
-        return turned
-
-    @cached_property
-    def _phases(self) -> tuple[Complexes, Complexes]:
-        """Phase of each frequency at every row and column of the pattern grid, complex64."""
-        sides = (
-            np.exp(2j * np.pi * (np.arange(side)[:, None] * cycles % 1.0)).astype(np.complex64)
-            for side, cycles in zip(
-                self.basis.projector, as_array(self.basis.frequencies).T, strict=True
-            )
-        )
-        down, across = sides
-        return down, across
+        return self.basis.uncentre(answers, centres)
 
 
 def corner_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats:
@@ -122,13 +87,9 @@ def _band(measurements: Measurements, frequencies: Sequence[Frequency], window: 
 
 def band_of(basis: RealBasis, window_offsets: NDArray[np.int64]) -> Band:
     """Return a basis with its patterns about q; its answers stand in its own order."""
-    return Band(basis, np.arange(basis.count), drawn(basis, window_offsets), drawn(basis, CORNERS))
-
-
-def drawn(basis: RealBasis, offsets: NDArray[np.int64]) -> Floats:
-    """Cosines and sines at chosen offsets from q, shape (R, len(offsets)), float32."""
-    angle = 2 * np.pi * (as_array(basis.frequencies) @ offsets.T)[basis.index]
-    return np.where(basis.is_sine[:, None], np.sin(angle), np.cos(angle)).astype(np.float32)
+    return Band(
+        basis, np.arange(basis.count), basis.drawn_at(window_offsets), basis.drawn_at(CORNERS)
+    )
 
 
 @dataclass(frozen=True)
@@ -171,7 +132,7 @@ def build_matrices(measurements: Measurements, window: int, far: Size, dropped: 
     lowest = real_basis(
         representatives(grid(dropped, Size(window, window))), measurements.projector
     )
-    unseen = drawn(lowest, near.offsets(window)).T.astype(np.float64)
+    unseen = lowest.drawn_at(near.offsets(window)).T.astype(np.float64)
     energy = np.sum(near_band.on_window.astype(np.float64) ** 2, axis=1)
     return Matrices(
         window,

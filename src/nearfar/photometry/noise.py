@@ -64,10 +64,11 @@ def fit_noise(
     NoiseModel
     """
     # Bins of equal population: a few odd pixels (saturated, moving) drop out.
-    order = np.argsort(mean.ravel())
-    parts = np.array_split(order, min(64, max(2, len(order) // 64)))
-    level = np.array([np.median(mean.ravel()[part]) for part in parts])
-    binned = np.array([max(typical(variance.ravel()[part]), least) for part in parts])
+    order = np.argsort(mean, axis=None)
+    rising, scatter = mean.ravel()[order], variance.ravel()[order]
+    bins = min(64, max(2, len(order) // 64))
+    level = np.array([np.median(part) for part in np.array_split(rising, bins)])
+    binned = np.array([max(typical(part), least) for part in np.array_split(scatter, bins)])
     if np.ptp(level) <= 1e-9:
         return NoiseModel(0.0, float(np.mean(binned)) / photos, least)
     weight = 1.0 / np.maximum(binned, 1e-3 * binned.max(initial=0.0) + 1e-30)

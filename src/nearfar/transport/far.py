@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Size
-from nearfar.illumination.frequencies import Frequency
-from nearfar.illumination.patterns import phase
+from nearfar.arrays import Complexes, Floats, Size
+from nearfar.illumination.frequencies import Frequency, as_array
 
 
 @dataclass(frozen=True)
@@ -67,11 +66,61 @@ class RealBasis:
     @cached_property
     def patterns(self) -> NDArray[np.float32]:
         """cos(2 pi k.p) or sin(2 pi k.p), shape (M, P)."""
-        drawn = np.empty((self.count, self.projector.pixels), dtype=np.float32)
+        drawn = np.empty((self.count, *self.projector), dtype=np.float32)
+        down, across = self._phases
         for m, (i, sine) in enumerate(zip(self.index, self.is_sine, strict=True)):
-            angle = 2 * np.pi * phase(self.frequencies[i], self.projector).ravel()
-            drawn[m] = np.sin(angle) if sine else np.cos(angle)
-        return drawn
+            wave = np.outer(down[:, i], across[:, i])
+            drawn[m] = wave.imag if sine else wave.real
+        return drawn.reshape(self.count, self.projector.pixels)
+
+    def drawn_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""
+        angle = 2 * np.pi * (as_array(self.frequencies) @ offsets.T)[self.index]
+        drawn = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))
+        return drawn.astype(np.float32)
+
+    def recentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
+        """Turn answers (n, channels, M) about each camera pixel's centre (n, 2)."""
+        return self._turn(answers, centres, +1)
+
+    def uncentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
+        """Inverse of `recentre`."""
+        return self._turn(answers, centres, -1)
+
+    def _turn(self, answers: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
+        down, across = self._single_phases
+        turn = down[centres[:, 0]] * across[centres[:, 1]]
+        cosine = np.flatnonzero(~self.is_sine)
+        # Frequencies that are their own negative answer no sine: their phase is 1 or -1.
+        own = np.diff(np.append(cosine, self.count)) == 1
+        turned = np.empty_like(answers)
+        turned[..., cosine[own]] = answers[..., cosine[own]] * turn.real[:, None, own]
+        first = np.flatnonzero(~own)
+        if not len(first):
+            return turned
+        # Views where the pairs stand side by side, as they do but for the few above.
+        for run in np.split(first, np.flatnonzero(np.diff(first) != 1) + 1):
+            start, stop = cosine[run[0]], cosine[run[-1]] + 2
+            c = turn.real[:, None, run[0] : run[-1] + 1]
+            s = sign * turn.imag[:, None, run[0] : run[-1] + 1]
+            even, odd = answers[..., start:stop:2], answers[..., start + 1 : stop : 2]
+            turned[..., start:stop:2] = even * c + odd * s
+            turned[..., start + 1 : stop : 2] = odd * c - even * s
+        return turned
+
+    @cached_property
+    def _phases(self) -> tuple[Complexes, Complexes]:
+        """exp(j 2 pi k y) and exp(j 2 pi k x) on the pattern grid, (Py, K) and (Px, K)."""
+        down, across = (
+            np.exp(2j * np.pi * (np.arange(side)[:, None] * cycles % 1.0))
+            for side, cycles in zip(self.projector, as_array(self.frequencies).T, strict=True)
+        )
+        return down, across
+
+    @cached_property
+    def _single_phases(self) -> tuple[Complexes, Complexes]:
+        down, across = self._phases
+        return down.astype(np.complex64), across.astype(np.complex64)
 
     def analyse(self, light: Floats) -> Floats:
         """Return weights times the light's overlap with each pattern: (..., P) to (..., M)."""

@@ -7,6 +7,7 @@ Index convention: arrays are (C, channels, ...); r runs over real answers, w ove
 """
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -174,12 +175,25 @@ def _problem(
         likely=seen_beside(correspondence, window),
     )
     repeats = measurements.repeats[band.places]
-
-    def built(kinds: tuple[Kind, ...]) -> Kinds:
-        return screened(tuple(build_prior(kind, band, repeats) for kind in kinds), band, repeats)
-
-    model = _Model(band, repeats, built(LIT), None if lit.all() else built(UNLIT))
+    shown = (tuple(frequencies), measurements.projector, window, tuple(repeats.tolist()))
+    unlit = None if lit.all() else _kinds(UNLIT, *shown)
+    model = _Model(band, repeats, _kinds(LIT, *shown), unlit)
     return _Problem(measurements, model, whole, window)
+
+
+# Blocks of camera rows share them, those of lit and of unlit camera pixels.
+@lru_cache(maxsize=2)
+def _kinds(
+    kinds: tuple[Kind, ...],
+    frequencies: tuple[Frequency, ...],
+    projector: Size,
+    window: int,
+    repeats: tuple[float, ...],
+) -> Kinds:
+    """Build the kinds for a set of measured frequencies and how often each was measured."""
+    band = band_of(real_basis(frequencies, projector), near.offsets(window))
+    measured = np.array(repeats, dtype=np.float32)
+    return screened(tuple(build_prior(kind, band, measured) for kind in kinds), band, measured)
 
 
 def _turn(problem: _Problem, before: _Rows | None, report: Callable[[float], None]) -> _Rows:

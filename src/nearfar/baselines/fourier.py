@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from nearfar.arrays import Floats, Integers, Size, blocks
-from nearfar.illumination.frequencies import as_array, grid, representatives
+from nearfar.illumination.frequencies import grid, representatives
 from nearfar.illumination.patterns import cosine, invert, quantise, sine
 from nearfar.transport.far import RealBasis, real_basis
 
@@ -58,7 +58,7 @@ class FullDFT:
     @cached_property
     def _numbers(self) -> Integers:
         """Frequencies as whole numbers of cycles across the projector, (frequencies, 2)."""
-        cycles = as_array(self.basis.frequencies) * np.array(self.projector)
+        cycles = self.basis.cycles * np.array(self.projector)
         return np.asarray(np.rint(cycles).astype(np.int64))
 
     def _shown(self, r: int) -> NDArray[np.uint8]:

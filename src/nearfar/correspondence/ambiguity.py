@@ -13,7 +13,6 @@ from scipy.special import ndtr
 
 from nearfar.correspondence.background import SEARCH
 from nearfar.errors import InputError
-from nearfar.illumination.frequencies import as_array
 from nearfar.transport.far import RealBasis
 
 # Noise of an answer, and direct light, as shares of the white of a camera pixel.
@@ -38,7 +37,7 @@ def expected_wrong(basis: RealBasis) -> float:
     """
     height, width = basis.projector
     down, across = np.arange(1 - height, height), np.arange(1 - width, width)
-    cycles = as_array(basis.frequencies)
+    cycles = basis.cycles
     weights = 1.0 / (NOISE**2 + SEARCH.power(basis))
     waves = np.exp(2j * np.pi * np.outer(down, cycles[:, 0])) * weights
     alike = (waves @ np.exp(2j * np.pi * np.outer(cycles[:, 1], across))).real

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.illumination.frequencies import as_array
 from nearfar.transport.far import RealBasis
 
 
@@ -29,7 +28,7 @@ class Background:
 
     def power(self, basis: RealBasis) -> Floats:
         """Return the mean square of the answers to each frequency, shape (K,)."""
-        cycles = as_array(basis.frequencies)
+        cycles = basis.cycles
         around = np.hypot(*(cycles * basis.projector).T)
         far = FAR * np.exp(-around / FAR_DECAY)
         spread = 2 * np.pi * NEAR_WIDTH**2

@@ -26,7 +26,7 @@ from nearfar.correspondence.background import SEARCH, SHARP, STRONG, Background
 from nearfar.correspondence.orientation import turned_round
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
-from nearfar.illumination.frequencies import DC, as_array
+from nearfar.illumination.frequencies import DC
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport.far import RealBasis
@@ -180,15 +180,14 @@ class _Waves(NamedTuple):
 
 def _waves(basis: RealBasis) -> _Waves:
     """Split exp(j 2 pi k.p) into a factor along rows and one down."""
-    frequencies = as_array(basis.frequencies)
     height, width = (np.arange(side) for side in basis.projector)
     cosine = np.flatnonzero(~basis.is_sine)
     paired = np.diff(np.append(cosine, basis.count)) == 2
     groups = []
-    levels = np.unique(frequencies[:, 0])
+    levels = np.unique(basis.cycles[:, 0])
     for level in levels:
-        mine = np.flatnonzero(frequencies[:, 0] == level)
-        wave = np.exp(2j * np.pi * (np.outer(frequencies[mine, 1], width) % 1.0))
+        mine = np.flatnonzero(basis.cycles[:, 0] == level)
+        wave = np.exp(2j * np.pi * (np.outer(basis.cycles[mine, 1], width) % 1.0))
         # The answer to a cosine less j times that to its sine.
         waves = np.concatenate([wave, -1j * wave[paired[mine]]])
         along = np.concatenate([waves.real, waves.imag], axis=1).astype(np.float32)
@@ -227,8 +226,7 @@ def _highest(basis: RealBasis, score: Floats, weights: Floats) -> NDArray[np.flo
     place = flat.argmax(axis=1)
     peak = flat[number, place]
     # Squares of a cosine and its sine add up to 1 at every whole place, and lose this between.
-    frequencies = as_array(basis.frequencies)
-    down, across = (np.cos(np.pi * frequencies[:, axis]) ** 2 for axis in (0, 1))
+    down, across = np.cos(np.pi * basis.cycles.T) ** 2
     whole = np.sqrt(weights.sum(axis=1)) + 1e-12
     between = np.sqrt(weights @ np.stack([across, down, down * across], axis=1)) + 1e-12
     found = np.stack(np.divmod(place, width), axis=-1).astype(np.float64)
@@ -270,10 +268,9 @@ def _footprints(
     limit = np.array(basis.projector) - 1
     offsets = _square(REACH)
     centre = np.clip(np.floor(around + 0.5).astype(np.int64), 0, limit)
-    frequencies = as_array(basis.frequencies)
     # Two entries overlap by a sum that depends on the offset between them alone.
     steps = _square(2 * REACH)
-    overlap = np.cos(2 * np.pi * (frequencies @ steps.T)).astype(np.float32)
+    overlap = np.cos(2 * np.pi * (basis.cycles @ steps.T)).astype(np.float32)
     apart = offsets[:, None] - offsets[None] + 2 * REACH
     number = apart[..., 0] * (4 * REACH + 1) + apart[..., 1]
     ridge = np.where(np.abs(offsets).max(axis=1) > 1, RIDGE, 0.0).astype(np.float32)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Size, blocks, product
 from nearfar.estimate.matrices import CORNERS, Band, Matrices, build_matrices
 from nearfar.estimate.sparse import least_risk, solve
-from nearfar.illumination.frequencies import as_array
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
@@ -36,8 +35,8 @@ FIRST = np.float32(0.75)
 FAINT = 0.1
 # What strays beyond the border by less than this share of a window's peak is rounding.
 DEPARTS = 1e-3
-# Camera pixels at once: keeps a block's windows near the processor.
-BLOCK = 1024
+# Windows at once, one for each channel of a camera pixel: few enough to lie near the processor.
+BLOCK = 2048
 # Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
 HIGH = 0.3
 
@@ -90,7 +89,7 @@ def estimate(
         if progress is not None:
             progress(done[0])
 
-    side_by_side(work, blocks(number, BLOCK))
+    side_by_side(work, blocks(number, max(1, BLOCK // channels)))
     shape = (*measurements.camera, channels)
     return Transport(
         projector=measurements.projector,
@@ -272,7 +271,7 @@ def _direct(
     highest near frequencies are weighed in as far as it does.
     """
     answer = pixels.corners @ matrices.checkerboard.on_corners.T
-    frequencies = np.abs(as_array(matrices.near.basis.frequencies)).max(axis=1, initial=0.0)
+    frequencies = np.abs(matrices.near.basis.cycles).max(axis=1, initial=0.0)
     high = frequencies[matrices.near.basis.index] > HIGH
     high_answer = pixels.corners @ matrices.near.on_corners[high].T
     faded = 1.0 - answer[:, 0] ** 2

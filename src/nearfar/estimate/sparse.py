@@ -102,12 +102,15 @@ def least_risk(v: Floats, inside: Booleans, noise: Floats) -> Floats:
     ndarray, shape (I,)
         One of `SHARES` of the noise.
     """
-    size = np.where(inside, np.abs(v), 0.0)
-    risks = []
+    size = np.abs(v)
+    size *= inside
+    beyond = np.count_nonzero(~inside, axis=1)
+    kept, risks = np.empty_like(size), []
     for share in SHARES:
         threshold = (share * noise)[:, None]
-        zeroed = np.sum((size <= threshold) & inside, axis=1)
-        risks.append(np.sum(np.minimum(size, threshold) ** 2, axis=1) - 2 * noise**2 * zeroed)
+        zeroed = np.count_nonzero(size <= threshold, axis=1) - beyond
+        np.minimum(size, threshold, out=kept)
+        risks.append(np.einsum("iw,iw->i", kept, kept) - 2 * noise**2 * zeroed)
     best = np.argmin(np.stack(risks, axis=1), axis=1)
     return np.asarray(np.array(SHARES, dtype=v.dtype)[best] * noise)
 
@@ -137,8 +140,11 @@ class _Problem(NamedTuple):
 def _step(problem: _Problem, z: Floats, unseen: Floats) -> Floats:
     """Return what reweighted least squares takes off z."""
     width = np.maximum(problem.threshold, problem.floor + SETTLED * problem.scale + TINY)[:, None]
-    v = problem.n0 + z @ unseen.T
-    weight = width / np.maximum(np.abs(v), width)
+    v = z @ unseen.T
+    v += problem.n0
+    weight = np.abs(v)
+    np.maximum(weight, width, out=weight)
+    np.divide(width, weight, out=weight)
     np.copyto(weight, 1.0, where=~problem.inside)
     return _weighted_step(v, weight, unseen)
 
@@ -148,7 +154,8 @@ def _weighted_step(v: Floats, weight: Floats, unseen: Floats) -> Floats:
     unknowns = unseen.shape[1]
     pairs = (unseen[:, :, None] * unseen[:, None, :]).reshape(len(unseen), -1)
     normal = (weight @ pairs).reshape(-1, unknowns, unknowns).astype(np.float64)
-    right = ((weight * v) @ unseen).astype(np.float64)
+    weight *= v
+    right = (weight @ unseen).astype(np.float64)
     # A window with no weight at all has nothing to say; the ridge keeps it still.
     ridge = 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(unknowns)
     return np.linalg.solve(normal + ridge, right[..., None])[..., 0].astype(v.dtype)

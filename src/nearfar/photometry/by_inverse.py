@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Integers, blocks
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.parallel import ahead
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.noise import NoiseModel, fit_noise
 from nearfar.photometry.photos import (
@@ -34,6 +35,8 @@ from nearfar.plan import Plan, Sinusoid
 
 # Pairs that sum to more or less than white + black by this share of white are not linear.
 NOT_LINEAR = 0.005
+# Camera pixels whose answers are laid side by side at once: few enough to lie near the processor.
+TURNED = 256
 
 
 class Pair(NamedTuple):
@@ -105,14 +108,16 @@ def measure_pairs(
     shape = (camera.pixels, photos.channels)
     differences = np.empty((len(pairs), *shape), dtype=np.float32)
     strays = np.empty((len(pairs), *shape), dtype=np.float32)
-    for start in range(0, len(pairs), BATCH):
-        batch = pairs[start : start + BATCH]
-        shown = photos.read([pair.photo for pair in batch], rows).reshape(-1, *shape)
-        inverse = photos.read([pair.inverse for pair in batch], rows).reshape(-1, *shape)
-        differences[start : start + len(batch)] = shown - inverse
-        strays[start : start + len(batch)] = shown + inverse
+
+    def read(batch: slice) -> Floats:
+        numbers = [n for pair in pairs[batch] for n in (pair.photo, pair.inverse)]
+        return photos.read(numbers, rows).reshape(-1, 2, *shape)
+
+    for batch, both in ahead(read, blocks(len(pairs), BATCH // 2)):
+        np.subtract(both[:, 0], both[:, 1], out=differences[batch])
+        np.add(both[:, 0], both[:, 1], out=strays[batch])
         if progress is not None:
-            progress(2 * (start + len(batch)))
+            progress(2 * batch.stop)
     pair_mean = strays.mean(axis=0, dtype=np.float64)
     strays -= pair_mean.astype(np.float32)
     pair_variance = np.einsum("kci,kci->ci", strays, strays, dtype=np.float64)
@@ -140,13 +145,9 @@ def measure_pairs(
         ]
     )
     left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
-    answers = np.zeros((*shape, basis.count), dtype=np.float32)
-    repeats = np.zeros(basis.count, dtype=np.float32)
-    for pair, difference in zip(pairs, differences, strict=True):
-        r = place[pair.frequency, pair.sine]
-        answers[..., r] += difference
-        repeats[r] += 1
-    answers /= repeats
+    places = np.array([place[pair.frequency, pair.sine] for pair in pairs])
+    repeats = np.bincount(places, minlength=basis.count).astype(np.float32)
+    answers = _means(differences, places, repeats)
     answers[..., place[DC, False]] = levels.light
     return Measurements(
         camera=camera,
@@ -159,6 +160,18 @@ def measure_pairs(
         repeats=repeats,
         light_noise=np.sqrt(levels.light_variance).astype(np.float32),
     )
+
+
+def _means(differences: Floats, places: Integers, repeats: Floats) -> Floats:
+    """Mean of the differences (pairs, C, channels) of each answer, (C, channels, R)."""
+    order = np.argsort(places, kind="stable")
+    first = np.flatnonzero(np.diff(places[order], prepend=-1))
+    shape = differences.shape[1:]
+    answers = np.empty((*shape, len(repeats)), dtype=np.float32)
+    for block in blocks(shape[0], TURNED):
+        sums = np.add.reduceat(differences[:, block][order], first, axis=0)
+        answers[block] = np.moveaxis(sums, 0, -1) / repeats
+    return answers
 
 
 def _excess_of_sums(pair_mean: Floats, white: Floats, black: Floats) -> float:

@@ -14,6 +14,7 @@ from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import Frequency
+from nearfar.parallel import ahead
 from nearfar.plan import Plan, Sinusoid, Stripe
 from nearfar.transport.far import RealBasis, real_basis
 
@@ -56,9 +57,11 @@ def in_batches(
     photos: Photos, numbers: Sequence[int], rows: slice
 ) -> Iterator[tuple[Sequence[int], Floats]]:
     """Yield photo numbers and their photos, (n, C, channels), `BATCH` at once."""
-    for batch in blocks(len(numbers), BATCH):
-        mine = list(numbers[batch])
-        yield mine, photos.read(mine, rows).reshape(len(mine), -1, photos.channels)
+
+    def read(mine: Sequence[int]) -> Floats:
+        return photos.read(mine, rows).reshape(len(mine), -1, photos.channels)
+
+    yield from ahead(read, [list(numbers[batch]) for batch in blocks(len(numbers), BATCH)])
 
 
 def mean_photo(photos: Photos, numbers: Sequence[int], rows: slice) -> NDArray[np.float64]:

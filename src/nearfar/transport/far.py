@@ -41,6 +41,11 @@ class RealBasis:
         )
 
     @cached_property
+    def cycles(self) -> NDArray[np.float64]:
+        """(fy, fx) of each frequency in cycles per projector pixel, shape (K, 2)."""
+        return as_array(self.frequencies)
+
+    @cached_property
     def is_sine(self) -> NDArray[np.bool_]:
         """Which coefficients answer a sine, shape (M,)."""
         return np.array(
@@ -75,7 +80,7 @@ class RealBasis:
 
     def drawn_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
         """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""
-        angle = 2 * np.pi * (as_array(self.frequencies) @ offsets.T)[self.index]
+        angle = 2 * np.pi * (self.cycles @ offsets.T)[self.index]
         drawn = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))
         return drawn.astype(np.float32)
 
@@ -113,7 +118,7 @@ class RealBasis:
         """exp(j 2 pi k y) and exp(j 2 pi k x) on the pattern grid, (Py, K) and (Px, K)."""
         down, across = (
             np.exp(2j * np.pi * (np.arange(side)[:, None] * cycles % 1.0))
-            for side, cycles in zip(self.projector, as_array(self.frequencies).T, strict=True)
+            for side, cycles in zip(self.projector, self.cycles.T, strict=True)
         )
         return down, across
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.illumination.frequencies import as_array
 from nearfar.transport import near
 from nearfar.transport.far import RealBasis
 
@@ -84,7 +83,7 @@ STRENGTHS = tuple(2e-4 * 2.0**step for step in range(11))
 
 def far_power(basis: RealBasis, kind: Kind) -> Floats:
     """Power of each real answer of f at unit strength, shape (R,), float64."""
-    cycles = as_array(basis.frequencies) * np.array(basis.projector)
+    cycles = basis.cycles * np.array(basis.projector)
     power = power_at(np.hypot(cycles[:, 0], cycles[:, 1]), kind)
     own = np.array([k.is_own_negative for k in basis.frequencies])
     return np.asarray((power * np.where(own, 1.0, 0.5))[basis.index])

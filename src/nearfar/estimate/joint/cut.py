@@ -25,7 +25,6 @@ from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import RATIOS, Prior
 from nearfar.estimate.joint.solve import Found, near_noise
 from nearfar.estimate.matrices import Band
-from nearfar.illumination.frequencies import as_array
 from nearfar.transport.kinds import CORRELATION, smooth_side
 
 
@@ -120,7 +119,7 @@ def _information(band: Band, weight: Floats) -> Callable[[Booleans], Floats]:
         every = (patterns.T * weight) @ patterns
         return lambda square: np.asarray(every[np.ix_(square.ravel(), square.ravel())])
     window = round(np.sqrt(band.on_window.shape[1]))
-    cycles = as_array(band.basis.frequencies)
+    cycles = band.basis.cycles
     side = np.arange(1 - window, window)
     waves = [np.exp(2j * np.pi * cycles[:, axis, None] * side) for axis in (0, 1)]
     told = np.real((waves[0].T * weight[cosine]) @ waves[1])

@@ -1,9 +1,10 @@
 """A large camera in little memory: 2 megapixels, a projector of 128 x 128, 300 photos.
 
 Run ``python benchmarks/large_camera.py [HxW ...]``, cameras (1225x1633 by default); give several
-to see that the cost grows with their pixels. A capture is made from a simple world, block by block;
-then a process of its own runs ``nearfar reconstruct --memory 2GB`` on it, and its time, camera
-pixels a second and peak memory are printed.
+to see that the cost grows with their pixels. Captures are made from a simple world, photo by photo:
+of the joint method's plan of 300 photos, and of the paper's with W = 11 and 5 x 5 (292 photos,
+correspondence given). Then a process of its own runs ``nearfar reconstruct --memory 2GB`` on each,
+and its time, camera pixels a second and peak memory are printed.
 """
 
 import subprocess
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nearfar import Size, choose_plan
+from nearfar import Size, choose_plan, paper_plan
 from nearfar.arrays import Floats, Integers, parse_size
 from nearfar.capture import write_capture
 from nearfar.plan import Plan
@@ -36,12 +37,17 @@ finally:
 """
 
 
+def places(camera: Size) -> list[Integers]:
+    """Row and column of the projector that each row and column of the camera sees."""
+    return [
+        np.linspace(1, p - 2, c).round().astype(int) for p, c in zip(PROJECTOR, camera, strict=True)
+    ]
+
+
 def photos_of(plan: Plan, camera: Size) -> Iterator[Integers]:
     """Yield photos of a flat scene with a little light from beside and from everywhere."""
     generator = np.random.default_rng(0)
-    q = [
-        np.linspace(1, p - 2, c).round().astype(int) for p, c in zip(PROJECTOR, camera, strict=True)
-    ]
+    q = places(camera)
     beside = np.exp(-(np.arange(-4, 5) ** 2) / 4.0)
     for number in range(len(plan.patterns)):
         light = plan.draw(number).astype(np.float32) / 255
@@ -54,18 +60,25 @@ def photos_of(plan: Plan, camera: Size) -> Iterator[Integers]:
         yield np.clip(electrons * (65535 / FULL_WELL), 0, 65535).astype(np.uint16)
 
 
-def run(camera: Size, folder: Path) -> None:
+def run(camera: Size, folder: Path, method: str) -> None:
     """Print one camera's row."""
-    plan, _ = choose_plan(PROJECTOR, PHOTOS, window=WINDOW)
-    capture = folder / f"{camera}.zarr"
+    given = []
+    if method == "joint":
+        plan, _ = choose_plan(PROJECTOR, PHOTOS, window=WINDOW)
+    else:
+        plan = paper_plan(PROJECTOR, 11, Size(5, 5), correspondence="none")
+        q = np.stack(np.meshgrid(*places(camera), indexing="ij"), axis=-1)
+        np.save(folder / "q.npy", q.astype(np.float32))
+        given = ["--method", "paper", "--correspondence", str(folder / "q.npy")]
+    capture = folder / "capture.zarr"
     write_capture(capture, plan, photos_of(plan, camera))
     command = [sys.executable, "-c", COMMAND, "reconstruct", str(capture), str(folder / "t.zarr")]
     started = time.perf_counter()
-    said = subprocess.run([*command, "--force"], check=True, capture_output=True, text=True)
+    said = subprocess.run([*command, *given], check=True, capture_output=True, text=True)
     seconds = time.perf_counter() - started
     peak = int(said.stdout.split()[-1]) / 1e6
     print(
-        f"{camera}: {camera.pixels / 1e6:.2f} megapixels, {len(plan.patterns)} photos: "
+        f"{camera}, {method}: {camera.pixels / 1e6:.2f} megapixels, {len(plan.patterns)} photos: "
         f"{seconds:.0f} s, {camera.pixels / seconds:.0f} camera pixels a second, "
         f"peak memory {peak:.2f} GB",
         flush=True,
@@ -74,5 +87,6 @@ def run(camera: Size, folder: Path) -> None:
 
 if __name__ == "__main__":
     for size in sys.argv[1:] or ["1225x1633"]:
-        with tempfile.TemporaryDirectory() as made:
-            run(parse_size(size), Path(made))
+        for name in ("paper", "joint"):
+            with tempfile.TemporaryDirectory() as made:
+                run(parse_size(size), Path(made), name)

@@ -1,0 +1,115 @@
+"""What all turns of the joint estimate share: the answers in order, q, and the kinds.
+
+Index convention: arrays are (C, channels, ...); r runs over real answers, w over window entries.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers, Size
+from nearfar.estimate.joint.edges import seen_beside
+from nearfar.estimate.joint.evidence import Kinds, screened
+from nearfar.estimate.joint.pixels import (
+    EXACT,
+    Whole,
+    offset_noise,
+    scale_of,
+)
+from nearfar.estimate.joint.prior import build_prior
+from nearfar.estimate.matrices import Band, band_of
+from nearfar.illumination.frequencies import Frequency
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport import near
+from nearfar.transport.far import real_basis
+from nearfar.transport.kinds import LIT, UNLIT, Kind
+
+# Direct light this close to a whole projector pixel is taken to be all that pixel's: noise moves q
+# by as much, and a footprint of 10 % too much beside q cost 1.5 dB under a random light. What
+# really lies beside it, kinds with spread find.
+WHOLE = 0.1
+
+
+class Rows(NamedTuple):
+    """Rows of all camera pixels, photo units."""
+
+    shared: Floats  # o, d and d times what q is off by, (C, channels, 4)
+    near: Floats  # (C, channels, W^2)
+    far: Floats  # (C, channels, R), as measured
+    near_noise: Floats  # (C, channels)
+    kind: Integers  # (C,), place in LIT + UNLIT
+    strength: Floats  # (C,), share of white
+
+
+class Model(NamedTuple):
+    """Kinds for a set of measured frequencies."""
+
+    band: Band
+    repeats: Floats
+    lit: Kinds
+    unlit: Kinds | None
+
+
+class Problem(NamedTuple):
+    """What all turns share."""
+
+    measurements: Measurements
+    model: Model
+    whole: Whole
+    window: int
+
+
+def lay_out(
+    measurements: Measurements, correspondence: Floats, window: int, frequencies: list[Frequency]
+) -> Problem:
+    """Lay out measurements for the joint estimate.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    correspondence : ndarray, shape (Cy, Cx, 2)
+    window : int
+    frequencies : list of Frequency
+        Those measured, but DC.
+    """
+    # Pairs of a cosine and a sine side by side, those that answer no sine at the end.
+    frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
+    basis = real_basis(frequencies, measurements.projector)
+    plain = band_of(basis, near.offsets(window))
+    band = Band(basis, measurements.places(frequencies), plain.on_window, plain.on_corners)
+    rounded = np.rint(correspondence)
+    close = np.abs(correspondence - rounded) < WHOLE
+    correspondence = np.where(close, rounded, correspondence).astype(np.float64)
+    lit = np.isfinite(correspondence).all(axis=-1).ravel()
+    white = scale_of(measurements)
+    whole = Whole(
+        answers=measurements.answers[..., band.places],
+        correspondence=correspondence.reshape(-1, 2),
+        centres=near.centre(correspondence, measurements.projector),
+        lit=lit,
+        noise=np.maximum(measurements.noise, EXACT * white),
+        offset_noise=offset_noise(measurements),
+        white=white,
+        likely=seen_beside(correspondence, window),
+    )
+    repeats = measurements.repeats[band.places]
+    shown = (tuple(frequencies), measurements.projector, window, tuple(repeats.tolist()))
+    unlit = None if lit.all() else _kinds(UNLIT, *shown)
+    model = Model(band, repeats, _kinds(LIT, *shown), unlit)
+    return Problem(measurements, model, whole, window)
+
+
+# Blocks of camera rows share them, those of lit and of unlit camera pixels.
+@lru_cache(maxsize=2)
+def _kinds(
+    kinds: tuple[Kind, ...],
+    frequencies: tuple[Frequency, ...],
+    projector: Size,
+    window: int,
+    repeats: tuple[float, ...],
+) -> Kinds:
+    """Build the kinds for a set of measured frequencies and how often each was measured."""
+    band = band_of(real_basis(frequencies, projector), near.offsets(window))
+    measured = np.array(repeats, dtype=np.float32)
+    return screened(tuple(build_prior(kind, band, measured) for kind in kinds), band, measured)

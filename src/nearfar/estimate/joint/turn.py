@@ -1,0 +1,203 @@
+"""One turn of the joint estimate over all camera pixels.
+
+The first is taken alone; later ones start from what the neighbours expect of each camera pixel and
+estimate what differs.
+
+Index convention: arrays are (C, channels, ...); r runs over real answers, w over window entries.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Integers, blocks, product
+from nearfar.estimate.joint.cut import rounded, solve_cut
+from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, with_spike
+from nearfar.estimate.joint.evidence import best_kind
+from nearfar.estimate.joint.neighbours import expect_each, expect_together
+from nearfar.estimate.joint.nuisance import KEPT
+from nearfar.estimate.joint.pixels import (
+    Pixels,
+    Whole,
+    gather,
+)
+from nearfar.estimate.joint.prior import Prior
+from nearfar.estimate.joint.problem import Problem, Rows
+from nearfar.estimate.joint.solve import Found, ratio_of, solve_whole
+from nearfar.estimate.matrices import Band
+from nearfar.parallel import side_by_side
+from nearfar.transport import near
+from nearfar.transport.direct import footprint
+from nearfar.transport.kinds import LIT
+
+# Camera pixels at once; and where the border cuts their windows.
+BLOCK = 2048
+CUT = 512
+
+
+class _Known(NamedTuple):
+    """What a turn starts from."""
+
+    before: Rows
+    expected: Rows  # by the neighbours
+    misdrawn: Callable[[slice | NDArray[np.int64]], Floats]  # see `_misdrawn`
+
+
+def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], None]) -> Rows:
+    """Estimate every camera pixel once."""
+    whole, model = problem.whole, problem.model
+    band, projector = model.band, problem.measurements.projector
+    number, channels, count = whole.answers.shape
+    rows = Rows(
+        np.zeros((number, channels, KEPT), dtype=np.float32),
+        np.zeros((number, channels, problem.window**2), dtype=np.float32),
+        np.zeros((number, channels, count), dtype=np.float32),
+        np.zeros((number, channels), dtype=np.float32),
+        np.zeros(number, dtype=np.int64),
+        np.zeros(number, dtype=np.float32),
+    )
+    known = None
+    if before is not None:
+        known = _Known(before, _expected(problem, before), _misdrawn(problem))
+    cut = whole.lit & ~near.inside(whole.centres, problem.window, projector).all(axis=1)
+
+    def shown(chosen: slice | NDArray[np.int64]) -> Floats | None:
+        """Answers that are expected, and what 8 bits made of direct light."""
+        if known is None:
+            return None
+        answers = product(known.expected.near[chosen], band.on_window.T)
+        answers = band.uncentre(answers, whole.centres[chosen])
+        answers += known.expected.far[chosen]
+        answers += known.before.shared[chosen, :, 1, None] * known.misdrawn(chosen)[:, None]
+        return answers
+
+    def put(chosen: NDArray[np.int64], pixels: Pixels, found: Found) -> None:
+        rows.shared[chosen] = found.shared[..., :KEPT]
+        rows.near[chosen] = found.near
+        rows.far[chosen] = band.uncentre(found.far, pixels.centres)
+        rows.near_noise[chosen] = found.near_noise
+
+    done = [0]
+
+    def choose(block: slice) -> None:
+        """Choose the kinds of a block, and estimate those whose windows are whole."""
+        pixels = gather(whole, block, band, projector, shown(block))
+        for lit, first, kinds in ((True, 0, model.lit), (False, len(LIT), model.unlit)):
+            mine = np.flatnonzero(pixels.lit == lit)
+            if not len(mine) or kinds is None:
+                continue
+            kind, strength, _ = best_kind(pixels.only(mine), kinds)
+            rows.kind[block.start + mine] = kind + first
+            rows.strength[block.start + mine] = strength
+            uncut = ~cut[block.start + mine]
+            for place in np.unique(kind[uncut]):
+                of_kind = np.flatnonzero(uncut & (kind == place))
+                some = pixels.only(mine[of_kind])
+                ratio = ratio_of(some, strength[of_kind])
+                put(
+                    block.start + mine[of_kind],
+                    some,
+                    _with_edges(some, kinds.priors[place], ratio, solve_whole, band),
+                )
+        done[0] += block.stop - block.start
+        report(done[0] / number)
+
+    def estimate_cut(chosen: NDArray[np.int64]) -> None:
+        """Estimate camera pixels of one kind whose windows the border cuts."""
+        pixels = gather(whole, chosen, band, projector, shown(chosen))
+        prior = model.lit.priors[rows.kind[chosen[0]]]
+        ratio = rounded(ratio_of(pixels, rows.strength[chosen]))
+        put(chosen, pixels, _with_edges(pixels, prior, ratio, solve_cut, band))
+
+    side_by_side(choose, blocks(number, BLOCK))
+    side_by_side(estimate_cut, _cut_alike(whole, rows.kind, np.flatnonzero(cut)))
+    if known is None:
+        return rows
+    # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
+    # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
+    return rows._replace(
+        near=rows.near + known.expected.near,
+        far=rows.far + known.expected.far,
+        kind=known.before.kind,
+        strength=known.before.strength,
+    )
+
+
+def _cut_alike(whole: Whole, kind: Integers, cut: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Cut camera pixels into groups of one kind, those whose windows are cut alike together."""
+    centres = whole.centres[cut]
+    order = cut[np.lexsort((centres[:, 1], centres[:, 0], kind[cut]))]
+    for group in np.split(order, np.flatnonzero(np.diff(kind[order])) + 1):
+        for part in blocks(len(group), CUT):
+            yield group[part]
+
+
+def _misdrawn(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
+    """Return what tells the answers (n, R) of unit direct light to what 8 bits got wrong."""
+    # A row for each projector pixel, so that what a camera pixel asks for lies side by side.
+    error = np.ascontiguousarray(problem.measurements.shown_error[problem.model.band.places].T)
+    where = footprint(problem.whole.correspondence, problem.measurements.projector)
+
+    def of(chosen: slice | NDArray[np.int64]) -> Floats:
+        pixels, weights = where.pixels[chosen], where.weights[chosen]
+        found = error[pixels[:, 0]] * weights[:, :1]
+        for corner in range(1, 4):
+            if weights[:, corner].any():
+                found += error[pixels[:, corner]] * weights[:, corner, None]
+        return np.asarray(found)
+
+    return of
+
+
+def _with_edges(
+    pixels: Pixels,
+    prior: Prior,
+    ratio: Floats,
+    solve: Callable[[Pixels, Prior, Floats, Band], Found],
+    band: Band,
+) -> Found:
+    """Estimate camera pixels of one kind, direct light of second surfaces in their windows."""
+    whole = solve(pixels, prior, ratio, band)
+    number = np.arange(len(ratio))
+    found = whole
+    for _ in range(MOST if pixels.lit.any() else 0):
+        entry, gain = likeliest_spike(pixels, prior, ratio, found)
+        sure = np.flatnonzero(gain > SURE)
+        if not len(sure):
+            break
+        number, ratio = number[sure], ratio[sure]
+        pixels = with_spike(pixels.only(sure), entry[sure])
+        found = solve(pixels, prior, ratio, band)
+        windows = found.near.copy()
+        for spike, entries in enumerate(pixels.spikes.T):
+            at = (np.arange(len(number))[:, None], np.arange(windows.shape[1]), entries[:, None])
+            windows[at] += found.shared[..., KEPT + spike]
+        whole.near[number] = windows
+        whole.far[number] = found.far
+        whole.shared[number] = found.shared[..., :KEPT]
+    return whole
+
+
+def _expected(problem: Problem, rows: Rows) -> Rows:
+    """Ask the neighbours of each camera pixel what they expect of it."""
+    whole, measurements = problem.whole, problem.measurements
+    camera, channels = measurements.camera, measurements.channels
+    shape = (*camera, channels)
+    white = whole.white.reshape(*shape, 1)
+    tiny = np.finfo(np.float32).tiny ** 0.5
+    variance = np.maximum((measurements.noise.reshape(shape) / white[..., 0]) ** 2, tiny)
+    far = expect_each(rows.far.reshape(*shape, -1) / white, variance, problem.model.repeats)
+    windows = expect_together(
+        rows.near.reshape(*shape, -1) / white,
+        rows.near_noise.reshape(shape) / white[..., 0] ** 2,
+        whole.lit.reshape(camera),
+    )
+    inside = near.inside(whole.centres, problem.window, measurements.projector)
+    windows *= white
+    far *= white
+    return rows._replace(
+        near=windows.reshape(rows.near.shape) * inside[:, None],
+        far=far.reshape(rows.far.shape),
+    )

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from array_api_compat import array_namespace, device, is_numpy_array, to_device
 from numpy.typing import NDArray
 
 from nearfar.errors import InputError
@@ -100,10 +101,29 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
+def namespace(*values: Any) -> Any:
+    """Return the array-API functions for arrays: NumPy's, PyTorch's or CuPy's."""
+    return array_namespace(*values)
+
+
+def beside(constant: NDArray[Any], values: Any) -> Any:
+    """Return a NumPy array as one of the kind of `values`, on the same device."""
+    if is_numpy_array(values):
+        return constant
+    return namespace(values).asarray(constant, device=device(values))
+
+
+def fetch(values: Any) -> NDArray[Any]:
+    """Return an array as NumPy's."""
+    if is_numpy_array(values):
+        return np.asarray(values)
+    return np.from_dlpack(to_device(values, "cpu"))
+
+
 def product(values: Floats, matrix: Floats) -> Floats:
     """Return (..., a) times (a, b) as one product, where NumPy makes one for each first axis."""
-    flat = values.reshape(math.prod(values.shape[:-1]), values.shape[-1]) @ matrix
-    return np.asarray(flat.reshape(*values.shape[:-1], matrix.shape[1]))
+    flat = values.reshape((math.prod(values.shape[:-1]), values.shape[-1])) @ matrix
+    return flat.reshape((*values.shape[:-1], matrix.shape[1]))
 
 
 def blocks(count: int, length: int) -> Iterator[slice]:

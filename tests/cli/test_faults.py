@@ -1,6 +1,8 @@
 """Lights, correspondence, pairs, rigs and options that cannot be: a sentence, and status 1."""
 
 import json
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import imagecodecs
@@ -72,6 +74,16 @@ def test_a_memory_that_cannot_be(
 ):
     arguments = ("reconstruct", finished.capture, tmp_path / "out.zarr", "--memory", memory)
     check_refused(untouched, arguments, "--memory", word)
+
+
+def test_a_device_that_cannot_be(finished: Job, untouched: Untouched, tmp_path: Path):
+    arguments = ("reconstruct", finished.capture, tmp_path / "out.zarr", "--device", "cuda")
+    check_refused(untouched, (*arguments, "--method", "paper"), "method paper does not run on")
+    torch = find_spec("torch") and import_module("torch")
+    if torch is None:
+        check_refused(untouched, arguments, "PyTorch, which is not installed", "device cpu")
+    elif not torch.cuda.is_available():
+        check_refused(untouched, arguments, "no CUDA device", "device cpu")
 
 
 def test_a_scheduler_that_cannot_be(finished: Job, untouched: Untouched, tmp_path: Path):

@@ -31,6 +31,13 @@ class Method(StrEnum):
     PAPER = "paper"
 
 
+class Where(StrEnum):
+    """Where the work is done."""
+
+    CPU = "cpu"
+    CUDA = "cuda"
+
+
 def reconstruct(
     capture: CapturePath,
     output: Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport to make.")],
@@ -56,6 +63,9 @@ def reconstruct(
         str,
         typer.Option(help="Memory to work in, but for --square: blocks of camera rows that fit."),
     ] = "2GB",
+    device: Annotated[
+        Where, typer.Option(help="Where the joint estimate is made; cuda needs PyTorch.")
+    ] = Where.CPU,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -79,6 +89,8 @@ def reconstruct(
 
     if square and scheduler is not None:
         raise typer.BadParameter("is not for --square.", param_hint="--scheduler")
+    if device is Where.CUDA and scheduler is not None:
+        raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
     available = parse_bytes(memory, name="--memory")
     keep_input(output, capture, *([correspondence] if correspondence else []))
     check_output(output, force=force)
@@ -105,13 +117,23 @@ def reconstruct(
             seen.camera = opened.camera
         elif square:
             transport, found = rebuild(
-                opened, given, method=method.value, square=True, progress=report
+                opened,
+                given,
+                method=method.value,
+                square=True,
+                device=device.value,
+                progress=report,
             )
             seen.add(transport, found)
             save_transport(output, transport, force=force)
         else:
             parts = reconstruct_in_blocks(
-                opened, given, method=method.value, memory=available, progress=report
+                opened,
+                given,
+                method=method.value,
+                memory=available,
+                device=device.value,
+                progress=report,
             )
             transports = (seen.add(*part) for part in parts)
             write_transport(output, transports, opened.camera.height, force=force)

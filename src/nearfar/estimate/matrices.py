@@ -1,12 +1,13 @@
 """What every camera pixel shares: patterns over the window, their inverse, what no photo sees."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Floats, Size, namespace
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
     Frequency,
@@ -42,6 +43,10 @@ class Band:
     on_window: Floats
     on_corners: Floats
 
+    def put(self, move: Callable[[Any], Any]) -> "Band":
+        """Put the patterns onto a device."""
+        return replace(self, on_window=move(self.on_window), on_corners=move(self.on_corners))
+
     def recentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
         """Turn answers (n, channels, R) about each pixel's centre (n, 2)."""
         return self.basis.recentre(answers, centres)
@@ -66,16 +71,19 @@ def corner_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats
     ndarray, shape (n, 3, 9), float32
         The bilinear footprint, and its derivatives by q; 0 along an axis on which q is whole.
     """
-    off = np.nan_to_num(correspondence - centres)
-    lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
-    weights = np.stack([np.maximum(-off, 0.0), 1 - np.abs(off), np.maximum(off, 0.0)], axis=-1)
-    sign = np.sign(off)
-    steps = np.stack([np.minimum(sign, 0.0), -sign, np.maximum(sign, 0.0)], axis=-1)
+    xp = namespace(correspondence)
+    lit = xp.all(xp.isfinite(correspondence), axis=1)
+    off = xp.where(lit[:, None], correspondence - centres, 0.0)
+    weights = xp.stack([xp.clip(-off, min=0.0), 1 - xp.abs(off), xp.clip(off, min=0.0)], axis=-1)
+    sign = xp.sign(off)
+    steps = xp.stack([xp.clip(sign, max=0.0), -sign, xp.clip(sign, min=0.0)], axis=-1)
     sides = ((weights, weights), (steps, weights), (weights, steps))
     found = [
-        np.einsum("ny,nx->nyx", of_y[:, 0], of_x[:, 1]).reshape(len(off), 9) for of_y, of_x in sides
+        (of_y[:, 0, :, None] * of_x[:, 1, None, :]).reshape((len(off), 9)) for of_y, of_x in sides
     ]
-    return np.where(lit[:, None, None], np.stack(found, axis=1), 0.0).astype(np.float32)
+    placed = xp.where(lit[:, None, None], xp.stack(found, axis=1), 0.0)
+    weighed: Floats = xp.astype(placed, xp.float32)
+    return weighed
 
 
 def _band(measurements: Measurements, frequencies: Sequence[Frequency], window: int) -> Band:

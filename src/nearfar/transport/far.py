@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats, Size
+from nearfar.arrays import Complexes, Floats, Size, beside, namespace
 from nearfar.illumination.frequencies import Frequency, as_array
 
 
@@ -93,21 +93,24 @@ class RealBasis:
         return self._turn(answers, centres, -1)
 
     def _turn(self, answers: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
-        down, across = self._single_phases
+        xp = namespace(answers)
+        down, across = (beside(phase, answers) for phase in self._single_phases)
         turn = down[centres[:, 0]] * across[centres[:, 1]]
+        real, imaginary = xp.real(turn)[:, None], xp.imag(turn)[:, None]
         cosine = np.flatnonzero(~self.is_sine)
         # Frequencies that are their own negative answer no sine: their phase is 1 or -1.
         own = np.diff(np.append(cosine, self.count)) == 1
-        turned = np.empty_like(answers)
-        turned[..., cosine[own]] = answers[..., cosine[own]] * turn.real[:, None, own]
+        turned: Floats = xp.empty_like(answers)
+        single, alone = beside(cosine[own], answers), beside(np.flatnonzero(own), answers)
+        turned[..., single] = answers[..., single] * real[..., alone]
         first = np.flatnonzero(~own)
         if not len(first):
             return turned
         # Views where the pairs stand side by side, as they do but for the few above.
         for run in np.split(first, np.flatnonzero(np.diff(first) != 1) + 1):
             start, stop = cosine[run[0]], cosine[run[-1]] + 2
-            c = turn.real[:, None, run[0] : run[-1] + 1]
-            s = sign * turn.imag[:, None, run[0] : run[-1] + 1]
+            c = real[..., run[0] : run[-1] + 1]
+            s = sign * imaginary[..., run[0] : run[-1] + 1]
             even, odd = answers[..., start:stop:2], answers[..., start + 1 : stop : 2]
             turned[..., start:stop:2] = even * c + odd * s
             turned[..., start + 1 : stop : 2] = odd * c - even * s

@@ -7,7 +7,7 @@ window of an odd W reaches (W-1)/2 to each side, that of an even W from -W/2 to 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Booleans, Floats, Size, beside
 
 
 def offsets(window: int) -> NDArray[np.int64]:
@@ -25,12 +25,13 @@ def centre(correspondence: Floats, projector: Size) -> NDArray[np.int64]:
 
 def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans:
     """Tell which window entries lie on the projector, shape (C, W^2)."""
-    side = np.arange(window) - window // 2
+    side = beside(np.arange(window) - window // 2, centres)
     rows = centres[:, 0, None] + side
     columns = centres[:, 1, None] + side
     rows_in = (rows >= 0) & (rows < projector.height)
     columns_in = (columns >= 0) & (columns < projector.width)
-    return np.asarray((rows_in[:, :, None] & columns_in[:, None, :]).reshape(len(centres), -1))
+    both: Booleans = rows_in[:, :, None] & columns_in[:, None, :]
+    return both.reshape((len(centres), window**2))
 
 
 def places_on(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:

@@ -21,6 +21,7 @@ from nearfar.correspondence import (
     correspond_by_stripes,
     has_stripes,
 )
+from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure
@@ -31,7 +32,7 @@ from nearfar.plan import Plan
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_rows
 from nearfar.version import version
-from nearfar.workflow.methods import ESTIMATORS, Method
+from nearfar.workflow.methods import ESTIMATORS, Method, require_device
 
 # Bytes of memory that a reconstruction takes at most, unless told otherwise.
 MEMORY = 2 * 10**9
@@ -92,6 +93,7 @@ class Job:
     cut : Cut
     brightest : float
         Largest white less black of the whole camera.
+    device : {"cpu", "cuda", "torch"}
     """
 
     capture: Capture
@@ -99,6 +101,7 @@ class Job:
     method: Method
     cut: Cut
     brightest: float
+    device: Device
 
 
 def prepare(
@@ -107,6 +110,7 @@ def prepare(
     method: Method,
     memory: int,
     given: bool,
+    device: Device = "cpu",
     report: Progress | None = None,
 ) -> Job:
     """Read what all blocks share: references, and the brightest white.
@@ -119,6 +123,7 @@ def prepare(
         Bytes to work in.
     given : bool
         Whether the correspondence is.
+    device : {"cpu", "cuda", "torch"}
     report : callable, optional
         As `nearfar.reconstruct` takes it.
 
@@ -128,11 +133,12 @@ def prepare(
         If the plan's patterns are complex, or not the paper's for its method.
     InputError
         If the plan by reference has too few whites and blacks, or a row of the camera does not
-        fit in the memory.
+        fit in the memory, or the device is not there.
     """
+    require_device(method, device)
     cut = cut_rows(capture, method=method, memory=memory, given=given)
     photos = without_drift(capture, report or unheard)
-    return Job(capture, photos, method, cut, brightest_white(photos))
+    return Job(capture, photos, method, cut, brightest_white(photos), device)
 
 
 def cut_rows(capture: Capture, *, method: Method, memory: int, given: bool) -> Cut:
@@ -183,7 +189,7 @@ def reconstruct_block(
         else:
             found = by_phase(measurements, str(job.capture.path))
         transport = ESTIMATORS[job.method].estimate(
-            plan, measurements, found.pixels, progress or (lambda _share: None)
+            plan, measurements, found.pixels, progress or (lambda _share: None), job.device
         )
     provenance = provenance_of(job.capture, job.photos, method=job.method, square=False)
     provenance["excess_of_sums"] = measurements.excess_of_sums

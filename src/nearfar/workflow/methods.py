@@ -1,10 +1,11 @@
 """The estimators by name: what plan each takes, and what memory."""
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from nearfar.arrays import Floats
-from nearfar.errors import PlanError
+from nearfar.devices import Device, mover
+from nearfar.errors import InputError, PlanError
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.estimate import TURNS
 from nearfar.estimate.joint.prior import RATIOS
@@ -48,13 +49,17 @@ def _require_photos(plan: Plan) -> None:
 
 
 def _as_the_paper(
-    plan: Plan, measurements: Measurements, pixels: Floats, _progress: Shares
+    plan: Plan, measurements: Measurements, pixels: Floats, _progress: Shares, _device: Device
 ) -> Transport:
     return estimate(measurements, pixels, plan.window, plan.far, plan.dropped)
 
 
-def _jointly(plan: Plan, measurements: Measurements, pixels: Floats, progress: Shares) -> Transport:
-    return estimate_jointly(measurements, pixels, plan.window, plan.far, progress=progress)
+def _jointly(
+    plan: Plan, measurements: Measurements, pixels: Floats, progress: Shares, device: Device
+) -> Transport:
+    return estimate_jointly(
+        measurements, pixels, plan.window, plan.far, device=device, progress=progress
+    )
 
 
 def _bytes_of_paper(plan: Plan, channels: int) -> tuple[int, int]:
@@ -75,6 +80,21 @@ def _bytes_of_joint(plan: Plan, channels: int) -> tuple[int, int]:
     return kinds * prior, rows + entries + pairs
 
 
+def require_device(method: "Method", device: Device) -> None:
+    """Refuse a device that is not there, or that a method does not run on.
+
+    Raises
+    ------
+    InputError
+    """
+    if device not in ESTIMATORS[method].devices:
+        raise InputError(
+            f"the method {method} does not run on the device {device}: use the device cpu, or the "
+            f"method joint."
+        )
+    mover(device)
+
+
 class Estimator(NamedTuple):
     """What plan a method takes, and what it makes of measurements and q.
 
@@ -86,16 +106,19 @@ class Estimator(NamedTuple):
         Rows of the camera beside those wanted that tell something of them.
     bytes_of : callable
         From a plan and a number of channels: bytes that all share, and those of a camera pixel.
+    devices : tuple of Device
+        Where it runs.
     """
 
     require: Callable[[Plan], None]
-    estimate: Callable[[Plan, Measurements, Floats, Shares], Transport]
+    estimate: Callable[[Plan, Measurements, Floats, Shares, Device], Transport]
     halo: int
     bytes_of: Callable[[Plan, int], tuple[int, int]]
+    devices: tuple[Device, ...]
 
 
 ESTIMATORS: dict[Method, Estimator] = {
-    "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper),
+    "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper, ("cpu",)),
     # Each turn but the first hears the neighbours, and the first sees their q.
-    "joint": Estimator(_require_photos, _jointly, TURNS, _bytes_of_joint),
+    "joint": Estimator(_require_photos, _jointly, TURNS, _bytes_of_joint, get_args(Device)),
 }

@@ -12,6 +12,7 @@ from nearfar.correspondence import (
     joined,
     onto_projector,
 )
+from nearfar.devices import Device
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import join
 from nearfar.photometry.photos import Photos
@@ -30,7 +31,7 @@ from nearfar.workflow.blocks import (
     without_drift,
     without_light,
 )
-from nearfar.workflow.methods import ESTIMATORS, Method
+from nearfar.workflow.methods import ESTIMATORS, Method, require_device
 
 
 def reconstruct(
@@ -40,6 +41,7 @@ def reconstruct(
     method: Method = "joint",
     square: bool = False,
     memory: int = MEMORY,
+    device: Device = "cpu",
     progress: Progress | None = None,
 ) -> tuple[Transport, Correspondence]:
     """Reconstruct the transport of a capture.
@@ -56,6 +58,9 @@ def reconstruct(
     memory : int
         Bytes to work in, above what is returned. The camera is cut into blocks of rows; a square
         T takes what it needs.
+    device : {"cpu", "cuda", "torch"}
+        Where the joint estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on
+        the processor.
     progress : callable, optional
         Told what is being done and the share done, 0 to 1.
 
@@ -71,13 +76,19 @@ def reconstruct(
         If the plan's patterns are complex, or not the paper's for its method.
     InputError
         If there is no correspondence to be had, no light in the photos, the plan by reference
-        has too few whites and blacks, or a row of the camera does not fit in the memory.
+        has too few whites and blacks, a row of the camera does not fit in the memory, or the
+        device is not there.
     """
     if square:
-        return _squarely(capture, correspondence, method, progress or unheard)
+        return _squarely(capture, correspondence, method, device, progress or unheard)
     parts = list(
         reconstruct_in_blocks(
-            capture, correspondence, method=method, memory=memory, progress=progress
+            capture,
+            correspondence,
+            method=method,
+            memory=memory,
+            device=device,
+            progress=progress,
         )
     )
     return stacked([part.transport for part in parts]), joined(
@@ -91,6 +102,7 @@ def reconstruct_in_blocks(
     *,
     method: Method = "joint",
     memory: int = MEMORY,
+    device: Device = "cpu",
     progress: Progress | None = None,
 ) -> Iterator[Part]:
     """Reconstruct block by block of camera rows, each when it is asked for; see `reconstruct`.
@@ -104,7 +116,7 @@ def reconstruct_in_blocks(
     if correspondence is not None and not correspondence.lit.any():
         raise without_light(capture)
     given = correspondence is not None
-    job = prepare(capture, method=method, memory=memory, given=given, report=report)
+    job = prepare(capture, method=method, memory=memory, given=given, device=device, report=report)
     height, excess, lit = capture.camera.height, 0.0, False
     for block in job.cut.blocks():
         known = None
@@ -126,9 +138,14 @@ def reconstruct_in_blocks(
 
 
 def _squarely(
-    capture: Capture, correspondence: Correspondence | None, method: Method, report: Progress
+    capture: Capture,
+    correspondence: Correspondence | None,
+    method: Method,
+    device: Device,
+    report: Progress,
 ) -> tuple[Transport, Correspondence]:
     """Reconstruct the paper's square T, all of it at once."""
+    require_device(method, device)
     estimator = ESTIMATORS[method]
     estimator.require(capture.plan)
     photos = without_drift(capture, report)
@@ -145,7 +162,7 @@ def _squarely(
         raise without_light(capture)
     whole, pixels = onto_projector(measured, correspondence)
     transport = estimator.estimate(
-        photos.plan, whole, pixels, lambda share: report("reconstructing", share)
+        photos.plan, whole, pixels, lambda share: report("reconstructing", share), device
     )
     provenance = provenance_of(capture, photos, method=method, square=True)
     provenance["excess_of_sums"] = max((part.excess_of_sums for part in measured), key=abs)

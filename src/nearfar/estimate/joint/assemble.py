@@ -5,7 +5,7 @@ Index convention: arrays are (C, channels, ...); w runs over window entries.
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size, blocks, product
+from nearfar.arrays import Floats, Size, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.pixels import (
     dc_place,
 )
@@ -32,34 +32,39 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
     low = [k for k in band.basis.frequencies if k in wanted or -k in wanted]
     basis = real_basis([DC, *low], measurements.projector)
     kept = np.flatnonzero(np.isin(band.basis.index, [band.basis.frequencies.index(k) for k in low]))
-    white = (
-        measurements.answers[..., dc_place(measurements)]
-        - _share_of_white(measurements) * rows.shared[..., 0]
+    share_of_white = _share_of_white(measurements).astype(np.float32)
+    xp = namespace(rows.near)
+    white, share, places = (
+        beside(values, rows.near)
+        for values in (measurements.answers[..., dc_place(measurements)], share_of_white, kept)
     )
-    direct = np.maximum(rows.shared[..., 1], 0.0) * problem.whole.lit[:, None]
-    rest = white - direct - rows.near.sum(axis=-1)
-    far_range = np.concatenate([rest[..., None], rows.far[..., kept]], axis=-1)
-    windows = _positive(problem, rows.near, far_range, band_of(basis, near.offsets(problem.window)))
+    direct = xp.clip(rows.shared[..., 1], min=0.0) * whole.lit[:, None]
+    rest = white - share * rows.shared[..., 0] - direct - xp.sum(rows.near, axis=-1)
+    far_range = xp.concat([rest[..., None], rows.far[..., places]], axis=-1)
+    drawn = band_of(basis, near.offsets(problem.window)).put(lambda one: beside(one, rows.near))
+    windows = _positive(problem, rows.near, far_range, drawn)
     shape = (*measurements.camera, measurements.channels)
     return Transport(
         projector=measurements.projector,
-        correspondence=whole.correspondence.reshape(*measurements.camera, 2).astype(np.float32),
-        direct=direct.reshape(shape),
-        near=windows.reshape(*shape, problem.window, problem.window),
-        far=far_range.reshape(*shape, -1),
+        correspondence=fetch(whole.correspondence)
+        .reshape(*measurements.camera, 2)
+        .astype(np.float32),
+        direct=fetch(direct).reshape(shape),
+        near=fetch(windows).reshape(*shape, problem.window, problem.window),
+        far=fetch(far_range).reshape(*shape, -1),
         far_basis=basis,
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
         belief=Belief(
             kinds=(*LIT, *UNLIT),
             frequencies=band.basis.frequencies,
-            repeats=problem.model.repeats,
-            kind=rows.kind.astype(np.uint8).reshape(measurements.camera),
-            strength=rows.strength.reshape(measurements.camera),
-            white=whole.white.reshape(shape),
-            offset_noise=whole.offset_noise.reshape(shape),
+            repeats=fetch(problem.model.repeats),
+            kind=fetch(rows.kind).astype(np.uint8).reshape(measurements.camera),
+            strength=fetch(rows.strength).reshape(measurements.camera),
+            white=fetch(whole.white).reshape(shape),
+            offset_noise=fetch(whole.offset_noise).reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),
-            share_of_white=_share_of_white(measurements).astype(np.float32).reshape(shape),
+            share_of_white=share_of_white.reshape(shape),
         ),
     )
 
@@ -68,14 +73,15 @@ def _positive(problem: Problem, windows: Floats, far_range: Floats, band: Band) 
     """Raise window entries to where n and f together are not negative, white kept."""
     apart = np.abs(near.offsets(problem.window)).max(axis=1) > 1
     inside = near.inside(problem.whole.centres, problem.window, problem.measurements.projector)
-    free = inside & apart & problem.whole.lit[:, None]
-    found = np.empty_like(windows)
-    weights = band.basis.weights.astype(np.float32)
+    xp = namespace(windows)
+    free = inside & beside(apart, windows) & problem.whole.lit[:, None]
+    found: Floats = xp.empty_like(windows)
+    weights = beside(band.basis.weights.astype(np.float32), windows)
 
     def work(block: slice) -> None:
         turned = band.recentre(far_range[block] * weights, problem.whole.centres[block])
         least = -product(turned, band.on_window)
-        mine = np.broadcast_to(free[block, None], least.shape)
+        mine = xp.broadcast_to(free[block, None], least.shape)
         found[block] = raise_to(windows[block], least, mine)
 
     side_by_side(work, blocks(len(windows), BLOCK))

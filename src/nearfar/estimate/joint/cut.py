@@ -13,13 +13,13 @@ Index convention: arrays are (n, channels, ...); r runs over real answers, w ove
 inside, g over y and the numbers of `nuisance`; m over pairs of a camera pixel and a channel.
 """
 
-from collections.abc import Callable
 from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg
+from array_api_compat import device
 
-from nearfar.arrays import Booleans, Floats, Integers, product
+from nearfar.arrays import Booleans, Floats, Integers, beside, fetch, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import RATIOS, Prior
@@ -30,39 +30,51 @@ from nearfar.transport.kinds import CORRELATION, smooth_side
 
 def rounded(ratio: Floats) -> Floats:
     """Round to the nearest power of 2, so that camera pixels share them."""
-    return np.asarray(2.0 ** np.rint(np.log2(np.clip(ratio, RATIOS[0], RATIOS[-1]))))
+    xp = namespace(ratio)
+    power: Floats = 2.0 ** xp.round(xp.log2(xp.clip(ratio, float(RATIOS[0]), float(RATIOS[-1]))))
+    return power
 
 
 def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
     """Estimate camera pixels of one kind; see `solve_whole`."""
-    number, channels, _ = pixels.answers.shape
+    xp = namespace(pixels.answers)
+    number, channels, count = pixels.answers.shape
     # m, how often each answer was measured: the squares of a row add up to it.
-    repeats = np.sum(prior.directions.astype(np.float64) ** 2, axis=1)
+    repeats = xp.sum(xp.astype(prior.directions, xp.float64) ** 2, axis=1)
+    power, deviation = (
+        beside(values, pixels.answers) for values in (prior.power, prior.factors.deviation)
+    )
     columns = nuisance.columns(pixels, band)
     known = nuisance.precision(pixels)
-    _, mask = np.unique(np.packbits(pixels.inside, axis=1), axis=0, return_inverse=True)
-    deviation = prior.factors.deviation
-    spread = band.on_window.astype(np.float64) * deviation
-    shared = np.empty(known.shape)
-    near = np.empty((number, channels, len(deviation)), dtype=np.float32)
-    far, left = np.empty_like(pixels.answers), np.empty_like(pixels.answers)
-    for value in np.unique(ratio):
-        weight = 1.0 / (value * prior.power + 1.0 / repeats)
-        c, i = np.nonzero(ratio == value)
-        y = np.concatenate([pixels.answers[c, i, None], columns[c]], axis=1).astype(np.float64)
+    spread = xp.astype(band.on_window, xp.float64) * deviation
+    rectangles = _rectangles(fetch(pixels.inside))
+
+    def empty(*shape: int, dtype: Any = None) -> Any:
+        return xp.empty(shape, dtype=dtype or xp.float32, device=device(pixels.answers))
+
+    shared = empty(*known.shape, dtype=xp.float64)
+    near = empty(number, channels, len(deviation))
+    far, left = empty(number, channels, count), empty(number, channels, count)
+    rounded_to = fetch(ratio)
+    for value in np.unique(rounded_to):
+        weight = 1.0 / (float(value) * power + 1.0 / repeats)
+        of, channel = np.nonzero(rounded_to == value)
+        c, i = beside(of, known), beside(channel, known)
+        y = xp.astype(xp.concat([pixels.answers[c, i, None], columns[c]], axis=1), xp.float64)
         weighed = y * weight
         told = product(weighed, spread)
-        solved = _solved(told, pixels.inside[c], mask.ravel()[c], prior, value, weight, band)
-        products = np.matmul(y, weighed.transpose(0, 2, 1))
-        products -= np.matmul(told, solved.transpose(0, 2, 1))
-        products /= pixels.noise[c, i, None, None].astype(np.float64) ** 2
+        solved = _solved(told, rectangles, of, prior, float(value), weight, band)
+        products = y @ xp.permute_dims(weighed, (0, 2, 1))
+        products -= told @ xp.permute_dims(solved, (0, 2, 1))
+        variance = xp.astype(pixels.noise[c, i], xp.float64)[:, None] ** 2
+        products /= variance[..., None]
         shared[c, i] = nuisance.solve(products[:, 1:, 1:], products[:, 1:, 0], known[c, i])
-        kept = np.concatenate([np.ones((len(c), 1)), -shared[c, i]], axis=1)[:, None]
-        window = np.matmul(kept, solved)[:, 0]
-        rest = (np.matmul(kept, y)[:, 0] - window @ spread.T) * weight
-        near[c, i] = window * deviation
-        far[c, i] = rest * (value * prior.power)
-        left[c, i] = rest / pixels.noise[c, i, None].astype(np.float64) ** 2
+        kept = xp.concat([xp.ones_like(shared[c, i][:, :1]), -shared[c, i]], axis=1)[:, None]
+        window = (kept @ solved)[:, 0]
+        rest = ((kept @ y)[:, 0] - window @ spread.T) * weight
+        near[c, i] = xp.astype(window * deviation, xp.float32)
+        far[c, i] = xp.astype(rest * (float(value) * power), xp.float32)
+        left[c, i] = xp.astype(rest / variance, xp.float32)
     return Found(
         shared=nuisance.laid_out(shared, pixels),
         near=near,
@@ -72,84 +84,101 @@ def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
     )
 
 
+class _Rectangles(NamedTuple):
+    """What the border leaves of the windows of camera pixels.
+
+    Attributes
+    ----------
+    rows, columns : list of slice
+        Of the window, for each way in which some are cut.
+    way : ndarray of int, shape (n,)
+        The way of each camera pixel.
+    """
+
+    rows: list[slice]
+    columns: list[slice]
+    way: Integers
+
+
+def _rectangles(inside: Booleans) -> _Rectangles:
+    """Find the rectangles that the entries inside make, (n, W^2)."""
+    side = round(np.sqrt(inside.shape[1]))
+    square = inside.reshape(-1, side, side)
+    sides: list[Booleans] = [np.any(square, axis=axis) for axis in (2, 1)]
+    ends = np.stack(
+        [end for on in sides for end in (on.argmax(axis=1), side - on[:, ::-1].argmax(axis=1))],
+        axis=1,
+    )
+    found, way = np.unique(ends, axis=0, return_inverse=True)
+    rows = [slice(int(top), int(bottom)) for top, bottom, _, _ in found]
+    columns = [slice(int(first), int(last)) for _, _, first, last in found]
+    return _Rectangles(rows, columns, way.ravel())
+
+
 def _solved(
     told: Floats,
-    inside: Booleans,
-    mask: Integers,
+    rectangles: _Rectangles,
+    of: Integers,
     prior: Prior,
     ratio: float,
     weight: Floats,
     band: Band,
 ) -> Floats:
-    """Lambda^-1 times vectors (m, 1 + G, W^2), 0 beyond the border.
-
-    `mask` (m,) numbers the ways in which windows are cut.
-    """
-    information = _information(band, weight)
-    deviation = prior.factors.deviation
-    solved = np.zeros_like(told)
-    for place in np.unique(mask):
-        chosen = np.flatnonzero(mask == place)
-        cut = inside[chosen[0]]
-        inner = np.flatnonzero(cut)
-        factor = information(cut.reshape(prior.factors.smooth.shape))
-        factor *= deviation[inner, None]
-        factor *= deviation[inner]
-        factor += _smooth_precision(prior, cut) / ratio
-        factor, _ = linalg.cho_factor(factor, lower=True, overwrite_a=True, check_finite=False)
-        some = told[chosen][..., inner]
-        flat = some.reshape(-1, len(inner)).T
-        found = linalg.cho_solve((factor, True), flat, check_finite=False)
-        solved[chosen[:, None, None], np.arange(told.shape[1])[:, None], inner] = found.T.reshape(
-            some.shape
-        )
+    """Lambda^-1 times vectors (m, 1 + G, W^2) of camera pixels `of`, 0 beyond the border."""
+    xp = namespace(told)
+    side = round(np.sqrt(told.shape[-1]))
+    deviation = beside(prior.factors.deviation, told)
+    scaled = _information(band, weight) * deviation * deviation[:, None]
+    entries = scaled.reshape((side, side, side, side))
+    places = np.arange(side * side).reshape(side, side)
+    solved: Floats = xp.zeros_like(told)
+    way = rectangles.way[of]
+    for one in np.unique(way):
+        rows, columns = rectangles.rows[one], rectangles.columns[one]
+        inner = places[rows, columns].ravel()
+        chosen = beside(np.flatnonzero(way == one)[:, None, None], told)
+        numbers = beside(np.arange(told.shape[1])[:, None], told)
+        put = (chosen, numbers, beside(inner, told))
+        precision = _smooth_precision(prior, places[rows, columns]) / ratio
+        factor = entries[rows, columns, rows, columns].reshape((len(inner), len(inner)))
+        factor = factor + beside(precision, told)
+        right = told[put].reshape((-1, len(inner)))
+        found = xp.linalg.solve(factor, right.T).T
+        solved[put] = found.reshape((len(chosen), told.shape[1], len(inner)))
     return solved
 
 
-def _information(band: Band, weight: Floats) -> Callable[[Booleans], Floats]:
-    """Return what tells B^T D^-1 B among the entries of a rectangle of the window, (W, W).
+def _information(band: Band, weight: Floats) -> Floats:
+    """Return what tells B^T D^-1 B, (W^2, W^2).
 
     A cosine and its sine, known alike, add up to the cosine of the difference of two entries, so
     there is one number for each difference.
     """
+    xp = namespace(weight)
     cosine = np.flatnonzero(~band.basis.is_sine)
     parts = np.diff(np.append(cosine, band.basis.count))
-    if not np.allclose(weight[cosine], weight[cosine + parts - 1], rtol=1e-6):
-        patterns = band.on_window.astype(np.float64)
+    alike = fetch(weight)
+    every: Floats
+    if not np.allclose(alike[cosine], alike[cosine + parts - 1], rtol=1e-6):
+        patterns = xp.astype(band.on_window, xp.float64)
         every = (patterns.T * weight) @ patterns
-        return lambda square: np.asarray(every[np.ix_(square.ravel(), square.ravel())])
+        return every
     window = round(np.sqrt(band.on_window.shape[1]))
-    cycles = band.basis.cycles
     side = np.arange(1 - window, window)
-    waves = [np.exp(2j * np.pi * cycles[:, axis, None] * side) for axis in (0, 1)]
-    told = np.real((waves[0].T * weight[cosine]) @ waves[1])
+    waves = [np.exp(2j * np.pi * band.basis.cycles[:, axis, None] * side) for axis in (0, 1)]
+    told = np.real((waves[0].T * alike[cosine]) @ waves[1])
     # [y, x, y', x'] is told[y - y', x - x'], counted from the middle.
-    down, across = told.strides
-
-    def among(square: Booleans) -> Floats:
-        height, width = _sides(square)
-        view = np.lib.stride_tricks.as_strided(
-            told[window - 1 :, window - 1 :],
-            (height, width, height, width),
-            (down, across, -down, -across),
-            writeable=False,
-        )
-        # A window of one row would come as a view of itself.
-        return np.array(view).reshape(height * width, height * width)
-
-    return among
+    apart = np.subtract.outer(np.arange(window), np.arange(window)) + window - 1
+    table = told[apart[:, None, :, None], apart[None, :, None, :]]
+    every = beside(table.reshape(window**2, window**2), weight)
+    return every
 
 
-def _sides(square: Booleans) -> tuple[int, int]:
-    return int(square.any(axis=1).sum()), int(square.any(axis=0).sum())
-
-
-def _smooth_precision(prior: Prior, inside: Booleans) -> Floats:
-    """(smooth + diag(alone))^-1 over the entries inside, which are a rectangle."""
-    height, width = _sides(inside.reshape(prior.factors.smooth.shape))
-    alone = prior.factors.alone[np.flatnonzero(inside)]
+def _smooth_precision(prior: Prior, places: Integers) -> Floats:
+    """(smooth + diag(alone))^-1 over the entries at `places`, which are a rectangle of them."""
+    alone = prior.factors.alone[places.ravel()]
     everywhere = float(prior.factors.alone.min())
-    found = _inverse_of_smooth(CORRELATION, height, width, everywhere).copy()
+    found = _inverse_of_smooth(CORRELATION, *places.shape, everywhere).copy()
     # Entries around q may have more of their own: a correction of a few ranks.
     more = np.flatnonzero(alone > everywhere)
     if len(more):

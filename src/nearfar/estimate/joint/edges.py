@@ -9,9 +9,11 @@ around that place is likely, and less evidence will do.
 Index convention: arrays are (n, channels, ...); w runs over window entries.
 """
 
+from math import log
+
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers, beside, namespace
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior
 from nearfar.estimate.joint.solve import Found
@@ -44,16 +46,16 @@ def likeliest_spike(
         What it adds to the log evidence, less the logarithm of the number of entries, and as
         much more as likely places need less; -inf where the spike would be faint or dark.
     """
-    step = np.rint(2 * np.log2(ratio / prior.ratios[0])).astype(np.int64)
-    table = prior.curvatures[np.clip(step, 0, len(prior.ratios) - 1)]
+    xp = namespace(ratio)
+    step = xp.astype(xp.round(2 * xp.log2(ratio / float(prior.ratios[0]))), xp.int64)
+    table = prior.curvatures[xp.clip(step, 0, len(prior.ratios) - 1)]
     curvature = table / pixels.noise[..., None] ** 2
-    height = found.pull.sum(axis=1) / curvature.sum(axis=1)
-    allowed = pixels.inside & _apart(pixels.inside.shape[1])
-    allowed &= height > FAINTEST * pixels.white.mean(axis=1, keepdims=True)
-    gain = 0.5 * np.sum(found.pull**2 / curvature, axis=1) - np.log(pixels.inside.shape[1])
-    gain = np.where(allowed, gain + (SURE - LIKELY) * pixels.likely, -np.inf)
-    entry = np.argmax(gain, axis=1)
-    return entry, gain[np.arange(len(gain)), entry]
+    height = xp.sum(found.pull, axis=1) / xp.sum(curvature, axis=1)
+    allowed = pixels.inside & beside(_apart(pixels.inside.shape[1]), pixels.inside)
+    allowed &= height > FAINTEST * xp.mean(pixels.white, axis=1, keepdims=True)
+    gain = 0.5 * xp.sum(found.pull**2 / curvature, axis=1) - log(pixels.inside.shape[1])
+    gain = xp.where(allowed, gain + (SURE - LIKELY) * pixels.likely, -xp.inf)
+    return xp.argmax(gain, axis=1), xp.max(gain, axis=1)
 
 
 def _apart(entries: int) -> Booleans:
@@ -95,4 +97,5 @@ def seen_beside(correspondence: Floats, window: int) -> Booleans:
 
 def with_spike(pixels: Pixels, entry: Integers) -> Pixels:
     """Add a spike at a window entry of each camera pixel to what is solved for."""
-    return pixels._replace(spikes=np.concatenate([pixels.spikes, entry[:, None]], axis=1))
+    xp = namespace(entry)
+    return pixels._replace(spikes=xp.concat([pixels.spikes, entry[:, None]], axis=1))

@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Floats, Size, beside, namespace
+from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.nuisance import KEPT
@@ -32,6 +33,7 @@ def estimate_jointly(
     far: Size,
     *,
     turns: int = TURNS,
+    device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Transport:
     """Estimate D, N and F together.
@@ -49,6 +51,9 @@ def estimate_jointly(
         Far band: f is kept at its measured frequencies.
     turns : int
         One alone, the rest with the neighbours.
+    device : {"cpu", "cuda", "torch"}
+        Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
+        processor.
     progress : callable, optional
         Called with the share done.
 
@@ -59,7 +64,7 @@ def estimate_jointly(
     Raises
     ------
     InputError
-        If white or everything else is missing.
+        If white or everything else is missing, or the device is.
     """
     frequencies = [k for k in measurements.basis.frequencies if k != DC]
     if len(frequencies) == len(measurements.basis.frequencies) or not frequencies:
@@ -67,7 +72,7 @@ def estimate_jointly(
             "these measurements lack white, or all but white: plan with --photos, or --near and "
             "--far."
         )
-    problem = lay_out(measurements, correspondence, window, frequencies)
+    problem = lay_out(measurements, correspondence, window, frequencies, device)
     rows = None
     for turn in range(turns):
 
@@ -84,10 +89,14 @@ def estimate_jointly(
 
 def _moved(problem: Problem, rows: Rows) -> Floats:
     """Move q by what it was found to be off, but no further than its rounding allows."""
-    direct = rows.shared[..., 1].astype(np.float64)
-    energy = np.maximum(np.sum(direct**2, axis=1), np.finfo(np.float32).tiny)
-    off = np.sum(rows.shared[..., 2:KEPT] * direct[..., None], axis=1) / energy[:, None]
-    off = np.where((direct.sum(axis=1) > 0)[:, None], np.clip(off, -FURTHEST, FURTHEST), 0.0)
-    whole, last = problem.whole, np.array(problem.measurements.projector) - 1
-    lowest = np.maximum(whole.centres - HALF, 0)
-    return np.clip(whole.correspondence + off, lowest, np.minimum(whole.centres + HALF, last))
+    xp = namespace(rows.shared)
+    shared = xp.astype(rows.shared, xp.float64)
+    direct = shared[..., 1]
+    energy = xp.clip(xp.sum(direct**2, axis=1), min=float(np.finfo(np.float32).tiny))
+    off = xp.sum(shared[..., 2:KEPT] * direct[..., None], axis=1) / energy[:, None]
+    off = xp.where((xp.sum(direct, axis=1) > 0)[:, None], xp.clip(off, -FURTHEST, FURTHEST), 0.0)
+    whole, centres = problem.whole, xp.astype(problem.whole.centres, xp.float64)
+    last = beside(np.array(problem.measurements.projector) - 1.0, shared)
+    lowest, highest = xp.clip(centres - HALF, min=0.0), xp.minimum(centres + HALF, last)
+    moved: Floats = xp.maximum(xp.minimum(whole.correspondence + off, highest), lowest)
+    return moved

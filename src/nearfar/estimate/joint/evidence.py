@@ -14,11 +14,13 @@ random light.
 Index convention: arrays are (n, channels, ...); i runs over eigenvectors.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+from array_api_compat import device
 
-from nearfar.arrays import Floats, Integers
+from nearfar.arrays import Floats, Integers, beside, fetch, namespace
 from nearfar.estimate.joint.nuisance import UNKNOWN
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior, Spectrum
@@ -47,6 +49,15 @@ class Kinds(NamedTuple):
     priors: tuple[Prior, ...]
     screens: tuple[Spectrum, ...]
     chosen: Integers
+
+    def put(self, move: Callable[[Any], Any]) -> "Kinds":
+        """Put what each camera pixel meets onto a device."""
+        priors = tuple(prior.put(move) for prior in self.priors)
+        if self.screens is self.priors:
+            return self._replace(priors=priors, screens=priors)
+        return self._replace(
+            priors=priors, screens=tuple(screen.put(move) for screen in self.screens)
+        )
 
 
 def screened(priors: tuple[Prior, ...], band: Band, repeats: Floats) -> Kinds:
@@ -77,29 +88,25 @@ def best_kind(pixels: Pixels, kinds: Kinds) -> tuple[Integers, Floats, Floats]:
     evidence : ndarray, shape (n,)
         Its logarithm, but for a constant of the camera pixel.
     """
-    number = np.arange(len(pixels.white))
+    xp = namespace(pixels.white)
     told = tell(pixels)
-    some = told._replace(
-        answers=told.answers[:, kinds.chosen], of_offset=told.of_offset[..., kinds.chosen]
-    )
-    values = np.empty((len(kinds.screens), len(number)), dtype=np.float32)
-    steps = np.empty(values.shape, dtype=np.int64)
-    for place, screen in enumerate(kinds.screens):
-        found = evidence(some, screen)
-        steps[place] = np.argmax(found, axis=1)
-        values[place] = found[number, steps[place]]
+    chosen = beside(kinds.chosen, told.answers)
+    some = told._replace(answers=told.answers[:, chosen], of_offset=told.of_offset[:, chosen])
+    found = [evidence(some, screen) for screen in kinds.screens]
+    values = xp.stack([xp.max(each, axis=1) for each in found])
+    steps = xp.stack([xp.argmax(each, axis=1) for each in found])
     if kinds.screens is not kinds.priors:
-        likely = np.zeros(values.shape, dtype=bool)
-        np.put_along_axis(likely, np.argsort(values, axis=0)[-KINDS:], values=True, axis=0)
-        values[:] = -np.inf
+        likely = values >= xp.sort(values, axis=0)[-min(KINDS, len(kinds.priors))]
+        values[...] = -xp.inf
         for place, prior in enumerate(kinds.priors):
-            mine = np.flatnonzero(likely[place])
+            (mine,) = xp.nonzero(likely[place, :])
             if len(mine):
-                found = evidence(told.only(mine), prior)
-                steps[place, mine] = np.argmax(found, axis=1)
-                values[place, mine] = found.max(axis=1)
-    kind = np.argmax(values, axis=0)
-    return kind, np.array(STRENGTHS)[steps[kind, number]], values[kind, number]
+                of_kind = evidence(told.only(mine), prior)
+                steps[place, mine] = xp.argmax(of_kind, axis=1)
+                values[place, mine] = xp.max(of_kind, axis=1)
+    kind = xp.argmax(values, axis=0)
+    step = xp.take_along_axis(steps, kind[None, :], axis=0)[0, :]
+    return kind, beside(np.array(STRENGTHS), values)[step], xp.max(values, axis=0)
 
 
 class Told(NamedTuple):
@@ -133,10 +140,11 @@ class Told(NamedTuple):
 
     def only(self, chosen: Integers) -> "Told":
         """Return what those of some camera pixels tell."""
-        place = np.full(len(self.corners), -1)
-        place[chosen] = np.arange(len(chosen))
+        xp, here = namespace(chosen), device(chosen)
+        place = xp.full(len(self.corners), -1, dtype=xp.int64, device=here)
+        place[chosen] = xp.arange(len(chosen), dtype=xp.int64, device=here)
         pixel = place[self.pixel]
-        rows = np.flatnonzero(pixel >= 0)
+        (rows,) = xp.nonzero(pixel >= 0)
         return Told(
             self.answers[rows],
             self.ratio[rows],
@@ -150,18 +158,20 @@ class Told(NamedTuple):
 
 def tell(pixels: Pixels) -> Told:
     """Lay out what the answers of camera pixels tell."""
-    ratio = (pixels.white / pixels.noise).ravel()
-    level = np.rint(STEPS * np.log2(ratio.astype(np.float64) * STRENGTHS[0])).astype(np.int64)
-    order = np.argsort(level, kind="stable")
-    flat = pixels.answers.reshape(len(order), -1)
+    xp = namespace(pixels.white)
+    noise = pixels.noise.reshape((-1, 1))
+    ratio = pixels.white.reshape((-1, 1)) / noise
+    level = xp.round(STEPS * xp.log2(xp.astype(ratio[:, 0], xp.float64) * STRENGTHS[0]))
+    order = xp.argsort(level, stable=True)
+    flat = pixels.answers.reshape((len(order), -1))
     return Told(
-        answers=flat[order] / pixels.noise.ravel()[order, None],
-        ratio=ratio[order, None],
-        offset_ratio=(pixels.offset_noise / pixels.noise).ravel()[order, None],
-        level=level[order],
+        answers=flat[order] / noise[order],
+        ratio=ratio[order],
+        offset_ratio=(pixels.offset_noise.reshape((-1, 1)) / noise)[order],
+        level=xp.astype(level[order], xp.int64),
         pixel=order // pixels.white.shape[1],
         corners=pixels.corners[:, 0],
-        of_offset=pixels.of_offset.reshape(-1, flat.shape[1]),
+        of_offset=pixels.of_offset.reshape((-1, flat.shape[1])),
     )
 
 
@@ -170,13 +180,15 @@ def evidence(told: Told, spectrum: Spectrum) -> Floats:
     y = told.answers @ spectrum.directions
     u = told.corners @ spectrum.of_corners
     v = told.of_offset @ spectrum.directions
-    found = np.empty((len(y), len(STRENGTHS)), dtype=np.float32)
-    first = np.flatnonzero(np.diff(told.level, prepend=told.level[:1] - 1))
-    for start, stop in zip(first, np.append(first[1:], len(y)), strict=True):
-        table = 4.0 ** ((told.level[start] + STEPS * np.arange(len(STRENGTHS))) / STEPS)
-        variance = 1.0 + table * spectrum.levels.astype(np.float64)[:, None]
-        weight = (1.0 / variance).astype(np.float32)
-        spread = np.log(variance).sum(axis=0).astype(np.float32)
+    xp, level = namespace(y), fetch(told.level)
+    found = xp.empty((len(y), len(STRENGTHS)), dtype=xp.float32, device=device(y))
+    levels = xp.astype(spectrum.levels, xp.float64)[:, None]
+    first = np.flatnonzero(np.diff(level, prepend=level[:1] - 1)).tolist()
+    for start, stop in zip(first, [*first[1:], len(y)], strict=True):
+        table = 4.0 ** ((level[start] + STEPS * np.arange(len(STRENGTHS))) / STEPS)
+        variance = 1.0 + beside(table, y) * levels
+        weight = xp.astype(1.0 / variance, xp.float32)
+        spread = xp.astype(xp.sum(xp.log(variance), axis=0), xp.float32)
         of_y, pixel = y[start:stop], told.pixel[start:stop]
         of_u = u[pixel]
         yy, uy, uu = ((a * b) @ weight for a, b in ((of_y, of_y), (of_u, of_y), (of_u, of_u)))
@@ -190,11 +202,12 @@ def evidence(told: Told, spectrum: Spectrum) -> Floats:
                 whole - known * of * by / free
                 for whole, of, by in ((yy, vy, vy), (uy, vu, vy), (uu, vu, vu))
             )
-            spread = spread + np.log(free)
+            spread = spread + xp.log(free)
         # d in units of the noise: UNKNOWN times white, beforehand.
         before = (UNKNOWN * told.ratio[start:stop]) ** 2
         free = 1.0 + before * uu
-        found[start:stop] = -0.5 * (yy - before * uy**2 / free + spread + np.log(free))
+        found[start:stop] = -0.5 * (yy - before * uy**2 / free + spread + xp.log(free))
     # Rows of one camera pixel, one for each channel, side by side again.
-    together = found[np.argsort(told.pixel, kind="stable")]
-    return np.asarray(together.reshape(len(u), -1, len(STRENGTHS)).sum(axis=1))
+    together = found[xp.argsort(told.pixel, stable=True)]
+    total: Floats = xp.sum(together.reshape((len(u), -1, len(STRENGTHS))), axis=1)
+    return total

@@ -8,14 +8,14 @@ PAMI 2, 1980), so that edges stay.
 Index convention: arrays are (Cy, Cx, channels, j), j over coefficients.
 """
 
-import numpy as np
+import math
 
-from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.arrays import Booleans, Floats, blocks, namespace
 from nearfar.parallel import side_by_side
 
 # Light is never known better than to this share of white.
 EXACT = 1e-6
-TINY = np.float32(1e-30)
+TINY = 1e-30
 # Bytes of coefficients filtered at once.
 HELD = 2**22
 
@@ -32,14 +32,15 @@ def expect_each(values: Floats, variance: Floats, repeats: Floats) -> Floats:
     repeats : ndarray, shape (J,)
         How often each was measured.
     """
-    found = np.empty_like(values)
-    whole = (1.0 / variance[..., None]).astype(values.dtype)
+    xp = namespace(values)
+    found: Floats = xp.empty_like(values)
+    whole = xp.astype(1.0 / variance[..., None], values.dtype)
 
     def work(rows: slice) -> None:
         some, weight, core = _with_neighbours(values, rows), _with_neighbours(whole, rows), rows
         total = _sum(weight)
         mean, scatter = _mean_and_scatter(some, weight, total)
-        change = np.maximum(scatter - 1.0 / (total * repeats), 0.0)
+        change = xp.clip(scatter - 1.0 / (total * repeats), min=0.0)
         trust = change / (change + variance[core, ..., None] / repeats)
         found[core] = mean + trust * (values[core] - mean)
 
@@ -59,32 +60,38 @@ def expect_together(values: Floats, variance: Floats, known: Booleans) -> Floats
     known : ndarray of bool, shape (Cy, Cx)
         Camera pixels that have a say; the rest expect nothing.
     """
-    found = np.zeros_like(values)
-    whole = (known[..., None] / np.maximum(variance, EXACT**2))[..., None].astype(values.dtype)
+    xp = namespace(values)
+    found: Floats = xp.zeros_like(values)
+    heard = known[..., None] / xp.clip(variance, min=EXACT**2)
+    whole = xp.astype(heard[..., None], values.dtype)
 
     def work(rows: slice) -> None:
         some, weight = _with_neighbours(values, rows), _with_neighbours(whole, rows)
-        total = np.maximum(_sum(weight), TINY)
+        total = xp.clip(_sum(weight), min=TINY)
         mean, scatter = _mean_and_scatter(some, weight, total)
-        change = np.maximum(np.mean(scatter, axis=-1, keepdims=True) - 1.0 / total, 0.0)
-        trust = change / np.maximum(change + variance[rows, ..., None], TINY)
+        change = xp.clip(xp.mean(scatter, axis=-1, keepdims=True) - 1.0 / total, min=0.0)
+        trust = change / xp.clip(change + variance[rows, ..., None], min=TINY)
         expected = mean + trust * (values[rows] - mean)
-        found[rows] = np.where(known[rows, :, None, None], expected, 0.0)
+        found[rows] = xp.where(known[rows, :, None, None], expected, 0.0)
 
     side_by_side(work, _row_blocks(values))
     return found
 
 
 def _row_blocks(values: Floats) -> list[slice]:
-    return list(blocks(len(values), HELD // max(1, values[:1].nbytes)))
+    row = math.prod(values.shape[1:]) * 4
+    return list(blocks(len(values), HELD // max(1, row)))
 
 
 def _with_neighbours(values: Floats, rows: slice) -> Floats:
     """Rows and one more on every side; at the camera's border the last is repeated."""
     some = values[max(rows.start - 1, 0) : rows.stop + 1]
-    above, below = int(rows.start == 0), int(rows.stop == len(values))
-    sides = ((above, below), (1, 1), *(((0, 0),) * (values.ndim - 2)))
-    return np.pad(some, sides, mode="edge")
+    above = [some[:1]] if rows.start == 0 else []
+    below = [some[-1:]] if rows.stop == len(values) else []
+    xp = namespace(values)
+    tall = xp.concat([*above, some, *below], axis=0)
+    wide: Floats = xp.concat([tall[:, :1], tall, tall[:, -1:]], axis=1)
+    return wide
 
 
 def _sum(values: Floats) -> Floats:

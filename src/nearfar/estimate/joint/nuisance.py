@@ -11,9 +11,9 @@ white at most, and that q was found well.
 Index convention: arrays are (n, channels, ...); g and h run over the numbers, r over answers.
 """
 
-import numpy as np
+from array_api_compat import device
 
-from nearfar.arrays import Floats, product
+from nearfar.arrays import Floats, namespace, product
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior
 from nearfar.estimate.matrices import Band
@@ -32,50 +32,56 @@ LEAST = 1e-12
 
 def columns(pixels: Pixels, band: Band) -> Floats:
     """Return answers a_g of unit o, d, shifts, d2 ..., those that are there: (n, G, R)."""
-    return np.concatenate(
+    return _side_by_side(
         [
             pixels.of_offset,
             product(pixels.corners, band.on_corners.T),
             band.on_window.T[pixels.spikes],
-        ],
-        axis=1,
+        ]
     )
 
 
 def turned(pixels: Pixels, prior: Prior) -> Floats:
     """Return the same in the coordinates of a kind's eigenvectors."""
-    return np.concatenate(
+    return _side_by_side(
         [
             product(pixels.of_offset, prior.directions),
             product(pixels.corners, prior.of_corners),
             prior.of_window[pixels.spikes],
-        ],
-        axis=1,
+        ]
     )
+
+
+def _side_by_side(parts: list[Floats]) -> Floats:
+    found: Floats = namespace(parts[0]).concat(parts, axis=1)
+    return found
 
 
 def precision(pixels: Pixels) -> Floats:
     """Precision, before any answer, of those that are there, shape (n, channels, G), float64."""
     known = precision_of(pixels.white, pixels.offset_noise)
-    spikes = np.repeat(known[..., 1:2], pixels.spikes.shape[1], axis=-1)
-    return np.concatenate([known[..., _places(pixels)], spikes], axis=-1)
+    direct = [1] * pixels.spikes.shape[1]
+    return known[..., _places(pixels) + direct]
 
 
 def precision_of(white: Floats, offset_noise: Floats) -> Floats:
     """Precision of o, d and shifts, for arrays (n, channels) as in `Pixels`."""
-    white = white.astype(np.float64)
-    offset = 1.0 / np.maximum(offset_noise, LEAST * white) ** 2
+    xp = namespace(white)
+    white = xp.astype(white, xp.float64)
+    offset = 1.0 / xp.maximum(xp.astype(offset_noise, xp.float64), LEAST * white) ** 2
     direct = 1.0 / (UNKNOWN * white) ** 2
     shift = 1.0 / (OFF * white) ** 2
-    return np.stack([offset, direct, shift, shift], axis=-1)
+    found: Floats = xp.stack([offset, direct, shift, shift], axis=-1)
+    return found
 
 
 def laid_out(shared: Floats, pixels: Pixels) -> Floats:
     """Lay numbers out as o, d, two shifts, d2 ...: 0 for those that are not there, float32."""
     places = _places(pixels)
-    found = np.zeros((*shared.shape[:2], KEPT + pixels.spikes.shape[1]), dtype=np.float32)
-    found[..., places] = shared[..., : len(places)]
-    found[..., KEPT:] = shared[..., len(places) :]
+    xp, shape = namespace(shared), (*shared.shape[:2], KEPT + pixels.spikes.shape[1])
+    found: Floats = xp.zeros(shape, dtype=xp.float32, device=device(shared))
+    spikes = list(range(KEPT, shape[-1]))
+    found[..., places + spikes] = xp.astype(shared, xp.float32)
     return found
 
 
@@ -93,5 +99,7 @@ def solve(normal: Floats, right: Floats, known: Floats) -> Floats:
     normal : ndarray, shape (n, channels, G, G)
     right, known : ndarray, shape (n, channels, G)
     """
-    matrix = normal + known[..., None] * np.eye(known.shape[-1])
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
+    xp = namespace(normal)
+    unit = xp.eye(known.shape[-1], dtype=known.dtype, device=device(known))
+    found: Floats = xp.linalg.solve(normal + known[..., None] * unit, right[..., None])[..., 0]
+    return found

@@ -6,9 +6,10 @@ Index convention: arrays are (n, channels, ...), n camera pixels; r runs over re
 from typing import NamedTuple
 
 import numpy as np
+from array_api_compat import device
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Booleans, Floats, Size, namespace
 from nearfar.estimate.matrices import Band, corner_weights
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
@@ -165,17 +166,19 @@ def gather(
     some = Whole._make(values[chosen] for values in whole)
     answers = some.answers if shown is None else some.answers - shown
     corners = corner_weights(some.correspondence, some.centres)
-    if not corners[:, 1:].any():
+    xp = namespace(some.answers)
+    if not bool(xp.any(corners[:, 1:] != 0)):
         corners = corners[:, :1]
-    ones = np.ones((len(some.lit), 1 if some.offset_noise.any() else 0, band.basis.count))
+    shape = (len(some.lit), int(bool(xp.any(some.offset_noise > 0))), band.basis.count)
+    ones = xp.ones(shape, dtype=xp.float32, device=device(some.answers))
     return Pixels(
         centres=some.centres,
         lit=some.lit,
-        inside=near.inside(some.centres, round(np.sqrt(some.likely.shape[1])), projector),
+        inside=near.inside(some.centres, round(some.likely.shape[1] ** 0.5), projector),
         answers=band.recentre(answers, some.centres),
         corners=corners,
-        of_offset=band.recentre(ones.astype(np.float32), some.centres),
-        spikes=np.zeros((len(some.lit), 0), dtype=np.int64),
+        of_offset=band.recentre(ones, some.centres),
+        spikes=some.centres[:, :0],
         noise=some.noise,
         offset_noise=some.offset_noise,
         white=some.white,

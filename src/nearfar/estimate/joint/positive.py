@@ -8,9 +8,7 @@ left alone.
 Index convention: arrays are (n, channels, W^2).
 """
 
-import numpy as np
-
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, namespace
 
 # The active set shrinks at every turn; this many are never needed for windows that were measured.
 TURNS = 60
@@ -30,16 +28,19 @@ def raise_to(values: Floats, least: Floats, free: Booleans) -> Floats:
     ndarray, shape (..., E), float32
         Unchanged where the sum is too small for it.
     """
-    above = np.where(free, values - least, 0.0).astype(np.float64)
-    total = above.sum(axis=-1, keepdims=True)
+    xp = namespace(values)
+    above = xp.astype(xp.where(free, values - least, 0.0), xp.float64)
+    total = xp.sum(above, axis=-1, keepdims=True)
     active = free & (above > 0)
-    taken = np.zeros_like(total)
+    taken = xp.zeros_like(total)
     for _ in range(TURNS):
-        count = np.maximum(active.sum(axis=-1, keepdims=True), 1)
-        taken = (np.sum(above * active, axis=-1, keepdims=True) - total) / count
+        count = xp.clip(xp.sum(xp.astype(active, xp.float64), axis=-1, keepdims=True), min=1.0)
+        taken = (xp.sum(above * active, axis=-1, keepdims=True) - total) / count
         smaller = active & (above > taken)
-        if np.array_equal(smaller, active):
+        if bool(xp.all(smaller == active)):
             break
         active = smaller
-    raised = least + np.maximum(above - taken, 0.0)
-    return np.where(free & (total > 0), raised, values).astype(np.float32)
+    raised = least + xp.clip(above - taken, min=0.0)
+    moved = xp.where(free & (total > 0), raised, xp.astype(values, raised.dtype))
+    found: Floats = xp.astype(moved, xp.float32)
+    return found

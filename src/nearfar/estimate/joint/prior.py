@@ -9,7 +9,9 @@ Index convention: r runs over real answers, w over window entries, i over eigenv
 t over tabulated ratios.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -44,6 +46,15 @@ class Spectrum:
     levels: Floats
     directions: Floats
     of_corners: Floats
+
+    def put(self, move: Callable[[Any], Any]) -> Self:
+        """Put what each camera pixel meets onto a device."""
+        values = {name: move(getattr(self, name)) for name in self._met}
+        return replace(self, **values)
+
+    @property
+    def _met(self) -> tuple[str, ...]:
+        return ("levels", "directions", "of_corners")
 
 
 @dataclass(frozen=True)
@@ -80,6 +91,10 @@ class Prior(Spectrum):
     factors: NearCovariance
     covariance: Floats
     power: Floats
+
+    @property
+    def _met(self) -> tuple[str, ...]:
+        return (*super()._met, "to_near", "to_far", "of_window", "curvatures")
 
     def told_by(self, chosen: Integers, band: Band, repeats: Floats) -> Spectrum:
         """Return the spectrum of some answers alone."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Integers, Size
+from nearfar.devices import Device, mover
 from nearfar.estimate.joint.edges import seen_beside
 from nearfar.estimate.joint.evidence import Kinds, screened
 from nearfar.estimate.joint.pixels import (
@@ -61,7 +62,11 @@ class Problem(NamedTuple):
 
 
 def lay_out(
-    measurements: Measurements, correspondence: Floats, window: int, frequencies: list[Frequency]
+    measurements: Measurements,
+    correspondence: Floats,
+    window: int,
+    frequencies: list[Frequency],
+    device: Device,
 ) -> Problem:
     """Lay out measurements for the joint estimate.
 
@@ -72,7 +77,10 @@ def lay_out(
     window : int
     frequencies : list of Frequency
         Those measured, but DC.
+    device : {"cpu", "cuda", "torch"}
+        Where all but the measurements' own arrays are put.
     """
+    move = mover(device)
     # Pairs of a cosine and a sine side by side, those that answer no sine at the end.
     frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
     basis = real_basis(frequencies, measurements.projector)
@@ -93,10 +101,11 @@ def lay_out(
         white=white,
         likely=seen_beside(correspondence, window),
     )
+    whole = Whole._make(move(values) for values in whole)
     repeats = measurements.repeats[band.places]
     shown = (tuple(frequencies), measurements.projector, window, tuple(repeats.tolist()))
-    unlit = None if lit.all() else _kinds(UNLIT, *shown)
-    model = Model(band, repeats, _kinds(LIT, *shown), unlit)
+    unlit = None if lit.all() else _kinds(UNLIT, *shown, device)
+    model = Model(band.put(move), move(repeats), _kinds(LIT, *shown, device), unlit)
     return Problem(measurements, model, whole, window)
 
 
@@ -108,8 +117,10 @@ def _kinds(
     projector: Size,
     window: int,
     repeats: tuple[float, ...],
+    device: Device,
 ) -> Kinds:
     """Build the kinds for a set of measured frequencies and how often each was measured."""
     band = band_of(real_basis(frequencies, projector), near.offsets(window))
     measured = np.array(repeats, dtype=np.float32)
-    return screened(tuple(build_prior(kind, band, measured) for kind in kinds), band, measured)
+    priors = tuple(build_prior(kind, band, measured) for kind in kinds)
+    return screened(priors, band, measured).put(mover(device))

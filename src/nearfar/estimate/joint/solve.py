@@ -9,9 +9,7 @@ over window entries, g over the numbers of `nuisance`.
 
 from typing import NamedTuple
 
-import numpy as np
-
-from nearfar.arrays import Floats, product
+from nearfar.arrays import Floats, beside, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.pixels import Pixels
 from nearfar.estimate.joint.prior import Prior
@@ -44,12 +42,24 @@ class Found(NamedTuple):
 
 def ratio_of(pixels: Pixels, strength: Floats) -> Floats:
     """(s / sigma)^2 for s as a share of white, shape (n, channels), float64."""
-    return np.asarray((strength[:, None] * pixels.white.astype(np.float64) / pixels.noise) ** 2)
+    xp = namespace(pixels.white)
+    ratio: Floats = (strength[:, None] * xp.astype(pixels.white, xp.float64) / pixels.noise) ** 2
+    return ratio
 
 
 def near_noise(pixels: Pixels, prior: Prior, ratio: Floats) -> Floats:
     """Mean variance of a window entry that noise causes, shape (n, channels)."""
-    return np.asarray(pixels.noise**2 * np.interp(ratio, prior.ratios, prior.shaken))
+    xp = namespace(ratio)
+    lowest, highest = float(prior.ratios[0]), float(prior.ratios[-1])
+    table, ratios = beside(prior.shaken, ratio), beside(prior.ratios, ratio)
+    # The ratios tabulated are half a power of 2 apart.
+    within = xp.clip(ratio, lowest, highest)
+    step = xp.astype(xp.floor(2 * xp.log2(within / lowest)), xp.int64)
+    step = xp.clip(step, 0, len(prior.ratios) - 2)
+    share = (within - ratios[step]) / (ratios[step + 1] - ratios[step])
+    shaken = table[step] + share * (table[step + 1] - table[step])
+    noise: Floats = xp.astype(pixels.noise**2 * shaken, xp.float32)
+    return noise
 
 
 def solve_whole(pixels: Pixels, prior: Prior, ratio: Floats, _band: Band) -> Found:
@@ -62,23 +72,25 @@ def solve_whole(pixels: Pixels, prior: Prior, ratio: Floats, _band: Band) -> Fou
     ratio : ndarray, shape (n, channels)
         (s / sigma)^2.
     """
-    noise = pixels.noise[..., None].astype(np.float32) ** 2
-    strong = ratio[..., None].astype(np.float32) * noise
+    xp = namespace(pixels.answers)
+    noise = xp.astype(pixels.noise[..., None], xp.float32) ** 2
+    strong = xp.astype(ratio[..., None], xp.float32) * noise
     weight = 1.0 / (strong * prior.levels + noise)
     y = product(pixels.answers, prior.directions)
     turned = nuisance.turned(pixels, prior)
-    across = turned.transpose(0, 2, 1)
+    across = xp.permute_dims(turned, (0, 2, 1))
     normal, right = [], []
     for i in range(y.shape[1]):
         weighed = turned * weight[:, i, None]
-        normal.append(np.matmul(weighed, across))
-        right.append(np.matmul(weighed, y[:, i, :, None])[..., 0])
-    shared = nuisance.solve(
-        np.stack(normal, axis=1).astype(np.float64),
-        np.stack(right, axis=1).astype(np.float64),
+        normal.append(weighed @ across)
+        right.append((weighed @ y[:, i, :, None])[..., 0])
+    solved = nuisance.solve(
+        xp.astype(xp.stack(normal, axis=1), xp.float64),
+        xp.astype(xp.stack(right, axis=1), xp.float64),
         nuisance.precision(pixels),
-    ).astype(np.float32)
-    y -= np.matmul(shared, turned)
+    )
+    shared = xp.astype(solved, xp.float32)
+    y -= shared @ turned
     y *= weight
     pull = product(y, prior.of_window.T)
     y *= strong

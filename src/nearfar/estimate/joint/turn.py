@@ -7,12 +7,13 @@ Index convention: arrays are (C, channels, ...); r runs over real answers, w ove
 """
 
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from array_api_compat import device
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Integers, blocks, product
+from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.cut import rounded, solve_cut
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, with_spike
 from nearfar.estimate.joint.evidence import best_kind
@@ -49,19 +50,24 @@ def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], N
     """Estimate every camera pixel once."""
     whole, model = problem.whole, problem.model
     band, projector = model.band, problem.measurements.projector
+    xp, here = namespace(whole.answers), device(whole.answers)
     number, channels, count = whole.answers.shape
+
+    def zeros(*shape: int, dtype: Any = xp.float32) -> Any:
+        return xp.zeros(shape, dtype=dtype, device=here)
+
     rows = Rows(
-        np.zeros((number, channels, KEPT), dtype=np.float32),
-        np.zeros((number, channels, problem.window**2), dtype=np.float32),
-        np.zeros((number, channels, count), dtype=np.float32),
-        np.zeros((number, channels), dtype=np.float32),
-        np.zeros(number, dtype=np.int64),
-        np.zeros(number, dtype=np.float32),
+        zeros(number, channels, KEPT),
+        zeros(number, channels, problem.window**2),
+        zeros(number, channels, count),
+        zeros(number, channels),
+        zeros(number, dtype=xp.int64),
+        zeros(number),
     )
     known = None
     if before is not None:
         known = _Known(before, _expected(problem, before), _misdrawn(problem))
-    cut = whole.lit & ~near.inside(whole.centres, problem.window, projector).all(axis=1)
+    cut = whole.lit & ~xp.all(near.inside(whole.centres, problem.window, projector), axis=1)
 
     def shown(chosen: slice | NDArray[np.int64]) -> Floats | None:
         """Answers that are expected, and what 8 bits made of direct light."""
@@ -85,15 +91,15 @@ def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], N
         """Choose the kinds of a block, and estimate those whose windows are whole."""
         pixels = gather(whole, block, band, projector, shown(block))
         for lit, first, kinds in ((True, 0, model.lit), (False, len(LIT), model.unlit)):
-            mine = np.flatnonzero(pixels.lit == lit)
+            (mine,) = xp.nonzero(pixels.lit == lit)
             if not len(mine) or kinds is None:
                 continue
             kind, strength, _ = best_kind(pixels.only(mine), kinds)
             rows.kind[block.start + mine] = kind + first
-            rows.strength[block.start + mine] = strength
+            rows.strength[block.start + mine] = xp.astype(strength, xp.float32)
             uncut = ~cut[block.start + mine]
-            for place in np.unique(kind[uncut]):
-                of_kind = np.flatnonzero(uncut & (kind == place))
+            for place in np.unique(fetch(kind[uncut])).tolist():
+                (of_kind,) = xp.nonzero(uncut & (kind == place))
                 some = pixels.only(mine[of_kind])
                 ratio = ratio_of(some, strength[of_kind])
                 put(
@@ -104,15 +110,16 @@ def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], N
         done[0] += block.stop - block.start
         report(done[0] / number)
 
-    def estimate_cut(chosen: NDArray[np.int64]) -> None:
+    def estimate_cut(part: NDArray[np.int64]) -> None:
         """Estimate camera pixels of one kind whose windows the border cuts."""
+        chosen = beside(part, whole.answers)
         pixels = gather(whole, chosen, band, projector, shown(chosen))
-        prior = model.lit.priors[rows.kind[chosen[0]]]
+        prior = model.lit.priors[int(rows.kind[chosen[0]])]
         ratio = rounded(ratio_of(pixels, rows.strength[chosen]))
         put(chosen, pixels, _with_edges(pixels, prior, ratio, solve_cut, band))
 
     side_by_side(choose, blocks(number, BLOCK))
-    side_by_side(estimate_cut, _cut_alike(whole, rows.kind, np.flatnonzero(cut)))
+    side_by_side(estimate_cut, _cut_alike(whole, rows.kind, cut))
     if known is None:
         return rows
     # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
@@ -125,10 +132,11 @@ def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], N
     )
 
 
-def _cut_alike(whole: Whole, kind: Integers, cut: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+def _cut_alike(whole: Whole, kind: Integers, cut: Booleans) -> Iterator[NDArray[np.int64]]:
     """Cut camera pixels into groups of one kind, those whose windows are cut alike together."""
-    centres = whole.centres[cut]
-    order = cut[np.lexsort((centres[:, 1], centres[:, 0], kind[cut]))]
+    (chosen,) = np.nonzero(fetch(cut))
+    centres, kind = fetch(whole.centres)[chosen], fetch(kind)
+    order = chosen[np.lexsort((centres[:, 1], centres[:, 0], kind[chosen]))]
     for group in np.split(order, np.flatnonzero(np.diff(kind[order])) + 1):
         for part in blocks(len(group), CUT):
             yield group[part]
@@ -137,16 +145,20 @@ def _cut_alike(whole: Whole, kind: Integers, cut: NDArray[np.int64]) -> Iterator
 def _misdrawn(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return what tells the answers (n, R) of unit direct light to what 8 bits got wrong."""
     # A row for each projector pixel, so that what a camera pixel asks for lies side by side.
-    error = np.ascontiguousarray(problem.measurements.shown_error[problem.model.band.places].T)
-    where = footprint(problem.whole.correspondence, problem.measurements.projector)
+    shown_error = problem.measurements.shown_error[problem.model.band.places]
+    where = footprint(fetch(problem.whole.correspondence), problem.measurements.projector)
+    error, places, shares = (
+        beside(np.ascontiguousarray(values), problem.whole.answers)
+        for values in (shown_error.T, where.pixels, where.weights)
+    )
 
     def of(chosen: slice | NDArray[np.int64]) -> Floats:
-        pixels, weights = where.pixels[chosen], where.weights[chosen]
-        found = error[pixels[:, 0]] * weights[:, :1]
+        pixels, weights = places[chosen], shares[chosen]
+        found: Floats = error[pixels[:, 0]] * weights[:, :1]
         for corner in range(1, 4):
-            if weights[:, corner].any():
+            if bool((weights[:, corner] != 0).any()):
                 found += error[pixels[:, corner]] * weights[:, corner, None]
-        return np.asarray(found)
+        return found
 
     return of
 
@@ -160,19 +172,21 @@ def _with_edges(
 ) -> Found:
     """Estimate camera pixels of one kind, direct light of second surfaces in their windows."""
     whole = solve(pixels, prior, ratio, band)
-    number = np.arange(len(ratio))
+    xp, here = namespace(whole.near), device(whole.near)
+    number = xp.arange(len(ratio), device=here)
     found = whole
-    for _ in range(MOST if pixels.lit.any() else 0):
+    for _ in range(MOST if bool(xp.any(pixels.lit)) else 0):
         entry, gain = likeliest_spike(pixels, prior, ratio, found)
-        sure = np.flatnonzero(gain > SURE)
+        (sure,) = xp.nonzero(gain > SURE)
         if not len(sure):
             break
         number, ratio = number[sure], ratio[sure]
         pixels = with_spike(pixels.only(sure), entry[sure])
         found = solve(pixels, prior, ratio, band)
-        windows = found.near.copy()
-        for spike, entries in enumerate(pixels.spikes.T):
-            at = (np.arange(len(number))[:, None], np.arange(windows.shape[1]), entries[:, None])
+        windows = xp.asarray(found.near, copy=True)
+        each, channel = (xp.arange(count, device=here) for count in windows.shape[:2])
+        for spike in range(pixels.spikes.shape[1]):
+            at = (each[:, None], channel, pixels.spikes[:, spike, None])
             windows[at] += found.shared[..., KEPT + spike]
         whole.near[number] = windows
         whole.far[number] = found.far
@@ -184,13 +198,14 @@ def _expected(problem: Problem, rows: Rows) -> Rows:
     """Ask the neighbours of each camera pixel what they expect of it."""
     whole, measurements = problem.whole, problem.measurements
     camera, channels = measurements.camera, measurements.channels
-    shape = (*camera, channels)
-    white = whole.white.reshape(*shape, 1)
-    tiny = np.finfo(np.float32).tiny ** 0.5
-    variance = np.maximum((measurements.noise.reshape(shape) / white[..., 0]) ** 2, tiny)
-    far = expect_each(rows.far.reshape(*shape, -1) / white, variance, problem.model.repeats)
+    xp, shape = namespace(rows.near), (*camera, channels)
+    white = whole.white.reshape((*shape, 1))
+    tiny = float(np.finfo(np.float32).tiny) ** 0.5
+    noise = beside(measurements.noise.reshape(shape), rows.near)
+    variance = xp.clip((noise / white[..., 0]) ** 2, min=tiny)
+    far = expect_each(rows.far.reshape((*shape, -1)) / white, variance, problem.model.repeats)
     windows = expect_together(
-        rows.near.reshape(*shape, -1) / white,
+        rows.near.reshape((*shape, -1)) / white,
         rows.near_noise.reshape(shape) / white[..., 0] ** 2,
         whole.lit.reshape(camera),
     )

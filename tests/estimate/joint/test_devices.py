@@ -1,0 +1,83 @@
+"""The joint estimate by PyTorch is NumPy's: the accelerator's code path, on the processor."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size, beside, fetch
+from nearfar.devices import mover
+from nearfar.errors import InputError
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.photometry.measure import measure
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.rigs.camera import SimulatedCamera
+from tests.worlds import model_transport
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+
+PROJECTOR, CAMERA, WINDOW = Size(24, 30), Size(24, 30), 7
+
+
+@pytest.mark.parametrize("offset", ["reference", "inverse"])
+@pytest.mark.parametrize("between", [False, True])
+def test_the_estimate_is_numpys(shoot, offset, between):
+    world = model_transport(PROJECTOR, CAMERA, window=WINDOW, far=Size(3, 3), channels=2)
+    if offset == "reference":
+        plan = choose_plan(PROJECTOR, 80, window=WINDOW)[0]
+    else:
+        plan = paper_plan(PROJECTOR, WINDOW, Size(3, 3))
+    measurements = measure(shoot(plan, world, SimulatedCamera()))
+    q = world.correspondence.copy()
+    if between:
+        # Between pixels, so that q is put right; and some without direct light.
+        q = np.clip(q + np.random.default_rng(0).uniform(-0.4, 0.4, q.shape), 0, 23)
+        q[3:5, 8:20] = np.nan
+        q = q.astype(np.float32)
+    # What rounding the answers in single precision changes is all that another library may.
+    generator = np.random.default_rng(1)
+    rounded = measurements.answers * (1 + 2e-7 * generator.normal(size=measurements.answers.shape))
+    again = replace(measurements, answers=rounded.astype(np.float32))
+    ours, shaken, theirs = (
+        estimate_jointly(told, q, WINDOW, plan.far, device=device)
+        for told, device in ((measurements, "cpu"), (again, "cpu"), (measurements, "torch"))
+    )
+    assert np.mean(ours.belief.kind == theirs.belief.kind) > 0.99
+    for name in ("direct", "near", "far", "correspondence"):
+        one, jolted, other = (np.nan_to_num(getattr(each, name)) for each in (ours, shaken, theirs))
+        assert type(other) is np.ndarray
+        assert one.dtype == other.dtype
+        allowed = 3 * np.sqrt(np.mean((jolted - one) ** 2)) + 1e-6
+        assert np.sqrt(np.mean((other - one) ** 2)) < allowed, name
+    np.testing.assert_array_equal(np.isnan(ours.correspondence), np.isnan(theirs.correspondence))
+
+
+def test_arrays_come_and_go():
+    values = np.arange(6.0, dtype=np.float32).reshape(2, 3)
+    there = mover("torch")(values)
+    assert isinstance(there, torch.Tensor)
+    np.testing.assert_array_equal(fetch(there), values)
+    constant = beside(np.arange(3), there)
+    assert isinstance(constant, torch.Tensor)
+    assert beside(values, values) is values
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
+def test_a_device_that_is_not_there_is_said():
+    with pytest.raises(InputError, match="no CUDA device"):
+        mover("cuda")
+
+
+def test_without_pytorch_it_is_said():
+    program = (
+        "import sys; sys.modules['torch'] = None\n"
+        "from nearfar.devices import mover\n"
+        "from nearfar.errors import InputError\n"
+        "try:\n    mover('cuda')\nexcept InputError as error:\n    print(error)"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", program], check=True, capture_output=True, text=True
+    )
+    assert "needs PyTorch" in said.stdout

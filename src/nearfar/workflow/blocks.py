@@ -37,7 +37,7 @@ from nearfar.workflow.methods import ESTIMATORS, Method, require_device
 # Bytes of memory that a reconstruction takes at most, unless told otherwise.
 MEMORY = 2 * 10**9
 # What Python and the libraries take of them.
-LIBRARIES = 3 * 10**8
+LIBRARIES = 4 * 10**8
 # What arrays that come and go add to those that are counted.
 SLACK = 1.5
 # Blocks of so many rows twice over, or more, are of a multiple of them: chunks in a file divide

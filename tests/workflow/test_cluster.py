@@ -130,6 +130,27 @@ def test_a_worker_that_is_killed_costs_its_block(cluster, world, tmp_path):
     assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
 
 
+def test_a_scheduler_that_is_lost_is_told_and_leaves_nothing(world, tmp_path, monkeypatch):
+    monkeypatch.setattr("nearfar.workflow.cluster.PATIENCE", 2)
+    capture, memory = _capture("joint", world, tmp_path)
+    before = _files(tmp_path)
+    with _cluster(2) as address:
+        with distributed.Client(address, set_as_default=False) as client:
+            host = client.run_on_scheduler(os.getpid)
+
+        def kill():
+            while not list(tmp_path.glob(".*partial*/near/c.*")):
+                time.sleep(0.01)
+            os.kill(host, signal.SIGKILL)
+
+        threading.Thread(target=kill, daemon=True).start()
+        with pytest.raises(ClusterError, match="was lost in the middle of the work"):
+            reconstruct_on(address, capture, tmp_path / "t.zarr", memory=memory)
+    # Workers that go on without a scheduler for a while write nothing more.
+    time.sleep(4.0)
+    assert _files(tmp_path) == before
+
+
 def test_a_fault_on_a_worker_is_told_here_and_leaves_nothing(cluster, world, tmp_path):
     capture, memory = _capture("paper", world, tmp_path)
     chunk = tmp_path / "c.zarr" / "photos" / "c.9.0.0.0"

@@ -11,7 +11,7 @@ import os
 import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -127,9 +127,10 @@ def reconstruct_on(
         try:
             done = _gathered(client, tasks, scheduler, report)
         except BaseException:
-            client.cancel([job, *tasks])
-            # Blocks that are under way end, but write no more.
-            client.run(abandon, partial, on_error="ignore")
+            # Blocks that are under way end, but write no more; nobody is told without a scheduler.
+            with suppress(OSError, CancelledError):
+                client.cancel([job, *tasks])
+                client.run(abandon, partial, on_error="ignore")
             raise
         if not done.lit:
             raise without_light(capture)
@@ -149,6 +150,8 @@ def _reconstructed(job: Job, block: slice, known: Correspondence | None, partial
     """On a worker: reconstruct a block of rows, and write it."""
     with _AT_WORK:
         part = reconstruct_block(job, block, known)
+    if not partial.is_dir():
+        raise ClusterError(f"{partial} was given up while this block was worked at.")
     write_rows(partial, part.transport, block.start, rows=job.cut.rows, height=job.cut.height)
     lit = part.correspondence.lit
     return Done(int(lit.sum()), lit.size, part.transport.provenance)
@@ -158,9 +161,8 @@ def _gathered(client: Client, tasks: list[Future[Done]], scheduler: str, report:
     """Wait for all blocks, and put what they say together."""
     lit, pixels, excess, provenance = 0, 0, 0.0, {}
     try:
-        for count, (_, done) in enumerate(
-            as_completed(tasks, loop=client.loop, with_results=True), start=1
-        ):
+        for count, task in enumerate(as_completed(tasks, loop=client.loop), start=1):
+            done = task.result()
             lit, pixels = lit + done.lit, pixels + done.pixels
             provenance = dict(done.provenance)
             excess = max(excess, provenance["excess_of_sums"], key=abs)

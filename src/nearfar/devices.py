@@ -1,7 +1,7 @@
-"""Where arrays are worked at: NumPy's on the processor, PyTorch's or CuPy's on an accelerator.
+"""Where arrays are worked at: NumPy's on the processor, PyTorch's on an accelerator.
 
-Estimators are written in the functions of the Python array API; which library they run in follows
-from the arrays that they are given.
+The joint estimate is written in the functions of the Python array API; which library it runs in
+follows from the arrays that it is given.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.errors import InputError
+from nearfar.errors import InputError, MissingPackageError
 
 # "torch" is PyTorch on the processor: the accelerator's code without one.
 Device = Literal["cpu", "cuda", "torch"]
@@ -21,17 +21,20 @@ def mover(device: Device) -> Callable[[NDArray[Any]], Any]:
 
     Raises
     ------
+    MissingPackageError
+        If PyTorch is not installed, and needed.
     InputError
-        If it is not there.
+        If there is no such device.
     """
     if device == "cpu":
         return np.asarray
     try:
         import torch
     except ImportError as error:
-        raise InputError(
-            f"the device {device} needs PyTorch, which is not installed ({error}): install it as "
-            f"pytorch.org says for your system, or use the device cpu."
+        raise MissingPackageError(
+            f"the device {device} needs PyTorch, which is not installed ({error}): install it by "
+            f"pip install 'nearfar[torch]', or as pytorch.org says for your driver, or use the "
+            f"device cpu."
         ) from error
     if device == "torch":
         return lambda values: torch.asarray(np.ascontiguousarray(values))

@@ -1,5 +1,6 @@
 """Writes that are under way when their folder is given up."""
 
+import shutil
 import threading
 import time
 
@@ -9,6 +10,7 @@ import pytest
 from nearfar.errors import StorageError
 from nearfar.files import add_array, new_output, stores
 from nearfar.files.stores import create_durable_store, create_store
+from nearfar.files.writes import abandon
 
 
 @pytest.mark.parametrize(
@@ -40,6 +42,16 @@ def test_writes_under_way_end_before_their_folder_goes(tmp_path, monkeypatch, cr
     assert list(tmp_path.iterdir()) == []
     # What had not begun was dropped, and nothing brings the folder back.
     time.sleep(0.3)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_given_up_is_not_made_again(tmp_path):
+    partial = tmp_path / "a.zarr"
+    group = create_store(partial, "nearfar test", 1)
+    abandon(partial)
+    shutil.rmtree(partial)
+    add_array(group.require_group("part"), "values", (4, 8), np.float32, (1, 8))
+    add_array(group, "values", (4, 8), np.float32, (1, 8))[:] = 1.0
     assert list(tmp_path.iterdir()) == []
 
 

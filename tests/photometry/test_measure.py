@@ -14,6 +14,7 @@ from nearfar.photometry.noise import fit_noise
 from nearfar.plan import paper_plan
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.projector import SimulatedProjector
+from tests.worlds import model_transport
 
 PLAN = paper_plan(Size(16, 20), 5, Size(3, 3))
 NOISY = SimulatedCamera()
@@ -170,6 +171,25 @@ def test_dim_answers_do_not_shrink(small_world, shoot):
         found = measure(shoot(PLAN, small_world, dim, seed=seed)).answers
         ratios.append(np.vdot(found, clean) / np.vdot(clean, clean))
     assert np.mean(ratios) == pytest.approx(1.0, abs=4e-3)
+
+
+def test_what_was_shot_twice_counts_as_the_mean(shoot):
+    # Dropped after far frequencies that near-range light is measured at too: shot in both bands.
+    plan = paper_plan(Size(24, 24), 8, Size(7, 7), dropped=Size(1, 1))
+    pairs = find_pairs(plan)
+    assert len({pair[:2] for pair in pairs}) < len(pairs)
+    world = model_transport(Size(24, 24), Size(4, 5), window=5, far=Size(3, 3), channels=2)
+    photos = shoot(plan, world, NOISY)
+    measurements = measure(photos)
+    taken = photos.read(range(len(plan.patterns)), slice(0, 4)).reshape(-1, 20, 2)
+    order = _places(measurements, pairs)
+    for place in range(1, measurements.basis.count):
+        mine = [pair for pair, at in zip(pairs, order, strict=True) if at == place]
+        mean = np.mean([taken[pair.photo] - taken[pair.inverse] for pair in mine], axis=0)
+        found = measurements.answers[..., place]
+        # What the sums' noise takes out of it is less than the noise.
+        assert measurements.repeats[place] == len(mine)
+        np.testing.assert_allclose(found, mean, atol=6 * measurements.noise.max())
 
 
 def test_a_pattern_without_its_inverse_is_refused():

@@ -23,6 +23,7 @@ from nearfar.rigs.simulated import SimulatedRig
 from nearfar.transport.store import write_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruct import reconstruct_in_blocks
+from tests.absent import said_without
 from tests.workflow.memory import memory_for
 from tests.worlds import model_transport
 
@@ -260,15 +261,7 @@ def test_workers_that_cannot_do_it_are_named(scheduler, world, tmp_path, what):
     assert _files(tmp_path) == before
 
 
-def test_without_dask_it_is_said(tmp_path):
-    program = (
-        "import sys; sys.modules['distributed'] = None\n"
-        "from nearfar.errors import MissingPackageError\n"
-        "try:\n    import nearfar.workflow.cluster\n"
-        "except MissingPackageError as error:\n    print(error)"
+def test_without_dask_it_is_said():
+    assert "pip install 'nearfar[dask]'" in said_without(
+        "distributed", "import nearfar.workflow.cluster"
     )
-    said = subprocess.run(
-        [sys.executable, "-c", program], check=True, capture_output=True, text=True
-    )
-    assert "pip install 'nearfar[dask]'" in said.stdout
-    assert Path(tmp_path).is_dir()

@@ -89,7 +89,9 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
         values |= {f"{BELIEF}_{name}": getattr(part.belief, name) for name in BELIEVED}
     group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
     for name, one in values.items():
-        chunk = (_rows_of_chunk(one, rows), *one.shape[1:])
+        # A single block has its chunks to itself, whatever their rows.
+        most = min(height, rows_of_chunk(one))
+        chunk = (most if rows >= height else _dividing(rows, most), *one.shape[1:])
         array = add_array(group, name, (height, *one.shape[1:]), one.dtype, chunk)
         array[first : first + len(one)] = one
 
@@ -142,10 +144,9 @@ def rows_of_chunk(values: Floats) -> int:
     return max(1, CHUNK_BYTES // max(1, values[:1].nbytes))
 
 
-def _rows_of_chunk(values: Floats, rows: int) -> int:
-    """Rows of a chunk of some megabytes that divide `rows`."""
-    most = min(rows, rows_of_chunk(values))
-    return next(count for count in range(most, 0, -1) if rows % count == 0)
+def _dividing(rows: int, most: int) -> int:
+    """Return the largest number up to `most` that divides `rows`."""
+    return next(count for count in range(min(most, rows), 0, -1) if rows % count == 0)
 
 
 def write_in_rows(group: Any, name: str, values: Floats) -> None:

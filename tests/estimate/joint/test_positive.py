@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.transport import near
-from tests.estimate.joint.test_joint import FAR, PROJECTOR, WINDOW, _frequencies, _measure
+from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
 from tests.worlds import model_transport
 
 
@@ -66,8 +66,8 @@ def test_they_are_the_nearest_such_values():
 def test_an_estimate_has_no_negative_transport_in_its_windows(noise):
     world = model_transport(PROJECTOR, Size(16, 20), window=WINDOW, far=Size(3, 3), entries=0)
     world = replace(world, near=np.zeros_like(world.near))
-    measurements = _measure(
-        world.dense().astype(np.float64), _frequencies(), noise=noise, camera=world.camera
+    measurements = measured(
+        world.dense().astype(np.float64), chosen_frequencies(), noise=noise, camera=world.camera
     )
     found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR)
     rows = found.dense()[:, 0]

@@ -1,0 +1,30 @@
+"""What neighbours expect."""
+
+import numpy as np
+
+from nearfar.estimate.joint.neighbours import expect_each, expect_together
+
+
+def test_neighbours_that_agree_take_noise_away_and_edges_stay():
+    generator = np.random.default_rng(0)
+    truth = np.zeros((40, 40, 1, 3))
+    truth[:, 20:] = 1.0
+    noisy = truth + 0.05 * generator.normal(size=truth.shape)
+    every = np.ones((40, 40), dtype=bool)
+    variance = np.full((40, 40, 1), 0.05**2)
+    found = expect_each(noisy, variance, np.ones(3))
+    flat = np.abs(np.arange(40) - 19.5) > 2
+    assert np.std((found - truth)[:, flat]) < 0.6 * 0.05
+    assert np.abs((found - truth)[:, 19:21]).max() < 4 * 0.05
+    together = expect_together(noisy, variance, every)
+    assert np.std((together - truth)[:, flat]) < 0.6 * 0.05
+    assert np.abs((together - truth)[:, 19:21]).max() < 4 * 0.05
+
+
+def test_neighbours_without_a_say_are_not_heard():
+    values = np.zeros((9, 9, 1, 2))
+    values[4, 4] = 100.0
+    known = np.ones((9, 9), dtype=bool)
+    known[4, 4] = False
+    found = expect_together(values, np.full((9, 9, 1), 1.0), known)
+    assert not found.any()

@@ -44,6 +44,9 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
     drawn = band_of(basis, near.offsets(problem.window)).put(lambda one: beside(one, rows.near))
     windows = _positive(problem, rows.near, far_range, drawn)
     shape = (*measurements.camera, measurements.channels)
+    # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
+    # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
+    first = rows.choices[0]
     return Transport(
         projector=measurements.projector,
         correspondence=fetch(whole.correspondence)
@@ -59,8 +62,8 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
             kinds=(*LIT, *UNLIT),
             frequencies=band.basis.frequencies,
             repeats=fetch(problem.model.repeats),
-            kind=fetch(rows.kind).astype(np.uint8).reshape(measurements.camera),
-            strength=fetch(rows.strength).reshape(measurements.camera),
+            kind=fetch(first.kind).astype(np.uint8).reshape(measurements.camera),
+            strength=fetch(first.strength).reshape(measurements.camera),
             white=fetch(whole.white).reshape(shape),
             offset_noise=fetch(whole.offset_noise).reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),

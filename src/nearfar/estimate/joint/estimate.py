@@ -5,6 +5,7 @@ mean. Then, in turns, each starts from what its neighbours expect and estimates 
 """
 
 from collections.abc import Callable
+from itertools import zip_longest
 
 import numpy as np
 
@@ -13,12 +14,14 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.nuisance import KEPT
-from nearfar.estimate.joint.problem import Problem, Rows, lay_out
+from nearfar.estimate.joint.problem import Choice, Problem, Rows, lay_out
 from nearfar.estimate.joint.turn import take_turn
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport.model import Transport
 
+# Kinds of camera pixels, one choice for each turn.
+Choices = tuple[Choice, ...]
 # Turns: one alone, the rest with the neighbours.
 TURNS = 3
 # q moves by no more than this in one turn, and stays where it was rounded to.
@@ -33,6 +36,7 @@ def estimate_jointly(
     far: Size,
     *,
     turns: int = TURNS,
+    kept: Choices = (),
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Transport:
@@ -51,6 +55,8 @@ def estimate_jointly(
         Far band: f is kept at its measured frequencies.
     turns : int
         One alone, the rest with the neighbours.
+    kept : Choices
+        Kinds of camera pixels from a look at some of the photos, by `choose_kinds`.
     device : {"cpu", "cuda", "torch"}
         Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
         processor.
@@ -66,25 +72,60 @@ def estimate_jointly(
     InputError
         If white or everything else is missing, or the device is.
     """
+    report = progress or (lambda _share: None)
+    problem = _lay_out(measurements, correspondence, window, device)
+    return assemble(*_take_turns(problem, turns, kept, report), far)
+
+
+def choose_kinds(
+    measurements: Measurements,
+    correspondence: Floats,
+    window: int,
+    *,
+    device: Device = "cpu",
+    progress: Callable[[float], None] | None = None,
+) -> Choices:
+    """Choose what kind each camera pixel is by some photos, for an estimate from more of them.
+
+    Parameters and errors are those of `estimate_jointly`.
+
+    Returns
+    -------
+    Choices
+        One for each turn.
+    """
+    report = progress or (lambda _share: None)
+    problem = _lay_out(measurements, correspondence, window, device)
+    _, rows = _take_turns(problem, TURNS, (), report)
+    return rows.choices
+
+
+def _lay_out(
+    measurements: Measurements, correspondence: Floats, window: int, device: Device
+) -> Problem:
     frequencies = [k for k in measurements.basis.frequencies if k != DC]
     if len(frequencies) == len(measurements.basis.frequencies) or not frequencies:
         raise InputError(
             "these measurements lack white, or all but white: plan with --photos, or --near and "
             "--far."
         )
-    problem = lay_out(measurements, correspondence, window, frequencies, device)
+    return lay_out(measurements, correspondence, window, frequencies, device)
+
+
+def _take_turns(
+    problem: Problem, turns: int, kept: Choices, progress: Callable[[float], None]
+) -> tuple[Problem, Rows]:
     rows = None
-    for turn in range(turns):
+    for turn, settled in zip_longest(range(turns), kept[:turns]):
 
         def report(share: float, turn: int = turn) -> None:
-            if progress is not None:
-                progress((turn + share) / turns)
+            progress((turn + share) / turns)
 
-        rows = take_turn(problem, rows, report)
+        rows = take_turn(problem, rows, report, settled)
         whole = problem.whole._replace(correspondence=_moved(problem, rows))
         problem = problem._replace(whole=whole)
     assert rows is not None
-    return assemble(problem, rows, far)
+    return problem, rows
 
 
 def _moved(problem: Problem, rows: Rows) -> Floats:

@@ -32,6 +32,25 @@ from nearfar.transport.kinds import LIT, UNLIT, Kind
 WHOLE = 0.1
 
 
+class Choice(NamedTuple):
+    """What kind each camera pixel is taken to be in one turn.
+
+    Attributes
+    ----------
+    kind : ndarray of int, shape (C,)
+        Place in LIT + UNLIT.
+    strength : ndarray, shape (C,), float32
+        Share of white.
+    """
+
+    kind: Integers
+    strength: Floats
+
+    def of(self, chosen: Integers, first: int) -> "Choice":
+        """Return that of some camera pixels, kinds counted from `first`."""
+        return Choice(self.kind[chosen] - first, self.strength[chosen])
+
+
 class Rows(NamedTuple):
     """Rows of all camera pixels, photo units."""
 
@@ -39,8 +58,7 @@ class Rows(NamedTuple):
     near: Floats  # (C, channels, W^2)
     far: Floats  # (C, channels, R), as measured
     near_noise: Floats  # (C, channels)
-    kind: Integers  # (C,), place in LIT + UNLIT
-    strength: Floats  # (C,), share of white
+    choices: tuple[Choice, ...]  # of each turn so far
 
 
 class Model(NamedTuple):

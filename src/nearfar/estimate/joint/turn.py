@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.cut import rounded, solve_cut
 from nearfar.estimate.joint.edges import MOST, SURE, likeliest_spike, with_spike
-from nearfar.estimate.joint.evidence import best_kind
+from nearfar.estimate.joint.evidence import Kinds, best_kind
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import KEPT
 from nearfar.estimate.joint.pixels import (
@@ -25,7 +25,7 @@ from nearfar.estimate.joint.pixels import (
     gather,
 )
 from nearfar.estimate.joint.prior import Prior
-from nearfar.estimate.joint.problem import Problem, Rows
+from nearfar.estimate.joint.problem import Choice, Problem, Rows
 from nearfar.estimate.joint.solve import Found, ratio_of, solve_whole
 from nearfar.estimate.matrices import Band
 from nearfar.parallel import side_by_side
@@ -46,24 +46,29 @@ class _Known(NamedTuple):
     misdrawn: Callable[[slice | NDArray[np.int64]], Floats]  # see `_misdrawn`
 
 
-def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], None]) -> Rows:
-    """Estimate every camera pixel once."""
+def take_turn(
+    problem: Problem,
+    before: Rows | None,
+    report: Callable[[float], None],
+    kept: Choice | None = None,
+) -> Rows:
+    """Estimate every camera pixel once.
+
+    Parameters
+    ----------
+    problem : Problem
+    before : Rows, optional
+        Of the turn before; none in the first.
+    report : callable
+        Called with the share done.
+    kept : Choice, optional
+        Kinds that need not be chosen any more.
+    """
     whole, model = problem.whole, problem.model
     band, projector = model.band, problem.measurements.projector
-    xp, here = namespace(whole.answers), device(whole.answers)
-    number, channels, count = whole.answers.shape
-
-    def zeros(*shape: int, dtype: Any = xp.float32) -> Any:
-        return xp.zeros(shape, dtype=dtype, device=here)
-
-    rows = Rows(
-        zeros(number, channels, KEPT),
-        zeros(number, channels, problem.window**2),
-        zeros(number, channels, count),
-        zeros(number, channels),
-        zeros(number, dtype=xp.int64),
-        zeros(number),
-    )
+    xp, number = namespace(whole.answers), len(whole.answers)
+    rows = _empty_rows(problem, before)
+    choice = rows.choices[-1]
     known = None
     if before is not None:
         known = _Known(before, _expected(problem, before), _misdrawn(problem))
@@ -94,9 +99,10 @@ def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], N
             (mine,) = xp.nonzero(pixels.lit == lit)
             if not len(mine) or kinds is None:
                 continue
-            kind, strength, _ = best_kind(pixels.only(mine), kinds)
-            rows.kind[block.start + mine] = kind + first
-            rows.strength[block.start + mine] = xp.astype(strength, xp.float32)
+            settled = kept and kept.of(block.start + mine, first)
+            kind, strength = _kinds_of(pixels.only(mine), kinds, settled)
+            choice.kind[block.start + mine] = kind + first
+            choice.strength[block.start + mine] = strength
             uncut = ~cut[block.start + mine]
             for place in np.unique(fetch(kind[uncut])).tolist():
                 (of_kind,) = xp.nonzero(uncut & (kind == place))
@@ -114,22 +120,48 @@ def take_turn(problem: Problem, before: Rows | None, report: Callable[[float], N
         """Estimate camera pixels of one kind whose windows the border cuts."""
         chosen = beside(part, whole.answers)
         pixels = gather(whole, chosen, band, projector, shown(chosen))
-        prior = model.lit.priors[int(rows.kind[chosen[0]])]
-        ratio = rounded(ratio_of(pixels, rows.strength[chosen]))
+        prior = model.lit.priors[int(choice.kind[chosen[0]])]
+        ratio = rounded(ratio_of(pixels, choice.strength[chosen]))
         put(chosen, pixels, _with_edges(pixels, prior, ratio, solve_cut, band))
 
     side_by_side(choose, blocks(number, BLOCK))
-    side_by_side(estimate_cut, _cut_alike(whole, rows.kind, cut))
+    side_by_side(estimate_cut, _cut_alike(whole, choice.kind, cut))
     if known is None:
         return rows
-    # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
-    # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
-    return rows._replace(
-        near=rows.near + known.expected.near,
-        far=rows.far + known.expected.far,
-        kind=known.before.kind,
-        strength=known.before.strength,
+    return rows._replace(near=rows.near + known.expected.near, far=rows.far + known.expected.far)
+
+
+def _empty_rows(problem: Problem, before: Rows | None) -> Rows:
+    """Make room for what a turn finds, behind the choices of the turns before."""
+    answers = problem.whole.answers
+    xp, (number, channels, count) = namespace(answers), answers.shape
+
+    def zeros(*shape: int, dtype: Any = xp.float32) -> Any:
+        return xp.zeros(shape, dtype=dtype, device=device(answers))
+
+    return Rows(
+        zeros(number, channels, KEPT),
+        zeros(number, channels, problem.window**2),
+        zeros(number, channels, count),
+        zeros(number, channels),
+        (
+            *(before.choices if before is not None else ()),
+            Choice(zeros(number, dtype=xp.int64), zeros(number)),
+        ),
     )
+
+
+def _kinds_of(pixels: Pixels, kinds: Kinds, settled: Choice | None) -> tuple[Integers, Floats]:
+    """Choose the kinds of camera pixels, places among `kinds`, where they are not settled."""
+    if settled is None:
+        kind, strength, _ = best_kind(pixels, kinds)
+        return kind, namespace(strength).astype(strength, namespace(strength).float32)
+    xp = namespace(settled.kind)
+    (left,) = xp.nonzero((settled.kind < 0) | (settled.kind >= len(kinds.priors)))
+    if len(left):
+        kind, strength = _kinds_of(pixels.only(left), kinds, None)
+        settled.kind[left], settled.strength[left] = kind, strength
+    return settled
 
 
 def _cut_alike(whole: Whole, kind: Integers, cut: Booleans) -> Iterator[NDArray[np.int64]]:

@@ -76,6 +76,32 @@ def test_a_memory_that_cannot_be(
     check_refused(untouched, arguments, "--memory", word)
 
 
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--transport", "{capture}"), "both capture and transport"),
+        (("--transport", "{there}"), "--force"),
+        (("--transport", "{out}", "--memory", "some"), "2GB or 500MB"),
+        (("--transport", "{out}", "--memory", "1MB"), "too few for one row"),
+        (("--transport", "{missing}"), "folder"),
+    ],
+)
+def test_a_transport_that_cannot_be_made_while_capturing(
+    finished: Job, untouched: Untouched, tmp_path: Path, options: tuple[str, ...], word: str
+):
+    there = tmp_path / "there.zarr"
+    there.write_text("kept")
+    names = {
+        "capture": tmp_path / "c.zarr",
+        "there": there,
+        "out": tmp_path / "t.zarr",
+        "missing": tmp_path / "missing" / "t.zarr",
+    }
+    given = [option.format_map(names) for option in options]
+    arguments = ("acquire", finished.plan, tmp_path / "c.zarr", "--rig", finished.truth, *given)
+    check_refused(untouched, arguments, word)
+
+
 def test_a_device_that_cannot_be(finished: Job, untouched: Untouched, tmp_path: Path):
     arguments = ("reconstruct", finished.capture, tmp_path / "out.zarr", "--device", "cuda")
     check_refused(untouched, (*arguments, "--method", "paper"), "method paper does not run on")

@@ -1,6 +1,7 @@
 """A user with a projector and a camera of their own, from the plan to relit pictures."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -234,3 +235,24 @@ def test_few_photos_and_nothing_for_correspondence(tmp_path: Path):
     assert json.loads(ran.out)["snr_b_pictures"] > 40
     remembered = check_done(run_nearfar("info", transport)).out
     assert "joint" in remembered
+
+
+@pytest.mark.parametrize("until", [(), ("--until", "30dB")])
+def test_a_transport_made_while_capturing(tmp_path: Path, until: tuple[str, ...]):
+    plan, capture, transport = tmp_path / "plan.json", tmp_path / "c.zarr", tmp_path / "t.zarr"
+    check_done(run_nearfar("plan", "--projector", "24x24", "--photos", 100, "-o", plan))
+    made = run_nearfar(
+        "acquire", plan, capture, "--rig", "cornell", *until, "--transport", transport
+    )
+    lines = check_done(made).out.splitlines()
+    assert re.fullmatch(r"\d+\.\d s after the last photo", lines[-2 if until else -1])
+    check_done(run_nearfar("reconstruct", capture, tmp_path / "after.zarr"))
+    there, after = (
+        check_done(run_nearfar("info", path)).out for path in (transport, tmp_path / "after.zarr")
+    )
+    assert there.replace("t.zarr", "after.zarr") == after
+    # Photos of a simulated rig come too fast for anything to be done meanwhile.
+    for name in ("t.zarr", "after.zarr"):
+        check_done(run_nearfar("convert", tmp_path / name, tmp_path / f"{name}.npy"))
+    dense = [np.load(tmp_path / f"{name}.npy") for name in ("t.zarr", "after.zarr")]
+    np.testing.assert_array_equal(*dense)

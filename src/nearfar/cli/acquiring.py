@@ -1,5 +1,7 @@
 """``nearfar acquire`` and ``nearfar import``."""
 
+import time
+from contextlib import ExitStack
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -7,8 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nearfar.cli.options import Force, PlanFile, Quiet, keep_input
+from nearfar.arrays import parse_bytes
+from nearfar.cli.options import Force, Memory, PlanFile, Processor, Quiet, Where, keep_input
 from nearfar.cli.progress import SATURATED, counted, progress_bar, say, warn
+from nearfar.cli.reconstructing import Seen
+from nearfar.errors import InputError
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
@@ -45,47 +50,81 @@ def acquire(
             metavar="35dB",
         ),
     ] = None,
+    transport: Annotated[
+        Path | None,
+        typer.Option(
+            help="Make the transport too, by the joint method: most of the work is done while "
+            "photos are taken.",
+            metavar="TRANSPORT.zarr",
+        ),
+    ] = None,
+    memory: Memory = "2GB",
+    device: Processor = Where.CPU,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Shoot a plan on a simulated rig.
 
-    Example: nearfar acquire plan.json capture.zarr --rig cornell --until 35dB
+    Example: nearfar acquire plan.json capture.zarr --rig cornell --transport transport.zarr
     """
     from nearfar.files import check_output
     from nearfar.plan import read_plan
     from nearfar.plan.checks import with_checks
     from nearfar.rigs.config import notes_of, open_rig
+    from nearfar.transport.store import write_transport
     from nearfar.workflow.acquire import acquire as shoot
+    from nearfar.workflow.estimating import RunningEstimate
     from nearfar.workflow.running import RunningCheck
 
     target = _decibels(until) if until is not None else None
+    available = parse_bytes(memory, name="--memory")
     made = read_plan(plan_file)
     made.require_real("shoot")
     if target is not None:
         made = with_checks(made)
     keep_input(output, plan_file, Path(rig))
     check_output(output, force=force)
-    with progress_bar("opening the rig", quiet=quiet) as report:
+    if transport is not None:
+        keep_input(transport, plan_file, Path(rig))
+        if transport.resolve() == output.resolve():
+            raise InputError(
+                f"{output} cannot be both capture and transport: choose another name for one."
+            )
+        check_output(transport, force=force)
+    with ExitStack() as stack:
+        report = stack.enter_context(progress_bar("opening the rig", quiet=quiet))
         opened = open_rig(rig, made.projector, progress=report)
         for note in notes_of(opened):
             warn(note)
-        check = None
+        check = estimate = None
         if target is not None:
             check = RunningCheck(made, target, opened.full_scale, partial(_tell, quiet=quiet))
+        if transport is not None:
+            estimate = stack.enter_context(
+                RunningEstimate(made, opened.full_scale, memory=available, device=device.value)
+            )
+        told = [each for each in (estimate, check) if each is not None]
         taken = shoot(
             made,
             output,
             opened,
             force=force,
             progress=counted(report, "photos", len(made.patterns)),
-            enough=check,
+            # The estimate hears of every photo, for it never says that they are enough.
+            enough=lambda number, photo: any(each(number, photo) for each in told),
         )
+        last = time.monotonic()
+        _conclude(taken, output, quiet=quiet)
+        if estimate is not None and transport is not None:
+            seen = Seen()
+            transports = (seen.add(*part) for part in estimate.finish(taken, report))
+            write_transport(transport, transports, taken.camera.height, force=force)
+            seen.conclude(taken, transport, quiet=quiet)
+            say(f"{time.monotonic() - last:.1f} s after the last photo", quiet=quiet)
     if opened.exposure != 1.0:
         say(f"transport of {opened.name} exposed by {opened.exposure:.6g}", quiet=quiet)
     if target is not None and check is not None and check.standing is not None:
         _say_what_limits(check.standing, target, quiet=quiet)
-    _conclude(taken, output, quiet=quiet)
 
 
 def _decibels(text: str) -> float:

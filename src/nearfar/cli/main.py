@@ -23,6 +23,7 @@ from nearfar.cli import (
     informing,
     looking,
     planning,
+    reconstructing,
     separating,
     transports,
 )
@@ -43,7 +44,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "export": planning.export,
     "acquire": acquiring.acquire,
     "import": acquiring.import_photos,
-    "reconstruct": transports.reconstruct,
+    "reconstruct": reconstructing.reconstruct,
     "relight": transports.relight,
     "evaluate": looking.evaluate,
     "render": looking.render,

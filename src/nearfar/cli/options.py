@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +8,13 @@ import typer
 
 from nearfar.arrays import Size, parse_size
 from nearfar.errors import InputError
+
+
+class Where(StrEnum):
+    """Where the work is done."""
+
+    CPU = "cpu"
+    CUDA = "cuda"
 
 
 def size(text: str | Size) -> Size:
@@ -40,6 +48,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdo
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
 TransportPath = Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport.")]
+Memory = Annotated[
+    str, typer.Option(help="Memory to work in: blocks of camera rows that fit.", metavar="2GB")
+]
+Processor = Annotated[
+    Where, typer.Option(help="Where the joint estimate is made; cuda needs PyTorch.")
+]
 ScenesProjector = Annotated[
     Size | None,
     typer.Option(

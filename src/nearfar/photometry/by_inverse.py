@@ -32,6 +32,7 @@ from nearfar.photometry.photos import (
     two_levels,
 )
 from nearfar.plan import Plan, Sinusoid
+from nearfar.transport.far import RealBasis
 
 # Pairs that sum to more or less than white + black by this share of white are not linear.
 NOT_LINEAR = 0.005
@@ -77,6 +78,19 @@ def find_pairs(plan: Plan) -> list[Pair]:
     return sorted(pairs, key=lambda pair: pair.photo)
 
 
+def answers_of_pairs(plan: Plan) -> tuple[RealBasis, Integers, Floats]:
+    """Return the basis that a plan's pairs answer, each pair's place in it, and repeats (R,)."""
+    pairs = find_pairs(plan)
+    if all(pair.frequency != DC for pair in pairs):
+        raise InputError(
+            "the plan shows no white with its inverse, black, of which all light is a share: plan "
+            "with a far band, which white belongs to."
+        )
+    basis, place = basis_of([(pair.frequency, pair.sine) for pair in pairs], plan.projector)
+    places = np.array([place[pair.frequency, pair.sine] for pair in pairs])
+    return basis, places, np.bincount(places, minlength=basis.count).astype(np.float32)
+
+
 def measure_pairs(
     photos: Photos, rows: slice, progress: Callable[[int], None] | None = None
 ) -> Measurements:
@@ -99,12 +113,11 @@ def measure_pairs(
     Raises
     ------
     InputError
-        If a pattern has no inverse, or a cosine no sine.
+        If a pattern has no inverse, a cosine no sine, or there is no white.
     """
     plan = photos.plan
     camera = size_of_rows(photos, rows)
-    pairs = find_pairs(plan)
-    basis, place = basis_of([(pair.frequency, pair.sine) for pair in pairs], plan.projector)
+    pairs, (basis, places, repeats) = find_pairs(plan), answers_of_pairs(plan)
     shape = (camera.pixels, photos.channels)
     differences = np.empty((len(pairs), *shape), dtype=np.float32)
     strays = np.empty((len(pairs), *shape), dtype=np.float32)
@@ -145,10 +158,8 @@ def measure_pairs(
         ]
     )
     left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
-    places = np.array([place[pair.frequency, pair.sine] for pair in pairs])
-    repeats = np.bincount(places, minlength=basis.count).astype(np.float32)
     answers = _means(differences, places, repeats)
-    answers[..., place[DC, False]] = levels.light
+    answers[..., basis.places([DC])[0]] = levels.light
     return Measurements(
         camera=camera,
         basis=basis,

@@ -30,6 +30,33 @@ from nearfar.photometry.photos import (
     two_levels,
 )
 from nearfar.photometry.steady import SteadyPhotos
+from nearfar.plan import Plan
+from nearfar.transport.far import RealBasis
+
+
+def answers_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, int]], Floats]:
+    """Tell what the photos of a plan by reference answer.
+
+    Returns
+    -------
+    basis : RealBasis
+    terms : dict
+        Place and sign of the answer of each photo, but of white's and black's.
+    repeats : ndarray, shape (R,)
+        How often each was shown, white for DC.
+    """
+    shown = find_shown(plan)
+    basis, place = basis_of(list(shown), plan.projector)
+    terms = {
+        number: (place[answer], sign)
+        for answer, numbers in shown.items()
+        if answer != (DC, False)
+        for number, sign in numbers
+    }
+    places = np.array([at for at, _ in terms.values()], dtype=np.int64)
+    repeats = np.bincount(places, minlength=basis.count).astype(np.float32)
+    repeats[place[DC, False]] = len(find_references(plan)[0])
+    return basis, terms, repeats
 
 
 def measure_by_reference(
@@ -56,8 +83,7 @@ def measure_by_reference(
         If a cosine was shown without its sine.
     """
     camera = size_of_rows(photos, rows)
-    shown = find_shown(photos.plan)
-    basis, place = basis_of(list(shown), photos.plan.projector)
+    basis, terms, repeats = answers_by_reference(photos.plan)
     whites, blacks = find_references(photos.plan)
     white = mean_photo(photos, whites.tolist(), rows)
     black = mean_photo(photos, blacks.tolist(), rows)
@@ -69,24 +95,15 @@ def measure_by_reference(
         ]
     )
     both = (2 * levels.black + levels.light).astype(np.float32)
-    repeats = np.zeros(basis.count, dtype=np.float32)
     answers = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
-    terms = {
-        number: (place[answer], sign)
-        for answer, numbers in shown.items()
-        if answer != (DC, False)
-        for number, sign in numbers
-    }
     for numbers, read in in_batches(photos, sorted(terms), rows):
         for number, photo in zip(numbers, read, strict=True):
             r, sign = terms[number]
             answers[..., r] += sign * (2 * photo - both)
-            repeats[r] += 1
         if progress is not None:
             progress(numbers[-1] + 1)
-    repeats[place[DC, False]] = len(whites)
     answers /= repeats
-    answers[..., place[DC, False]] = levels.light
+    answers[..., basis.places([DC])[0]] = levels.light
 
     def deviation(variance: Floats) -> NDArray[np.float32]:
         return np.sqrt(variance).astype(np.float32)

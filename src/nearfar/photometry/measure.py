@@ -2,14 +2,16 @@
 
 from collections.abc import Callable
 
+from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import Frequency
-from nearfar.photometry.by_inverse import find_pairs, measure_pairs
-from nearfar.photometry.by_reference import measure_by_reference
+from nearfar.photometry.by_inverse import answers_of_pairs, find_pairs, measure_pairs
+from nearfar.photometry.by_reference import answers_by_reference, measure_by_reference
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos, find_shown
 from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
+from nearfar.transport.far import RealBasis
 
 
 def measured_frequencies(plan: Plan) -> set[Frequency]:
@@ -27,6 +29,29 @@ def measured_frequencies(plan: Plan) -> set[Frequency]:
         find_references(plan)
         return {frequency for frequency, _ in find_shown(plan)}
     return {pair.frequency for pair in find_pairs(plan)}
+
+
+def answered(plan: Plan) -> tuple[RealBasis, Floats]:
+    """Tell what the photos of a plan measure before there are any.
+
+    Returns
+    -------
+    basis : RealBasis
+        That of the measurements.
+    repeats : ndarray, shape (R,)
+        How often each answer is measured.
+
+    Raises
+    ------
+    PlanError, InputError
+        As `measure`.
+    """
+    plan.require_real("measure")
+    if plan.offset == "reference":
+        basis, _, repeats = answers_by_reference(plan)
+    else:
+        basis, _, repeats = answers_of_pairs(plan)
+    return basis, repeats
 
 
 def measure(

@@ -87,10 +87,7 @@ class Measurements:
 
     def places(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
         """Places of the answers to `frequencies` along the last axis, cosine before sine."""
-        order = {k: i for i, k in enumerate(self.basis.frequencies)}
-        wanted = [order[k] for k in frequencies]
-        found = [np.flatnonzero(self.basis.index == i) for i in wanted]
-        return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
+        return self.basis.places(frequencies)
 
     def of_pixels(self, camera: Size, pixels: slice) -> "Measurements":
         """Return the measurements of some camera pixels, as a camera of size `camera`."""

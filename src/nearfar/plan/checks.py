@@ -2,7 +2,7 @@
 
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, Frequency
-from nearfar.plan.model import Pattern, Picture, Plan, Sinusoid
+from nearfar.plan.model import Pattern, Picture, Plan, Sinusoid, Stripe
 
 # Not those that `nearfar evaluate` relights under.
 SEEDS = (101, 102, 103)
@@ -46,9 +46,18 @@ def check_photos(plan: Plan) -> dict[int, list[int]]:
 def ends(plan: Plan) -> list[int]:
     """Numbers of photos after which a plan may end.
 
-    White and black have just been shown for the second time or later, and every cosine has its
-    sine.
+    Every cosine has its sine, a set of stripes that was begun is whole, and white and black have
+    just been shown for the second time or later; or every pattern has its inverse, white among
+    them.
     """
+    stripes = [i for i, pattern in enumerate(plan.patterns) if isinstance(pattern, Stripe)]
+    first, last = (stripes[0], stripes[-1]) if stripes else (0, -1)
+    return [end for end in _ends_of(plan) if end <= first or end > last]
+
+
+def _ends_of(plan: Plan) -> list[int]:
+    if plan.offset != "reference":
+        return _ends_of_pairs(plan)
     found: list[int] = []
     times, open_pairs = 0, set[Frequency]()
     for i, pattern in enumerate(plan.patterns):
@@ -60,5 +69,22 @@ def ends(plan: Plan) -> list[int]:
             continue
         times += 1
         if times > 1 and not open_pairs:
+            found.append(i + 1)
+    return found
+
+
+def _ends_of_pairs(plan: Plan) -> list[int]:
+    found: list[int] = []
+    shown: set[tuple[Frequency, str]] = set()
+    without_inverse: set[tuple[Frequency, str, str]] = set()
+    without_other: set[Frequency] = set()
+    for i, pattern in enumerate(plan.patterns):
+        if isinstance(pattern, Sinusoid):
+            frequency, kind = pattern.frequency, pattern.kind
+            without_inverse ^= {(frequency, kind, pattern.purpose)}
+            if (frequency, kind) not in shown and not frequency.is_own_negative:
+                without_other ^= {frequency}
+            shown |= {(frequency, kind)}
+        if (DC, "cosine") in shown and not without_inverse and not without_other:
             found.append(i + 1)
     return found

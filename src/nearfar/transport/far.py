@@ -62,6 +62,13 @@ class RealBasis:
         """Number of real coefficients M."""
         return len(self.index)
 
+    def places(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
+        """Places of the coefficients of `frequencies`, cosine before sine."""
+        order = {k: i for i, k in enumerate(self.frequencies)}
+        wanted = [order[k] for k in frequencies]
+        found = [np.flatnonzero(self.index == i) for i in wanted]
+        return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
+
     @cached_property
     def weights(self) -> NDArray[np.float64]:
         """1/P, or 2/P for a pair +-k: what the inverse DFT gives each coefficient, (M,)."""

@@ -32,7 +32,7 @@ from nearfar.plan import Plan
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_rows
 from nearfar.version import version
-from nearfar.workflow.methods import ESTIMATORS, Method, require_device
+from nearfar.workflow.methods import ESTIMATORS, Estimate, Method, require_device
 
 # Bytes of memory that a reconstruction takes at most, unless told otherwise.
 MEMORY = 2 * 10**9
@@ -94,6 +94,8 @@ class Job:
     brightest : float
         Largest white less black of the whole camera.
     device : {"cpu", "cuda", "torch"}
+    estimate : callable
+        The method's, as `nearfar.workflow.methods.Estimator` has it.
     """
 
     capture: Capture
@@ -102,6 +104,7 @@ class Job:
     cut: Cut
     brightest: float
     device: Device
+    estimate: Estimate
 
 
 def prepare(
@@ -111,6 +114,7 @@ def prepare(
     memory: int,
     given: bool,
     device: Device = "cpu",
+    photos: Photos | None = None,
     report: Progress | None = None,
 ) -> Job:
     """Read what all blocks share: references, and the brightest white.
@@ -124,6 +128,8 @@ def prepare(
     given : bool
         Whether the correspondence is.
     device : {"cpu", "cuda", "torch"}
+    photos : Photos, optional
+        The capture's, where they are held already.
     report : callable, optional
         As `nearfar.reconstruct` takes it.
 
@@ -137,8 +143,9 @@ def prepare(
     """
     require_device(method, device)
     cut = cut_rows(capture, method=method, memory=memory, given=given)
-    photos = without_drift(capture, report or unheard)
-    return Job(capture, photos, method, cut, brightest_white(photos), device)
+    read = without_drift(photos or capture, report or unheard)
+    estimate = ESTIMATORS[method].estimate
+    return Job(capture, read, method, cut, brightest_white(read), device, estimate)
 
 
 def cut_rows(capture: Capture, *, method: Method, memory: int, given: bool) -> Cut:
@@ -188,7 +195,7 @@ def reconstruct_block(
             found = correspond_by_stripes(job.photos, whole)
         else:
             found = by_phase(measurements, str(job.capture.path))
-        transport = ESTIMATORS[job.method].estimate(
+        transport = job.estimate(
             plan, measurements, found.pixels, progress or (lambda _share: None), job.device
         )
     provenance = provenance_of(job.capture, job.photos, method=job.method, square=False)
@@ -199,7 +206,7 @@ def reconstruct_block(
     )
 
 
-def rows_at_once(capture: Capture, method: Method, memory: int) -> int:
+def rows_at_once(photos: Photos, method: Method, memory: int) -> int:
     """Tell how many rows of the camera may be worked at in so many bytes.
 
     Raises
@@ -207,9 +214,9 @@ def rows_at_once(capture: Capture, method: Method, memory: int) -> int:
     InputError
         If not even one fits.
     """
-    estimator, camera = ESTIMATORS[method], capture.camera
-    shared, pixel = estimator.bytes_of(capture.plan, capture.channels)
-    shared += LIBRARIES + _bytes_of_references(capture.plan, camera.pixels * capture.channels)
+    estimator, camera = ESTIMATORS[method], photos.camera
+    shared, pixel = estimator.bytes_of(photos.plan, photos.channels)
+    shared += LIBRARIES + _bytes_of_references(photos.plan, camera.pixels * photos.channels)
     row = SLACK * pixel * camera.width
     # One more for correspondence by phase.
     beside = 2 * (estimator.halo + 1) if estimator.halo else 0
@@ -230,13 +237,13 @@ def _bytes_of_references(plan: Plan, values: int) -> int:
     return 9 * values if plan.offset == "reference" else 0
 
 
-def without_drift(capture: Capture, report: Progress) -> Photos:
-    """Read a capture by reference without the drift of lamp and ambient; others as they are."""
-    if capture.plan.offset != "reference":
-        return capture
-    whites, blacks = find_references(capture.plan)
+def without_drift(photos: Photos, report: Progress) -> Photos:
+    """Read photos by reference without the drift of lamp and ambient; others as they are."""
+    if photos.plan.offset != "reference":
+        return photos
+    whites, blacks = find_references(photos.plan)
     total = 2 * (len(whites) + len(blacks))
-    return steady(capture, lambda done: report("references", done / total))
+    return steady(photos, lambda done: report("references", done / total))
 
 
 def brightest_white(photos: Photos) -> float:

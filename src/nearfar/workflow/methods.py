@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, get_args
 from nearfar.arrays import Floats
 from nearfar.devices import Device, mover
 from nearfar.errors import InputError, PlanError
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import Choices, estimate_jointly
 from nearfar.estimate.joint.estimate import TURNS
 from nearfar.estimate.joint.prior import RATIOS
 from nearfar.estimate.paper import estimate
@@ -19,6 +19,7 @@ from nearfar.transport.model import Transport
 
 Method = Literal["joint", "paper"]
 Shares = Callable[[float], None]
+Estimate = Callable[[Plan, Measurements, Floats, Shares, Device], Transport]
 
 
 def require_paper_plan(plan: Plan) -> None:
@@ -54,11 +55,17 @@ def _as_the_paper(
     return estimate(measurements, pixels, plan.window, plan.far, plan.dropped)
 
 
-def _jointly(
-    plan: Plan, measurements: Measurements, pixels: Floats, progress: Shares, device: Device
+def jointly(
+    plan: Plan,
+    measurements: Measurements,
+    pixels: Floats,
+    progress: Shares,
+    device: Device,
+    kept: Choices = (),
 ) -> Transport:
+    """Estimate jointly, with the plan's window and far band."""
     return estimate_jointly(
-        measurements, pixels, plan.window, plan.far, device=device, progress=progress
+        measurements, pixels, plan.window, plan.far, kept=kept, device=device, progress=progress
     )
 
 
@@ -111,7 +118,7 @@ class Estimator(NamedTuple):
     """
 
     require: Callable[[Plan], None]
-    estimate: Callable[[Plan, Measurements, Floats, Shares, Device], Transport]
+    estimate: Estimate
     halo: int
     bytes_of: Callable[[Plan, int], tuple[int, int]]
     devices: tuple[Device, ...]
@@ -120,5 +127,5 @@ class Estimator(NamedTuple):
 ESTIMATORS: dict[Method, Estimator] = {
     "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper, ("cpu",)),
     # Each turn but the first hears the neighbours, and the first sees their q.
-    "joint": Estimator(_require_photos, _jointly, TURNS, _bytes_of_joint, get_args(Device)),
+    "joint": Estimator(_require_photos, jointly, TURNS, _bytes_of_joint, get_args(Device)),
 }

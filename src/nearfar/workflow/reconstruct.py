@@ -20,6 +20,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.rows import stacked
 from nearfar.workflow.blocks import (
     MEMORY,
+    Job,
     Part,
     Progress,
     by_phase,
@@ -117,6 +118,12 @@ def reconstruct_in_blocks(
         raise without_light(capture)
     given = correspondence is not None
     job = prepare(capture, method=method, memory=memory, given=given, device=device, report=report)
+    yield from parts_of(job, correspondence, report)
+
+
+def parts_of(job: Job, correspondence: Correspondence | None, report: Progress) -> Iterator[Part]:
+    """Reconstruct the blocks of a job in order; see `reconstruct_in_blocks`."""
+    capture = job.capture
     height, excess, lit = capture.camera.height, 0.0, False
     for block in job.cut.blocks():
         known = None

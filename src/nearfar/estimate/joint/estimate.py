@@ -11,12 +11,10 @@ import numpy as np
 
 from nearfar.arrays import Floats, Size, beside, namespace
 from nearfar.devices import Device
-from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.nuisance import KEPT
 from nearfar.estimate.joint.problem import Choice, Problem, Rows, lay_out
 from nearfar.estimate.joint.turn import take_turn
-from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport.model import Transport
 
@@ -73,7 +71,7 @@ def estimate_jointly(
         If white or everything else is missing, or the device is.
     """
     report = progress or (lambda _share: None)
-    problem = _lay_out(measurements, correspondence, window, device)
+    problem = lay_out(measurements, correspondence, window, device)
     return assemble(*_take_turns(problem, turns, kept, report), far)
 
 
@@ -95,21 +93,9 @@ def choose_kinds(
         One for each turn.
     """
     report = progress or (lambda _share: None)
-    problem = _lay_out(measurements, correspondence, window, device)
+    problem = lay_out(measurements, correspondence, window, device)
     _, rows = _take_turns(problem, TURNS, (), report)
     return rows.choices
-
-
-def _lay_out(
-    measurements: Measurements, correspondence: Floats, window: int, device: Device
-) -> Problem:
-    frequencies = [k for k in measurements.basis.frequencies if k != DC]
-    if len(frequencies) == len(measurements.basis.frequencies) or not frequencies:
-        raise InputError(
-            "these measurements lack white, or all but white: plan with --photos, or --near and "
-            "--far."
-        )
-    return lay_out(measurements, correspondence, window, frequencies, device)
 
 
 def _take_turns(

@@ -10,6 +10,7 @@ import numpy as np
 
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.devices import Device, mover
+from nearfar.errors import InputError
 from nearfar.estimate.joint.edges import seen_beside
 from nearfar.estimate.joint.evidence import Kinds, screened
 from nearfar.estimate.joint.pixels import (
@@ -20,10 +21,10 @@ from nearfar.estimate.joint.pixels import (
 )
 from nearfar.estimate.joint.prior import build_prior
 from nearfar.estimate.matrices import Band, band_of
-from nearfar.illumination.frequencies import Frequency
+from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
+from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import LIT, UNLIT, Kind
 
 # Direct light this close to a whole projector pixel is taken to be all that pixel's: noise moves q
@@ -79,12 +80,50 @@ class Problem(NamedTuple):
     window: int
 
 
+def build_model(
+    measured: RealBasis, repeats: Floats, window: int, device: Device, *, unlit: bool
+) -> Model:
+    """Build the kinds for what is measured; the last few are kept, so that blocks share them.
+
+    Parameters
+    ----------
+    measured : RealBasis
+        DC among it.
+    repeats : ndarray, shape (R,)
+        How often each answer is.
+    window : int
+    device : {"cpu", "cuda", "torch"}
+    unlit : bool
+        Whether there are camera pixels without direct light.
+
+    Raises
+    ------
+    InputError
+        If white or everything else is missing, or the device is.
+    """
+    move = mover(device)
+    frequencies = [k for k in measured.frequencies if k != DC]
+    if len(frequencies) == len(measured.frequencies) or not frequencies:
+        raise InputError(
+            "these measurements lack white, or all but white: plan with --photos, or --near and "
+            "--far."
+        )
+    # Pairs of a cosine and a sine side by side, those that answer no sine at the end.
+    frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
+    places = measured.places(frequencies)
+    plain = band_of(real_basis(frequencies, measured.projector), near.offsets(window))
+    band = Band(plain.basis, places, plain.on_window, plain.on_corners)
+    shown = (tuple(frequencies), measured.projector, window, tuple(repeats[places].tolist()))
+    return Model(
+        band.put(move),
+        move(repeats[places]),
+        _kinds(LIT, *shown, device),
+        _kinds(UNLIT, *shown, device) if unlit else None,
+    )
+
+
 def lay_out(
-    measurements: Measurements,
-    correspondence: Floats,
-    window: int,
-    frequencies: list[Frequency],
-    device: Device,
+    measurements: Measurements, correspondence: Floats, window: int, device: Device
 ) -> Problem:
     """Lay out measurements for the joint estimate.
 
@@ -93,24 +132,24 @@ def lay_out(
     measurements : Measurements
     correspondence : ndarray, shape (Cy, Cx, 2)
     window : int
-    frequencies : list of Frequency
-        Those measured, but DC.
     device : {"cpu", "cuda", "torch"}
         Where all but the measurements' own arrays are put.
+
+    Raises
+    ------
+    InputError
+        As `build_model`.
     """
-    move = mover(device)
-    # Pairs of a cosine and a sine side by side, those that answer no sine at the end.
-    frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
-    basis = real_basis(frequencies, measurements.projector)
-    plain = band_of(basis, near.offsets(window))
-    band = Band(basis, measurements.places(frequencies), plain.on_window, plain.on_corners)
     rounded = np.rint(correspondence)
     close = np.abs(correspondence - rounded) < WHOLE
     correspondence = np.where(close, rounded, correspondence).astype(np.float64)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
+    model = build_model(
+        measurements.basis, measurements.repeats, window, device, unlit=not lit.all()
+    )
     white = scale_of(measurements)
     whole = Whole(
-        answers=measurements.answers[..., band.places],
+        answers=measurements.answers[..., model.band.places],
         correspondence=correspondence.reshape(-1, 2),
         centres=near.centre(correspondence, measurements.projector),
         lit=lit,
@@ -119,16 +158,13 @@ def lay_out(
         white=white,
         likely=seen_beside(correspondence, window),
     )
-    whole = Whole._make(move(values) for values in whole)
-    repeats = measurements.repeats[band.places]
-    shown = (tuple(frequencies), measurements.projector, window, tuple(repeats.tolist()))
-    unlit = None if lit.all() else _kinds(UNLIT, *shown, device)
-    model = Model(band.put(move), move(repeats), _kinds(LIT, *shown, device), unlit)
+    whole = Whole._make(map(mover(device), whole))
     return Problem(measurements, model, whole, window)
 
 
-# Blocks of camera rows share them, those of lit and of unlit camera pixels.
-@lru_cache(maxsize=2)
+# Blocks of camera rows share them, those of lit and of unlit camera pixels; those for a look at
+# some of the photos, and for all.
+@lru_cache(maxsize=4)
 def _kinds(
     kinds: tuple[Kind, ...],
     frequencies: tuple[Frequency, ...],

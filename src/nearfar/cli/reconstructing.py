@@ -1,0 +1,176 @@
+"""``nearfar reconstruct``."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nearfar.arrays import Size, parse_bytes
+from nearfar.cli.options import CapturePath, Force, Memory, Processor, Quiet, Where, keep_input
+from nearfar.cli.progress import SATURATED, progress_bar, say, warn
+
+if TYPE_CHECKING:
+    from nearfar.capture import Capture
+    from nearfar.correspondence import Correspondence
+    from nearfar.transport.model import Transport
+
+# Lamp or ambient light that changed by more than this share of the lamp's is worth a warning.
+DRIFT = 0.05
+# Pairs that sum to more or less than white and black by this share of white are worth a warning.
+NOT_LINEAR = 0.01
+
+
+class Method(StrEnum):
+    """How the transport is estimated."""
+
+    JOINT = "joint"
+    PAPER = "paper"
+
+
+def reconstruct(
+    capture: CapturePath,
+    output: Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport to make.")],
+    method: Annotated[
+        Method,
+        typer.Option(help="All in one model with what is known of light, or as the paper does."),
+    ] = Method.JOINT,
+    correspondence: Annotated[
+        Path | None,
+        typer.Option(
+            help="q as a .npy of H x W x 2, (y, x), NaN without direct light; from the photos "
+            "otherwise.",
+            metavar="Q.npy",
+        ),
+    ] = None,
+    square: Annotated[
+        bool,
+        typer.Option(
+            "--square", help="Average the camera pixels of each projector pixel: the paper's T."
+        ),
+    ] = False,
+    memory: Memory = "2GB",
+    device: Processor = Where.CPU,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="Dask scheduler whose workers do the work; they see both files by these names.",
+            metavar="ADDRESS",
+        ),
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Reconstruct direct, near-range and far-range transport from a capture.
+
+    Example: nearfar reconstruct capture.zarr transport.zarr
+    """
+    from nearfar.capture import open_capture
+    from nearfar.correspondence import read_correspondence
+    from nearfar.files import check_output
+    from nearfar.transport.store import save_transport, write_transport
+    from nearfar.workflow.reconstruct import reconstruct as rebuild
+    from nearfar.workflow.reconstruct import reconstruct_in_blocks
+
+    if square and scheduler is not None:
+        raise typer.BadParameter("is not for --square.", param_hint="--scheduler")
+    if device is Where.CUDA and scheduler is not None:
+        raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
+    available = parse_bytes(memory, name="--memory")
+    keep_input(output, capture, *([correspondence] if correspondence else []))
+    check_output(output, force=force)
+    opened = open_capture(capture)
+    given = None
+    if correspondence is not None:
+        given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
+    seen = Seen()
+    with progress_bar("reconstructing", quiet=quiet) as report:
+        if scheduler is not None:
+            from nearfar.workflow.cluster import reconstruct_on
+
+            done = reconstruct_on(
+                scheduler,
+                opened,
+                output,
+                given,
+                method=method.value,
+                memory=available,
+                force=force,
+                progress=report,
+            )
+            seen.lit, seen.pixels, seen.provenance = done
+            seen.camera = opened.camera
+        elif square:
+            transport, found = rebuild(
+                opened,
+                given,
+                method=method.value,
+                square=True,
+                device=device.value,
+                progress=report,
+            )
+            seen.add(transport, found)
+            save_transport(output, transport, force=force)
+        else:
+            parts = reconstruct_in_blocks(
+                opened,
+                given,
+                method=method.value,
+                memory=available,
+                device=device.value,
+                progress=report,
+            )
+            transports = (seen.add(*part) for part in parts)
+            write_transport(output, transports, opened.camera.height, force=force)
+    seen.conclude(opened, output, quiet=quiet)
+
+
+class Seen:
+    """What is said of a transport that goes by in blocks."""
+
+    def __init__(self) -> None:
+        self.provenance: Mapping[str, Any] = {}
+        self.camera, self.lit, self.pixels = Size(0, 0), 0, 0
+
+    def add(self, transport: "Transport", correspondence: "Correspondence") -> "Transport":
+        """Take note of a block, and hand its transport on."""
+        self.provenance = transport.provenance
+        camera = transport.camera
+        self.camera = Size(self.camera.height + camera.height, camera.width)
+        self.lit += int(correspondence.lit.sum())
+        self.pixels += correspondence.lit.size
+        return transport
+
+    def conclude(self, capture: "Capture", output: Path, *, quiet: bool) -> None:
+        """Say what was made, and what is wrong with the photos."""
+        _warn_of_faults(capture, self.provenance)
+        say(
+            f"transport of {self.camera} camera pixels with {capture.channels} "
+            f"channel{'s' if capture.channels > 1 else ''}, "
+            f"{self.lit / self.pixels:.1%} of the camera's directly lit, written to {output}",
+            quiet=quiet,
+        )
+
+
+def _warn_of_faults(capture: "Capture", provenance: Mapping[str, Any]) -> None:
+    """Say what the photos themselves tell of a rig that is not linear or not steady."""
+    excess = float(provenance["excess_of_sums"])
+    if abs(excess) > NOT_LINEAR:
+        warn(
+            f"in {capture.path} a pattern and its inverse sum to {abs(excess):.1%} "
+            f"{'more' if excess > 0 else 'less'} than white and black: projector or camera is not "
+            f"linear, or the lamp drifts; relighting will be wrong by about as much."
+        )
+    drift = provenance["drift"]
+    if drift is not None and max(drift.values()) > DRIFT:
+        warn(
+            f"in {capture.path} the lamp changed by {drift['lamp']:.1%}, and ambient light by "
+            f"{drift['ambient']:.1%} of white: both were followed by the references and taken out, "
+            f"but what changes between two of them is not seen."
+        )
+    if capture.saturated_share > SATURATED:
+        warn(
+            f"{capture.saturated_share:.2%} of the values in {capture.path} are saturated: their "
+            f"camera pixels will be wrong."
+        )

@@ -1,0 +1,256 @@
+"""Getting the transport of a capture ready while it goes on.
+
+The photos are held as they come. Once enough of them are there, what takes long and hardly changes
+any more is done beside the capture: what kind each camera pixel is. After the last photo the joint
+estimate is made from all of them, and those kinds are not chosen again (docs/decisions/0017).
+"""
+
+import time
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.capture import Capture
+from nearfar.correspondence import correspond_by_phase, correspond_by_stripes, has_stripes
+from nearfar.devices import Device
+from nearfar.errors import InputError
+from nearfar.estimate.joint import Choices, choose_kinds
+from nearfar.estimate.joint.problem import build_model
+from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.measure import answered, measure
+from nearfar.plan import Plan, Sinusoid
+from nearfar.plan.checks import ends
+from nearfar.workflow.blocks import (
+    MEMORY,
+    Part,
+    Progress,
+    prepare,
+    rows_at_once,
+    unheard,
+    without_drift,
+)
+from nearfar.workflow.methods import ESTIMATORS, jointly, require_device
+from nearfar.workflow.reconstruct import parts_of, reconstruct_in_blocks
+
+# Kinds are first chosen by this share of the photos of transport, to see how long it takes.
+FIRST = 0.5
+# By this share they are as good as by all: within 0.1 dB, where half of them costs up to 0.6.
+ENOUGH = 0.8
+# Another choice must gain this share.
+MORE = 0.1
+# It is begun while what is left of the capture is longer, by this factor, than it will take.
+EARLY = 1.5
+
+
+class _EndedError(Exception):
+    """The capture ended before the choice was made."""
+
+
+class _Choice(NamedTuple):
+    """Kinds by the first photos, and the seconds it took to choose them."""
+
+    photos: int
+    kinds: Choices
+    seconds: float
+
+
+class RunningEstimate:
+    """Follows a capture photo by photo; its transport is there soon after the last.
+
+    Use it as a context: leaving it ends what is under way.
+
+    Parameters
+    ----------
+    plan : Plan
+    full_scale : float
+        Value of full scale of the photos.
+    memory : int
+        Bytes to work in. Where photos and estimate do not fit, nothing is held, and the transport
+        is made from the capture's file, block by block.
+    device : {"cpu", "cuda", "torch"}
+
+    Raises
+    ------
+    PlanError
+        If the plan's patterns are complex.
+    InputError
+        If a pattern lacks its inverse, or a plan by reference its whites and blacks, or the device
+        is not there.
+    """
+
+    def __init__(
+        self, plan: Plan, full_scale: float, *, memory: int = MEMORY, device: Device = "cpu"
+    ) -> None:
+        require_device("joint", device)
+        ESTIMATORS["joint"].require(plan)
+        self.held: HeldPhotos | None = None
+        self._plan, self._full_scale = plan, full_scale
+        self._memory, self._device = memory, device
+        self._ends = ends(plan)
+        told = np.cumsum([isinstance(pattern, Sinusoid) for pattern in plan.patterns])
+        self._share = np.concatenate([[0.0], told / told[-1]])
+        self._begun = time.monotonic()
+        self._choice: _Choice | None = None
+        self._under_way: Future[_Choice | None] | None = None
+        self._ended = False
+        self._beside = ThreadPoolExecutor(max_workers=1)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self._end()
+
+    def __call__(self, number: int, photo: NDArray[Any]) -> bool:
+        """Take in a photo, (Cy, Cx, channels); it is never the one to end a capture.
+
+        Raises
+        ------
+        InputError
+            With the first photo, if a row of the camera does not fit in the memory.
+        """
+        if number == 0:
+            self.held = self._room_for(photo)
+        if self.held is None:
+            return False
+        self.held.photos[number] = photo
+        taken = number + 1
+        self._take_choice()
+        if self._under_way is None and taken in self._ends and self._is_time(taken):
+            self._under_way = self._beside.submit(self._choose, taken)
+        return False
+
+    def finish(self, capture: Capture, progress: Progress | None = None) -> Iterator[Part]:
+        """Reconstruct the capture that was followed; see `nearfar.reconstruct`.
+
+        Parameters
+        ----------
+        capture : Capture
+            With all photos that were taken in, and no others.
+        progress : callable, optional
+            Told what is being done and the share done, 0 to 1.
+
+        Yields
+        ------
+        Part
+            In order.
+        """
+        self._end()
+        report, memory = progress or unheard, self._memory
+        if self.held is None:
+            yield from reconstruct_in_blocks(
+                capture, memory=memory, device=self._device, progress=report
+            )
+            return
+        photos = HeldPhotos(
+            capture.plan, self.held.photos[: len(capture.plan.patterns)], self._full_scale
+        )
+        job = prepare(
+            capture,
+            method="joint",
+            memory=memory,
+            given=False,
+            device=self._device,
+            photos=photos,
+            report=report,
+        )
+        kinds = self._choice.kinds if self._choice is not None and self.chosen_by else ()
+        # All of the camera is one block, since the photos fit beside it.
+        yield from parts_of(replace(job, estimate=partial(jointly, kept=kinds)), None, report)
+
+    @property
+    def chosen_by(self) -> int:
+        """How many photos the kinds were chosen by; 0 where they will be by all."""
+        if self._choice is None or self._share[self._choice.photos] < ENOUGH:
+            return 0
+        return self._choice.photos
+
+    def _room_for(self, photo: NDArray[Any]) -> HeldPhotos | None:
+        """Make room for all photos, if they fit beside the estimate of the whole camera."""
+        count = len(self._plan.patterns)
+        shape = (count, *photo.shape)
+        room = HeldPhotos(self._plan, np.broadcast_to(photo[:1, :1], shape), self._full_scale)
+        # One more set of kinds, for the photos there are while they are chosen.
+        shared, _ = ESTIMATORS["joint"].bytes_of(self._plan, photo.shape[-1])
+        rest = self._memory - count * photo.nbytes - shared
+        try:
+            fits = rows_at_once(room, "joint", rest) >= len(photo)
+        except InputError:
+            rows_at_once(room, "joint", self._memory)
+            return None
+        if not fits:
+            return None
+        return HeldPhotos(self._plan, np.empty(shape, photo.dtype), self._full_scale)
+
+    def _is_time(self, taken: int) -> bool:
+        """Tell whether to choose kinds now, rather than later or never."""
+        count = len(self._plan.patterns)
+        if self._share[taken] < FIRST or taken == count:
+            return False
+        if self._choice is None:
+            return True
+        gained = self._share[taken] - self._share[self._choice.photos]
+        if gained < MORE or not self._fits(taken):
+            return False
+        later = [end for end in self._ends if taken < end < count]
+        return not later or not self._fits(later[0])
+
+    def _fits(self, taken: int) -> bool:
+        """Tell whether choosing by so many photos would be over before the last photo."""
+        assert self._choice is not None
+        each = (time.monotonic() - self._begun) / taken
+        seconds = self._choice.seconds * taken / self._choice.photos
+        return EARLY * seconds < each * (len(self._plan.patterns) - taken)
+
+    def _choose(self, taken: int) -> _Choice | None:
+        """Choose kinds by the first photos; None where they do not settle q."""
+        begun = time.monotonic()
+        assert self.held is not None
+        plan = self._plan.first(taken)
+        some = HeldPhotos(plan, self.held.photos[:taken], self._full_scale)
+        photos = without_drift(some, unheard)
+        measurements = measure(photos, progress=self._heed)
+        if has_stripes(plan):
+            pixels = correspond_by_stripes(photos).pixels
+        else:
+            try:
+                pixels = correspond_by_phase(measurements).pixels
+            except InputError:
+                return None
+        kinds = choose_kinds(
+            measurements, pixels, plan.window, device=self._device, progress=self._heed
+        )
+        # Those for all photos, for when they are there.
+        basis, repeats = answered(self._plan)
+        build_model(basis, repeats, plan.window, self._device, unlit=True)
+        return _Choice(taken, kinds, time.monotonic() - begun)
+
+    def _heed(self, _done: float) -> None:
+        if self._ended:
+            raise _EndedError
+
+    def _take_choice(self) -> None:
+        """Take what was chosen meanwhile."""
+        if self._under_way is not None and self._under_way.done():
+            # What is wrong with the photos is told after the last of them.
+            with suppress(_EndedError, CancelledError, InputError):
+                self._choice = self._under_way.result() or self._choice
+            self._under_way = None
+
+    def _end(self) -> None:
+        """End what is under way, and take what it found."""
+        self._ended = True
+        self._beside.shutdown(wait=True, cancel_futures=True)
+        self._take_choice()

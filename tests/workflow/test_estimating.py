@@ -1,0 +1,227 @@
+"""Transports that are made while the photos are taken."""
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.correspondence import correspond_by_stripes
+from nearfar.errors import InputError, PlanError
+from nearfar.illumination.pictures import standard_lights
+from nearfar.photometry.measure import answered, measure
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan.checks import ends
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.workflow import estimating
+from nearfar.workflow.acquire import acquire, hold
+from nearfar.workflow.estimating import RunningEstimate
+from nearfar.workflow.evaluate import relighting_snr
+from nearfar.workflow.reconstruct import reconstruct
+from tests.workflow.memory import memory_for
+
+SIZE = Size(32, 32)
+PLANS = {
+    "reference": choose_plan(SIZE, 120)[0],
+    "pairs": paper_plan(SIZE, 8, Size(5, 5), correspondence="none"),
+    "pairs and stripes": paper_plan(SIZE, 8, Size(5, 5)),
+    "reference and stripes": paper_plan(SIZE, 8, Size(5, 5), offset="reference"),
+}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return cached_scene("cornell", SIZE)
+
+
+@pytest.fixture
+def rig(scene):
+    return SimulatedRig(scene, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+
+
+class Patient(RunningEstimate):
+    """Waits for what is done beside the capture, as slow photos would."""
+
+    def __call__(self, number, photo):
+        found = super().__call__(number, photo)
+        if self._under_way is not None:
+            self._under_way.exception()
+        return found
+
+    def _fits(self, taken):
+        # The photo after one that is not the last is always slow enough.
+        return taken < len(self._plan.patterns)
+
+
+def _follow(plan, rig, path):
+    with Patient(plan, rig.full_scale) as estimate:
+        capture = acquire(plan, path, rig, enough=estimate)
+        (part,) = estimate.finish(capture)
+    return part, estimate, capture
+
+
+@pytest.mark.parametrize("plan", ["reference", "pairs", "pairs and stripes"])
+def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, tmp_path, plan):
+    part, estimate, capture = _follow(PLANS[plan], rig, tmp_path / "c.zarr")
+    expected, correspondence = reconstruct(capture)
+    assert 0 < estimate.chosen_by < len(PLANS[plan].patterns)
+    np.testing.assert_array_equal(part.correspondence.pixels, correspondence.pixels)
+    assert part.transport.provenance == expected.provenance
+    lights = standard_lights(SIZE)
+    found, best = (relighting_snr(t, scene, lights) for t in (part.transport, expected))
+    assert min(found[name] - best[name] for name in lights) > -0.5
+    assert np.mean([found[name] - best[name] for name in lights]) > -0.15
+
+
+def test_kinds_are_those_that_were_chosen_on_the_way(rig, tmp_path):
+    part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
+    chosen = estimate._choice.kinds[0]
+    np.testing.assert_array_equal(part.transport.belief.kind.ravel(), chosen.kind)
+    np.testing.assert_array_equal(part.transport.belief.strength.ravel(), chosen.strength)
+
+
+def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, monkeypatch):
+    plan = PLANS["pairs and stripes"]
+    dark = (3, 4)
+
+    def unlit(*arguments):
+        found = correspond_by_stripes(*arguments)
+        found.pixels[dark] = np.nan
+        return found
+
+    monkeypatch.setattr("nearfar.workflow.blocks.correspond_by_stripes", unlit)
+    part, estimate, capture = _follow(plan, rig, tmp_path / "c.zarr")
+    assert estimate.chosen_by > 0
+    expected, _ = reconstruct(capture)
+    kind = part.transport.belief.kind
+    assert kind[dark] == expected.belief.kind[dark]
+    assert kind[dark] > kind[:3].max()
+    np.testing.assert_array_equal(part.transport.near[dark], 0)
+
+
+def test_photos_that_come_too_fast_are_estimated_from_all_the_same(rig, tmp_path, monkeypatch):
+    monkeypatch.setattr(RunningEstimate, "_is_time", lambda *_: False)
+    part, estimate, capture = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
+    assert estimate.chosen_by == 0
+    expected, _ = reconstruct(capture)
+    for name in ("direct", "near", "far"):
+        np.testing.assert_array_equal(getattr(part.transport, name), getattr(expected, name))
+
+
+def test_photos_that_do_not_fit_are_read_again_in_blocks(rig, tmp_path):
+    plan = PLANS["reference"]
+    memory = memory_for(9, plan, SIZE, "joint")
+    with Patient(plan, rig.full_scale, memory=memory) as estimate:
+        capture = acquire(plan, tmp_path / "c.zarr", rig, enough=estimate)
+        parts = list(estimate.finish(capture))
+    assert estimate.held is None
+    assert len(parts) > 1
+    expected, _ = reconstruct(capture, memory=memory)
+    found = np.concatenate([part.transport.near for part in parts])
+    np.testing.assert_array_equal(found, expected.near)
+
+
+def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
+    with (
+        pytest.raises(InputError, match="--memory"),
+        RunningEstimate(PLANS["reference"], rig.full_scale, memory=10**6) as estimate,
+    ):
+        acquire(PLANS["reference"], tmp_path / "c.zarr", rig, enough=estimate)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path):
+    plan = PLANS["reference"]
+    end = next(end for end in ends(plan) if end > 0.7 * len(plan.patterns))
+    with Patient(plan, rig.full_scale) as estimate:
+        capture = acquire(
+            plan, tmp_path / "c.zarr", rig, enough=lambda n, p: estimate(n, p) or n + 1 == end
+        )
+        (part,) = estimate.finish(capture)
+    assert len(capture.plan.patterns) == end
+    # Kinds by half of the photos are not good enough.
+    assert estimate._choice.photos < end
+    assert estimate.chosen_by == 0
+    expected, _ = reconstruct(capture)
+    assert part.transport.provenance == expected.provenance
+    np.testing.assert_array_equal(part.transport.near, expected.near)
+
+
+def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
+    begun, before = threading.Event(), threading.active_count()
+
+    def endless(*_arguments, progress, **_options):
+        begun.set()
+        while True:
+            time.sleep(0.01)
+            progress(0.0)
+
+    monkeypatch.setattr(estimating, "choose_kinds", endless)
+
+    def stop(_number, _photo):
+        if begun.is_set():
+            raise KeyboardInterrupt
+        return False
+
+    with (
+        pytest.raises(KeyboardInterrupt),
+        RunningEstimate(PLANS["reference"], rig.full_scale) as estimate,
+    ):
+        acquire(
+            PLANS["reference"],
+            tmp_path / "c.zarr",
+            rig,
+            enough=lambda n, p: estimate(n, p) or (n > 80 and begun.wait(10) and stop(n, p)),
+        )
+    assert begun.is_set()
+    assert list(tmp_path.iterdir()) == []
+    assert threading.active_count() <= before + 1
+
+
+def test_photos_that_cannot_be_measured_are_kept(rig, tmp_path):
+    # White stands at full scale everywhere, which the references tell.
+    bright = replace(rig, exposure=1e3)
+    with Patient(PLANS["reference"], rig.full_scale) as estimate:
+        capture = acquire(PLANS["reference"], tmp_path / "c.zarr", bright, enough=estimate)
+        with pytest.raises(InputError, match="full scale"):
+            list(estimate.finish(capture))
+    assert estimate.chosen_by == 0
+    np.testing.assert_array_equal(
+        capture.read([0]), hold(PLANS["reference"], bright).read([0], slice(None))
+    )
+
+
+def test_complex_patterns_are_refused():
+    with pytest.raises(PlanError):
+        RunningEstimate(paper_plan(SIZE, 8, Size(5, 5), offset="none"), 1.0)
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
+    whole = PLANS[plan]
+    photos = hold(whole, rig)
+    found = ends(whole)
+    stripes = [i for i, pattern in enumerate(whole.patterns) if pattern.purpose == "correspondence"]
+    assert len(found) > 4
+    for end in range(1, len(whole.patterns) + 1):
+        part = replace(photos, plan=whole.first(end), photos=photos.photos[:end])
+        among = bool(stripes) and stripes[0] < end <= stripes[-1]
+        if end in found:
+            assert not among
+            measure(part, slice(0, 1))
+        elif whole.offset == "inverse" and not among:
+            with pytest.raises(InputError):
+                measure(part, slice(0, 1))
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_what_is_measured_is_known_before(rig, plan):
+    basis, repeats = answered(PLANS[plan])
+    measurements = measure(hold(PLANS[plan], rig), slice(0, 1))
+    assert basis.frequencies == measurements.basis.frequencies
+    np.testing.assert_array_equal(repeats, measurements.repeats)

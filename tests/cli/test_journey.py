@@ -247,12 +247,10 @@ def test_a_transport_made_while_capturing(tmp_path: Path, until: tuple[str, ...]
     lines = check_done(made).out.splitlines()
     assert re.fullmatch(r"\d+\.\d s after the last photo", lines[-2 if until else -1])
     check_done(run_nearfar("reconstruct", capture, tmp_path / "after.zarr"))
-    there, after = (
-        check_done(run_nearfar("info", path)).out for path in (transport, tmp_path / "after.zarr")
-    )
-    assert there.replace("t.zarr", "after.zarr") == after
-    # Photos of a simulated rig come too fast for anything to be done meanwhile.
+    told, dense = [], []
     for name in ("t.zarr", "after.zarr"):
+        told.append(check_done(run_nearfar("info", tmp_path / name)).out.replace(name, ""))
         check_done(run_nearfar("convert", tmp_path / name, tmp_path / f"{name}.npy"))
-    dense = [np.load(tmp_path / f"{name}.npy") for name in ("t.zarr", "after.zarr")]
-    np.testing.assert_array_equal(*dense)
+        dense.append(np.load(tmp_path / f"{name}.npy"))
+    assert told[0] == told[1]
+    assert np.linalg.norm(dense[0] - dense[1]) < 0.03 * np.linalg.norm(dense[1])

@@ -9,7 +9,7 @@ import pytest
 
 from nearfar.capture import open_capture
 from nearfar.plan import read_plan
-from nearfar.transport.store import load_transport
+from nearfar.transport.store import StoredTransport, load_transport
 from tests.cli.conftest import (
     BY_PAPER,
     PLAN,
@@ -115,7 +115,9 @@ def test_a_plan_with_one_white_is_refused(finished: Job, plan: Path, tmp_path: P
     assert not out.exists()
 
 
-def test_a_joint_estimate_tells_its_errors(finished: Job, plan: Path, tmp_path: Path):
+def test_a_joint_estimate_tells_its_errors(
+    finished: Job, plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     capture, transport = tmp_path / "capture.zarr", tmp_path / "transport.zarr"
     check_done(run_nearfar("acquire", plan, capture, "--rig", finished.truth))
     q = tmp_path / "q.npy"
@@ -128,6 +130,12 @@ def test_a_joint_estimate_tells_its_errors(finished: Job, plan: Path, tmp_path: 
     deviation = np.load(bars)
     assert deviation.shape == np.load(picture).shape
     assert (deviation > 0).all()
+    # Rows read a few at a time make the same pictures.
+    monkeypatch.setattr(StoredTransport.blocks, "__defaults__", (1,))
+    for out, options in ((picture, ()), (bars, ("--error-bars",))):
+        again = tmp_path / f"again-{out.name}"
+        check_done(run_nearfar("relight", transport, finished.light, again, *options))
+        np.testing.assert_allclose(np.load(again), np.load(out), rtol=1e-5)
     # Gains scale it.
     twice = tmp_path / "twice.npy"
     gains = [f"--gain={name}=2" for name in ("direct", "near", "far")]
@@ -169,3 +177,30 @@ def test_a_plan_that_cannot_be_checked_on_the_way_is_refused(finished: Job, tmp_
     shoot = ("acquire", finished.plan, capture, "--rig", finished.truth)
     check_sentence(run_nearfar(*shoot, "--until", "30dB"), "--photos")
     assert not capture.exists()
+
+
+def test_half_precision_is_half_the_size_and_says_when_it_shows(
+    finished: Job, plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    capture = tmp_path / "capture.zarr"
+    check_done(run_nearfar("acquire", plan, capture, "--rig", finished.truth))
+    whole, half = tmp_path / "whole.zarr", tmp_path / "half.zarr"
+    check_done(run_nearfar("reconstruct", capture, whole))
+    check_done(run_nearfar("reconstruct", capture, half, "--half"))
+    for name in ("near", "far"):
+        sizes = [
+            sum(path.stat().st_size for path in (folder / name).glob("c*"))
+            for folder in (whole, half)
+        ]
+        assert sizes[1] < 0.6 * sizes[0]
+    pictures = []
+    for folder in (whole, half):
+        out = tmp_path / f"{folder.stem}.npy"
+        check_done(run_nearfar("relight", folder, finished.light, out))
+        pictures.append(np.load(out))
+    np.testing.assert_allclose(*pictures, atol=2e-3 * pictures[0].max())
+    # Where there is hardly any noise, it is told.
+    monkeypatch.setattr("nearfar.cli.reconstructing.ROUNDED", 1e-5)
+    ran = run_nearfar("reconstruct", capture, half, "--half", "--force")
+    assert ran.status == 0
+    assert ran.err.startswith("warning: float16 strays from the windows and bands by 0.0")

@@ -20,7 +20,14 @@ from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
-from nearfar.transport.store import BELIEVED, FACTORS, load_transport, save_transport
+from nearfar.transport.rows import stacked
+from nearfar.transport.store import (
+    BELIEVED,
+    FACTORS,
+    load_transport,
+    open_transport,
+    save_transport,
+)
 from tests.transport.test_operators import CAMERA, PROJECTOR, _exact, _transport
 
 
@@ -96,6 +103,22 @@ def test_a_damaged_belief_gets_a_sentence(tmp_path, generator):
     chunk.unlink()
     with pytest.raises(UnreadableFileError, match=r"t\.zarr"):
         load_transport(path)
+
+
+@pytest.mark.parametrize("size", [1, 6000, 2**28])
+def test_rows_are_read_in_blocks(tmp_path, generator, size):
+    transport = _believed(_transport(generator))
+    save_transport(tmp_path / "t.zarr", transport)
+    stored = open_transport(tmp_path / "t.zarr")
+    parts = list(stored.blocks(size))
+    assert len(parts) == {1: 9, 6000: 5, 2**28: 1}[size]
+    whole = stacked(parts)
+    for name in FACTORS:
+        np.testing.assert_array_equal(getattr(whole, name), getattr(transport, name))
+    for name in BELIEVED:
+        got = getattr(whole.belief, name)
+        np.testing.assert_array_equal(got, getattr(transport.belief, name))
+    assert (stored.camera, stored.channels) == (transport.camera, transport.channels)
 
 
 def test_nothing_is_overwritten_without_force(stored, generator):

@@ -84,8 +84,8 @@ def _files(folder):
     }
 
 
-def _locally(capture, known, method, memory, path):
-    parts = list(reconstruct_in_blocks(capture, known, method=method, memory=memory))
+def _locally(capture, known, method, memory, path, **options):
+    parts = list(reconstruct_in_blocks(capture, known, method=method, memory=memory, **options))
     assert len(parts) == 8
     write_transport(path, (part.transport for part in parts), CAMERA.height)
 
@@ -106,6 +106,14 @@ def test_the_transport_is_the_local_one_to_the_bit(cluster, world, tmp_path, met
     )
     assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
     assert done.pixels == CAMERA.pixels
+
+
+def test_half_precision_is_the_local_one_to_the_bit(cluster, world, tmp_path):
+    capture, memory = _capture("joint", world, tmp_path)
+    _locally(capture, None, "joint", memory, tmp_path / "local.zarr", half=True)
+    done = reconstruct_on(cluster, capture, tmp_path / "spread.zarr", memory=memory, half=True)
+    assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
+    assert 0 < done.provenance["rounding"] < 0.5
 
 
 def test_a_worker_that_is_killed_costs_its_block(cluster, world, tmp_path):

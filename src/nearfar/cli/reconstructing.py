@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Lamp or ambient light that changed by more than this share of the lamp's is worth a warning.
 DRIFT = 0.05
+# Rounding of more than this share of the noise is worth a warning.
+ROUNDED = 0.5
 # Pairs that sum to more or less than white and black by this share of white are worth a warning.
 NOT_LINEAR = 0.01
 
@@ -52,6 +54,10 @@ def reconstruct(
     ] = False,
     memory: Memory = "2GB",
     device: Processor = Where.CPU,
+    half: Annotated[
+        bool,
+        typer.Option("--half", help="Keep windows and bands in float16: half the bytes."),
+    ] = False,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -75,6 +81,8 @@ def reconstruct(
 
     if square and scheduler is not None:
         raise typer.BadParameter("is not for --square.", param_hint="--scheduler")
+    if square and half:
+        raise typer.BadParameter("is not for --square.", param_hint="--half")
     if device is Where.CUDA and scheduler is not None:
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
     available = parse_bytes(memory, name="--memory")
@@ -96,6 +104,7 @@ def reconstruct(
                 given,
                 method=method.value,
                 memory=available,
+                half=half,
                 force=force,
                 progress=report,
             )
@@ -119,6 +128,7 @@ def reconstruct(
                 method=method.value,
                 memory=available,
                 device=device.value,
+                half=half,
                 progress=report,
             )
             transports = (seen.add(*part) for part in parts)
@@ -161,6 +171,12 @@ def _warn_of_faults(capture: "Capture", provenance: Mapping[str, Any]) -> None:
             f"in {capture.path} a pattern and its inverse sum to {abs(excess):.1%} "
             f"{'more' if excess > 0 else 'less'} than white and black: projector or camera is not "
             f"linear, or the lamp drifts; relighting will be wrong by about as much."
+        )
+    rounding = float(provenance["rounding"])
+    if rounding > ROUNDED:
+        warn(
+            f"float16 strays from the windows and bands by {rounding:.2g} of their noise: "
+            f"reconstruct again without --half if that matters."
         )
     drift = provenance["drift"]
     if drift is not None and max(drift.values()) > DRIFT:

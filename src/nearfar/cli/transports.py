@@ -66,22 +66,22 @@ def relight(
         read_light,
         write_picture,
     )
-    from nearfar.transport.store import load_transport
+    from nearfar.transport.store import open_transport
 
     gains = _gains(gain or [])
     check_picture_ending(output)
     keep_input(output, transport, light)
     check_output(output, force=force)
     with progress_bar("relighting", quiet=quiet):
-        opened = load_transport(transport)
+        opened = open_transport(transport)
         shown = read_light(light, opened.projector, srgb=srgb)
         if shown.ndim == 3 and opened.channels == 1:
             shown = luminance(shown)
-        if error_bars:
-            picture = ErrorBars(opened).picture(shown, **gains)
-        else:
-            picture = opened.relight(shown, **gains)
-        write_picture(output, picture.astype(np.float32), force=force)
+        parts = []
+        for rows in opened.blocks():
+            relit = ErrorBars(rows).picture if error_bars else rows.relight
+            parts.append(relit(shown, **gains).astype(np.float32))
+        write_picture(output, np.concatenate(parts), force=force)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"
     say(f"{what} of {opened.camera} written to {output}", quiet=quiet)
 

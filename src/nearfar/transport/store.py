@@ -1,15 +1,24 @@
 """Transports on the disk: factors in chunks of camera rows."""
 
 import json
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.arrays import AnyPath, Floats, Size, blocks
 from nearfar.errors import UnreadableFileError
-from nearfar.files import add_array, add_to_store, new_output, open_store, read_array
+from nearfar.files import (
+    add_array,
+    add_to_store,
+    new_output,
+    open_array,
+    open_store,
+    read_selection,
+)
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis, real_basis
@@ -21,6 +30,9 @@ KIND = "nearfar transport"
 FORMAT_VERSION = 1
 # Bytes of a chunk: large enough for the disk, small enough to read a few rows.
 CHUNK_BYTES = 8 * 2**20
+
+# Bytes of a transport that are read at once where it is gone through in blocks.
+READ_BYTES = 2**28
 
 # Of the belief, where there is one: a mapping of its own in the attributes, and arrays.
 BELIEF = "belief"
@@ -84,7 +96,7 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
     height : int
         Rows of the whole camera.
     """
-    values = {name: np.asarray(getattr(part, name), np.float32) for name in FACTORS}
+    values = {name: _as_stored(getattr(part, name)) for name in FACTORS}
     if part.belief is not None:
         values |= {f"{BELIEF}_{name}": getattr(part.belief, name) for name in BELIEVED}
     group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
@@ -94,6 +106,10 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
         chunk = (most if rows >= height else _dividing(rows, most), *one.shape[1:])
         array = add_array(group, name, (height, *one.shape[1:]), one.dtype, chunk)
         array[first : first + len(one)] = one
+
+
+def _as_stored(values: Floats) -> Floats:
+    return values if values.dtype == np.float16 else np.asarray(values, np.float32)
 
 
 def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
@@ -122,23 +138,6 @@ def _described(belief: Belief) -> dict[str, Any]:
     }
 
 
-def _read_belief(group: Any, described: dict[str, Any]) -> Belief:
-    return Belief(
-        kinds=tuple(Kind(*(float(value) for value in kind)) for kind in described["kinds"]),
-        frequencies=tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
-        repeats=np.array([float(count) for count in described["repeats"]], dtype=np.float32),
-        **{name: read_array(group, f"{BELIEF}_{name}") for name in BELIEVED},
-    )
-
-
-def _belief_fits(belief: Belief, basis: RealBasis, shape: tuple[int, ...]) -> bool:
-    count = real_basis(belief.frequencies, basis.projector).count
-    flat = (belief.kind.shape, belief.strength.shape) == (shape[:2], shape[:2])
-    full = all(getattr(belief, name).shape == shape for name in BELIEVED[2:])
-    places = belief.kind.dtype == np.uint8 and int(belief.kind.max(initial=0)) < len(belief.kinds)
-    return flat and full and places and belief.repeats.shape == (count,)
-
-
 def rows_of_chunk(values: Floats) -> int:
     """Rows of an array that make some megabytes."""
     return max(1, CHUNK_BYTES // max(1, values[:1].nbytes))
@@ -155,8 +154,61 @@ def write_in_rows(group: Any, name: str, values: Floats) -> None:
     add_array(group, name, values.shape, values.dtype, (rows, *values.shape[1:]))[:] = values
 
 
-def load_transport(path: AnyPath) -> Transport:
-    """Read a transport.
+@dataclass(frozen=True)
+class StoredTransport:
+    """A transport on the disk, of which rows of the camera are read when asked for.
+
+    Attributes
+    ----------
+    path : Path
+    projector : Size
+    camera : Size
+    far_basis : RealBasis
+    provenance : mapping
+    channels : int
+    """
+
+    path: Path
+    projector: Size
+    camera: Size
+    far_basis: RealBasis
+    provenance: Mapping[str, Any]
+    channels: int
+    _arrays: Mapping[str, Any]
+    _belief: Mapping[str, Any] | None
+
+    def rows(self, rows: slice = slice(None)) -> Transport:
+        """Read some rows of the camera.
+
+        Raises
+        ------
+        UnreadableFileError
+            If what belongs to them is damaged.
+        """
+        read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
+        believed: dict[str, Any] = {name: read.pop(f"{BELIEF}_{name}", None) for name in BELIEVED}
+        belief = Belief(**self._belief, **believed) if self._belief is not None else None
+        if belief is not None and int(belief.kind.max(initial=0)) >= len(belief.kinds):
+            raise _misfit(self.path)
+        return Transport(
+            projector=self.projector,
+            far_basis=self.far_basis,
+            provenance=self.provenance,
+            belief=belief,
+            **read,
+        )
+
+    def blocks(self, size: int = READ_BYTES) -> Iterator[Transport]:
+        """Read the camera row by row in blocks of so many bytes, each when it is asked for."""
+        row = sum(
+            array.dtype.itemsize * math.prod(array.shape[1:]) for array in self._arrays.values()
+        )
+        for rows in blocks(self.camera.height, size // row):
+            yield self.rows(rows)
+
+
+def open_transport(path: AnyPath) -> StoredTransport:
+    """Open a transport for reading some of its rows.
 
     Raises
     ------
@@ -165,44 +217,82 @@ def load_transport(path: AnyPath) -> Transport:
     """
     path = Path(path)
     group = open_store(path, KIND, FORMAT_VERSION)
-    factors = {name: read_array(group, name) for name in FACTORS}
+    arrays = {name: open_array(group, name) for name in FACTORS}
+    belief = None
     try:
         height, width = (int(side) for side in listed(group.attrs["projector"]))
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
-        belief = (
-            _read_belief(group, _mapped(group.attrs[BELIEF])) if BELIEF in group.attrs else None
-        )
+        if BELIEF in group.attrs:
+            belief = _shared_belief(_mapped(group.attrs[BELIEF]))
     except (KeyError, TypeError, ValueError) as error:
         raise UnreadableFileError(
             f"{path} is damaged: its zarr.json does not describe a transport ({error}); "
             f"reconstruct it again."
         ) from None
-    projector = Size(height, width)
-    basis = real_basis(frequencies, projector)
-    camera_and_channels = factors["direct"].shape
-    window = factors["near"].shape[-1]
+    basis = real_basis(frequencies, Size(height, width))
+    each = tuple(int(side) for side in arrays["direct"].shape)
+    window = arrays["near"].shape[-1] if arrays["near"].ndim else 0
     shapes = {
-        "correspondence": (*camera_and_channels[:2], 2),
-        "near": (*camera_and_channels, window, window),
-        "far": (*camera_and_channels, basis.count),
-        "black": camera_and_channels,
-        "noise": camera_and_channels,
+        "correspondence": (*each[:2], 2),
+        "near": (*each, window, window),
+        "far": (*each, basis.count),
+        "black": each,
+        "noise": each,
     }
     for name, shape in shapes.items():
-        if len(camera_and_channels) != 3 or factors[name].shape != shape:
+        if len(each) != 3 or arrays[name].shape != shape:
             raise UnreadableFileError(
-                f"{path} is damaged: its {name} has shape {factors[name].shape}, not {shape}; "
+                f"{path} is damaged: its {name} has shape {arrays[name].shape}, not {shape}; "
                 f"reconstruct it again."
             )
-    if belief is not None and not _belief_fits(belief, basis, camera_and_channels):
-        raise UnreadableFileError(
-            f"{path} is damaged: what its error bars follow from does not fit the transport; "
-            f"reconstruct it again."
-        )
-    return Transport(
-        projector=projector, far_basis=basis, provenance=provenance, belief=belief, **factors
+    if belief is not None:
+        arrays |= {f"{BELIEF}_{name}": open_array(group, f"{BELIEF}_{name}") for name in BELIEVED}
+        if not _belief_fits(belief, arrays, basis.projector, each):
+            raise _misfit(path)
+    return StoredTransport(
+        path, basis.projector, Size(*each[:2]), basis, provenance, each[2], arrays, belief
     )
+
+
+def _shared_belief(described: dict[str, Any]) -> dict[str, Any]:
+    """Read what all camera pixels share of a belief."""
+    return {
+        "kinds": tuple(Kind(*(float(value) for value in kind)) for kind in described["kinds"]),
+        "frequencies": tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
+        "repeats": np.array([float(count) for count in described["repeats"]], dtype=np.float32),
+    }
+
+
+def _belief_fits(
+    belief: Mapping[str, Any],
+    arrays: Mapping[str, Any],
+    projector: Size,
+    each: tuple[int, ...],
+) -> bool:
+    count = real_basis(belief["frequencies"], projector).count
+    kind, strength = (arrays[f"{BELIEF}_{name}"] for name in BELIEVED[:2])
+    flat = (kind.shape, strength.shape) == (each[:2], each[:2])
+    full = all(arrays[f"{BELIEF}_{name}"].shape == each for name in BELIEVED[2:])
+    return flat and full and kind.dtype == np.uint8 and belief["repeats"].shape == (count,)
+
+
+def _misfit(path: Path) -> UnreadableFileError:
+    return UnreadableFileError(
+        f"{path} is damaged: what its error bars follow from does not fit the transport; "
+        f"reconstruct it again."
+    )
+
+
+def load_transport(path: AnyPath) -> Transport:
+    """Read a transport, all of it.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        If it is not there, damaged, of another kind or of another version.
+    """
+    return open_transport(path).rows()
 
 
 def listed(value: Any) -> list[Any]:

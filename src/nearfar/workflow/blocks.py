@@ -6,7 +6,7 @@ own rows: the noise model of inverse pairs, and what is a usual step of q (which
 are seen, in correspondence by phase).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -29,6 +29,7 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos
 from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
+from nearfar.transport.half import in_half, rounding_over_noise
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_rows
 from nearfar.version import version
@@ -96,6 +97,8 @@ class Job:
     device : {"cpu", "cuda", "torch"}
     estimate : callable
         The method's, as `nearfar.workflow.methods.Estimator` has it.
+    half : bool
+        Whether n and f are made float16.
     """
 
     capture: Capture
@@ -105,6 +108,7 @@ class Job:
     brightest: float
     device: Device
     estimate: Estimate
+    half: bool = False
 
 
 def prepare(
@@ -114,6 +118,7 @@ def prepare(
     memory: int,
     given: bool,
     device: Device = "cpu",
+    half: bool = False,
     photos: Photos | None = None,
     report: Progress | None = None,
 ) -> Job:
@@ -128,6 +133,8 @@ def prepare(
     given : bool
         Whether the correspondence is.
     device : {"cpu", "cuda", "torch"}
+    half : bool
+        Whether n and f are made float16.
     photos : Photos, optional
         The capture's, where they are held already.
     report : callable, optional
@@ -145,7 +152,7 @@ def prepare(
     cut = cut_rows(capture, method=method, memory=memory, given=given)
     read = without_drift(photos or capture, report or unheard)
     estimate = ESTIMATORS[method].estimate
-    return Job(capture, read, method, cut, brightest_white(read), device, estimate)
+    return Job(capture, read, method, cut, brightest_white(read), device, estimate, half)
 
 
 def cut_rows(capture: Capture, *, method: Method, memory: int, given: bool) -> Cut:
@@ -182,7 +189,7 @@ def reconstruct_block(
     Returns
     -------
     Part
-        The provenance's `excess_of_sums` is the block's own.
+        The provenance's `excess_of_sums` and `rounding` are the block's own.
     """
     whole = job.cut.around(block)
     core = slice(block.start - whole.start, block.stop - whole.start)
@@ -200,10 +207,19 @@ def reconstruct_block(
         )
     provenance = provenance_of(job.capture, job.photos, method=job.method, square=False)
     provenance["excess_of_sums"] = measurements.excess_of_sums
-    return Part(
-        replace(of_rows(transport, core), provenance=provenance),
-        Correspondence(found.pixels[core], found.confidence[core]),
-    )
+    mine = of_rows(transport, core)
+    provenance["rounding"] = rounding_over_noise(mine) if job.half else 0.0
+    mine = replace(in_half(mine) if job.half else mine, provenance=provenance)
+    return Part(mine, Correspondence(found.pixels[core], found.confidence[core]))
+
+
+def of_all(before: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the provenance of blocks so far and of one more: the worst of what they tell."""
+    worst = {
+        name: max(before.get(name, 0.0), provenance[name], key=abs)
+        for name in ("excess_of_sums", "rounding")
+    }
+    return {**provenance, **worst}
 
 
 def rows_at_once(photos: Photos, method: Method, memory: int) -> int:

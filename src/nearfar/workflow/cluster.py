@@ -28,6 +28,7 @@ from nearfar.workflow.blocks import (
     Job,
     Progress,
     cut_rows,
+    of_all,
     prepare,
     reconstruct_block,
     unheard,
@@ -75,6 +76,7 @@ def reconstruct_on(
     *,
     method: Method = "joint",
     memory: int = MEMORY,
+    half: bool = False,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Done:
@@ -119,7 +121,7 @@ def reconstruct_on(
     with _connected(scheduler) as client, new_output(output, force=force) as partial:
         partial.mkdir()
         _require_workers(client, scheduler, source, partial, memory)
-        job = client.submit(_prepared, source, method, memory, given, pure=False)
+        job = client.submit(_prepared, source, method, memory, given, half, pure=False)
         tasks = []
         for block in cut.blocks():
             known = correspondence.of_rows(cut.around(block)) if correspondence else None
@@ -141,9 +143,9 @@ def reconstruct_on(
     return done
 
 
-def _prepared(source: Path, method: Method, memory: int, given: bool) -> Job:
+def _prepared(source: Path, method: Method, memory: int, given: bool, half: bool) -> Job:
     """On a worker: read what all blocks share."""
-    return prepare(open_capture(source), method=method, memory=memory, given=given)
+    return prepare(open_capture(source), method=method, memory=memory, given=given, half=half)
 
 
 def _reconstructed(job: Job, block: slice, known: Correspondence | None, partial: Path) -> Done:
@@ -159,13 +161,13 @@ def _reconstructed(job: Job, block: slice, known: Correspondence | None, partial
 
 def _gathered(client: Client, tasks: list[Future[Done]], scheduler: str, report: Progress) -> Done:
     """Wait for all blocks, and put what they say together."""
-    lit, pixels, excess, provenance = 0, 0, 0.0, {}
+    lit, pixels = 0, 0
+    provenance: Mapping[str, Any] = {}
     try:
         for count, task in enumerate(as_completed(tasks, loop=client.loop), start=1):
             done = task.result()
             lit, pixels = lit + done.lit, pixels + done.pixels
-            provenance = dict(done.provenance)
-            excess = max(excess, provenance["excess_of_sums"], key=abs)
+            provenance = of_all(provenance, done.provenance)
             report("reconstructing", count / len(tasks))
     except KilledWorker as error:
         raise ClusterError(
@@ -177,7 +179,7 @@ def _gathered(client: Client, tasks: list[Future[Done]], scheduler: str, report:
             f"the scheduler at {scheduler} was lost in the middle of the work: see that it and its "
             f"workers run, and reconstruct again."
         ) from error
-    return Done(lit, pixels, {**provenance, "excess_of_sums": excess})
+    return Done(lit, pixels, provenance)
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """From a capture to a transport."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 from nearfar.arrays import blocks
 from nearfar.capture import Capture
@@ -24,6 +25,7 @@ from nearfar.workflow.blocks import (
     Part,
     Progress,
     by_phase,
+    of_all,
     prepare,
     provenance_of,
     reconstruct_block,
@@ -104,9 +106,16 @@ def reconstruct_in_blocks(
     method: Method = "joint",
     memory: int = MEMORY,
     device: Device = "cpu",
+    half: bool = False,
     progress: Progress | None = None,
 ) -> Iterator[Part]:
     """Reconstruct block by block of camera rows, each when it is asked for; see `reconstruct`.
+
+    Parameters
+    ----------
+    half : bool
+        Whether n and f are made float16; the provenance's `rounding` tells by how much that
+        strays, as a share of their noise.
 
     Yields
     ------
@@ -117,14 +126,23 @@ def reconstruct_in_blocks(
     if correspondence is not None and not correspondence.lit.any():
         raise without_light(capture)
     given = correspondence is not None
-    job = prepare(capture, method=method, memory=memory, given=given, device=device, report=report)
+    job = prepare(
+        capture,
+        method=method,
+        memory=memory,
+        given=given,
+        device=device,
+        half=half,
+        report=report,
+    )
     yield from parts_of(job, correspondence, report)
 
 
 def parts_of(job: Job, correspondence: Correspondence | None, report: Progress) -> Iterator[Part]:
     """Reconstruct the blocks of a job in order; see `reconstruct_in_blocks`."""
     capture = job.capture
-    height, excess, lit = capture.camera.height, 0.0, False
+    height, lit = capture.camera.height, False
+    provenance: Mapping[str, Any] = {}
     for block in job.cut.blocks():
         known = None
         if correspondence is not None:
@@ -137,9 +155,7 @@ def parts_of(job: Job, correspondence: Correspondence | None, report: Progress) 
         lit = lit or bool(part.correspondence.lit.any())
         if block.stop == height and not lit:
             raise without_light(capture)
-        provenance = dict(part.transport.provenance)
-        excess = max(excess, provenance["excess_of_sums"], key=abs)
-        provenance["excess_of_sums"] = excess
+        provenance = of_all(provenance, part.transport.provenance)
         yield part._replace(transport=replace(part.transport, provenance=provenance))
         report("reconstructing", block.stop / height)
 
@@ -173,6 +189,7 @@ def _squarely(
     )
     provenance = provenance_of(capture, photos, method=method, square=True)
     provenance["excess_of_sums"] = max((part.excess_of_sums for part in measured), key=abs)
+    provenance["rounding"] = 0.0
     return replace(transport, provenance=provenance), correspondence
 
 

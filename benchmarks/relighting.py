@@ -2,15 +2,20 @@
 
 Run ``python benchmarks/relighting.py``. It prints lights a second, one by one and 64 at once, and
 how many times as long as one pass over the factors' bytes a light takes, in the same run: float32
-lights, then float64 ones, which NumPy takes longer over.
+lights, then float64 ones, which NumPy takes longer over; and prepared transports, by NumPy and,
+where it is installed, by PyTorch, on an accelerator if there is one.
 """
 
 import time
 from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 
-from nearfar import Size, Transport
+from nearfar import Size, Transport, prepare_transport
+from nearfar.arrays import fetch
+from nearfar.devices import Device, mover
 from reconstruction import FAR, PROJECTOR, WINDOW, random_transport
 
 LIGHTS = 64
@@ -49,6 +54,30 @@ def main() -> None:
                 f"{np.dtype(kind)!s}, {name}: {1 / seconds:.0f} lights a second, "
                 f"{seconds / reading:.2f} passes each"
             )
+    for device in devices():
+        for half in (False, True):
+            prepared = prepare_transport(transport, device, half=half)
+            lights = mover(device)(generator.random((LIGHTS, *PROJECTOR), dtype=np.float32))
+            single = fastest(
+                lambda prepared=prepared, one=lights[:1]: fetch(prepared.pictures(one))
+            )
+            many = fastest(
+                lambda prepared=prepared, lights=lights: fetch(prepared.pictures(lights))
+            )
+            print(
+                f"prepared, {device}, {'float16' if half else 'float32'}, "
+                f"{prepared.nbytes / 2**20:.0f} MiB: {1 / single:.0f} lights a second one by one, "
+                f"{LIGHTS / many:.0f} {LIGHTS} at once"
+            )
+
+
+def devices() -> list[Device]:
+    """Tell where transports can be prepared."""
+    if find_spec("torch") is None:
+        return ["cpu"]
+    return (
+        ["cpu", "torch", "cuda"] if import_module("torch").cuda.is_available() else ["cpu", "torch"]
+    )
 
 
 if __name__ == "__main__":

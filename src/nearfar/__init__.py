@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_store import load_exact, save_exact
     from nearfar.transport.model import Transport
+    from nearfar.transport.prepared import prepare_transport
     from nearfar.transport.store import load_transport, save_transport
     from nearfar.version import version
     from nearfar.workflow.acquire import acquire
@@ -55,6 +56,7 @@ _HOMES = {
     "paper_plan": "nearfar.plan",
     "parse_plan": "nearfar.plan",
     "parse_size": "nearfar.arrays",
+    "prepare_transport": "nearfar.transport.prepared",
     "penguin": "nearfar.illumination.pictures",
     "random_pattern": "nearfar.illumination.pictures",
     "read_correspondence": "nearfar.correspondence",
@@ -94,6 +96,7 @@ __all__ = [
     "parse_plan",
     "parse_size",
     "penguin",
+    "prepare_transport",
     "random_pattern",
     "read_correspondence",
     "read_plan",

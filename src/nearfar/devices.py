@@ -1,7 +1,7 @@
 """Where arrays are worked at: NumPy's on the processor, PyTorch's on an accelerator.
 
-The joint estimate is written in the functions of the Python array API; which library it runs in
-follows from the arrays that it is given.
+Estimators and prepared transports are written in the functions of the Python array API; which
+library they run in follows from the arrays that they are given.
 """
 
 from collections.abc import Callable
@@ -44,3 +44,8 @@ def mover(device: Device) -> Callable[[NDArray[Any]], Any]:
             "that is installed, or use the device cpu."
         )
     return lambda values: torch.asarray(np.ascontiguousarray(values), device="cuda")
+
+
+def require_device(device: Device) -> None:
+    """Refuse a device that is not there; raises as `mover`."""
+    mover(device)

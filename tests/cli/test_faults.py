@@ -104,12 +104,13 @@ def test_a_transport_that_cannot_be_made_while_capturing(
 
 def test_a_device_that_cannot_be(finished: Job, untouched: Untouched, tmp_path: Path):
     arguments = ("reconstruct", finished.capture, tmp_path / "out.zarr", "--device", "cuda")
-    check_refused(untouched, (*arguments, "--method", "paper"), "method paper does not run on")
     torch = find_spec("torch") and import_module("torch")
-    if torch is None:
-        check_refused(untouched, arguments, "PyTorch, which is not installed", "device cpu")
-    elif not torch.cuda.is_available():
-        check_refused(untouched, arguments, "no CUDA device", "device cpu")
+    for method in ("joint", "paper"):
+        chosen = (*arguments, "--method", method)
+        if torch is None:
+            check_refused(untouched, chosen, "PyTorch, which is not installed", "device cpu")
+        elif not torch.cuda.is_available():
+            check_refused(untouched, chosen, "no CUDA device", "device cpu")
 
 
 def test_a_scheduler_that_cannot_be(finished: Job, untouched: Untouched, tmp_path: Path):

@@ -51,9 +51,7 @@ TransportPath = Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="T
 Memory = Annotated[
     str, typer.Option(help="Memory to work in: blocks of camera rows that fit.", metavar="2GB")
 ]
-Processor = Annotated[
-    Where, typer.Option(help="Where the joint estimate is made; cuda needs PyTorch.")
-]
+Processor = Annotated[Where, typer.Option(help="Where the estimate is made; cuda needs PyTorch.")]
 ScenesProjector = Annotated[
     Size | None,
     typer.Option(

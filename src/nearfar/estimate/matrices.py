@@ -127,6 +127,13 @@ class Matrices:
     near_leak: Floats
     checkerboard_leak: Floats
 
+    def put(self, move: Callable[[Any], Any]) -> "Matrices":
+        """Put what each camera pixel meets onto a device."""
+        bands = ("checkerboard", "near", "far")
+        arrays = ("near_inverse", "unseen", "near_leak", "checkerboard_leak")
+        moved = {name: getattr(self, name).put(move) for name in bands}
+        return replace(self, **moved, **{name: move(getattr(self, name)) for name in arrays})
+
 
 def build_matrices(measurements: Measurements, window: int, far: Size, dropped: Size) -> Matrices:
     """Build the paper's matrices.

@@ -8,13 +8,25 @@ Index convention: arrays are (n, channels, ...) with n camera pixels; r runs ove
 w over window entries, m over far coefficients.
 """
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from array_api_compat import device as device_of
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size, blocks, product
+from nearfar.arrays import (
+    Booleans,
+    Floats,
+    Size,
+    beside,
+    blocks,
+    fetch,
+    namespace,
+    product,
+)
+from nearfar.devices import Device, mover
 from nearfar.estimate.matrices import CORNERS, Band, Matrices, build_matrices
 from nearfar.estimate.sparse import least_risk, solve
 from nearfar.parallel import side_by_side
@@ -49,6 +61,7 @@ def estimate(
     dropped: Size,
     *,
     rounds: int = ROUNDS,
+    device: Device = "cpu",
     progress: Callable[[int], None] | None = None,
 ) -> Transport:
     """Estimate D, N and F as in the paper.
@@ -64,14 +77,24 @@ def estimate(
         Far band and the block of near frequencies that were not shot.
     rounds : int
         Rounds of near and far.
+    device : {"cpu", "cuda", "torch"}
+        Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
+        processor.
     progress : callable, optional
         Called with the number of camera pixels done after each block.
 
     Returns
     -------
     Transport
+
+    Raises
+    ------
+    InputError, MissingPackageError
+        As `nearfar.devices.mover`.
     """
+    move = mover(device)
     matrices = build_matrices(measurements, window, far, dropped)
+    there = matrices.put(move)
     where = footprint(correspondence, measurements.projector)
     centres = near.centre(correspondence, measurements.projector)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
@@ -83,8 +106,10 @@ def estimate(
 
     def work(block: slice) -> None:
         pixels = _pixels(measurements, where, lit, centres, block, matrices)
-        found = _estimate_block(pixels, matrices, rounds)
-        direct[block], windows[block], low[block] = found.direct, found.near, found.far
+        pixels = _Pixels._make(map(move, pixels))
+        found = _estimate_block(pixels, there, rounds)
+        for values, own in ((direct, found.direct), (windows, found.near), (low, found.far)):
+            values[block] = fetch(own)
         done[0] += block.stop - block.start
         if progress is not None:
             progress(done[0])
@@ -131,7 +156,7 @@ class _Estimate(NamedTuple):
     unseen: Floats  # z of equation (10)
 
     def copy(self) -> "_Estimate":
-        return _Estimate(*(values.copy() for values in self))
+        return _Estimate(*(namespace(values).asarray(values, copy=True) for values in self))
 
     def only(self, pixels: Booleans) -> "_Estimate":
         return _Estimate(*(values[pixels] for values in self))
@@ -148,19 +173,20 @@ def _estimate_block(pixels: _Pixels, matrices: Matrices, rounds: int) -> _Estima
     Where a scene does not obey the model, or the near set reaches into the far band, the rounds
     may not settle: a camera pixel whose leaks move no less than before keeps its best round.
     """
+    xp, here = namespace(pixels.near), device_of(pixels.near)
     found = _round(pixels, None, _no_leaks(pixels), matrices)
-    moving = np.arange(len(pixels.lit))
+    moving = xp.arange(len(pixels.lit), device=here)
     latest, leaks = found.copy(), _no_leaks(pixels)
-    before = np.full(len(moving), np.inf)
+    before = xp.full(len(moving), xp.inf, dtype=xp.float64, device=here)
     for _ in range(rounds - 1):
         previous, leaks = leaks, _leaks(latest.far, pixels, matrices)
         moved = _moved(previous, leaks)
-        limit = AGREED_NOISE * pixels.noise.mean(axis=1) + AGREED * pixels.light
+        limit = AGREED_NOISE * xp.mean(pixels.noise, axis=1) + AGREED * pixels.light
         settling = moved <= SETTLING * before
         # The latest round of a pixel that still settles is its best so far.
         found.put(moving[settling], latest.only(settling))
         going = settling & (moved > limit)
-        if not going.any():
+        if not bool(xp.any(going)):
             break
         moving, pixels, before = moving[going], pixels.only(going), moved[going]
         leaks = _Leaks(*(leak[going] for leak in leaks))
@@ -172,10 +198,14 @@ def _estimate_block(pixels: _Pixels, matrices: Matrices, rounds: int) -> _Estima
 
 def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
     """Root mean square by which each camera pixel's leaks changed, (n,)."""
-    moved = np.zeros(len(leaks.near))
+    xp = namespace(leaks.near)
+    moved: NDArray[np.float64] = xp.zeros(
+        len(leaks.near), dtype=xp.float64, device=device_of(leaks.near)
+    )
     for old, new in zip(previous, leaks, strict=True):
-        if new.size:
-            moved = np.maximum(moved, np.sqrt(np.mean((new - old) ** 2, axis=(1, 2))))
+        if new.shape[2]:
+            off = xp.sqrt(xp.mean((new - old) ** 2, axis=(1, 2)))
+            moved = xp.maximum(moved, xp.astype(off, xp.float64))
     return moved
 
 
@@ -187,7 +217,8 @@ class _Leaks(NamedTuple):
 
 
 def _no_leaks(pixels: _Pixels) -> _Leaks:
-    return _Leaks(np.zeros_like(pixels.checkerboard), np.zeros_like(pixels.near))
+    xp = namespace(pixels.near)
+    return _Leaks(xp.zeros_like(pixels.checkerboard), xp.zeros_like(pixels.near))
 
 
 def _leaks(far: Floats, pixels: _Pixels, matrices: Matrices) -> _Leaks:
@@ -270,17 +301,18 @@ def _direct(
     There the checkerboard's answer fades, d (1 - 2a)(1 - 2b) for an offset (a, b), so the
     highest near frequencies are weighed in as far as it does.
     """
+    xp = namespace(near_answers)
     answer = pixels.corners @ matrices.checkerboard.on_corners.T
     frequencies = np.abs(matrices.near.basis.cycles).max(axis=1, initial=0.0)
-    high = frequencies[matrices.near.basis.index] > HIGH
+    high = beside(np.flatnonzero(frequencies[matrices.near.basis.index] > HIGH), near_answers)
     high_answer = pixels.corners @ matrices.near.on_corners[high].T
     faded = 1.0 - answer[:, 0] ** 2
-    energy = answer[:, 0] ** 2 + faded * np.sum(high_answer**2, axis=1)
-    total = checkerboard[..., 0] * answer + faded[:, None] * np.einsum(
-        "ncr,nr->nc", near_answers[..., high], high_answer
-    )
-    d = total / np.maximum(energy, FAINT)[:, None] * pixels.lit[:, None]
-    return np.asarray(d, dtype=np.float32)
+    energy = answer[:, 0] ** 2 + faded * xp.sum(high_answer**2, axis=1)
+    of_high = (near_answers[..., high] @ high_answer[..., None])[..., 0]
+    total = checkerboard[..., 0] * answer + faded[:, None] * of_high
+    d = total / xp.clip(energy, min=FAINT)[:, None] * pixels.lit[:, None]
+    found: Floats = xp.astype(d, xp.float32)
+    return found
 
 
 def _near(
@@ -288,19 +320,20 @@ def _near(
 ) -> tuple[Floats, Floats]:
     """Equation (10): windows n, shape (n, channels, W^2), and the unseen part z."""
     number, channels = answers.shape[:2]
-    n0 = product(answers, matrices.near_inverse).reshape(-1, matrices.window**2)
+    xp, rows = namespace(answers), number * channels
+    n0 = product(answers, matrices.near_inverse).reshape((rows, matrices.window**2))
     # A window entry is a mean of W^2 answers, cosine and sine of each pair.
-    entry_noise = pixels.noise.reshape(-1) * np.float32(np.sqrt(2.0) / matrices.window)
-    inside = np.repeat(pixels.inside, channels, axis=0)
+    entry_noise = pixels.noise.reshape((rows,)) * (math.sqrt(2.0) / matrices.window)
+    inside = xp.repeat(pixels.inside, channels, axis=0)
     if start is None:
         _, z = solve(n0, matrices.unseen, inside, FIRST * entry_noise)
     else:
-        z = start.reshape(len(n0), -1)
+        z = start.reshape((rows, matrices.unseen.shape[1]))
     v = n0 + z @ matrices.unseen.T
-    entry_noise = np.maximum(entry_noise, _strays_beyond_the_border(v, inside, z.shape[1]))
+    entry_noise = xp.maximum(entry_noise, _strays_beyond_the_border(v, inside, z.shape[1]))
     windows, unseen = solve(n0, matrices.unseen, inside, least_risk(v, inside, entry_noise), z)
-    shape = (number, channels, -1)
-    return windows.reshape(shape) * pixels.lit[:, None, None], unseen.reshape(shape)
+    windows = windows.reshape((number, channels, matrices.window**2)) * pixels.lit[:, None, None]
+    return windows, unseen.reshape((number, channels, z.shape[1]))
 
 
 def _strays_beyond_the_border(v: Floats, inside: Booleans, unknowns: int) -> Floats:
@@ -309,8 +342,10 @@ def _strays_beyond_the_border(v: Floats, inside: Booleans, unknowns: int) -> Flo
     They are known to be zero: what a scene that departs from the model leaves there tells how far
     the entries inside can be trusted, as noise would. Where the model holds it is 0.
     """
-    beyond = np.count_nonzero(~inside, axis=1)
-    energy = np.sum(np.where(inside, 0.0, v) ** 2, axis=1)
-    strays = np.sqrt(energy / np.maximum(beyond - unknowns, 1))
-    told = (beyond > unknowns) & (strays > DEPARTS * np.abs(v).max(axis=1))
-    return np.asarray(strays * told)
+    xp = namespace(v)
+    beyond = xp.count_nonzero(~inside, axis=1)
+    energy = xp.sum(xp.where(inside, 0.0, v) ** 2, axis=1)
+    strays = xp.sqrt(energy / xp.astype(xp.clip(beyond - unknowns, min=1), v.dtype))
+    told = (beyond > unknowns) & (strays > DEPARTS * xp.max(xp.abs(v), axis=1))
+    known: Floats = strays * told
+    return known

@@ -17,9 +17,9 @@ Index convention: rows i run over camera pixels and channels, w over the W^2 win
 
 from typing import NamedTuple
 
-import numpy as np
+from array_api_compat import device
 
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, namespace
 
 # Reweighting steps at most, and when a row is settled: relative to lambda, and to its size.
 STEPS = 60
@@ -62,24 +62,29 @@ def solve(
     z : ndarray, shape (I, m)
     """
     rows, unknowns = len(n0), unseen.shape[1]
-    z = np.zeros((rows, unknowns), dtype=n0.dtype) if start is None else start.copy()
-    if unknowns:
-        scale = np.abs(n0).max(axis=1, initial=0.0)
+    xp, here = namespace(n0), device(n0)
+    if start is None:
+        z = xp.zeros((rows, unknowns), dtype=n0.dtype, device=here)
+    else:
+        z = xp.asarray(start, copy=True)
+    if unknowns and rows:
+        scale = xp.max(xp.abs(n0), axis=1)
+        largest = float(xp.max(xp.abs(unseen)))
         # Rows stop on their own, so that no row's answer depends on its company.
-        moving = np.arange(rows)
+        moving = xp.arange(rows, device=here)
         problem = _Problem(n0, inside, threshold, scale, FLOOR * scale)
         for _ in range(STEPS):
             change = _step(problem, z[moving], unseen)
             z[moving] -= change
             problem = problem.with_lower_floor()
-            going = ~problem.settled(np.abs(unseen).max() * np.abs(change).max(axis=1))
-            if not going.all():
+            going = ~problem.settled(largest * xp.max(xp.abs(change), axis=1))
+            if not bool(xp.all(going)):
                 moving, problem = moving[going], problem.only(going)
             if not len(moving):
                 break
     v = n0 + z @ unseen.T
-    n = np.sign(v) * np.maximum(np.abs(v) - threshold[:, None], 0.0) * inside
-    return n.astype(n0.dtype, copy=False), z
+    n = xp.sign(v) * xp.clip(xp.abs(v) - threshold[:, None], min=0.0) * inside
+    return xp.astype(n, n0.dtype, copy=False), z
 
 
 def least_risk(v: Floats, inside: Booleans, noise: Floats) -> Floats:
@@ -102,17 +107,19 @@ def least_risk(v: Floats, inside: Booleans, noise: Floats) -> Floats:
     ndarray, shape (I,)
         One of `SHARES` of the noise.
     """
-    size = np.abs(v)
+    xp = namespace(v)
+    size = xp.abs(v)
     size *= inside
-    beyond = np.count_nonzero(~inside, axis=1)
-    kept, risks = np.empty_like(size), []
+    beyond = xp.count_nonzero(~inside, axis=1)
+    risks = []
     for share in SHARES:
         threshold = (share * noise)[:, None]
-        zeroed = np.count_nonzero(size <= threshold, axis=1) - beyond
-        np.minimum(size, threshold, out=kept)
-        risks.append(np.einsum("iw,iw->i", kept, kept) - 2 * noise**2 * zeroed)
-    best = np.argmin(np.stack(risks, axis=1), axis=1)
-    return np.asarray(np.array(SHARES, dtype=v.dtype)[best] * noise)
+        zeroed = xp.count_nonzero(size <= threshold, axis=1) - beyond
+        kept = xp.minimum(size, threshold)
+        risks.append(xp.vecdot(kept, kept) - 2 * noise**2 * zeroed)
+    best = xp.argmin(xp.stack(risks, axis=1), axis=1)
+    chosen: Floats = xp.asarray(SHARES, dtype=v.dtype, device=device(v))[best] * noise
+    return chosen
 
 
 class _Problem(NamedTuple):
@@ -134,28 +141,30 @@ class _Problem(NamedTuple):
         """Tell which rows moved no more, under a floor that no longer matters."""
         least = SETTLED * self.scale
         still = moved <= SETTLED_NOISE * self.threshold + least
-        return np.asarray(still & (self.floor <= self.threshold + least))
+        done: Booleans = still & (self.floor <= self.threshold + least)
+        return done
 
 
 def _step(problem: _Problem, z: Floats, unseen: Floats) -> Floats:
     """Return what reweighted least squares takes off z."""
-    width = np.maximum(problem.threshold, problem.floor + SETTLED * problem.scale + TINY)[:, None]
+    xp = namespace(z)
+    width = xp.maximum(problem.threshold, problem.floor + SETTLED * problem.scale + TINY)[:, None]
     v = z @ unseen.T
     v += problem.n0
-    weight = np.abs(v)
-    np.maximum(weight, width, out=weight)
-    np.divide(width, weight, out=weight)
-    np.copyto(weight, 1.0, where=~problem.inside)
+    weight = width / xp.maximum(xp.abs(v), width)
+    weight[~problem.inside] = 1.0
     return _weighted_step(v, weight, unseen)
 
 
 def _weighted_step(v: Floats, weight: Floats, unseen: Floats) -> Floats:
     """(Z^T diag(weight) Z)^-1 Z^T diag(weight) v for each row."""
-    unknowns = unseen.shape[1]
-    pairs = (unseen[:, :, None] * unseen[:, None, :]).reshape(len(unseen), -1)
-    normal = (weight @ pairs).reshape(-1, unknowns, unknowns).astype(np.float64)
+    xp, unknowns = namespace(v), unseen.shape[1]
+    pairs = (unseen[:, :, None] * unseen[:, None, :]).reshape((len(unseen), unknowns**2))
+    normal = xp.astype((weight @ pairs).reshape((len(v), unknowns, unknowns)), xp.float64)
     weight *= v
-    right = (weight @ unseen).astype(np.float64)
+    right = xp.astype(weight @ unseen, xp.float64)
     # A window with no weight at all has nothing to say; the ridge keeps it still.
-    ridge = 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(unknowns)
-    return np.linalg.solve(normal + ridge, right[..., None])[..., 0].astype(v.dtype)
+    unit = xp.eye(unknowns, dtype=xp.float64, device=device(v))
+    ridge = 1e-9 * xp.linalg.trace(normal)[:, None, None] * unit
+    step: Floats = xp.astype(xp.linalg.solve(normal + ridge, right[..., None])[..., 0], v.dtype)
+    return step

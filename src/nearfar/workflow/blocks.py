@@ -21,7 +21,7 @@ from nearfar.correspondence import (
     correspond_by_stripes,
     has_stripes,
 )
-from nearfar.devices import Device
+from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure
@@ -33,7 +33,7 @@ from nearfar.transport.half import in_half, rounding_over_noise
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_rows
 from nearfar.version import version
-from nearfar.workflow.methods import ESTIMATORS, Estimate, Method, require_device
+from nearfar.workflow.methods import ESTIMATORS, Estimate, Method
 
 # Bytes of memory that a reconstruction takes at most, unless told otherwise.
 MEMORY = 2 * 10**9
@@ -148,7 +148,7 @@ def prepare(
         If the plan by reference has too few whites and blacks, or a row of the camera does not
         fit in the memory, or the device is not there.
     """
-    require_device(method, device)
+    require_device(device)
     cut = cut_rows(capture, method=method, memory=memory, given=given)
     read = without_drift(photos or capture, report or unheard)
     estimate = ESTIMATORS[method].estimate

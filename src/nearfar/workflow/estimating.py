@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from nearfar.capture import Capture
 from nearfar.correspondence import correspond_by_phase, correspond_by_stripes, has_stripes
-from nearfar.devices import Device
+from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
 from nearfar.estimate.joint import Choices, choose_kinds
 from nearfar.estimate.joint.problem import build_model
@@ -36,7 +36,7 @@ from nearfar.workflow.blocks import (
     unheard,
     without_drift,
 )
-from nearfar.workflow.methods import ESTIMATORS, jointly, require_device
+from nearfar.workflow.methods import ESTIMATORS, jointly
 from nearfar.workflow.reconstruct import parts_of, reconstruct_in_blocks
 
 # Kinds are first chosen by this share of the photos of transport, to see how long it takes.
@@ -88,7 +88,7 @@ class RunningEstimate:
     def __init__(
         self, plan: Plan, full_scale: float, *, memory: int = MEMORY, device: Device = "cpu"
     ) -> None:
-        require_device("joint", device)
+        require_device(device)
         ESTIMATORS["joint"].require(plan)
         self.held: HeldPhotos | None = None
         self._plan, self._full_scale = plan, full_scale

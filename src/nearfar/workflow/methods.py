@@ -1,11 +1,11 @@
 """The estimators by name: what plan each takes, and what memory."""
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 from nearfar.arrays import Floats
-from nearfar.devices import Device, mover
-from nearfar.errors import InputError, PlanError
+from nearfar.devices import Device
+from nearfar.errors import PlanError
 from nearfar.estimate.joint import Choices, estimate_jointly
 from nearfar.estimate.joint.estimate import TURNS
 from nearfar.estimate.joint.prior import RATIOS
@@ -50,9 +50,9 @@ def _require_photos(plan: Plan) -> None:
 
 
 def _as_the_paper(
-    plan: Plan, measurements: Measurements, pixels: Floats, _progress: Shares, _device: Device
+    plan: Plan, measurements: Measurements, pixels: Floats, _progress: Shares, device: Device
 ) -> Transport:
-    return estimate(measurements, pixels, plan.window, plan.far, plan.dropped)
+    return estimate(measurements, pixels, plan.window, plan.far, plan.dropped, device=device)
 
 
 def jointly(
@@ -87,21 +87,6 @@ def _bytes_of_joint(plan: Plan, channels: int) -> tuple[int, int]:
     return kinds * prior, rows + entries + pairs
 
 
-def require_device(method: "Method", device: Device) -> None:
-    """Refuse a device that is not there, or that a method does not run on.
-
-    Raises
-    ------
-    InputError
-    """
-    if device not in ESTIMATORS[method].devices:
-        raise InputError(
-            f"the method {method} does not run on the device {device}: use the device cpu, or the "
-            f"method joint."
-        )
-    mover(device)
-
-
 class Estimator(NamedTuple):
     """What plan a method takes, and what it makes of measurements and q.
 
@@ -113,19 +98,16 @@ class Estimator(NamedTuple):
         Rows of the camera beside those wanted that tell something of them.
     bytes_of : callable
         From a plan and a number of channels: bytes that all share, and those of a camera pixel.
-    devices : tuple of Device
-        Where it runs.
     """
 
     require: Callable[[Plan], None]
     estimate: Estimate
     halo: int
     bytes_of: Callable[[Plan, int], tuple[int, int]]
-    devices: tuple[Device, ...]
 
 
 ESTIMATORS: dict[Method, Estimator] = {
-    "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper, ("cpu",)),
+    "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper),
     # Each turn but the first hears the neighbours, and the first sees their q.
-    "joint": Estimator(_require_photos, jointly, TURNS, _bytes_of_joint, get_args(Device)),
+    "joint": Estimator(_require_photos, jointly, TURNS, _bytes_of_joint),
 }

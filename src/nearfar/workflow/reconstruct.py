@@ -13,7 +13,7 @@ from nearfar.correspondence import (
     joined,
     onto_projector,
 )
-from nearfar.devices import Device
+from nearfar.devices import Device, require_device
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import join
 from nearfar.photometry.photos import Photos
@@ -34,7 +34,7 @@ from nearfar.workflow.blocks import (
     without_drift,
     without_light,
 )
-from nearfar.workflow.methods import ESTIMATORS, Method, require_device
+from nearfar.workflow.methods import ESTIMATORS, Method
 
 
 def reconstruct(
@@ -62,7 +62,7 @@ def reconstruct(
         Bytes to work in, above what is returned. The camera is cut into blocks of rows; a square
         T takes what it needs.
     device : {"cpu", "cuda", "torch"}
-        Where the joint estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on
+        Where the estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on
         the processor.
     progress : callable, optional
         Told what is being done and the share done, 0 to 1.
@@ -168,7 +168,7 @@ def _squarely(
     report: Progress,
 ) -> tuple[Transport, Correspondence]:
     """Reconstruct the paper's square T, all of it at once."""
-    require_device(method, device)
+    require_device(device)
     estimator = ESTIMATORS[method]
     estimator.require(capture.plan)
     photos = without_drift(capture, report)

@@ -32,7 +32,7 @@ from nearfar.estimate.sparse import least_risk, solve
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.direct import Footprint, footprint
+from nearfar.transport.direct import Footprint, footprint, look_up_each
 from nearfar.transport.model import Transport
 
 # Rounds of near and far at most, and when they agree: as a share of the noise, and of the light.
@@ -95,6 +95,12 @@ def estimate(
     move = mover(device)
     matrices = build_matrices(measurements, window, far, dropped)
     there = matrices.put(move)
+    errors = _ShownErrors(
+        *(
+            np.ascontiguousarray(measurements.shown_error[band.places].T)
+            for band in (matrices.near, matrices.far)
+        )
+    )
     where = footprint(correspondence, measurements.projector)
     centres = near.centre(correspondence, measurements.projector)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
@@ -105,7 +111,7 @@ def estimate(
     done = [0]
 
     def work(block: slice) -> None:
-        pixels = _pixels(measurements, where, lit, centres, block, matrices)
+        pixels = _pixels(measurements, where, lit, centres, block, matrices, errors)
         pixels = _Pixels._make(map(move, pixels))
         found = _estimate_block(pixels, there, rounds)
         for values, own in ((direct, found.direct), (windows, found.near), (low, found.far)):
@@ -126,6 +132,13 @@ def estimate(
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
     )
+
+
+class _ShownErrors(NamedTuple):
+    """What 8 bits got wrong of the near and far patterns, a row for each projector pixel."""
+
+    near: Floats
+    far: Floats
 
 
 class _Pixels(NamedTuple):
@@ -260,6 +273,7 @@ def _pixels(
     centres: NDArray[np.int64],
     block: slice,
     matrices: Matrices,
+    errors: _ShownErrors,
 ) -> _Pixels:
     """Gather what a block's rounds need."""
     projector = measurements.projector
@@ -268,16 +282,15 @@ def _pixels(
     corners = _corner_weights(where, centres, projector.width)
     answers = measurements.answers[block]
 
-    def shown_error(band: Band) -> Floats:
+    def shown_error(error: Floats) -> Floats:
         """Answers (n, 1, R) of unit direct light to what 8 bits got wrong."""
-        error = measurements.shown_error[band.places][:, where.pixels]
-        return np.asarray(np.einsum("rnk,nk->nr", error, where.weights))[:, None]
+        return look_up_each(error, where.pixels, where.weights)[:, None]
 
     def of_direct(band: Band) -> Floats:
         return np.asarray((corners @ band.on_corners.T)[:, None])
 
     checkerboard, near_band, far_band = matrices.checkerboard, matrices.near, matrices.far
-    near_error = near_band.recentre(shown_error(near_band), centres)
+    near_error = near_band.recentre(shown_error(errors.near), centres)
     return _Pixels(
         centres=centres,
         lit=lit[block],
@@ -289,7 +302,7 @@ def _pixels(
         near=near_band.recentre(answers[..., near_band.places], centres),
         far=answers[..., far_band.places],
         near_of_direct=of_direct(near_band) + near_error,
-        far_of_direct=far_band.uncentre(of_direct(far_band), centres) + shown_error(far_band),
+        far_of_direct=far_band.uncentre(of_direct(far_band), centres) + shown_error(errors.far),
     )
 
 

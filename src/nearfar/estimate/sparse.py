@@ -27,6 +27,8 @@ SETTLED_NOISE = 0.01
 SETTLED = 1e-6
 # The noise-free corner of |.|_1 is reached under a floor that shrinks by this at each step.
 FLOOR = 0.3
+# A lambda of less than this share of a row's largest entry is close to that corner.
+CORNER = 1e-3
 SHRINK = 0.6
 # lambda is looked for among these shares of an entry's noise.
 SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
@@ -72,7 +74,11 @@ def solve(
         largest = float(xp.max(xp.abs(unseen)))
         # Rows stop on their own, so that no row's answer depends on its company.
         moving = xp.arange(rows, device=here)
-        problem = _Problem(n0, inside, threshold, scale, FLOOR * scale)
+        floor = FLOOR * scale
+        if start is not None:
+            # From close by the minimum needs no floor to be found, but at the corner.
+            floor = xp.where(threshold > CORNER * scale, 0.0, floor)
+        problem = _Problem(n0, inside, threshold, scale, floor)
         for _ in range(STEPS):
             change = _step(problem, z[moving], unseen)
             z[moving] -= change

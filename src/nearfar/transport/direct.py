@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Booleans, Floats, Integers, Size, namespace
 
 # q closer than this to a whole pixel is taken as that pixel.
 WHOLE = 1e-4
@@ -62,6 +62,19 @@ def footprint(correspondence: Floats, projector: Size) -> Footprint:
 def look_up(light: Floats, where: Footprint) -> Floats:
     """Read a light (..., P) at each camera pixel's footprint: shape (..., C)."""
     return np.asarray(np.einsum("...ck,ck->...c", light[..., where.pixels], where.weights))
+
+
+def look_up_each(answers: Floats, pixels: Integers, weights: Floats) -> Floats:
+    """Read the answers (P, R) of every projector pixel at footprints, both (n, 4): (n, R).
+
+    What a camera pixel asks for lies side by side; corners that nobody weighs are not read.
+    """
+    found: Floats = answers[pixels[:, 0]] * weights[:, :1]
+    xp = namespace(answers)
+    for corner in range(1, 4):
+        if bool(xp.any(weights[:, corner] != 0)):
+            found += answers[pixels[:, corner]] * weights[:, corner, None]
+    return found
 
 
 def spread(image: Floats, where: Footprint, projector: Size) -> Floats:

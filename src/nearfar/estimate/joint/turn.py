@@ -30,7 +30,7 @@ from nearfar.estimate.joint.solve import Found, ratio_of, solve_whole
 from nearfar.estimate.matrices import Band
 from nearfar.parallel import side_by_side
 from nearfar.transport import near
-from nearfar.transport.direct import footprint
+from nearfar.transport.direct import footprint, look_up_each
 from nearfar.transport.kinds import LIT
 
 # Camera pixels at once; and where the border cuts their windows.
@@ -184,15 +184,7 @@ def _misdrawn(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]
         for values in (shown_error.T, where.pixels, where.weights)
     )
 
-    def of(chosen: slice | NDArray[np.int64]) -> Floats:
-        pixels, weights = places[chosen], shares[chosen]
-        found: Floats = error[pixels[:, 0]] * weights[:, :1]
-        for corner in range(1, 4):
-            if bool((weights[:, corner] != 0).any()):
-                found += error[pixels[:, corner]] * weights[:, corner, None]
-        return found
-
-    return of
+    return lambda chosen: look_up_each(error, places[chosen], shares[chosen])
 
 
 def _with_edges(

@@ -1,6 +1,7 @@
 """What neighbours expect."""
 
 import numpy as np
+import pytest
 
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 
@@ -28,3 +29,13 @@ def test_neighbours_without_a_say_are_not_heard():
     known[4, 4] = False
     found = expect_together(values, np.full((9, 9, 1), 1.0), known)
     assert not found.any()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 1), (5, 6)])
+def test_what_is_alike_everywhere_stays_so_to_the_cameras_border(shape):
+    values, variance = np.full((*shape, 2, 3), 0.7), np.full((*shape, 2), 0.01)
+    found = expect_each(values, variance, np.ones(3))
+    np.testing.assert_allclose(found, values, rtol=1e-12)
+    np.testing.assert_allclose(
+        expect_together(values, variance, np.ones(shape, dtype=bool)), values, rtol=1e-12
+    )

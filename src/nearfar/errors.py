@@ -40,3 +40,7 @@ class MissingPackageError(NearfarError, ImportError):
 
 class ClusterError(NearfarError, ConnectionError):
     """A scheduler that is not there, or workers that cannot do the work."""
+
+
+class CaptureInterrupted(KeyboardInterrupt):
+    """A capture that was told to stop; the message tells what is kept of it."""

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nearfar.arrays import Size
-from nearfar.capture import open_capture, store, white_and_black, write_capture
+from nearfar.capture import open_capture, white_and_black, write_capture, writing
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -266,7 +266,7 @@ def test_rows_of_large_photos_are_read_without_the_rest(tmp_path: Path, monkeypa
     photos = list(photos_of(PLAN))
     height, row = photos[0].shape[0], photos[0][0].nbytes
     assert height % 3
-    monkeypatch.setattr(store, "CHUNK_BYTES", 3 * row + 1)
+    monkeypatch.setattr(writing, "CHUNK_BYTES", 3 * row + 1)
     path = tmp_path / "a.zarr"
     capture = write_capture(path, PLAN, photos)
     assert (path / "photos" / "c.0.1.0.0").exists()

@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import pty
+import re
 import resource
 import select
 import signal
@@ -17,7 +18,7 @@ import pytest
 
 from nearfar.cli.main import COMMANDS
 from nearfar.version import version
-from tests.cli.conftest import PLAN, check_done, run_nearfar
+from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
 
 SCRIPT = Path(sys.executable).with_name("nearfar")
 MODULE = (sys.executable, "-m", "nearfar")
@@ -99,13 +100,14 @@ def long_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupted_capture_leaves_nothing(long_job, tmp_path: Path, stop: signal.Signals):
+def test_an_interrupted_capture_keeps_its_photos(long_job, tmp_path: Path, stop: signal.Signals):
     plan, rig = long_job
     out = tmp_path / "capture.zarr"
+    unfinished = tmp_path / "capture.zarr.unfinished"
     command = [*MODULE, "acquire", str(plan), str(out), "--rig", str(rig)]
     with subprocess.Popen(command, stdout=-1, stderr=-1, text=True) as process:
         deadline = time.monotonic() + 60
-        while not list(tmp_path.glob(".*/photos/c.*.0.0.0")):
+        while not (unfinished / "photos" / "c.2.0.0.0").exists():
             assert process.poll() is None, process.communicate()
             assert time.monotonic() < deadline
             time.sleep(0.01)
@@ -113,8 +115,17 @@ def test_an_interrupted_capture_leaves_nothing(long_job, tmp_path: Path, stop: s
         said, complaint = process.communicate(timeout=60)
     assert process.returncode == 128 + stop
     assert said == ""
-    assert complaint == "nearfar: interrupted: nothing half-written was left behind.\n"
-    assert list(tmp_path.iterdir()) == []
+    kept = re.fullmatch(
+        rf"nearfar: interrupted: (\d+) of (\d+) photos are kept in {unfinished}: "
+        r"go on with --resume\.\n",
+        complaint,
+    )
+    assert kept
+    assert 1 < int(kept[1]) < int(kept[2])
+    assert list(tmp_path.iterdir()) == [unfinished]
+    check_sentence(run_nearfar(*command[len(MODULE) :]), unfinished, "--resume", "--force")
+    check_done(run_nearfar(*command[len(MODULE) :], "--resume"))
+    assert list(tmp_path.iterdir()) == [out]
 
 
 IMPATIENT = "from nearfar.cli import main, progress\nprogress.PATIENCE = 0.05\n"

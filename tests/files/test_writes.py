@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nearfar.errors import StorageError
-from nearfar.files import add_array, new_output, stores
+from nearfar.files import add_array, add_to_store, new_output, open_store, read_array, stores
 from nearfar.files.stores import create_durable_store, create_store
 from nearfar.files.writes import abandon
 
@@ -68,3 +68,12 @@ def test_a_fault_of_the_disk_is_still_a_fault(tmp_path, monkeypatch):
         monkeypatch.setattr(stores, "_write_durably", full)
         array[:] = 1.0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_zeros_are_written_into_arrays_that_are_there(tmp_path):
+    values = np.zeros((4, 8), dtype=np.float32)
+    for _ in range(2):
+        group = add_to_store(tmp_path / "a.zarr", "nearfar test", 1)
+        add_array(group, "values", (4, 8), np.float32, (2, 8))[:] = values
+    read = read_array(open_store(tmp_path / "a.zarr", "nearfar test", 1), "values")
+    np.testing.assert_array_equal(read, values)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.baselines.separation import Separation, black_over_white_less_black
-from nearfar.capture.store import as_photo, check_photo
+from nearfar.capture.checks import as_photo, check_photo
 from nearfar.errors import InputError
 from nearfar.files import full_scale_of, list_pictures, read_picture
 from nearfar.rigs.base import Rig

@@ -8,7 +8,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from nearfar.capture.store import Capture, write_capture
+from nearfar.capture.store import Capture
+from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import list_pictures, read_picture
 from nearfar.plan.model import Picture, Plan, Stripe

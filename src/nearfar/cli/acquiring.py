@@ -58,6 +58,10 @@ def acquire(
             metavar="TRANSPORT.zarr",
         ),
     ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on with the photos of a capture that was stopped."),
+    ] = False,
     memory: Memory = "2GB",
     device: Processor = Where.CPU,
     force: Force = False,
@@ -67,7 +71,7 @@ def acquire(
 
     Example: nearfar acquire plan.json capture.zarr --rig cornell --transport transport.zarr
     """
-    from nearfar.files import check_output
+    from nearfar.files import check_output, check_resumable
     from nearfar.plan import read_plan
     from nearfar.plan.checks import with_checks
     from nearfar.rigs.config import notes_of, open_rig
@@ -83,7 +87,9 @@ def acquire(
     if target is not None:
         made = with_checks(made)
     keep_input(output, plan_file, Path(rig))
-    check_output(output, force=force)
+    if resume and force:
+        raise typer.BadParameter("is not for --force.", param_hint="--resume")
+    check_resumable(output, resume=resume, force=force)
     if transport is not None:
         keep_input(transport, plan_file, Path(rig))
         if transport.resolve() == output.resolve():
@@ -108,6 +114,7 @@ def acquire(
             made,
             output,
             opened,
+            resume=resume,
             force=force,
             progress=counted(report, "photos", len(made.patterns)),
             # The estimate hears of every photo, for it never says that they are enough.

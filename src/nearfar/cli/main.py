@@ -27,7 +27,7 @@ from nearfar.cli import (
     separating,
     transports,
 )
-from nearfar.errors import NearfarError
+from nearfar.errors import CaptureInterrupted, NearfarError
 
 app = typer.Typer(
     name="nearfar",
@@ -89,8 +89,8 @@ def _faults_in_sentences() -> Iterator[None]:
         sys.stdout.flush()
     except NearfarError as error:
         _fail(str(error))
-    except KeyboardInterrupt:
-        _interrupted()
+    except KeyboardInterrupt as stopped:
+        _interrupted(stopped)
     except BrokenPipeError:
         # Whoever read our output has gone; the interpreter must not complain at exit.
         _discard_stdout()
@@ -156,9 +156,10 @@ def _stopped_cleanly() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _interrupted() -> NoReturn:
+def _interrupted(stopped: KeyboardInterrupt | None = None) -> NoReturn:
     status = 128 + (_stops[-1] if _stops else signal.SIGINT)
-    _fail("interrupted: nothing half-written was left behind.", status=status)
+    what = "interrupted: nothing half-written was left behind."
+    _fail(str(stopped) if isinstance(stopped, CaptureInterrupted) else what, status=status)
 
 
 def _discard_stdout() -> None:

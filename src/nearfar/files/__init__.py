@@ -15,13 +15,14 @@ from nearfar.files.images import (
     write_picture,
 )
 from nearfar.files.kinds import kind_of_store
-from nearfar.files.output import check_output, new_output
+from nearfar.files.output import check_output, check_resumable, new_output, resumable_output
 from nearfar.files.stores import (
     add_array,
     add_to_store,
     create_durable_store,
     create_store,
     open_array,
+    open_durable_store,
     open_store,
     read_array,
     read_selection,
@@ -32,6 +33,7 @@ __all__ = [
     "add_to_store",
     "check_output",
     "check_picture_ending",
+    "check_resumable",
     "create_durable_store",
     "create_store",
     "encode_png",
@@ -43,6 +45,7 @@ __all__ = [
     "natural_key",
     "new_output",
     "open_array",
+    "open_durable_store",
     "open_store",
     "read_array",
     "read_arrays",
@@ -51,6 +54,7 @@ __all__ = [
     "read_picture",
     "read_selection",
     "require_finite",
+    "resumable_output",
     "to_srgb",
     "write_picture",
 ]

@@ -18,8 +18,10 @@ from nearfar.errors import (
     StorageError,
 )
 from nearfar.files.kinds import kind_of_store
-from nearfar.files.writes import abandon
+from nearfar.files.writes import abandon, settle
 
+# Ending of a folder that is not finished, and may be gone on with.
+UNFINISHED = ".unfinished"
 _CURES = {
     errno.ENOSPC: "the disk is full: free space and run the command again",
     errno.EDQUOT: "the disk quota is used up: free space and run the command again",
@@ -92,6 +94,88 @@ def new_output(
         raise
     finally:
         _remove(partial)
+
+
+@contextlib.contextmanager
+def resumable_output(
+    path: Path,
+    worth: Callable[[Path], bool],
+    *,
+    resume: bool = False,
+    force: bool = False,
+) -> Iterator[Path]:
+    """Give a path beside `path` to write a folder to, which is kept where the body does not end.
+
+    When the body ends well the folder takes the place of `path`, as with `new_output`. Whatever
+    stops it, kill -9 too, leaves the folder as it stands, to go on with; an `InputError`, of what
+    is no good, removes it.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to make; a link is followed.
+    worth : callable
+        Says of a folder that was stopped whether there is anything in it to go on with.
+    resume : bool
+        Go on with what is there.
+    force : bool
+        Replace what is there.
+
+    Yields
+    ------
+    Path
+        `path` with ``.unfinished`` behind it.
+
+    Raises
+    ------
+    MissingFileError
+        If there is nothing to go on with.
+    ExistingOutputError
+        If there is something, and neither `resume` nor `force`.
+    NearfarError
+        As `new_output`.
+    """
+    target, unfinished = _checked_resumable(path, resume=resume, force=force)
+    if not resume:
+        _remove(unfinished)
+    try:
+        with storage_faults(path):
+            yield unfinished
+            synchronise(unfinished)
+            _move_into_place(unfinished, target)
+    except BaseException as error:
+        settle()
+        useless = isinstance(error, InputError) or not worth(unfinished)
+        if useless and not resume:
+            _remove(unfinished)
+        raise
+
+
+def check_resumable(path: Path, *, resume: bool = False, force: bool = False) -> None:
+    """Refuse, before any work, what `resumable_output` would refuse, in the same words."""
+    _checked_resumable(path, resume=resume, force=force)
+
+
+def _checked_resumable(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
+    target = _checked_target(path, force=force, replaceable=is_ours)
+    unfinished = target.with_name(f"{target.name}{UNFINISHED}")
+    if resume and not unfinished.is_dir():
+        raise MissingFileError(
+            f"{unfinished} is not there, so there is nothing to go on with: leave out --resume."
+        )
+    if not resume and unfinished.exists():
+        if not force:
+            raise ExistingOutputError(
+                f"{unfinished} holds what was not finished: go on with it by --resume, or begin "
+                f"anew by --force."
+            )
+        _checked_target(unfinished, force=True, replaceable=_is_begun)
+    return target, unfinished
+
+
+def _is_begun(folder: Path) -> bool:
+    """Tell whether a folder is ours, or was begun when the process was killed."""
+    return is_ours(folder) or all(entry.suffix == ".partial" for entry in folder.iterdir())
 
 
 @contextlib.contextmanager

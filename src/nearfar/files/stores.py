@@ -129,6 +129,11 @@ def create_durable_store(
     return _create(_DurableStore(path), kind, version, attributes)
 
 
+def open_durable_store(path: Path) -> zarr.Group:
+    """Open a group that `create_durable_store` made, to go on writing."""
+    return zarr.open_group(_DurableStore(path), mode="r+", zarr_format=3)
+
+
 def add_to_store(
     path: Path, kind: str, version: int, attributes: Mapping[str, Any] | None = None
 ) -> zarr.Group:
@@ -163,7 +168,8 @@ def add_array(
         found = group[name]
         if not isinstance(found, zarr.Array) or (found.shape, found.chunks) != (shape, chunks):
             raise ValueError(f"{name} is laid out otherwise in {_root(group.store)}")
-        return found
+        # Not kept on the disk: chunks of zeros would be left out.
+        return found.with_config({"write_empty_chunks": True})
     return group.create_array(
         name,
         shape=shape,

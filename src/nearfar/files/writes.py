@@ -28,6 +28,11 @@ async def write_into(folder: Path, write: Callable[[], None]) -> None:
 def abandon(folder: Path) -> None:
     """Let writes into `folder` that are under way end, and no other begin."""
     _abandoned.add(folder)
+    settle()
+
+
+def settle() -> None:
+    """Let writes that are under way end."""
     for loop in [loop for loop in _loops if loop.is_running()]:
         with contextlib.suppress(TimeoutError):
             asyncio.run_coroutine_threadsafe(_others(), loop).result(2 * PATIENCE)

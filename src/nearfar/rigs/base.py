@@ -28,6 +28,9 @@ class Rig(Protocol):
         """Tell what the capture should remember of the rig, as JSON."""
         ...
 
-    def shoot(self, patterns: Iterable[NDArray[np.uint8]]) -> Iterator[Photo]:
-        """Show each 8-bit pattern and yield its photo, (Cy, Cx, channels), in order."""
+    def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
+        """Show each 8-bit pattern and yield its photo, (Cy, Cx, channels), in order.
+
+        `first` is the number of the first pattern in its plan.
+        """
         ...

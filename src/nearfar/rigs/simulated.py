@@ -80,25 +80,31 @@ class SimulatedRig:
             **self.details,
         }
 
-    def shoot(self, patterns: Iterable[NDArray[np.uint8]]) -> Iterator[Photo]:
-        """Yield a photo for each pattern, in order."""
-        number = 0
-        for batch in _batches(patterns, BATCH):
-            lights = np.stack(
-                [self.optics.emit(pattern, number + i) for i, pattern in enumerate(batch)]
-            )
-            for picture in self.world.pictures(lights):
+    def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
+        """Yield a photo for each pattern, in order; `first` is the number of the first."""
+        number = first
+        for batch in _batches(patterns, BATCH, first):
+            # Dark lights before the first: pictures depend in their last digit on how many are
+            # made at once, and photos must not on where a capture was taken up again.
+            before = number % BATCH
+            lights = np.zeros((before + len(batch), *self.projector), dtype=np.float32)
+            for i, pattern in enumerate(batch):
+                lights[before + i] = self.optics.emit(pattern, number + i)
+            for picture in self.world.pictures(lights)[before:]:
                 generator = np.random.default_rng([self.seed, number])
                 yield self.sensor.photograph(self.exposure * picture, generator, number)
                 number += 1
 
 
 def _batches(
-    patterns: Iterable[NDArray[np.uint8]], length: int
+    patterns: Iterable[NDArray[np.uint8]], length: int, first: int
 ) -> Iterator[list[NDArray[np.uint8]]]:
+    """Cut patterns where their numbers are multiples of `length`."""
     remaining = iter(patterns)
-    while batch := list(islice(remaining, length)):
+    batch = list(islice(remaining, length - first % length))
+    while batch:
         yield batch
+        batch = list(islice(remaining, length))
 
 
 def brightest(world: World, name: str = "the transport") -> float:

@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
-from nearfar.capture import Capture, write_capture
-from nearfar.errors import InputError
+from nearfar.capture import Capture, CaptureWriter, open_capture
+from nearfar.capture.writing import LOG, has_photos
+from nearfar.errors import CaptureInterrupted, InputError, StorageError
+from nearfar.files import resumable_output
+from nearfar.files.output import UNFINISHED
 from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
 from nearfar.rigs.base import Photo, Rig
@@ -20,11 +23,16 @@ def acquire(
     path: AnyPath,
     rig: Rig,
     *,
+    resume: bool = False,
     force: bool = False,
     progress: Callable[[int], None] | None = None,
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
 ) -> Capture:
     """Shoot a plan.
+
+    Every photo is on the disk before the next pattern is shown. Until the last they lie in a
+    folder of the capture's name with ``.unfinished`` behind it, and whatever stops the capture,
+    they can be gone on with.
 
     Parameters
     ----------
@@ -32,12 +40,15 @@ def acquire(
     path : str or Path
         Capture to make.
     rig : Rig
+    resume : bool
+        Go on with the photos that are there, of the same plan and rig.
     force : bool
         Replace a capture that is there.
     progress : callable, optional
         Told the number of photos taken after each.
     enough : callable, optional
-        Told each photo's number and the photo; where it says so, no more are taken.
+        Told each photo's number and the photo, those that were there too; where it says so, no
+        more are taken.
 
     Returns
     -------
@@ -48,21 +59,54 @@ def acquire(
     PlanError
         If the plan's patterns are complex.
     InputError
-        If the rig's projector is not the plan's.
+        If the rig's projector is not the plan's; if plan or rig are not those of the photos there;
+        if a photo is not like the others, or they tell of a projector that is off: what was taken
+        is removed then.
     NearfarError
-        As `nearfar.capture.write_capture`.
+        As `nearfar.files.resumable_output`.
+    CaptureInterrupted
+        If it was told to stop. What was taken is kept.
     """
     path = Path(path)
-    return write_capture(
-        path,
-        plan,
-        _photos(plan, rig),
-        full_scale=rig.full_scale,
-        rig=rig.describe(),
-        force=force,
-        progress=progress,
-        enough=enough,
-    )
+    _require(plan, rig)
+    count, taken = len(plan.patterns), 0
+    try:
+        with (
+            resumable_output(path, has_photos, resume=resume, force=force) as folder,
+            _writer(folder, plan, rig, resume=resume) as writer,
+        ):
+            taken = writer.taken
+            ended = writer.ended
+            for number in range(taken):
+                ended = (enough is not None and enough(number, writer.read(number))) or ended
+            photos = iter(()) if ended else _photos(plan, rig, taken)
+            while not ended:
+                photo = writer.add(next(photos, None))
+                taken = writer.taken
+                if progress is not None:
+                    progress(taken)
+                ended = (enough is not None and enough(taken - 1, photo)) or writer.ended
+            writer.finish()
+    except KeyboardInterrupt as error:
+        if not taken:
+            raise
+        raise CaptureInterrupted(f"interrupted: {_kept(path, taken, count)}") from error
+    except StorageError as error:
+        if not taken:
+            raise
+        raise StorageError(f"{error} {_kept(path, taken, count)}") from error
+    # Until it had its name, it was what the photos would have been gone on with by.
+    (path.resolve() / LOG).unlink(missing_ok=True)
+    return open_capture(path)
+
+
+def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWriter:
+    begin = CaptureWriter.resume if resume else CaptureWriter
+    return begin(folder, plan, full_scale=rig.full_scale, rig=rig.describe())
+
+
+def _kept(path: Path, taken: int, count: int) -> str:
+    return f"{taken} of {count} photos are kept in {path}{UNFINISHED}: go on with --resume."
 
 
 def hold(plan: Plan, rig: Rig) -> HeldPhotos:
@@ -73,14 +117,18 @@ def hold(plan: Plan, rig: Rig) -> HeldPhotos:
     PlanError, InputError
         As `acquire`.
     """
+    _require(plan, rig)
     return HeldPhotos(plan, np.stack(list(_photos(plan, rig))), rig.full_scale)
 
 
-def _photos(plan: Plan, rig: Rig) -> Iterator[Photo]:
+def _require(plan: Plan, rig: Rig) -> None:
     plan.require_real("shoot")
     if rig.projector != plan.projector:
         raise InputError(
             f"the plan is for a projector of {plan.projector}, the rig has {rig.projector}: make "
             f"the plan with --projector {rig.projector}."
         )
-    return rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))
+
+
+def _photos(plan: Plan, rig: Rig, first: int = 0) -> Iterator[Photo]:
+    return rig.shoot((plan.draw(i) for i in range(first, len(plan.patterns))), first)

@@ -1,0 +1,117 @@
+"""What photos must be like: each like the first, and together what their plan asks for."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Size
+from nearfar.capture.store import DTYPES
+from nearfar.errors import InputError
+from nearfar.files import require_finite
+
+
+def as_photo(photo: NDArray[Any] | None, name: str) -> NDArray[Any]:
+    """Bring a photo to (Cy, Cx, channels).
+
+    Raises
+    ------
+    InputError
+        If there is none, or its kind or shape is not a photo's.
+    """
+    if photo is None:
+        raise InputError("there are no photos: give one for each pattern of the plan.")
+    if photo.dtype not in DTYPES or photo.ndim not in {2, 3} or photo.size == 0:
+        raise InputError(
+            f"{name} is an array of {photo.dtype} and shape {photo.shape}: a photo is uint8, "
+            f"uint16 or float32, height x width or height x width x channels."
+        )
+    return np.atleast_3d(photo)
+
+
+def _describe(photo: NDArray[Any]) -> str:
+    height, width, channels = photo.shape
+    plural = "" if channels == 1 else "s"
+    return f"{Size(height, width)} with {channels} channel{plural} of {photo.dtype}"
+
+
+def check_photo(photo: NDArray[Any], first: NDArray[Any], scale: float, name: str) -> None:
+    """Refuse a photo that is not like the first, or is beyond its full scale.
+
+    Raises
+    ------
+    InputError
+    """
+    if photo.shape != first.shape or photo.dtype != first.dtype:
+        raise InputError(
+            f"{name} is {_describe(photo)}, but the first photo is {_describe(first)}: "
+            f"take all photos with the same camera settings."
+        )
+    if photo.dtype.kind == "f":
+        require_finite(photo, name)
+    elif photo.max() > scale:
+        raise InputError(
+            f"{name} has values up to {photo.max()}, above the full scale of {scale:g}: give the "
+            f"camera's true full scale."
+        )
+
+
+def check_count(written: int, count: int, more: bool) -> None:
+    """Refuse fewer photos than patterns, or more.
+
+    Raises
+    ------
+    InputError
+    """
+    if written < count or more:
+        there = f"only {written}" if written < count else f"more than {count}"
+        raise InputError(
+            f"there are {there} photos for the {count} patterns of the plan: give one for each."
+        )
+
+
+def check_white_and_black(
+    pair: tuple[int, int] | None, means: NDArray[np.float64], called: list[str]
+) -> None:
+    """Refuse white that is no brighter than black; photos that are not there yet have mean NaN.
+
+    Raises
+    ------
+    InputError
+    """
+    if pair is None:
+        return
+    white, black = pair
+    if means[white] <= means[black]:
+        raise InputError(
+            f"{called[white]}, of the white pattern, is no brighter than {called[black]}, of the "
+            f"black one: the photos seem to be out of order, or the projector was off."
+        )
+
+
+def check_order(
+    pair: tuple[int, int] | None, means: NDArray[np.float64], called: list[str]
+) -> None:
+    """Refuse photos darker than black or brighter than white.
+
+    Raises
+    ------
+    InputError
+    """
+    # No pattern gives less light than black or more than white; half their difference is far
+    # above any noise or drift.
+    if pair is None:
+        return
+    white, black = pair
+    margin = (means[white] - means[black]) / 2
+    darkest, brightest = int(means.argmin()), int(means.argmax())
+    for bad, word, reference, name in (
+        (means[darkest] < means[black] - margin, "darker", black, "black"),
+        (means[brightest] > means[white] + margin, "brighter", white, "white"),
+    ):
+        if bad:
+            other = darkest if reference == black else brightest
+            raise InputError(
+                f"{called[other]} is much {word} than {called[reference]}, of the {name} pattern: "
+                f"the photos seem to be out of order."
+            )

@@ -1,0 +1,418 @@
+"""Writing a capture: every photo is on the disk, and noted, before the next is asked for."""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from nearfar.arrays import AnyPath
+from nearfar.capture.checks import (
+    as_photo,
+    check_count,
+    check_order,
+    check_photo,
+    check_white_and_black,
+)
+from nearfar.capture.store import (
+    CHUNK_BYTES,
+    FORMAT_VERSION,
+    KIND,
+    Capture,
+    is_positive,
+    open_capture,
+    white_and_black,
+)
+from nearfar.errors import InputError, UnreadableFileError
+from nearfar.files import (
+    add_array,
+    create_durable_store,
+    full_scale_of,
+    new_output,
+    open_array,
+    open_durable_store,
+    open_store,
+    read_selection,
+)
+from nearfar.plan.model import Plan
+from nearfar.version import version
+
+if sys.platform != "win32":
+    import fcntl
+
+# A line for each photo that is on the disk; gone once the capture is whole.
+LOG = "photos.jsonl"
+
+
+class _Taken(NamedTuple):
+    """What is noted of a photo."""
+
+    time: float
+    saturated: float
+    mean: float
+    # Whether it is the first photo again.
+    same: bool
+
+
+class CaptureWriter:
+    """Writes the photos of a plan into a folder, in order; it may be gone on with by another.
+
+    Use it as a context: leaving it lets others at the folder.
+
+    Parameters
+    ----------
+    folder : Path
+        To make; within `nearfar.files.new_output` or `nearfar.files.resumable_output`.
+    plan : Plan
+    full_scale : float, optional
+        Raw value of full scale; by default that of the numbers' type.
+    rig : mapping, optional
+        What takes the photos, free JSON.
+    exposure : float, optional
+        Exposure time in seconds.
+    names : sequence of str, optional
+        What to call each photo in a message.
+
+    Raises
+    ------
+    PlanError
+        If the plan's patterns are complex.
+    InputError
+        If full scale or exposure are not above 0.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        plan: Plan,
+        *,
+        full_scale: float | None = None,
+        rig: Mapping[str, Any] | None = None,
+        exposure: float | None = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        plan.require_real("capture")
+        for name, value in (("full scale", full_scale), ("exposure", exposure)):
+            if value is not None and not is_positive(value):
+                raise InputError(f"the {name} {value} is not a positive number: give one above 0.")
+        self._folder, self._plan, self._scale = folder, plan, full_scale
+        self._attributes = {
+            "plan": json.loads(plan.to_json()),
+            "rig": dict(rig or {}),
+            "exposure": exposure,
+            "nearfar": version(),
+        }
+        count = len(plan.patterns)
+        self._called = [f"photo {i}" for i in range(count)]
+        if names:
+            self._called = [
+                f"{photo} ({name})" for photo, name in zip(self._called, names, strict=True)
+            ]
+        self._white_black = white_and_black(plan)
+        self._means = np.full(count, np.nan)
+        self._taken: list[_Taken] = []
+        self._first: NDArray[Any] | None = None
+        self._group: zarr.Group | None = None
+        self._photos: zarr.Array[Any] | None = None
+        self._log: int | None = None
+
+    @classmethod
+    def resume(
+        cls,
+        folder: Path,
+        plan: Plan,
+        *,
+        full_scale: float | None = None,
+        rig: Mapping[str, Any] | None = None,
+    ) -> Self:
+        """Go on with a capture that another writer left.
+
+        Parameters
+        ----------
+        folder : Path
+            Where it is.
+        plan, full_scale, rig
+            As they were.
+
+        Raises
+        ------
+        InputError
+            If they are not as they were, or another is at work on it.
+        UnreadableFileError
+            If it is damaged, or something else.
+        """
+        group = open_store(folder, KIND, FORMAT_VERSION)
+        writer = cls(folder, plan, full_scale=full_scale, rig=rig)
+        writer._open_log()
+        try:
+            writer._take_up(group)
+        except BaseException:
+            writer.__exit__()
+            raise
+        return writer
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_fault: object) -> None:
+        if self._log is not None:
+            os.close(self._log)
+            self._log = None
+
+    @property
+    def taken(self) -> int:
+        """How many photos there are."""
+        return len(self._taken)
+
+    @property
+    def ended(self) -> bool:
+        """Whether all photos are there, or the capture has ended before all were."""
+        count = len(self._plan.patterns)
+        known = self._group.attrs.get("plan") if self._group is not None else None
+        return self.taken == count or known == json.loads(self._plan.first(self.taken).to_json())
+
+    def read(self, number: int) -> NDArray[Any]:
+        """Read a photo that is there, raw."""
+        assert self._photos is not None
+        return read_selection(self._photos, (number,))
+
+    def add(self, photo: NDArray[Any] | None) -> NDArray[Any]:
+        """Write the next photo, and wait for the disk.
+
+        Parameters
+        ----------
+        photo : ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
+            uint8, uint16 or float32.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx, channels)
+
+        Raises
+        ------
+        InputError
+            If it does not fit the others, holds NaN, infinities or whole numbers above full
+            scale, or white is no brighter than black.
+        """
+        number = self.taken
+        called = self._called[number]
+        photo = as_photo(photo, called) if self._first is None else np.atleast_3d(np.asarray(photo))
+        first = photo if self._first is None else self._first
+        scale = full_scale_of(first.dtype) if self._scale is None else float(self._scale)
+        check_photo(photo, first, scale, called)
+        if self._photos is None:
+            self._photos = self._laid_out(first, scale)
+        self._first, self._scale = first, scale
+        self._photos[number] = photo
+        mean = float(photo.mean(dtype=np.float64))
+        self._means[number] = mean
+        check_white_and_black(self._white_black, self._means, self._called)
+        saturated = float(np.mean(photo >= scale))
+        self._note(_Taken(time.time(), saturated, mean, bool(np.array_equal(photo, first))))
+        return photo
+
+    def finish(self) -> None:
+        """Make a capture of the photos there are, and a plan of their patterns.
+
+        Raises
+        ------
+        InputError
+            If all photos are the same, or seem out of order.
+        """
+        assert self._group is not None
+        assert self._photos is not None
+        count = self.taken
+        check_order(self._white_black, self._means[:count], self._called)
+        if all(taken.same for taken in self._taken):
+            assert self._first is not None
+            what = "the same" if self._first.any() else "black"
+            raise InputError(
+                f"all {count} photos are {what}: check that the projector shows the patterns and "
+                f"the camera sees them."
+            )
+        for name in ("time", "saturated"):
+            values = np.array([getattr(taken, name) for taken in self._taken])
+            add_array(self._group, name, (count,), np.float64, (count,))[:] = values
+        if count < len(self._plan.patterns):
+            self._group.attrs["plan"] = json.loads(self._plan.first(count).to_json())
+            self._photos.resize((count, *self._photos.shape[1:]))
+
+    def _take_up(self, group: zarr.Group) -> None:
+        """Take over what another writer left."""
+        folder, before = self._folder, dict(group.attrs)
+        self._taken = _read_log(folder)
+        # What was being written when it was killed.
+        for left in folder.rglob(".*.partial"):
+            left.unlink()
+        now = json.loads(json.dumps(self._attributes))
+        # A capture that ended early has the plan of its photos.
+        ended = json.loads(self._plan.first(self.taken).to_json())
+        if before.get("plan") not in (now["plan"], ended):
+            raise InputError(
+                f"{folder} was begun with another plan: give that one, or begin anew with --force."
+            )
+        if before.get("rig") != now["rig"]:
+            names = _different(before.get("rig"), now["rig"])
+            raise InputError(
+                f"{folder} was begun with another rig ({names}): set it up as it was, or begin "
+                f"anew with --force."
+            )
+        photos, scale = open_array(group, "photos"), before.get("full_scale")
+        many = self.taken > min(photos.shape[0], len(self._plan.patterns))
+        if many or not is_positive(scale):
+            raise UnreadableFileError(f"{folder} is damaged: begin anew with --force.")
+        self._scale = float(scale)
+        self._means[: self.taken] = [taken.mean for taken in self._taken]
+        if self._taken:
+            self._first = read_selection(photos, (0,))
+        self._group = open_durable_store(folder)
+        self._photos = add_array(self._group, "photos", photos.shape, photos.dtype, photos.chunks)
+
+    def _laid_out(self, first: NDArray[Any], scale: float) -> zarr.Array[Any]:
+        """Lay out the folder for photos like the first."""
+        count = len(self._plan.patterns)
+        self._group = create_durable_store(
+            self._folder, KIND, FORMAT_VERSION, {**self._attributes, "full_scale": scale}
+        )
+        rows = max(1, min(len(first), CHUNK_BYTES // max(1, first[0].nbytes)))
+        chunk = (1, rows, *first.shape[1:])
+        photos = add_array(self._group, "photos", (count, *first.shape), first.dtype, chunk)
+        self._open_log()
+        return photos
+
+    def _open_log(self) -> None:
+        log = os.open(self._folder / LOG, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+        if sys.platform != "win32":
+            try:
+                fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(log)
+                raise InputError(
+                    f"another nearfar is at work on {self._folder}: wait for it, or end it first."
+                ) from None
+        self._log = log
+
+    def _note(self, taken: _Taken) -> None:
+        assert self._log is not None
+        os.write(self._log, (json.dumps(taken._asdict()) + "\n").encode())
+        os.fsync(self._log)
+        self._taken.append(taken)
+
+
+def has_photos(folder: Path) -> bool:
+    """Tell whether a folder holds photos to go on with."""
+    log = folder / LOG
+    return log.exists() and log.stat().st_size > 0
+
+
+def _read_log(folder: Path) -> list[_Taken]:
+    """Read what is noted of the photos; what a crash tore off the last line is cut away."""
+    path = folder / LOG
+    lines = path.read_bytes().splitlines(keepends=True)
+    taken: list[_Taken] = []
+    whole = 0
+    for line in lines:
+        try:
+            noted = _Taken(**json.loads(line))
+        except (ValueError, TypeError):
+            break
+        if not line.endswith(b"\n"):
+            break
+        taken.append(noted)
+        whole += len(line)
+    os.truncate(path, whole)
+    return taken
+
+
+def _different(before: object, now: Mapping[str, Any]) -> str:
+    if not isinstance(before, Mapping):
+        return "its description is damaged"
+    return ", ".join(
+        name for name in {**before, **now} if before.get(name, ...) != now.get(name, ...)
+    )
+
+
+def write_capture(
+    path: AnyPath,
+    plan: Plan,
+    photos: Iterable[NDArray[Any]],
+    *,
+    full_scale: float | None = None,
+    rig: Mapping[str, Any] | None = None,
+    exposure: float | None = None,
+    names: Sequence[str] | None = None,
+    force: bool = False,
+    progress: Callable[[int], None] | None = None,
+    enough: Callable[[int, NDArray[Any]], bool] | None = None,
+) -> Capture:
+    """Write photos that are there, one for each pattern of a plan; whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder to make, ending in ``.zarr`` by custom.
+    plan : Plan
+    photos : iterable of arrays
+        Raw photos in the order of the plan, all uint8, uint16 or float32 and of one shape,
+        (Cy, Cx) or (Cy, Cx, channels).
+    full_scale : float, optional
+        Raw value of full scale; by default that of the numbers' type.
+    rig : mapping, optional
+        What took the photos, free JSON.
+    exposure : float, optional
+        Exposure time in seconds.
+    names : sequence of str, optional
+        What to call each photo in a message.
+    force : bool
+        Replace a capture that is there.
+    progress : callable, optional
+        Told the number of photos written after each.
+    enough : callable, optional
+        Told each photo's number and the photo, (Cy, Cx, channels); where it says so, the capture
+        ends there, and its plan with it.
+
+    Returns
+    -------
+    Capture
+        The capture, open for reading.
+
+    Raises
+    ------
+    PlanError
+        If the plan's patterns are complex.
+    InputError
+        If a photo does not fit the others, holds NaN, infinities or whole numbers above full
+        scale, if there are too few or too many, if all are the same, or white is no brighter
+        than black.
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`; nothing is left behind.
+    """
+    path = Path(path)
+    count = len(plan.patterns)
+    with (
+        new_output(path, force=force) as partial,
+        CaptureWriter(
+            partial, plan, full_scale=full_scale, rig=rig, exposure=exposure, names=names
+        ) as writer,
+    ):
+        remaining = iter(photos)
+        ended = False
+        while writer.taken < count and not ended:
+            photo = next(remaining, None)
+            if photo is None and writer.taken:
+                break
+            photo = writer.add(photo)
+            if progress is not None:
+                progress(writer.taken)
+            ended = enough is not None and enough(writer.taken - 1, photo)
+        if not ended:
+            check_count(writer.taken, count, next(remaining, None) is not None)
+        writer.finish()
+        (partial / LOG).unlink()
+    return open_capture(path)

@@ -1,0 +1,257 @@
+"""Captures that were stopped and are gone on with: as if they had never been stopped."""
+
+import errno
+import json
+import random
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.capture import CaptureWriter, open_capture
+from nearfar.capture.writing import LOG
+from nearfar.errors import (
+    CaptureInterrupted,
+    ExistingOutputError,
+    InputError,
+    MissingFileError,
+    StorageError,
+    UnreadableFileError,
+)
+from nearfar.files import output, stores
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.workflow.acquire import acquire
+from tests.worlds import model_transport
+
+PROJECTOR = Size(16, 20)
+PLAN = choose_plan(PROJECTOR, 50, window=5)[0]
+COUNT = len(PLAN.patterns)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    world = model_transport(PROJECTOR, Size(8, 9), window=5, far=Size(3, 3), channels=2)
+    return SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 1.0, 3)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(rig, tmp_path_factory):
+    return acquire(PLAN, tmp_path_factory.mktemp("whole") / "c.zarr", rig)
+
+
+def _stop_after(count, reason=KeyboardInterrupt):
+    def enough(number, _photo):
+        if number + 1 == count:
+            raise reason
+        return False
+
+    return enough
+
+
+def _stopped(rig, path, count, plan=PLAN, resume=False):
+    with pytest.raises(CaptureInterrupted, match=f"{count} of {COUNT} photos are kept"):
+        acquire(plan, path, rig, enough=_stop_after(count), resume=resume)
+
+
+def _check_same(capture, other):
+    assert capture.plan == other.plan
+    assert capture.rig == other.rig
+    assert capture.full_scale == other.full_scale
+    np.testing.assert_array_equal(capture.photos[:], other.photos[:])
+    np.testing.assert_array_equal(capture.saturated, other.saturated)
+    assert (np.diff(capture.times) >= 0).all()
+    folder = capture.path
+    assert {path.name for path in folder.iterdir()} == {
+        "photos",
+        "saturated",
+        "time",
+        "zarr.json",
+    }
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("stops", [(1,), (15,), (16,), (17, 18, 40), (COUNT - 1,), (COUNT,)])
+def test_it_is_as_if_it_had_not_been_stopped(rig, undisturbed, tmp_path, stops):
+    for i, stop in enumerate(stops):
+        _stopped(rig, tmp_path / "c.zarr", stop, resume=i > 0)
+        assert [path.name for path in tmp_path.iterdir()] == ["c.zarr.unfinished"]
+    told = []
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
+    # No photo was taken twice.
+    assert told == list(range(stops[-1] + 1, COUNT + 1))
+    _check_same(capture, undisturbed)
+
+
+def test_what_was_stopped_before_the_first_photo_leaves_nothing(rig, tmp_path):
+    class Off(SimulatedRig):
+        def shoot(self, patterns, first=0):
+            raise KeyboardInterrupt
+
+    off = Off(**{name: getattr(rig, name) for name in rig.__dataclass_fields__})
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        acquire(PLAN, tmp_path / "c.zarr", off)
+    assert not isinstance(stopped.value, CaptureInterrupted)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_photo_that_was_not_noted_is_taken_again(rig, undisturbed, tmp_path):
+    _stopped(rig, tmp_path / "c.zarr", 20)
+    log = tmp_path / "c.zarr.unfinished" / LOG
+    log.write_bytes(log.read_bytes()[:-7])
+    told = []
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
+    assert told[0] == 20
+    _check_same(capture, undisturbed)
+
+
+def test_every_photo_is_told_to_who_decides(rig, tmp_path):
+    heard = []
+    _stopped(rig, tmp_path / "c.zarr", 10)
+
+    def hear(number, photo):
+        heard.append((number, photo.shape))
+        return number == 29
+
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, enough=hear)
+    assert heard == [(number, (8, 9, 2)) for number in range(30)]
+    assert len(capture.plan.patterns) == 30
+
+
+@pytest.mark.parametrize("early", [None, 30])
+def test_what_was_whole_but_for_its_name_is_not_shot_again(
+    rig, undisturbed, tmp_path, monkeypatch, early
+):
+    def gone(*_arguments):
+        raise KeyboardInterrupt
+
+    def enough(number, _photo):
+        return number + 1 == early
+
+    with monkeypatch.context() as patch, pytest.raises(CaptureInterrupted):
+        patch.setattr(output, "_move_into_place", gone)
+        acquire(PLAN, tmp_path / "c.zarr", rig, enough=enough)
+    told = []
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
+    assert told == []
+    if early is None:
+        _check_same(capture, undisturbed)
+    else:
+        assert capture.plan == PLAN.first(early)
+        np.testing.assert_array_equal(capture.photos[:], undisturbed.photos[:early])
+
+
+def test_a_full_disk_costs_no_photo(rig, undisturbed, tmp_path, monkeypatch):
+    write = stores._write_durably
+
+    def full(path, value):
+        if path.name == "c.25.0.0.0":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(path, value)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stores, "_write_durably", full)
+        with pytest.raises(StorageError, match=r"disk is full.*25 of .* are kept.*--resume"):
+            acquire(PLAN, tmp_path / "c.zarr", rig)
+    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+
+
+def test_another_plan_or_rig_is_refused_and_nothing_is_lost(rig, undisturbed, tmp_path):
+    _stopped(rig, tmp_path / "c.zarr", 12)
+    other = choose_plan(PROJECTOR, 40, window=5)[0]
+    with pytest.raises(InputError, match="another plan"):
+        acquire(other, tmp_path / "c.zarr", rig, resume=True)
+    for changed in (replace(rig, seed=4), replace(rig, exposure=0.9)):
+        with pytest.raises(InputError, match=r"another rig \((seed|transport_exposure)\)"):
+            acquire(PLAN, tmp_path / "c.zarr", changed, resume=True)
+    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+
+
+def test_what_is_there_is_replaced_by_force_alone(rig, undisturbed, tmp_path):
+    _stopped(rig, tmp_path / "c.zarr", 12)
+    with pytest.raises(ExistingOutputError, match=r"c\.zarr\.unfinished.*--resume.*--force"):
+        acquire(PLAN, tmp_path / "c.zarr", rig)
+    told = []
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, force=True, progress=told.append)
+    assert told[0] == 1
+    _check_same(capture, undisturbed)
+    with pytest.raises(MissingFileError, match="nothing to go on with"):
+        acquire(PLAN, tmp_path / "d.zarr", rig, resume=True)
+
+
+def test_what_is_not_finished_is_no_capture_yet(rig, tmp_path):
+    _stopped(rig, tmp_path / "c.zarr", 12)
+    with pytest.raises(UnreadableFileError, match=r"not finished.*--resume"):
+        open_capture(tmp_path / "c.zarr.unfinished")
+
+
+def test_two_at_once_are_refused(rig, tmp_path):
+    _stopped(rig, tmp_path / "c.zarr", 12)
+    folder = tmp_path / "c.zarr.unfinished"
+    with (
+        CaptureWriter.resume(folder, PLAN, full_scale=rig.full_scale, rig=rig.describe()),
+        pytest.raises(InputError, match="another nearfar is at work"),
+    ):
+        acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
+    acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
+
+
+@pytest.mark.parametrize("damage", ["photos", "photo", "attributes", "more"])
+def test_what_is_damaged_gets_a_sentence_and_is_left(rig, tmp_path, damage):
+    _stopped(rig, tmp_path / "c.zarr", 12)
+    folder = tmp_path / "c.zarr.unfinished"
+    if damage == "photos":
+        (folder / "photos" / "zarr.json").unlink()
+    elif damage == "photo":
+        (folder / "photos" / "c.0.0.0.0").write_bytes(b"torn")
+    elif damage == "attributes":
+        metadata = json.loads((folder / "zarr.json").read_text())
+        metadata["attributes"]["full_scale"] = "much"
+        (folder / "zarr.json").write_text(json.dumps(metadata))
+    else:
+        log = (folder / LOG).read_bytes()
+        (folder / LOG).write_bytes(log * COUNT)
+    with pytest.raises(UnreadableFileError, match=r"c\.zarr\.unfinished is damaged"):
+        acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
+    assert folder.is_dir()
+
+
+COMMAND = [sys.executable, "-m", "nearfar"]
+
+
+@pytest.mark.slow
+def test_kill_9_at_twenty_moments_costs_nothing(tmp_path):
+    generator = random.Random(0)
+    plan, scene = tmp_path / "plan.json", tmp_path / "T.npy"
+    plan.write_text(paper_plan(PROJECTOR, 13, Size(5, 5)).to_json())
+    np.save(scene, np.random.default_rng(0).random((8, 9, 16, 20), dtype=np.float32) / 400)
+    shoot = [*COMMAND, "acquire", str(plan), "--rig", str(scene), "-q"]
+    whole, killed = tmp_path / "whole.zarr", tmp_path / "k" / "killed.zarr"
+    subprocess.run([*shoot, str(whole)], check=True)
+    (tmp_path / "k").mkdir()
+    log = tmp_path / "k" / "killed.zarr.unfinished" / LOG
+    resume: list[str] = []
+    for kill in range(20):
+        process = subprocess.Popen([*shoot, str(killed), *resume])
+        # At work on its first few photos, of some hundreds in all.
+        before = log.read_bytes().count(b"\n") if log.exists() else 0
+        while not log.exists() or log.read_bytes().count(b"\n") < before + kill % 3:
+            assert process.poll() is None
+            time.sleep(0.001)
+        time.sleep(generator.uniform(0, 0.01))
+        process.kill()
+        process.wait()
+        resume = ["--resume"]
+    assert not killed.exists()
+    subprocess.run([*shoot, str(killed), *resume], check=True)
+    one, other = (open_capture(path) for path in (whole, killed))
+    np.testing.assert_array_equal(one.photos[:], other.photos[:])
+    assert one.plan == other.plan
+    assert list((tmp_path / "k").iterdir()) == [killed]
+    assert not list(killed.rglob("*.partial"))

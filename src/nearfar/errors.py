@@ -14,6 +14,10 @@ class InputError(NearfarError, ValueError):
     """A value, an array or an option that cannot be used."""
 
 
+class UselessPhotosError(InputError):
+    """Photos that tell of a projector that is off, or a camera that sees nothing."""
+
+
 class PlanError(InputError):
     """A plan that cannot be made, read or used for what was asked."""
 

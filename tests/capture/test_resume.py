@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.capture import CaptureWriter, open_capture
+from nearfar.capture import open_capture, white_and_black
 from nearfar.capture.writing import LOG
 from nearfar.errors import (
     CaptureInterrupted,
@@ -21,9 +21,11 @@ from nearfar.errors import (
     MissingFileError,
     StorageError,
     UnreadableFileError,
+    UselessPhotosError,
 )
 from nearfar.files import output, stores
 from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan.checks import with_checks
 from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.projector import SimulatedProjector
 from nearfar.rigs.simulated import SimulatedRig
@@ -56,7 +58,9 @@ def _stop_after(count, reason=KeyboardInterrupt):
 
 
 def _stopped(rig, path, count, plan=PLAN, resume=False):
-    with pytest.raises(CaptureInterrupted, match=f"{count} of {COUNT} photos are kept"):
+    with pytest.raises(
+        CaptureInterrupted, match=f"^interrupted; {count} of {COUNT} photos are kept"
+    ):
         acquire(plan, path, rig, enough=_stop_after(count), resume=resume)
 
 
@@ -77,7 +81,7 @@ def _check_same(capture, other):
     assert list(folder.parent.iterdir()) == [folder]
 
 
-@pytest.mark.parametrize("stops", [(1,), (15,), (16,), (17, 18, 40), (COUNT - 1,), (COUNT,)])
+@pytest.mark.parametrize("stops", [(2,), (15,), (16,), (17, 18, 40), (COUNT - 1,), (COUNT,)])
 def test_it_is_as_if_it_had_not_been_stopped(rig, undisturbed, tmp_path, stops):
     for i, stop in enumerate(stops):
         _stopped(rig, tmp_path / "c.zarr", stop, resume=i > 0)
@@ -89,16 +93,31 @@ def test_it_is_as_if_it_had_not_been_stopped(rig, undisturbed, tmp_path, stops):
     _check_same(capture, undisturbed)
 
 
-def test_what_was_stopped_before_the_first_photo_leaves_nothing(rig, tmp_path):
-    class Off(SimulatedRig):
-        def shoot(self, patterns, first=0):
-            raise KeyboardInterrupt
+class _Odd:
+    """A rig with which something happens instead of a photo."""
 
-    off = Off(**{name: getattr(rig, name) for name in rig.__dataclass_fields__})
-    with pytest.raises(KeyboardInterrupt) as stopped:
-        acquire(PLAN, tmp_path / "c.zarr", off)
-    assert not isinstance(stopped.value, CaptureInterrupted)
-    assert list(tmp_path.iterdir()) == []
+    def __init__(self, rig, at, what):
+        self._rig, self._at, self._what = rig, at, what
+
+    def __getattr__(self, name):
+        return getattr(self._rig, name)
+
+    def shoot(self, patterns, first=0):
+        for number, photo in enumerate(self._rig.shoot(patterns, first), first):
+            if number != self._at:
+                yield photo
+            elif isinstance(self._what, BaseException):
+                raise self._what
+            else:
+                yield self._what(photo)
+
+
+def test_what_was_stopped_before_the_second_photo_leaves_nothing(rig, tmp_path):
+    for stop in (0, 1):
+        with pytest.raises(KeyboardInterrupt) as stopped:
+            acquire(PLAN, tmp_path / "c.zarr", _Odd(rig, stop, KeyboardInterrupt()))
+        assert not isinstance(stopped.value, CaptureInterrupted)
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_photo_that_was_not_noted_is_taken_again(rig, undisturbed, tmp_path):
@@ -124,6 +143,80 @@ def test_every_photo_is_told_to_who_decides(rig, tmp_path):
     assert len(capture.plan.patterns) == 30
 
 
+def test_a_capture_does_not_end_before_the_photos_that_are_there(rig, tmp_path):
+    # What says now that 20 photos are enough may say so of 20, not of the 25 there are.
+    _stopped(rig, tmp_path / "c.zarr", 25)
+    ends = {20, 40}
+    capture = acquire(
+        PLAN, tmp_path / "c.zarr", rig, resume=True, enough=lambda n, _photo: n + 1 in ends
+    )
+    assert len(capture.plan.patterns) == 40
+    _stopped(rig, tmp_path / "d.zarr", 25)
+    capture = acquire(
+        PLAN, tmp_path / "d.zarr", rig, resume=True, enough=lambda n, _photo: n + 1 == 25
+    )
+    assert len(capture.plan.patterns) == 25
+
+
+@pytest.mark.parametrize(
+    ("odd", "word"),
+    [
+        (lambda photo: np.full_like(photo, 16383), "much brighter"),
+        (lambda photo: photo[:-1], "same camera settings"),
+    ],
+)
+def test_an_odd_photo_is_named_and_taken_again(rig, undisturbed, tmp_path, odd, word):
+    with pytest.raises(InputError, match=rf"photo 40 .*{word}.*; 40 of {COUNT} photos are kept"):
+        acquire(PLAN, tmp_path / "c.zarr", _Odd(rig, 40, odd))
+    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+
+
+def test_a_dark_projector_keeps_nothing(rig, tmp_path):
+    white, _ = white_and_black(PLAN)
+    with pytest.raises(UselessPhotosError, match="no brighter"):
+        acquire(PLAN, tmp_path / "c.zarr", _Odd(rig, white, np.zeros_like))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_path):
+    first = acquire(PLAN, tmp_path / "c.zarr", replace(rig, seed=9))
+    before = first.photos[:]
+    with pytest.raises(CaptureInterrupted, match="--resume --force goes on"):
+        acquire(PLAN, tmp_path / "c.zarr", rig, enough=_stop_after(20), force=True)
+    np.testing.assert_array_equal(open_capture(tmp_path / "c.zarr").photos[:], before)
+    with pytest.raises(ExistingOutputError, match="--force"):
+        acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
+    told = []
+    acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, force=True, progress=told.append)
+    assert told[0] == 21
+    _check_same(open_capture(tmp_path / "c.zarr"), undisturbed)
+
+
+def test_the_same_plan_with_other_options_is_named(rig, tmp_path):
+    checked = with_checks(PLAN)
+    for before, now, word in (
+        (PLAN, checked, "leave out --until"),
+        (checked, PLAN, "give --until"),
+    ):
+        path = tmp_path / f"{len(before.patterns)}.zarr"
+        with pytest.raises(CaptureInterrupted):
+            acquire(before, path, rig, enough=_stop_after(12))
+        with pytest.raises(InputError, match=word):
+            acquire(now, path, rig, resume=True)
+
+
+def test_a_link_is_followed_and_the_folder_named(rig, tmp_path):
+    (tmp_path / "else").mkdir()
+    link, real = tmp_path / "link.zarr", tmp_path / "else" / "real.zarr"
+    link.symlink_to(real)
+    with pytest.raises(CaptureInterrupted, match=str(tmp_path / "else" / "real.zarr.unfinished")):
+        acquire(PLAN, link, rig, enough=_stop_after(12))
+    capture = acquire(PLAN, link, rig, resume=True)
+    assert real.is_dir()
+    assert not (real / LOG).exists()
+    assert len(capture.plan.patterns) == COUNT
+
+
 @pytest.mark.parametrize("early", [None, 30])
 def test_what_was_whole_but_for_its_name_is_not_shot_again(
     rig, undisturbed, tmp_path, monkeypatch, early
@@ -135,7 +228,7 @@ def test_what_was_whole_but_for_its_name_is_not_shot_again(
         return number + 1 == early
 
     with monkeypatch.context() as patch, pytest.raises(CaptureInterrupted):
-        patch.setattr(output, "_move_into_place", gone)
+        patch.setattr(output, "move_into_place", gone)
         acquire(PLAN, tmp_path / "c.zarr", rig, enough=enough)
     told = []
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
@@ -157,7 +250,7 @@ def test_a_full_disk_costs_no_photo(rig, undisturbed, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(stores, "_write_durably", full)
-        with pytest.raises(StorageError, match=r"disk is full.*25 of .* are kept.*--resume"):
+        with pytest.raises(StorageError, match=r"disk is full.*; 25 of .* are kept.*--resume"):
             acquire(PLAN, tmp_path / "c.zarr", rig)
     _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
@@ -191,15 +284,22 @@ def test_what_is_not_finished_is_no_capture_yet(rig, tmp_path):
         open_capture(tmp_path / "c.zarr.unfinished")
 
 
-def test_two_at_once_are_refused(rig, tmp_path):
-    _stopped(rig, tmp_path / "c.zarr", 12)
-    folder = tmp_path / "c.zarr.unfinished"
-    with (
-        CaptureWriter.resume(folder, PLAN, full_scale=rig.full_scale, rig=rig.describe()),
-        pytest.raises(InputError, match="another nearfar is at work"),
-    ):
-        acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
-    acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
+def test_two_at_once_are_refused(rig, undisturbed, tmp_path):
+    path = tmp_path / "c.zarr"
+    _stopped(rig, path, 12)
+    refused = []
+
+    def also(number, _photo):
+        for options in ({"resume": True}, {"force": True}, {"resume": True, "force": True}):
+            with pytest.raises(ExistingOutputError, match="another nearfar is at work"):
+                acquire(PLAN, path, rig, **options)
+        with pytest.raises(ExistingOutputError, match="--resume"):
+            acquire(PLAN, path, rig)
+        refused.append(number)
+        return False
+
+    _check_same(acquire(PLAN, path, rig, resume=True, enough=also), undisturbed)
+    assert len(refused) == COUNT
 
 
 @pytest.mark.parametrize("damage", ["photos", "photo", "attributes", "more"])

@@ -116,8 +116,8 @@ def test_an_interrupted_capture_keeps_its_photos(long_job, tmp_path: Path, stop:
     assert process.returncode == 128 + stop
     assert said == ""
     kept = re.fullmatch(
-        rf"nearfar: interrupted: (\d+) of (\d+) photos are kept in {unfinished}: "
-        r"go on with --resume\.\n",
+        rf"nearfar: interrupted; (\d+) of (\d+) photos are kept in {unfinished}, and "
+        r"--resume goes on with them\.\n",
         complaint,
     )
     assert kept

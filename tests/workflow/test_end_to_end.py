@@ -316,23 +316,6 @@ def test_a_truth_of_another_size_is_refused(world):
         judge_by_truth(world, other)
 
 
-def test_an_interrupted_capture_leaves_nothing(tmp_path, world):
-    rig = _rig(world)
-
-    class Unplugged:
-        projector, full_scale, describe = rig.projector, rig.full_scale, rig.describe
-
-        def shoot(self, patterns):
-            for number, photo in enumerate(rig.shoot(patterns)):
-                if number == 9:
-                    raise KeyboardInterrupt
-                yield photo
-
-    with pytest.raises(KeyboardInterrupt):
-        acquire(PLAN, tmp_path / "c.zarr", Unplugged())
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_capture_remembers_its_rig(tmp_path, world):
     acquire(PLAN, tmp_path / "c.zarr", _rig(world))
     capture = open_capture(tmp_path / "c.zarr")

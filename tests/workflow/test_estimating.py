@@ -24,6 +24,7 @@ from nearfar.workflow.estimating import RunningEstimate
 from nearfar.workflow.evaluate import relighting_snr
 from nearfar.workflow.reconstruct import reconstruct
 from tests.workflow.memory import memory_for
+from tests.worlds import model_transport
 
 SIZE = Size(32, 32)
 PLANS = {
@@ -137,19 +138,50 @@ def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
 
 def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path):
     plan = PLANS["reference"]
-    end = next(end for end in ends(plan) if end > 0.7 * len(plan.patterns))
+    end = next(end for end in ends(plan) if end > 0.6 * len(plan.patterns))
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(
             plan, tmp_path / "c.zarr", rig, enough=lambda n, p: estimate(n, p) or n + 1 == end
         )
         (part,) = estimate.finish(capture)
     assert len(capture.plan.patterns) == end
-    # Kinds by half of the photos are not good enough.
-    assert estimate._choice.photos < end
-    assert estimate.chosen_by == 0
+    # Kinds that were chosen by enough of the photos that there are.
+    assert estimating.ENOUGH * end < estimate.chosen_by < end
     expected, _ = reconstruct(capture)
     assert part.transport.provenance == expected.provenance
+
+
+def test_kinds_by_too_few_photos_are_chosen_again(rig, tmp_path, monkeypatch):
+    # Photos come too fast for more than the first choice, by half of them.
+    monkeypatch.setattr(Patient, "_fits", lambda *_: False)
+    part, estimate, capture = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
+    assert estimate._choice is not None
+    assert estimate.chosen_by == 0
+    expected, _ = reconstruct(capture)
     np.testing.assert_array_equal(part.transport.near, expected.near)
+
+
+def test_a_small_camera_is_not_followed(tmp_path):
+    world = model_transport(SIZE, Size(1, 1), window=5, far=Size(3, 3), channels=1)
+    rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    for plan in ("reference", "pairs"):
+        part, estimate, capture = _follow(PLANS[plan], rig, tmp_path / f"{plan}.zarr")
+        assert estimate._choice is None
+        expected, _ = reconstruct(capture)
+        np.testing.assert_array_equal(part.transport.near, expected.near)
+
+
+def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
+    def faulty(*_arguments, **_options):
+        raise RuntimeError("out of memory")
+
+    monkeypatch.setattr(estimating, "choose_kinds", faulty)
+    plan = PLANS["reference"]
+    with Patient(plan, rig.full_scale) as estimate:
+        capture = acquire(plan, tmp_path / "c.zarr", rig, enough=estimate)
+        assert len(capture.plan.patterns) == len(plan.patterns)
+        with pytest.raises(RuntimeError, match="out of memory"):
+            list(estimate.finish(capture))
 
 
 def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):

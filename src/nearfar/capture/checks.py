@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Size
 from nearfar.capture.store import DTYPES
-from nearfar.errors import InputError
+from nearfar.errors import InputError, UselessPhotosError
 from nearfar.files import require_finite
 
 
@@ -77,13 +77,13 @@ def check_white_and_black(
 
     Raises
     ------
-    InputError
+    UselessPhotosError
     """
     if pair is None:
         return
     white, black = pair
     if means[white] <= means[black]:
-        raise InputError(
+        raise UselessPhotosError(
             f"{called[white]}, of the white pattern, is no brighter than {called[black]}, of the "
             f"black one: the photos seem to be out of order, or the projector was off."
         )
@@ -92,7 +92,7 @@ def check_white_and_black(
 def check_order(
     pair: tuple[int, int] | None, means: NDArray[np.float64], called: list[str]
 ) -> None:
-    """Refuse photos darker than black or brighter than white.
+    """Refuse photos darker than black or brighter than white, once both are there.
 
     Raises
     ------
@@ -103,8 +103,10 @@ def check_order(
     if pair is None:
         return
     white, black = pair
+    if np.isnan(means[white]) or np.isnan(means[black]):
+        return
     margin = (means[white] - means[black]) / 2
-    darkest, brightest = int(means.argmin()), int(means.argmax())
+    darkest, brightest = int(np.nanargmin(means)), int(np.nanargmax(means))
     for bad, word, reference, name in (
         (means[darkest] < means[black] - margin, "darker", black, "black"),
         (means[brightest] > means[white] + margin, "brighter", white, "white"),

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from nearfar.arrays import AnyPath, Size
 from nearfar.errors import UnreadableFileError
 from nearfar.files import (
+    UNFINISHED,
     open_array,
     open_store,
     read_array,
     read_selection,
 )
-from nearfar.files.output import UNFINISHED
 from nearfar.illumination.frequencies import DC
 from nearfar.plan.model import Plan, Sinusoid, parse_plan
 

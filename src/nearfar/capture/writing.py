@@ -2,7 +2,6 @@
 
 import json
 import os
-import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -29,7 +28,7 @@ from nearfar.capture.store import (
     open_capture,
     white_and_black,
 )
-from nearfar.errors import InputError, UnreadableFileError
+from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
     add_array,
     create_durable_store,
@@ -40,11 +39,9 @@ from nearfar.files import (
     open_store,
     read_selection,
 )
+from nearfar.files.output import synchronise_entry
 from nearfar.plan.model import Plan
 from nearfar.version import version
-
-if sys.platform != "win32":
-    import fcntl
 
 # A line for each photo that is on the disk; gone once the capture is whole.
 LOG = "photos.jsonl"
@@ -63,7 +60,7 @@ class _Taken(NamedTuple):
 class CaptureWriter:
     """Writes the photos of a plan into a folder, in order; it may be gone on with by another.
 
-    Use it as a context: leaving it lets others at the folder.
+    Use it as a context: leaving it closes the log.
 
     Parameters
     ----------
@@ -143,7 +140,7 @@ class CaptureWriter:
         Raises
         ------
         InputError
-            If they are not as they were, or another is at work on it.
+            If they are not as they were.
         UnreadableFileError
             If it is damaged, or something else.
         """
@@ -198,7 +195,9 @@ class CaptureWriter:
         ------
         InputError
             If it does not fit the others, holds NaN, infinities or whole numbers above full
-            scale, or white is no brighter than black.
+            scale, or is much darker than black or brighter than white; it is not kept then.
+        UselessPhotosError
+            If white is no brighter than black.
         """
         number = self.taken
         called = self._called[number]
@@ -212,7 +211,9 @@ class CaptureWriter:
         self._photos[number] = photo
         mean = float(photo.mean(dtype=np.float64))
         self._means[number] = mean
+        # What is no good is not noted, so that it is taken again.
         check_white_and_black(self._white_black, self._means, self._called)
+        check_order(self._white_black, self._means, self._called)
         saturated = float(np.mean(photo >= scale))
         self._note(_Taken(time.time(), saturated, mean, bool(np.array_equal(photo, first))))
         return photo
@@ -222,26 +223,26 @@ class CaptureWriter:
 
         Raises
         ------
-        InputError
-            If all photos are the same, or seem out of order.
+        UselessPhotosError
+            If all photos are the same.
         """
         assert self._group is not None
         assert self._photos is not None
         count = self.taken
-        check_order(self._white_black, self._means[:count], self._called)
         if all(taken.same for taken in self._taken):
             assert self._first is not None
             what = "the same" if self._first.any() else "black"
-            raise InputError(
+            raise UselessPhotosError(
                 f"all {count} photos are {what}: check that the projector shows the patterns and "
                 f"the camera sees them."
             )
+        if count < len(self._plan.patterns):
+            # First of all: whoever goes on with this knows by it that no photo is missing.
+            self._group.attrs["plan"] = json.loads(self._plan.first(count).to_json())
+            self._photos.resize((count, *self._photos.shape[1:]))
         for name in ("time", "saturated"):
             values = np.array([getattr(taken, name) for taken in self._taken])
             add_array(self._group, name, (count,), np.float64, (count,))[:] = values
-        if count < len(self._plan.patterns):
-            self._group.attrs["plan"] = json.loads(self._plan.first(count).to_json())
-            self._photos.resize((count, *self._photos.shape[1:]))
 
     def _take_up(self, group: zarr.Group) -> None:
         """Take over what another writer left."""
@@ -254,9 +255,7 @@ class CaptureWriter:
         # A capture that ended early has the plan of its photos.
         ended = json.loads(self._plan.first(self.taken).to_json())
         if before.get("plan") not in (now["plan"], ended):
-            raise InputError(
-                f"{folder} was begun with another plan: give that one, or begin anew with --force."
-            )
+            raise InputError(_other_plan(folder, before.get("plan"), now["plan"]))
         if before.get("rig") != now["rig"]:
             names = _different(before.get("rig"), now["rig"])
             raise InputError(
@@ -287,16 +286,9 @@ class CaptureWriter:
         return photos
 
     def _open_log(self) -> None:
-        log = os.open(self._folder / LOG, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
-        if sys.platform != "win32":
-            try:
-                fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                os.close(log)
-                raise InputError(
-                    f"another nearfar is at work on {self._folder}: wait for it, or end it first."
-                ) from None
-        self._log = log
+        self._log = os.open(self._folder / LOG, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+        synchronise_entry(self._folder)
+        synchronise_entry(self._folder.parent)
 
     def _note(self, taken: _Taken) -> None:
         assert self._log is not None
@@ -305,10 +297,12 @@ class CaptureWriter:
         self._taken.append(taken)
 
 
-def has_photos(folder: Path) -> bool:
-    """Tell whether a folder holds photos to go on with."""
-    log = folder / LOG
-    return log.exists() and log.stat().st_size > 0
+def count_photos(folder: Path) -> int:
+    """Tell how many photos of a capture that is not finished are on the disk."""
+    try:
+        return (folder / LOG).read_bytes().count(b"\n")
+    except FileNotFoundError:
+        return 0
 
 
 def _read_log(folder: Path) -> list[_Taken]:
@@ -328,6 +322,23 @@ def _read_log(folder: Path) -> list[_Taken]:
         whole += len(line)
     os.truncate(path, whole)
     return taken
+
+
+def _other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
+    """Say that a plan is another, or how the same plan was called."""
+
+    def shown(plan: object) -> list[Any]:
+        patterns = plan.get("patterns") if isinstance(plan, Mapping) else None
+        return patterns if isinstance(patterns, list) else []
+
+    def of_transport(plan: object) -> list[Any]:
+        return [p for p in shown(plan) if not isinstance(p, dict) or p.get("purpose") != "check"]
+
+    if of_transport(before) and of_transport(before) == of_transport(now):
+        checked = len(shown(before)) > len(of_transport(before))
+        cure = "give --until with --resume" if checked else "leave out --until"
+        return f"{folder} was begun {'with' if checked else 'without'} --until: {cure}."
+    return f"{folder} was begun with another plan: give that one, or begin anew with --force."
 
 
 def _different(before: object, now: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
-from nearfar.cli.options import Force, Memory, PlanFile, Processor, Quiet, Where, keep_input
+from nearfar.cli.options import Force, PlanFile, Quiet, Where, keep_input
 from nearfar.cli.progress import SATURATED, counted, progress_bar, say, warn
 from nearfar.cli.reconstructing import Seen
 from nearfar.errors import InputError
@@ -62,8 +62,12 @@ def acquire(
         bool,
         typer.Option("--resume", help="Go on with the photos of a capture that was stopped."),
     ] = False,
-    memory: Memory = "2GB",
-    device: Processor = Where.CPU,
+    memory: Annotated[
+        str | None, typer.Option(help="Memory for --transport.", metavar="2GB")
+    ] = None,
+    device: Annotated[
+        Where | None, typer.Option(help="Where --transport is made; cuda needs PyTorch.")
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -81,14 +85,15 @@ def acquire(
     from nearfar.workflow.running import RunningCheck
 
     target = _decibels(until) if until is not None else None
-    available = parse_bytes(memory, name="--memory")
+    for name, given in (("--memory", memory), ("--device", device)):
+        if transport is None and given is not None:
+            raise typer.BadParameter("is for --transport.", param_hint=name)
+    available = parse_bytes(memory or "2GB", name="--memory")
     made = read_plan(plan_file)
     made.require_real("shoot")
     if target is not None:
         made = with_checks(made)
     keep_input(output, plan_file, Path(rig))
-    if resume and force:
-        raise typer.BadParameter("is not for --force.", param_hint="--resume")
     check_resumable(output, resume=resume, force=force)
     if transport is not None:
         keep_input(transport, plan_file, Path(rig))
@@ -107,7 +112,9 @@ def acquire(
             check = RunningCheck(made, target, opened.full_scale, partial(_tell, quiet=quiet))
         if transport is not None:
             estimate = stack.enter_context(
-                RunningEstimate(made, opened.full_scale, memory=available, device=device.value)
+                RunningEstimate(
+                    made, opened.full_scale, memory=available, device=(device or Where.CPU).value
+                )
             )
         told = [each for each in (estimate, check) if each is not None]
         taken = shoot(

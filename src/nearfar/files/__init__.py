@@ -15,7 +15,8 @@ from nearfar.files.images import (
     write_picture,
 )
 from nearfar.files.kinds import kind_of_store
-from nearfar.files.output import check_output, check_resumable, new_output, resumable_output
+from nearfar.files.output import check_output, new_output
+from nearfar.files.resumable import UNFINISHED, check_resumable, resumable_output
 from nearfar.files.stores import (
     add_array,
     add_to_store,
@@ -29,6 +30,7 @@ from nearfar.files.stores import (
 )
 
 __all__ = [
+    "UNFINISHED",
     "add_array",
     "add_to_store",
     "check_output",

@@ -18,10 +18,8 @@ from nearfar.errors import (
     StorageError,
 )
 from nearfar.files.kinds import kind_of_store
-from nearfar.files.writes import abandon, settle
+from nearfar.files.writes import abandon
 
-# Ending of a folder that is not finished, and may be gone on with.
-UNFINISHED = ".unfinished"
 _CURES = {
     errno.ENOSPC: "the disk is full: free space and run the command again",
     errno.EDQUOT: "the disk quota is used up: free space and run the command again",
@@ -47,7 +45,7 @@ def check_output(
     path: Path, *, force: bool = False, replaceable: Callable[[Path], bool] = is_ours
 ) -> None:
     """Refuse, before any work, what `new_output` would refuse; same parameters and errors."""
-    _checked_target(path, force=force, replaceable=replaceable)
+    checked_target(path, force=force, replaceable=replaceable)
 
 
 @contextlib.contextmanager
@@ -82,100 +80,18 @@ def new_output(
     StorageError
         If the disk is full, read-only or closed to this user, in the body or after.
     """
-    target = _checked_target(path, force=force, replaceable=replaceable)
+    target = checked_target(path, force=force, replaceable=replaceable)
     partial = _beside(target, "partial")
     try:
         with storage_faults(path):
             yield partial
             synchronise(partial)
-            _move_into_place(partial, target)
+            move_into_place(partial, target)
     except BaseException:
         abandon(partial)
         raise
     finally:
-        _remove(partial)
-
-
-@contextlib.contextmanager
-def resumable_output(
-    path: Path,
-    worth: Callable[[Path], bool],
-    *,
-    resume: bool = False,
-    force: bool = False,
-) -> Iterator[Path]:
-    """Give a path beside `path` to write a folder to, which is kept where the body does not end.
-
-    When the body ends well the folder takes the place of `path`, as with `new_output`. Whatever
-    stops it, kill -9 too, leaves the folder as it stands, to go on with; an `InputError`, of what
-    is no good, removes it.
-
-    Parameters
-    ----------
-    path : Path
-        Folder to make; a link is followed.
-    worth : callable
-        Says of a folder that was stopped whether there is anything in it to go on with.
-    resume : bool
-        Go on with what is there.
-    force : bool
-        Replace what is there.
-
-    Yields
-    ------
-    Path
-        `path` with ``.unfinished`` behind it.
-
-    Raises
-    ------
-    MissingFileError
-        If there is nothing to go on with.
-    ExistingOutputError
-        If there is something, and neither `resume` nor `force`.
-    NearfarError
-        As `new_output`.
-    """
-    target, unfinished = _checked_resumable(path, resume=resume, force=force)
-    if not resume:
-        _remove(unfinished)
-    try:
-        with storage_faults(path):
-            yield unfinished
-            synchronise(unfinished)
-            _move_into_place(unfinished, target)
-    except BaseException as error:
-        settle()
-        useless = isinstance(error, InputError) or not worth(unfinished)
-        if useless and not resume:
-            _remove(unfinished)
-        raise
-
-
-def check_resumable(path: Path, *, resume: bool = False, force: bool = False) -> None:
-    """Refuse, before any work, what `resumable_output` would refuse, in the same words."""
-    _checked_resumable(path, resume=resume, force=force)
-
-
-def _checked_resumable(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
-    target = _checked_target(path, force=force, replaceable=is_ours)
-    unfinished = target.with_name(f"{target.name}{UNFINISHED}")
-    if resume and not unfinished.is_dir():
-        raise MissingFileError(
-            f"{unfinished} is not there, so there is nothing to go on with: leave out --resume."
-        )
-    if not resume and unfinished.exists():
-        if not force:
-            raise ExistingOutputError(
-                f"{unfinished} holds what was not finished: go on with it by --resume, or begin "
-                f"anew by --force."
-            )
-        _checked_target(unfinished, force=True, replaceable=_is_begun)
-    return target, unfinished
-
-
-def _is_begun(folder: Path) -> bool:
-    """Tell whether a folder is ours, or was begun when the process was killed."""
-    return is_ours(folder) or all(entry.suffix == ".partial" for entry in folder.iterdir())
+        remove(partial)
 
 
 @contextlib.contextmanager
@@ -214,7 +130,8 @@ def synchronise_entry(path: Path) -> None:
         os.close(descriptor)
 
 
-def _checked_target(path: Path, *, force: bool, replaceable: Callable[[Path], bool]) -> Path:
+def checked_target(path: Path, *, force: bool, replaceable: Callable[[Path], bool]) -> Path:
+    """Return where an output goes, links followed; raises as `new_output` before its body."""
     with storage_faults(path):
         target = path.resolve()
         if not target.parent.is_dir():
@@ -244,7 +161,8 @@ def _beside(target: Path, what: str) -> Path:
     return target.with_name(name)
 
 
-def _move_into_place(partial: Path, target: Path) -> None:
+def move_into_place(partial: Path, target: Path) -> None:
+    """Let a file or folder take the place of another, and wait for the disk."""
     if not target.is_dir() and not (target.exists() and partial.is_dir()):
         partial.replace(target)
     else:
@@ -257,11 +175,12 @@ def _move_into_place(partial: Path, target: Path) -> None:
         except BaseException:
             old.rename(target)
             raise
-        _remove(old)
+        remove(old)
     synchronise_entry(target.parent)
 
 
-def _remove(path: Path) -> None:
+def remove(path: Path) -> None:
+    """Remove a file or folder, if it is there."""
     # Others than our own stores may still be adding to the folder: look again.
     for _ in range(100):
         if path.is_dir():

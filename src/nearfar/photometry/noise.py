@@ -66,7 +66,7 @@ def fit_noise(
     # Bins of equal population: a few odd pixels (saturated, moving) drop out.
     order = np.argsort(mean, axis=None)
     rising, scatter = mean.ravel()[order], variance.ravel()[order]
-    bins = min(64, max(2, len(order) // 64))
+    bins = min(64, len(order), max(2, len(order) // 64))
     level = np.array([np.median(part) for part in np.array_split(rising, bins)])
     binned = np.array([max(typical(part), least) for part in np.array_split(scatter, bins)])
     if np.ptp(level) <= 1e-9:

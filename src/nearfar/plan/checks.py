@@ -1,5 +1,7 @@
 """Pictures among a plan's patterns that no estimate sees, to tell how well it relights."""
 
+from collections import Counter
+
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.plan.model import Pattern, Picture, Plan, Sinusoid, Stripe
@@ -76,15 +78,15 @@ def _ends_of(plan: Plan) -> list[int]:
 def _ends_of_pairs(plan: Plan) -> list[int]:
     found: list[int] = []
     shown: set[tuple[Frequency, str]] = set()
-    without_inverse: set[tuple[Frequency, str, str]] = set()
+    surplus: Counter[tuple[Frequency, str, str]] = Counter()
     without_other: set[Frequency] = set()
     for i, pattern in enumerate(plan.patterns):
         if isinstance(pattern, Sinusoid):
             frequency, kind = pattern.frequency, pattern.kind
-            without_inverse ^= {(frequency, kind, pattern.purpose)}
+            surplus[frequency, kind, pattern.purpose] += -1 if pattern.inverse else 1
             if (frequency, kind) not in shown and not frequency.is_own_negative:
                 without_other ^= {frequency}
             shown |= {(frequency, kind)}
-        if (DC, "cosine") in shown and not without_inverse and not without_other:
+        if (DC, "cosine") in shown and not without_other and not any(surplus.values()):
             found.append(i + 1)
     return found

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
-from nearfar.capture.writing import LOG, has_photos
-from nearfar.errors import CaptureInterrupted, InputError, StorageError
+from nearfar.capture.writing import LOG, count_photos
+from nearfar.errors import CaptureInterrupted, InputError, NearfarError, UselessPhotosError
 from nearfar.files import resumable_output
-from nearfar.files.output import UNFINISHED
 from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
 from nearfar.rigs.base import Photo, Rig
@@ -43,7 +42,7 @@ def acquire(
     resume : bool
         Go on with the photos that are there, of the same plan and rig.
     force : bool
-        Replace a capture that is there.
+        Replace a capture that is there, and without `resume` what was not finished.
     progress : callable, optional
         Told the number of photos taken after each.
     enough : callable, optional
@@ -60,53 +59,76 @@ def acquire(
         If the plan's patterns are complex.
     InputError
         If the rig's projector is not the plan's; if plan or rig are not those of the photos there;
-        if a photo is not like the others, or they tell of a projector that is off: what was taken
-        is removed then.
+        if a photo is not like the others.
+    UselessPhotosError
+        If the photos tell of a projector that is off: they are removed, unless they were there.
     NearfarError
-        As `nearfar.files.resumable_output`.
+        As `nearfar.files.resumable_output`. What was taken is kept, and the message says where.
     CaptureInterrupted
-        If it was told to stop. What was taken is kept.
+        If it was told to stop; likewise.
     """
     path = Path(path)
     _require(plan, rig)
-    count, taken = len(plan.patterns), 0
+    kept = _Kept(path, len(plan.patterns), resume=resume)
     try:
         with (
-            resumable_output(path, has_photos, resume=resume, force=force) as folder,
+            resumable_output(path, kept.worth, resume=resume, force=force) as folder,
             _writer(folder, plan, rig, resume=resume) as writer,
         ):
-            taken = writer.taken
-            ended = writer.ended
+            kept.folder = folder
+            ended, taken = writer.ended, writer.taken
             for number in range(taken):
-                ended = (enough is not None and enough(number, writer.read(number))) or ended
+                answer = enough is not None and enough(number, writer.read(number))
+                # Only the last may end it: photos are not taken back.
+                ended = ended or (answer and number + 1 == taken)
             photos = iter(()) if ended else _photos(plan, rig, taken)
             while not ended:
                 photo = writer.add(next(photos, None))
-                taken = writer.taken
                 if progress is not None:
-                    progress(taken)
-                ended = (enough is not None and enough(taken - 1, photo)) or writer.ended
+                    progress(writer.taken)
+                ended = (enough is not None and enough(writer.taken - 1, photo)) or writer.ended
             writer.finish()
     except KeyboardInterrupt as error:
-        if not taken:
+        if not kept.photos:
             raise
-        raise CaptureInterrupted(f"interrupted: {_kept(path, taken, count)}") from error
-    except StorageError as error:
-        if not taken:
+        raise CaptureInterrupted(f"interrupted; {kept}.") from error
+    except NearfarError as error:
+        if not kept.photos:
             raise
-        raise StorageError(f"{error} {_kept(path, taken, count)}") from error
+        raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
     # Until it had its name, it was what the photos would have been gone on with by.
     (path.resolve() / LOG).unlink(missing_ok=True)
     return open_capture(path)
 
 
+class _Kept:
+    """What is kept of a capture that was stopped, in words."""
+
+    def __init__(self, path: Path, count: int, *, resume: bool) -> None:
+        self.folder: Path | None = None
+        self._path, self._count, self._resume = path, count, resume
+
+    @property
+    def photos(self) -> int:
+        """Photos that are kept."""
+        return count_photos(self.folder) if self.folder is not None else 0
+
+    def worth(self, folder: Path, error: BaseException) -> bool:
+        """Tell whether a folder is worth keeping: one photo is taken again as soon."""
+        useless = isinstance(error, UselessPhotosError) or count_photos(folder) <= 1
+        return self._resume or not useless
+
+    def __str__(self) -> str:
+        again = "--resume --force" if self._path.exists() else "--resume"
+        return (
+            f"{self.photos} of {self._count} photos are kept in {self.folder}, and {again} goes on "
+            f"with them"
+        )
+
+
 def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWriter:
     begin = CaptureWriter.resume if resume else CaptureWriter
     return begin(folder, plan, full_scale=rig.full_scale, rig=rig.describe())
-
-
-def _kept(path: Path, taken: int, count: int) -> str:
-    return f"{taken} of {count} photos are kept in {path}{UNFINISHED}: go on with --resume."
 
 
 def hold(plan: Plan, rig: Rig) -> HeldPhotos:

@@ -6,9 +6,9 @@ estimate is made from all of them, and those kinds are not chosen again (docs/de
 """
 
 import time
+from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import suppress
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from types import TracebackType
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from nearfar.capture import Capture
 from nearfar.correspondence import correspond_by_phase, correspond_by_stripes, has_stripes
@@ -45,6 +46,10 @@ FIRST = 0.5
 ENOUGH = 0.8
 # Another choice must gain this share.
 MORE = 0.1
+# Of fewer camera pixels a few that change their kind show, and all is quickly done anyway.
+FEWEST = 1000
+# How long a photo takes is told by the last of them.
+TIMED = 32
 # It is begun while what is left of the capture is longer, by this factor, than it will take.
 EARLY = 1.5
 
@@ -96,7 +101,9 @@ class RunningEstimate:
         self._ends = ends(plan)
         told = np.cumsum([isinstance(pattern, Sinusoid) for pattern in plan.patterns])
         self._share = np.concatenate([[0.0], told / told[-1]])
-        self._begun = time.monotonic()
+        self._times: deque[float] = deque(maxlen=TIMED)
+        self._taken = 0
+        self._fault: BaseException | None = None
         self._choice: _Choice | None = None
         self._under_way: Future[_Choice | None] | None = None
         self._ended = False
@@ -126,7 +133,8 @@ class RunningEstimate:
         if self.held is None:
             return False
         self.held.photos[number] = photo
-        taken = number + 1
+        self._times.append(time.monotonic())
+        self._taken = taken = number + 1
         self._take_choice()
         if self._under_way is None and taken in self._ends and self._is_time(taken):
             self._under_way = self._beside.submit(self._choose, taken)
@@ -148,6 +156,8 @@ class RunningEstimate:
             In order.
         """
         self._end()
+        if self._fault is not None:
+            raise self._fault
         report, memory = progress or unheard, self._memory
         if self.held is None:
             yield from reconstruct_in_blocks(
@@ -173,9 +183,10 @@ class RunningEstimate:
     @property
     def chosen_by(self) -> int:
         """How many photos the kinds were chosen by; 0 where they will be by all."""
-        if self._choice is None or self._share[self._choice.photos] < ENOUGH:
+        if self._choice is None:
             return 0
-        return self._choice.photos
+        enough = self._share[self._choice.photos] >= ENOUGH * self._share[self._taken]
+        return self._choice.photos if enough else 0
 
     def _room_for(self, photo: NDArray[Any]) -> HeldPhotos | None:
         """Make room for all photos, if they fit beside the estimate of the whole camera."""
@@ -197,7 +208,9 @@ class RunningEstimate:
     def _is_time(self, taken: int) -> bool:
         """Tell whether to choose kinds now, rather than later or never."""
         count = len(self._plan.patterns)
-        if self._share[taken] < FIRST or taken == count:
+        assert self.held is not None
+        few = self.held.camera.pixels < FEWEST
+        if few or self._fault is not None or self._share[taken] < FIRST or taken == count:
             return False
         if self._choice is None:
             return True
@@ -210,12 +223,16 @@ class RunningEstimate:
     def _fits(self, taken: int) -> bool:
         """Tell whether choosing by so many photos would be over before the last photo."""
         assert self._choice is not None
-        each = (time.monotonic() - self._begun) / taken
+        each = (self._times[-1] - self._times[0]) / max(1, len(self._times) - 1)
         seconds = self._choice.seconds * taken / self._choice.photos
         return EARLY * seconds < each * (len(self._plan.patterns) - taken)
 
     def _choose(self, taken: int) -> _Choice | None:
         """Choose kinds by the first photos; None where they do not settle q."""
+        with threadpool_limits(1, "blas"):
+            return self._chosen(taken)
+
+    def _chosen(self, taken: int) -> _Choice | None:
         begun = time.monotonic()
         assert self.held is not None
         plan = self._plan.first(taken)
@@ -243,11 +260,18 @@ class RunningEstimate:
 
     def _take_choice(self) -> None:
         """Take what was chosen meanwhile."""
-        if self._under_way is not None and self._under_way.done():
-            # What is wrong with the photos is told after the last of them.
-            with suppress(_EndedError, CancelledError, InputError):
-                self._choice = self._under_way.result() or self._choice
-            self._under_way = None
+        if self._under_way is None or not self._under_way.done():
+            return
+        done, self._under_way = self._under_way, None
+        if done.cancelled():
+            return
+        fault = done.exception()
+        if fault is None:
+            self._choice = done.result() or self._choice
+        elif not isinstance(fault, _EndedError | InputError):
+            # No fault of this work may cost photos: it is told after the last of them. So is what
+            # is wrong with the photos themselves, by the estimate.
+            self._fault = fault
 
     def _end(self) -> None:
         """End what is under way, and take what it found."""

@@ -20,7 +20,7 @@ SEPARATE = ("separate", "--projector", "16x20")
 
 
 def _version(text: str) -> str:
-    return text.replace('"version": 2', '"version": 7')
+    return text.replace('"version": 3', '"version": 7')
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 import nearfar
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
-from nearfar.correspondence import given_correspondence
+from nearfar.correspondence import correspond_by_gray_code, given_correspondence
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import natural_picture
 from nearfar.plan import choose_plan, paper_plan
@@ -325,6 +325,20 @@ def test_a_capture_remembers_its_rig(tmp_path, world):
     transport, _ = reconstruct(capture)
     assert transport.provenance["rig"] == capture.rig
     assert transport.provenance["plan"]["window"] == 7
+
+
+@pytest.mark.parametrize("method", ["paper", "joint"])
+def test_a_plan_of_gray_code_corresponds_by_it(tmp_path, world, method):
+    plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="gray")
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    transport, correspondence = reconstruct(capture, method=method)
+    expected = correspond_by_gray_code(capture)
+    np.testing.assert_array_equal(correspondence.pixels, expected.pixels)
+    np.testing.assert_array_equal(transport.lit, expected.lit)
+    # In blocks, too.
+    memory = memory_for(5, plan, capture.camera, method)
+    _, parts = reconstruct(capture, method=method, memory=memory)
+    assert np.mean(parts.pixels == expected.pixels) > 0.95
 
 
 def test_a_plan_without_stripes_corresponds_by_phase(tmp_path, world):

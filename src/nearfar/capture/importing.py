@@ -12,7 +12,7 @@ from nearfar.capture.store import Capture
 from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import list_pictures, read_picture
-from nearfar.plan.model import Picture, Plan, Stripe
+from nearfar.plan.model import GrayCode, Picture, Plan, Stripe
 
 
 @dataclass(frozen=True)
@@ -113,6 +113,9 @@ def pairing(plan: Plan, index: int, path: Path) -> Pairing:
     pattern = plan.patterns[index]
     if isinstance(pattern, Stripe):
         return Pairing(index, f"{pattern.kind} {pattern.index}", path)
+    if isinstance(pattern, GrayCode):
+        inverse = ", inverse" if pattern.inverse else ""
+        return Pairing(index, f"{pattern.kind}, bit {pattern.bit}{inverse}", path)
     if isinstance(pattern, Picture):
         return Pairing(index, f"picture {pattern.seed} to check by", path)
     fy, fx = pattern.frequency

@@ -29,6 +29,7 @@ class CorrespondenceBy(StrEnum):
     """What is projected for correspondence."""
 
     STRIPES = "stripes"
+    GRAY = "gray"
     PHASE = "phase"
     NONE = "none"
 
@@ -66,8 +67,8 @@ def plan(
     correspondence: Annotated[
         CorrespondenceBy | None,
         typer.Option(
-            help="Photos of black stripes, the patterns' own phase, or none. By default stripes "
-            "with --far, else phase."
+            help="Photos of black stripes or of Gray code, the patterns' own phase, or none. By "
+            "default stripes with --far, else phase."
         ),
     ] = None,
     look: Annotated[

@@ -1,6 +1,8 @@
 """Which projector pixel lights each camera pixel directly."""
 
+from nearfar.correspondence.gray import correspond_by_gray_code, has_gray_code
 from nearfar.correspondence.phase import correspond_by_phase
+from nearfar.correspondence.photographed import correspond_by_photos, has_correspondence_photos
 from nearfar.correspondence.result import (
     Correspondence,
     given_correspondence,
@@ -12,9 +14,13 @@ from nearfar.correspondence.stripes import correspond_by_stripes, has_stripes
 
 __all__ = [
     "Correspondence",
+    "correspond_by_gray_code",
     "correspond_by_phase",
+    "correspond_by_photos",
     "correspond_by_stripes",
     "given_correspondence",
+    "has_correspondence_photos",
+    "has_gray_code",
     "has_stripes",
     "joined",
     "onto_projector",

@@ -1,4 +1,4 @@
-"""Patterns: sinusoids with offset, stripes, and their 8-bit form.
+"""Patterns: sinusoids with offset, stripes, Gray code, and their 8-bit form.
 
 A pattern is (Py, Px), values in [0, 1], 1 = full white.
 """
@@ -53,6 +53,26 @@ def black_column(index: int, size: Size) -> NDArray[np.float64]:
     pattern = np.ones(size)
     pattern[:, index] = 0.0
     return pattern
+
+
+def gray_bits(length: int) -> int:
+    """Return how many bits of Gray code tell so many rows or columns apart."""
+    return (length - 1).bit_length()
+
+
+def gray_rows(bit: int, size: Size) -> NDArray[np.float64]:
+    """White where bit `bit`, 0 the finest, of the row's Gray code is 1 (Gray 1953)."""
+    return np.repeat(_gray(bit, size.height)[:, None], size.width, axis=1)
+
+
+def gray_columns(bit: int, size: Size) -> NDArray[np.float64]:
+    """White where bit `bit`, 0 the finest, of the column's Gray code is 1."""
+    return np.repeat(_gray(bit, size.width)[None, :], size.height, axis=0)
+
+
+def _gray(bit: int, length: int) -> NDArray[np.float64]:
+    index = np.arange(length)
+    return (((index ^ (index >> 1)) >> bit) & 1).astype(np.float64)
 
 
 def quantise(pattern: NDArray[np.float64]) -> NDArray[np.uint8]:

@@ -1,11 +1,12 @@
 """What to project, and why."""
 
 from nearfar.plan.choose import choose_plan
-from nearfar.plan.model import Plan, Sinusoid, Stripe, parse_plan, read_plan
+from nearfar.plan.model import GrayCode, Plan, Sinusoid, Stripe, parse_plan, read_plan
 from nearfar.plan.paper import paper_plan
 from nearfar.plan.references import with_references
 
 __all__ = [
+    "GrayCode",
     "Plan",
     "Sinusoid",
     "Stripe",

@@ -4,7 +4,7 @@ from collections import Counter
 
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, Frequency
-from nearfar.plan.model import Pattern, Picture, Plan, Sinusoid, Stripe
+from nearfar.plan.model import GrayCode, Pattern, Picture, Plan, Sinusoid, Stripe
 
 # Not those that `nearfar evaluate` relights under.
 SEEDS = (101, 102, 103)
@@ -20,10 +20,10 @@ def with_checks(plan: Plan) -> Plan:
     PlanError
         If the plan is not one whose first photos can be estimated from.
     """
-    if plan.offset != "reference" or plan.correspondence == "stripes":
+    if plan.offset != "reference" or plan.correspondence in {"stripes", "gray"}:
         raise PlanError(
-            "a plan of inverse pairs or of stripes tells nothing before its last photo, so there "
-            "is nothing to check on the way: make the plan with --photos."
+            "a plan of inverse pairs, stripes or Gray code tells nothing before its last photo, so "
+            "there is nothing to check on the way: make the plan with --photos."
         )
     start = next(i for i, pattern in enumerate(plan.patterns) if not is_reference(pattern))
     checks = tuple(Picture(seed=seed) for _ in range(TIMES) for seed in SEEDS)
@@ -48,12 +48,12 @@ def check_photos(plan: Plan) -> dict[int, list[int]]:
 def ends(plan: Plan) -> list[int]:
     """Numbers of photos after which a plan may end.
 
-    Every cosine has its sine, a set of stripes that was begun is whole, and white and black have
-    just been shown for the second time or later; or every pattern has its inverse, white among
-    them.
+    Every cosine has its sine, stripes or Gray code that were begun are whole, and white and black
+    have just been shown for the second time or later; or every pattern has its inverse, white
+    among them.
     """
-    stripes = [i for i, pattern in enumerate(plan.patterns) if isinstance(pattern, Stripe)]
-    first, last = (stripes[0], stripes[-1]) if stripes else (0, -1)
+    own = [i for i, p in enumerate(plan.patterns) if isinstance(p, Stripe | GrayCode)]
+    first, last = (own[0], own[-1]) if own else (0, -1)
     return [end for end in _ends_of(plan) if end <= first or end > last]
 
 

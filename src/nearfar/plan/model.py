@@ -28,10 +28,10 @@ from nearfar.illumination.frequencies import (
 )
 from nearfar.illumination.pictures import natural_picture
 
-# Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by;
-# all of version 1 is version 2 as well.
-FORMAT_VERSION = 2
-READABLE = (1, 2)
+# Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by,
+# version 3 Gray code; all of an earlier version is of the next as well.
+FORMAT_VERSION = 3
+READABLE = (1, 2, 3)
 
 Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check"]
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
@@ -90,6 +90,21 @@ class Stripe(_Frozen):
         return patterns.quantise(shape(self.index, size))
 
 
+class GrayCode(_Frozen):
+    """One bit of the Gray code of all rows or columns, or its inverse, for correspondence."""
+
+    kind: Literal["gray rows", "gray columns"]
+    bit: int = Field(ge=0)
+    inverse: bool = False
+    purpose: Purpose = "correspondence"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        shape = patterns.gray_rows if self.kind == "gray rows" else patterns.gray_columns
+        shown = patterns.quantise(shape(self.bit, size))
+        return patterns.invert(shown) if self.inverse else shown
+
+
 class Picture(_Frozen):
     """A natural picture that no estimate sees, to check relighting by."""
 
@@ -102,7 +117,9 @@ class Picture(_Frozen):
         return patterns.quantise(natural_picture(size, self.seed).astype(np.float64))
 
 
-Pattern = Annotated[Sinusoid | Exponential | Stripe | Picture, Field(discriminator="kind")]
+Pattern = Annotated[
+    Sinusoid | Exponential | Stripe | GrayCode | Picture, Field(discriminator="kind")
+]
 
 
 class Plan(_Frozen):
@@ -121,24 +138,28 @@ class Plan(_Frozen):
     offset : {"inverse", "reference", "none"}
         Inverse pairs, whites and blacks at intervals for all, or none (complex patterns, for
         simulation).
-    correspondence : {"stripes", "phase", "none"}
-        Photos of stripes, the phase of the transport's own photos, or none at all.
-    patterns : tuple of Sinusoid, Exponential, Stripe or Picture
+    correspondence : {"stripes", "gray", "phase", "none"}
+        Photos of stripes or of Gray code, the phase of the transport's own photos, or none at all.
+    patterns : tuple of Sinusoid, Exponential, Stripe, GrayCode or Picture
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[2] = 2
+    version: Literal[3] = 3
     projector: SizeField
     window: int = Field(ge=1)
     far: SizeField
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
-    correspondence: Literal["stripes", "phase", "none"]
+    correspondence: Literal["stripes", "gray", "phase", "none"]
     patterns: tuple[Pattern, ...]
 
     @model_validator(mode="after")
-    def _stripes_lie_on_the_projector(self) -> "Plan":
+    def _patterns_lie_on_the_projector(self) -> "Plan":
         for pattern in self.patterns:
+            if isinstance(pattern, GrayCode):
+                side = self.projector[0 if pattern.kind == "gray rows" else 1]
+                if pattern.bit >= patterns.gray_bits(side):
+                    raise ValueError(f"{pattern.kind} have no bit {pattern.bit} on the projector")
             if isinstance(pattern, Stripe):
                 rows = pattern.kind == "black row"
                 if pattern.index >= (self.projector.height if rows else self.projector.width):
@@ -226,7 +247,7 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
     if data.get("version") not in READABLE:
         raise UnreadableFileError(
             f"{source} is a plan of version {data.get('version')!r}, this nearfar reads versions "
-            f"{' and '.join(map(str, READABLE))}: make the plan again, or use the nearfar that "
+            f"1 to {FORMAT_VERSION}: make the plan again, or use the nearfar that "
             f"made it."
         )
     try:

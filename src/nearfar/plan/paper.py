@@ -14,14 +14,15 @@ from nearfar.illumination.frequencies import (
     near_frequencies,
     representatives,
 )
-from nearfar.plan.model import Exponential, Plan, Purpose, Sinusoid, Stripe
+from nearfar.illumination.patterns import gray_bits
+from nearfar.plan.model import Exponential, GrayCode, Plan, Purpose, Sinusoid, Stripe
 from nearfar.plan.references import with_references
 
 # No projector has a longer side.
 LARGEST = 16384
 
 Offset = Literal["inverse", "reference", "none"]
-Correspondence = Literal["stripes", "phase", "none"]
+Correspondence = Literal["stripes", "gray", "phase", "none"]
 
 
 def paper_plan(
@@ -49,8 +50,9 @@ def paper_plan(
     offset : {"inverse", "reference", "none"}
         Each pattern with its inverse; each once, with whites and blacks at intervals to take the
         offset out; or the theory's complex patterns (simulation only).
-    correspondence : {"stripes", "phase", "none"}
-        Only stripes take photos of their own.
+    correspondence : {"stripes", "gray", "phase", "none"}
+        Stripes take photos of their own, Py + Px, and Gray code with its inverse 2 log2 Py +
+        2 log2 Px.
 
     Returns
     -------
@@ -91,7 +93,7 @@ def paper_plan(
         *shown([CHECKERBOARD], "direct"),
         *shown(far_frequencies(far, projector), "far"),
         *shown(near_frequencies(window, dropped), "near"),
-        *(stripes(projector) if correspondence == "stripes" else ()),
+        *_OF_CORRESPONDENCE[correspondence](projector),
     )
     return Plan(
         projector=projector,
@@ -142,3 +144,21 @@ def stripes(projector: Size) -> tuple[Stripe, ...]:
         *(Stripe(kind="black row", index=y) for y in range(projector.height)),
         *(Stripe(kind="black column", index=x) for x in range(projector.width)),
     )
+
+
+def gray_code(projector: Size) -> tuple[GrayCode, ...]:
+    """Return the Gray code of the rows, then of the columns, each bit beside its inverse."""
+    return tuple(
+        GrayCode(kind=kind, bit=bit, inverse=inverse)
+        for kind, side in (("gray rows", projector.height), ("gray columns", projector.width))
+        for bit in range(gray_bits(side))
+        for inverse in (False, True)
+    )
+
+
+_OF_CORRESPONDENCE: dict[Correspondence, Callable[[Size], tuple[Stripe | GrayCode, ...]]] = {
+    "stripes": stripes,
+    "gray": gray_code,
+    "phase": lambda _projector: (),
+    "none": lambda _projector: (),
+}

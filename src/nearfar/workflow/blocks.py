@@ -18,8 +18,8 @@ from nearfar.capture import Capture, white_and_black
 from nearfar.correspondence import (
     Correspondence,
     correspond_by_phase,
-    correspond_by_stripes,
-    has_stripes,
+    correspond_by_photos,
+    has_correspondence_photos,
 )
 from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
@@ -160,7 +160,7 @@ def cut_rows(capture: Capture, *, method: Method, memory: int, given: bool) -> C
     estimator = ESTIMATORS[method]
     estimator.require(capture.plan)
     # Seeing which way round q runs takes a row more than the neighbours' own estimates.
-    by_phase = not given and not has_stripes(capture.plan)
+    by_phase = not given and not has_correspondence_photos(capture.plan)
     halo = estimator.halo + (1 if by_phase else 0)
     return Cut(capture.camera.height, rows_at_once(capture, method, memory), halo)
 
@@ -198,8 +198,8 @@ def reconstruct_block(
         measurements = replace(measure(job.photos, whole), brightest=job.brightest)
         if known is not None:
             found = known
-        elif has_stripes(plan):
-            found = correspond_by_stripes(job.photos, whole)
+        elif has_correspondence_photos(plan):
+            found = correspond_by_photos(job.photos, whole)
         else:
             found = by_phase(measurements, str(job.capture.path))
         transport = job.estimate(

@@ -19,7 +19,11 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from nearfar.capture import Capture
-from nearfar.correspondence import correspond_by_phase, correspond_by_stripes, has_stripes
+from nearfar.correspondence import (
+    correspond_by_phase,
+    correspond_by_photos,
+    has_correspondence_photos,
+)
 from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
 from nearfar.estimate.joint import Choices, choose_kinds
@@ -239,8 +243,8 @@ class RunningEstimate:
         some = HeldPhotos(plan, self.held.photos[:taken], self._full_scale)
         photos = without_drift(some, unheard)
         measurements = measure(photos, progress=self._heed)
-        if has_stripes(plan):
-            pixels = correspond_by_stripes(photos).pixels
+        if has_correspondence_photos(plan):
+            pixels = correspond_by_photos(photos).pixels
         else:
             try:
                 pixels = correspond_by_phase(measurements).pixels

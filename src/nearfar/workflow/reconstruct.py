@@ -8,8 +8,8 @@ from nearfar.arrays import blocks
 from nearfar.capture import Capture
 from nearfar.correspondence import (
     Correspondence,
-    correspond_by_stripes,
-    has_stripes,
+    correspond_by_photos,
+    has_correspondence_photos,
     joined,
     onto_projector,
 )
@@ -53,7 +53,7 @@ def reconstruct(
     ----------
     capture : Capture
     correspondence : Correspondence, optional
-        By default from the capture's stripes, or without them by phase.
+        By default from the capture's stripes or Gray code, or without them by phase.
     method : {"joint", "paper"}
         Estimator.
     square : bool
@@ -177,8 +177,8 @@ def _squarely(
     for block in blocks(photos.camera.height, rows):
         measured.append(measure(photos, block))
         report("measuring", block.stop / photos.camera.height)
-    if correspondence is None and has_stripes(photos.plan):
-        correspondence = _by_stripes(photos, rows, report)
+    if correspondence is None and has_correspondence_photos(photos.plan):
+        correspondence = _by_photos(photos, rows, report)
     elif correspondence is None:
         correspondence = by_phase(join(measured), str(capture.path))
     if not correspondence.lit.any():
@@ -193,9 +193,9 @@ def _squarely(
     return replace(transport, provenance=provenance), correspondence
 
 
-def _by_stripes(photos: Photos, rows: int, report: Progress) -> Correspondence:
+def _by_photos(photos: Photos, rows: int, report: Progress) -> Correspondence:
     found = []
     for block in blocks(photos.camera.height, rows):
-        found.append(correspond_by_stripes(photos, block))
+        found.append(correspond_by_photos(photos, block))
         report("correspondence", block.stop / photos.camera.height)
     return joined(found)

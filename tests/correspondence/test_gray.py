@@ -1,0 +1,148 @@
+"""Gray code: its patterns, what they decode to, and where they cannot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.correspondence import (
+    correspond_by_gray_code,
+    correspond_by_photos,
+    correspond_by_stripes,
+    has_gray_code,
+)
+from nearfar.errors import InputError
+from nearfar.illumination.patterns import gray_bits
+from nearfar.plan import GrayCode, paper_plan, parse_plan
+from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.acquire import hold
+from tests.worlds import model_transport
+
+SIZES = [Size(16, 16), Size(13, 18), Size(33, 7), Size(9, 64)]
+
+
+def _plan(projector, correspondence="gray"):
+    side = min(5, *projector)
+    return paper_plan(projector, side, Size(3, 3), correspondence=correspondence)
+
+
+def _codes(plan, kind):
+    return [p for p in plan.patterns if isinstance(p, GrayCode) and p.kind == kind]
+
+
+@pytest.mark.parametrize("projector", [*SIZES, Size(1080, 1920)])
+def test_neighbours_differ_in_one_bit_and_all_have_a_code(projector):
+    plan = paper_plan(projector, 5, Size(3, 3), correspondence="gray")
+    for kind, side, axis in (
+        ("gray rows", projector.height, 0),
+        ("gray columns", projector.width, 1),
+    ):
+        codes = _codes(plan, kind)
+        assert len(codes) == 2 * gray_bits(side) == 2 * int(np.ceil(np.log2(side)))
+        drawn = {(code.bit, code.inverse): code.draw(projector) for code in codes}
+        for (bit, inverse), pattern in drawn.items():
+            assert set(np.unique(pattern)) <= {0, 255}
+            # The same all along the other axis, and the inverse of its inverse.
+            np.testing.assert_array_equal(pattern, pattern.take([0], axis=1 - axis) + 0 * pattern)
+            np.testing.assert_array_equal(pattern, 255 - drawn[bit, not inverse])
+        words = np.stack(
+            [drawn[bit, False].take(0, axis=1 - axis) for bit in range(gray_bits(side))]
+        )
+        assert len(np.unique(words, axis=1).T) == side
+        np.testing.assert_array_equal((np.diff(words.astype(int), axis=1) != 0).sum(axis=0), 1)
+    assert plan.counts["correspondence"] == sum(2 * gray_bits(side) for side in projector)
+    assert parse_plan(plan.to_json()) == plan
+
+
+@pytest.mark.parametrize("projector", SIZES)
+def test_whole_pixels_are_found_exactly(projector, shoot):
+    world = model_transport(projector, projector, window=3, far=Size(3, 3), channels=2)
+    # Direct light outshines the rest.
+    world = replace(world, near=0.2 * world.near, far=0.2 * world.far)
+    found = correspond_by_photos(shoot(_plan(projector), world))
+    np.testing.assert_array_equal(found.pixels, world.correspondence)
+    assert (found.confidence > 0.999).all()
+
+
+def test_blocks_of_rows_are_those_of_the_whole(shoot):
+    world = model_transport(SIZES[1], Size(12, 9), window=3, far=Size(3, 3), channels=2)
+    photos = shoot(_plan(SIZES[1]), world)
+    whole = correspond_by_gray_code(photos)
+    part = correspond_by_gray_code(photos, slice(4, 9))
+    np.testing.assert_array_equal(part.pixels, whole.pixels[4:9])
+
+
+def test_a_camera_pixel_between_two_is_shared_by_them(shoot):
+    projector = Size(16, 20)
+    world = model_transport(projector, Size(40, 50), window=3, far=Size(3, 3), channels=1)
+    q = np.stack(np.meshgrid(np.linspace(1, 14, 40), np.linspace(1, 18, 50), indexing="ij"), -1)
+    direct = np.full((40, 50, 1), 0.5, np.float32)
+    world = replace(
+        world,
+        correspondence=q.astype(np.float32),
+        direct=direct,
+        near=0 * world.near,
+        far=0.2 * world.far,
+    )
+    found = correspond_by_gray_code(shoot(_plan(projector), world))
+    off = np.abs(found.pixels - q).max(axis=-1)
+    assert np.isfinite(off).all()
+    assert off.max() < 0.5
+    assert np.median(off) < 0.2
+
+
+def test_camera_pixels_without_direct_light_are_left_out(shoot):
+    projector = Size(16, 20)
+    world = model_transport(projector, projector, window=3, far=Size(3, 3), channels=1)
+    dark = world.correspondence.copy()
+    dark[4:8, 3:9] = np.nan
+    lit = np.isfinite(dark[..., :1])
+    world = replace(
+        world,
+        correspondence=dark,
+        direct=world.direct * lit,
+        near=world.near * lit[..., None, None],
+    )
+    found = correspond_by_gray_code(shoot(_plan(projector), world, SimulatedCamera()))
+    np.testing.assert_array_equal(found.lit, lit[..., 0])
+    assert found.confidence[4:8, 3:9].max() < 0.999
+
+
+@pytest.mark.parametrize("name", ["cornell", "cornell-aside"])
+def test_scenes_with_noise_are_found_about_as_well_as_by_stripes(name):
+    scene = cached_scene(name, Size(32, 32))
+    rig = SimulatedRig(scene, name, SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    truth = scene.correspondence
+    shares, recalls = [], []
+    for how in ("gray", "stripes"):
+        plan = paper_plan(scene.projector, 5, Size(3, 3), correspondence=how)
+        found = correspond_by_photos(hold(plan, rig))
+        both = found.lit & np.isfinite(truth[..., 0])
+        off = np.abs(found.pixels - truth).max(axis=-1)[both]
+        shares.append(np.mean(off <= 1.0))
+        recalls.append(both.sum() / np.isfinite(truth[..., 0]).sum())
+    assert shares[0] > 0.98
+    assert recalls[0] > 0.9 * recalls[1]
+
+
+def test_what_is_no_gray_code_is_said(shoot):
+    world = model_transport(SIZES[0], Size(4, 5), window=3, far=Size(3, 3), channels=1)
+    stripes = shoot(_plan(SIZES[0], "stripes"), world)
+    assert not has_gray_code(stripes.plan)
+    with pytest.raises(InputError, match="no Gray code"):
+        correspond_by_gray_code(stripes)
+    np.testing.assert_array_equal(
+        correspond_by_photos(stripes).pixels, correspond_by_stripes(stripes).pixels
+    )
+    plan = _plan(SIZES[0])
+    missing = plan.first(len(plan.patterns) - 1)
+    assert has_gray_code(plan)
+    assert not has_gray_code(missing)
+    with pytest.raises(ValueError, match="no bit 4"):
+        type(plan).model_validate(
+            {**plan.model_dump(), "patterns": [GrayCode(kind="gray rows", bit=4)]}
+        )

@@ -95,7 +95,7 @@ def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, mon
         found.pixels[dark] = np.nan
         return found
 
-    monkeypatch.setattr("nearfar.workflow.blocks.correspond_by_stripes", unlit)
+    monkeypatch.setattr("nearfar.workflow.blocks.correspond_by_photos", unlit)
     part, estimate, capture = _follow(plan, rig, tmp_path / "c.zarr")
     assert estimate.chosen_by > 0
     expected, _ = reconstruct(capture)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -168,6 +169,16 @@ def test_a_capture_does_not_end_before_the_photos_that_are_there(rig, tmp_path):
 def test_an_odd_photo_is_named_and_taken_again(rig, undisturbed, tmp_path, odd, word):
     with pytest.raises(InputError, match=rf"photo 40 .*{word}.*; 40 of {COUNT} photos are kept"):
         acquire(PLAN, tmp_path / "c.zarr", _Odd(rig, 40, odd))
+    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+
+
+def test_a_rig_that_ends_too_soon_keeps_its_photos(rig, undisturbed, tmp_path):
+    class Short(_Odd):
+        def shoot(self, patterns, first=0):
+            return islice(self._rig.shoot(patterns, first), 30)
+
+    with pytest.raises(InputError, match=f"only 30 photos for the {COUNT} .*; 30 of .* are kept"):
+        acquire(PLAN, tmp_path / "c.zarr", Short(rig, 0, None))
     _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 

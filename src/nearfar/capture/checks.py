@@ -56,7 +56,7 @@ def check_photo(photo: NDArray[Any], first: NDArray[Any], scale: float, name: st
         )
 
 
-def check_count(written: int, count: int, more: bool) -> None:
+def check_count(written: int, count: int, *, more: bool) -> None:
     """Refuse fewer photos than patterns, or more.
 
     Raises

@@ -185,7 +185,7 @@ class CaptureWriter:
         Parameters
         ----------
         photo : ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
-            uint8, uint16 or float32.
+            uint8, uint16 or float32; none where photos end before patterns do.
 
         Returns
         -------
@@ -194,13 +194,16 @@ class CaptureWriter:
         Raises
         ------
         InputError
-            If it does not fit the others, holds NaN, infinities or whole numbers above full
-            scale, or is much darker than black or brighter than white; it is not kept then.
+            If there is none, or it does not fit the others, holds NaN, infinities or whole numbers
+            above full scale, or is much darker than black or brighter than white; it is not kept
+            then.
         UselessPhotosError
             If white is no brighter than black.
         """
         number = self.taken
         called = self._called[number]
+        if photo is None and number:
+            check_count(number, len(self._called), more=False)
         photo = as_photo(photo, called) if self._first is None else np.atleast_3d(np.asarray(photo))
         first = photo if self._first is None else self._first
         scale = full_scale_of(first.dtype) if self._scale is None else float(self._scale)
@@ -372,14 +375,8 @@ def write_capture(
     photos : iterable of arrays
         Raw photos in the order of the plan, all uint8, uint16 or float32 and of one shape,
         (Cy, Cx) or (Cy, Cx, channels).
-    full_scale : float, optional
-        Raw value of full scale; by default that of the numbers' type.
-    rig : mapping, optional
-        What took the photos, free JSON.
-    exposure : float, optional
-        Exposure time in seconds.
-    names : sequence of str, optional
-        What to call each photo in a message.
+    full_scale, rig, exposure, names
+        As `CaptureWriter`.
     force : bool
         Replace a capture that is there.
     progress : callable, optional
@@ -415,15 +412,12 @@ def write_capture(
         remaining = iter(photos)
         ended = False
         while writer.taken < count and not ended:
-            photo = next(remaining, None)
-            if photo is None and writer.taken:
-                break
-            photo = writer.add(photo)
+            photo = writer.add(next(remaining, None))
             if progress is not None:
                 progress(writer.taken)
             ended = enough is not None and enough(writer.taken - 1, photo)
         if not ended:
-            check_count(writer.taken, count, next(remaining, None) is not None)
+            check_count(count, count, more=next(remaining, None) is not None)
         writer.finish()
         (partial / LOG).unlink()
     return open_capture(path)

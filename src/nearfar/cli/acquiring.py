@@ -53,8 +53,8 @@ def acquire(
     transport: Annotated[
         Path | None,
         typer.Option(
-            help="Make the transport too, by the joint method: most of the work is done while "
-            "photos are taken.",
+            help="Make the transport too, by the joint method: what kind each camera pixel is, is "
+            "found while photos are taken.",
             metavar="TRANSPORT.zarr",
         ),
     ] = None,

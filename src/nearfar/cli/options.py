@@ -48,10 +48,6 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdo
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
 TransportPath = Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport.")]
-Memory = Annotated[
-    str, typer.Option(help="Memory to work in: blocks of camera rows that fit.", metavar="2GB")
-]
-Processor = Annotated[Where, typer.Option(help="Where the estimate is made; cuda needs PyTorch.")]
 ScenesProjector = Annotated[
     Size | None,
     typer.Option(

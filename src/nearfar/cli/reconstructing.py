@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nearfar.arrays import Size, parse_bytes
-from nearfar.cli.options import CapturePath, Force, Memory, Processor, Quiet, Where, keep_input
+from nearfar.cli.options import CapturePath, Force, Quiet, Where, keep_input
 from nearfar.cli.progress import SATURATED, progress_bar, say, warn
 
 if TYPE_CHECKING:
@@ -52,8 +52,16 @@ def reconstruct(
             "--square", help="Average the camera pixels of each projector pixel: the paper's T."
         ),
     ] = False,
-    memory: Memory = "2GB",
-    device: Processor = Where.CPU,
+    memory: Annotated[
+        str,
+        typer.Option(
+            help="Memory to work in, but for --square: blocks of camera rows that fit.",
+            metavar="2GB",
+        ),
+    ] = "2GB",
+    device: Annotated[
+        Where, typer.Option(help="Where the estimate is made; cuda needs PyTorch.")
+    ] = Where.CPU,
     half: Annotated[
         bool,
         typer.Option("--half", help="Keep windows and bands in float16: half the bytes."),

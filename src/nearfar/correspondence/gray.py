@@ -22,7 +22,7 @@ from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
 from nearfar.photometry.noise import fit_noise
-from nearfar.photometry.photos import Photos
+from nearfar.photometry.photos import Photos, size_of_rows
 from nearfar.plan import GrayCode, Plan
 
 # Confidence at which direct light is taken as seen: a false alarm of noise in a million.
@@ -84,8 +84,7 @@ def correspond_by_gray_code(
             "--correspondence Q.npy, or plan with --correspondence gray."
         )
     rows = slice(0, photos.camera.height) if rows is None else rows
-    height = len(range(*rows.indices(photos.camera.height)))
-    camera = Size(height, photos.camera.width)
+    camera = size_of_rows(photos, rows)
     read: dict[str, tuple[Floats, Floats]] = {}
     for kind, bits in _bits(plan.projector).items():
         read[kind] = _differences(photos, _numbers(plan, kind), len(bits), rows)
@@ -127,7 +126,7 @@ def _differences(
     photos: Photos, numbers: dict[tuple[int, bool], int], bits: int, rows: slice
 ) -> tuple[Floats, Floats]:
     """Photo less inverse and their sum, (B, C) each, channels added."""
-    pixels = len(range(*rows.indices(photos.camera.height))) * photos.camera.width
+    pixels = size_of_rows(photos, rows).pixels
     differences, sums = np.empty((bits, pixels)), np.empty((bits, pixels))
     for bit in range(bits):
         pair = photos.read([numbers[bit, False], numbers[bit, True]], rows)

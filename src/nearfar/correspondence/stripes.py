@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from nearfar.arrays import Floats, Integers, Size
+from nearfar.arrays import Floats, Integers
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
-from nearfar.photometry.photos import BATCH, Photos
+from nearfar.photometry.photos import BATCH, Photos, size_of_rows
 from nearfar.plan import Plan, Stripe
 
 # A peak has no background closer than this to it.
@@ -78,8 +78,7 @@ def correspond_by_stripes(
             "--correspondence Q.npy, or plan with --correspondence stripes."
         )
     rows = slice(0, photos.camera.height) if rows is None else rows
-    height = len(range(*rows.indices(photos.camera.height)))
-    camera = Size(height, photos.camera.width)
+    camera = size_of_rows(photos, rows)
     down = _axis(photos, "black row", rows, progress)
     across = _axis(photos, "black column", rows, progress)
 

@@ -158,6 +158,13 @@ class RunningEstimate:
         ------
         Part
             In order.
+
+        Raises
+        ------
+        Exception
+            Whatever went wrong beside the capture, and is no fault of the photos.
+        NearfarError
+            As `nearfar.reconstruct`.
         """
         self._end()
         if self._fault is not None:
@@ -203,6 +210,7 @@ class RunningEstimate:
         try:
             fits = rows_at_once(room, "joint", rest) >= len(photo)
         except InputError:
+            # Not beside the photos; where not without them either, that is said now.
             rows_at_once(room, "joint", self._memory)
             return None
         if not fits:

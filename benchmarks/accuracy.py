@@ -28,9 +28,9 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.acquire import hold
 

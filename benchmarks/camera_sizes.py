@@ -11,7 +11,7 @@ from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 
 SIDES = (64, 96, 128, 192)

@@ -27,7 +27,7 @@ from nearfar import ExactTransport, Size, choose_plan, paper_plan
 from nearfar.arrays import Floats, parse_size
 from nearfar.correspondence import Correspondence, correspond_by_phase, correspond_by_stripes
 from nearfar.photometry.measure import measure
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes import sizes
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.camera import gather

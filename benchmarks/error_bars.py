@@ -20,7 +20,7 @@ from nearfar.estimate.fit import fit_model
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 
 SHARES = (4, 16)

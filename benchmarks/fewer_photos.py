@@ -22,7 +22,7 @@ from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.held import HeldPhotos
 from nearfar.photometry.measure import measure
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import row_snr

@@ -21,9 +21,9 @@ from nearfar import ExactTransport, snr
 from nearfar.baselines.separation import separate_by_extremes
 from nearfar.baselines.separation_methods import Method, by_checkerboards, by_sinusoids
 from nearfar.baselines.separation_photos import PhotosToSeparate, separate, shoot_to_separate
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes import NAMES
 from nearfar.scenes.cache import cached_scene
 

@@ -10,9 +10,9 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import hold
 from tests.worlds import model_transport
 

@@ -14,9 +14,9 @@ from nearfar.baselines.random_patterns import (
     measure_by_rig,
 )
 from nearfar.errors import InputError
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from tests.conftest import QUIET
 

@@ -12,9 +12,9 @@ from nearfar.baselines.fourier import FullDFT
 from nearfar.baselines.hadamard import Hadamard
 from nearfar.baselines.reference import acquire_reference
 from nearfar.errors import InputError, StorageError
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact, save_exact
 from tests.conftest import QUIET

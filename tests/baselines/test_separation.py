@@ -31,9 +31,9 @@ from nearfar.baselines.separation_photos import (
     unsteadiness,
 )
 from nearfar.errors import InputError
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.separate import compare_to_truth
 from tests.conftest import QUIET

@@ -27,9 +27,9 @@ from nearfar.errors import (
 from nearfar.files import output, stores
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.plan.checks import with_checks
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
 from tests.worlds import model_transport
 

@@ -15,9 +15,9 @@ from nearfar.correspondence import (
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
 from nearfar.plan import GrayCode, paper_plan, parse_plan
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.acquire import hold
 from tests.worlds import model_transport

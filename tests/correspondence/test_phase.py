@@ -20,7 +20,7 @@ from nearfar.illumination.frequencies import (
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import paper_plan
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.transport.far import real_basis
 from tests.worlds import ideal_measurements, model_transport
 

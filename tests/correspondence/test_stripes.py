@@ -15,7 +15,7 @@ from nearfar.correspondence import (
 from nearfar.errors import InputError, NearfarError
 from nearfar.photometry.measure import measure
 from nearfar.plan import paper_plan
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from tests.worlds import model_transport
 
 PROJECTOR = Size(24, 30)

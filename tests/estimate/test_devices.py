@@ -12,7 +12,7 @@ from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.paper import estimate
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan, paper_plan
-from nearfar.rigs.camera import SimulatedCamera
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from tests.absent import said_without
 from tests.worlds import model_transport
 

@@ -16,8 +16,8 @@ from nearfar.photometry.noise import fit_noise, mean_of_few
 from nearfar.photometry.steady import steady
 from nearfar.plan import paper_plan, with_references
 from nearfar.plan.model import Sinusoid
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
 from tests.conftest import QUIET
 from tests.worlds import model_transport
 

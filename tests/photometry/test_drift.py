@@ -15,9 +15,9 @@ from nearfar.photometry.measure import measure
 from nearfar.photometry.robust import robust_fit
 from nearfar.photometry.steady import steady
 from nearfar.plan import Sinusoid, paper_plan, with_references
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.drift import SimulatedDrift
-from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.drift import SimulatedDrift
+from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.workflow.evaluate import snr
 from tests.conftest import QUIET
 from tests.worlds import model_transport

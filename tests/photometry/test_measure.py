@@ -12,8 +12,8 @@ from nearfar.photometry.by_inverse import find_pairs
 from nearfar.photometry.measure import measure
 from nearfar.photometry.noise import fit_noise
 from nearfar.plan import paper_plan
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
 from tests.worlds import model_transport
 
 PLAN = paper_plan(Size(16, 20), 5, Size(3, 3))

@@ -6,11 +6,11 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.plan import paper_plan
-from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.config import open_rig
-from nearfar.rigs.drift import SimulatedDrift
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.drift import SimulatedDrift
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact_store import save_exact
 from nearfar.transport.store import save_transport
 from tests.estimate.test_fit import _exact_of

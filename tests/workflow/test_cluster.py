@@ -17,9 +17,9 @@ from nearfar.arrays import Size
 from nearfar.correspondence import Correspondence, given_correspondence
 from nearfar.errors import ClusterError, ExistingOutputError, InputError
 from nearfar.plan import choose_plan, paper_plan
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.store import write_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruct import reconstruct_in_blocks

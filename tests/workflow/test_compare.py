@@ -13,9 +13,9 @@ from nearfar.errors import InputError
 from nearfar.plan.choose import LEAST_PHOTOS
 from nearfar.report.comparison import HEAD, comparison_page, is_comparison, rows, write_comparison
 from nearfar.report.comparison import winners as best_of
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.compare import (
     METHODS,

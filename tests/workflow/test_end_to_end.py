@@ -14,11 +14,11 @@ from nearfar.correspondence import correspond_by_gray_code, given_correspondence
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import natural_picture
 from nearfar.plan import choose_plan, paper_plan
-from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.config import open_rig
-from nearfar.rigs.drift import SimulatedDrift
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.drift import SimulatedDrift
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.rows import BELIEVED, FACTORS
 from nearfar.transport.store import load_transport, write_transport

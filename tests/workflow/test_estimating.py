@@ -14,9 +14,9 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import answered, measure
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.plan.checks import ends
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow import estimating
 from nearfar.workflow.acquire import acquire, hold

@@ -10,9 +10,9 @@ from nearfar.capture import open_capture
 from nearfar.errors import InputError, PlanError
 from nearfar.plan import choose_plan, paper_plan, parse_plan
 from nearfar.plan.checks import SEEDS, TIMES, check_photos, ends, is_reference, with_checks
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import snr

@@ -9,9 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from nearfar.arrays import Size, parse_size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import kind_of_store
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig, World, brightest
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig, World, brightest
 from nearfar.scenes import NAMES
 from nearfar.scenes.cache import Progress, cached_scene
 from nearfar.scenes.mitsuba.loading import load_scene

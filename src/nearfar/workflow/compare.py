@@ -27,10 +27,10 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, choose_plan, paper_plan
 from nearfar.plan.choose import LEAST_PHOTOS, NOISE, default_window
-from nearfar.rigs.camera import SimulatedCamera
 from nearfar.rigs.config import choose_exposure
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from nearfar.workflow.acquire import hold
 from nearfar.workflow.evaluate import snr

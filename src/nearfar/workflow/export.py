@@ -2,24 +2,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from nearfar.arrays import Size
-from nearfar.errors import InputError
 from nearfar.files import encode_png, new_output
+from nearfar.illumination.frames import Shown, draw_frame, fit_frame
 from nearfar.plan import Plan
 
 PLAN_NAME = "plan.json"
-
-
-class Shown(NamedTuple):
-    """How patterns appear on the frame."""
-
-    frame: Size
-    scale: int
 
 
 def export_patterns(
@@ -71,37 +60,6 @@ def export_patterns(
                 progress(number + 1)
         (partial / PLAN_NAME).write_text(plan.to_json(), encoding="utf-8")
     return shown
-
-
-def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
-    """Return the frame and scale that show a pattern grid; see `export_patterns`.
-
-    Raises
-    ------
-    InputError
-        If the pattern does not fit on `native`.
-    """
-    if native is None:
-        scale = scale or 1
-        return Shown(Size(projector.height * scale, projector.width * scale), scale)
-    largest = min(native.height // projector.height, native.width // projector.width)
-    if largest < (scale or 1):
-        raise InputError(
-            f"a pattern of {projector} at --scale {scale or 1} does not fit on --native {native}: "
-            f"choose a larger frame or a smaller scale."
-        )
-    return Shown(native, scale or largest)
-
-
-def draw_frame(pattern: NDArray[np.uint8], shown: Shown) -> NDArray[np.uint8]:
-    """Show a pattern on a frame, each pixel as a block, centred, black around."""
-    blown = pattern.repeat(shown.scale, axis=0).repeat(shown.scale, axis=1)
-    frame = np.zeros(shown.frame, dtype=np.uint8)
-    top, left = (
-        (outer - inner) // 2 for outer, inner in zip(shown.frame, blown.shape, strict=True)
-    )
-    frame[top : top + blown.shape[0], left : left + blown.shape[1]] = blown
-    return frame
 
 
 def _is_export(folder: Path) -> bool:

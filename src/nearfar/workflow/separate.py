@@ -13,11 +13,11 @@ from nearfar.baselines.separation_methods import Method
 from nearfar.baselines.separation_photos import PhotosToSeparate
 from nearfar.errors import InputError
 from nearfar.files import encode_png, new_output, write_picture
+from nearfar.illumination.frames import Shown, draw_frame, fit_frame
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.version import version
 from nearfar.workflow.evaluate import snr
-from nearfar.workflow.export import Shown, draw_frame, fit_frame
 
 NUMBERS = "numbers.json"
 PICTURES = ("direct", "global")

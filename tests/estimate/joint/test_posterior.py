@@ -17,9 +17,9 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.plan.choose import choose_frequencies
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
 from nearfar.transport.belief import Belief

@@ -17,9 +17,9 @@ from nearfar.arrays import Floats, Size
 from nearfar.correspondence import Correspondence
 from nearfar.illumination.pictures import landscape, penguin, white
 from nearfar.plan import Plan, paper_plan
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
-from nearfar.rigs.simulated import SimulatedRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from nearfar.arrays import Floats
-from nearfar.rigs.drift import SimulatedDrift
+from nearfar.rigs.simulated.drift import SimulatedDrift
 
 # Far above any full well, below what a generator of counts takes.
 MOST_ELECTRONS = 1e18

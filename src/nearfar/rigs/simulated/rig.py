@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
 from nearfar.rigs.base import Photo
-from nearfar.rigs.camera import SimulatedCamera
-from nearfar.rigs.projector import SimulatedProjector
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
 
 # Patterns lit at once: a matrix product, not a pass over T for each.
 BATCH = 32

@@ -1,0 +1,56 @@
+"""The frame a projector shows: a pattern as blocks of its pixels, centred, black around."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+
+
+class Shown(NamedTuple):
+    """How patterns appear on the frame."""
+
+    frame: Size
+    scale: int
+
+
+def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
+    """Return the frame and scale that show a pattern grid.
+
+    Parameters
+    ----------
+    projector : Size
+        Pattern grid.
+    scale : int, optional
+        Side of a pattern pixel on the frame; 1, or the largest that fits on `native`.
+    native : Size, optional
+        Frame to centre the pattern on, black around.
+
+    Raises
+    ------
+    InputError
+        If the pattern does not fit on `native`.
+    """
+    if native is None:
+        scale = scale or 1
+        return Shown(Size(projector.height * scale, projector.width * scale), scale)
+    largest = min(native.height // projector.height, native.width // projector.width)
+    if largest < (scale or 1):
+        raise InputError(
+            f"a pattern of {projector} at --scale {scale or 1} does not fit on --native {native}: "
+            f"choose a larger frame or a smaller scale."
+        )
+    return Shown(native, scale or largest)
+
+
+def draw_frame(pattern: NDArray[np.uint8], shown: Shown) -> NDArray[np.uint8]:
+    """Show a pattern on a frame, each pixel as a block, centred, black around."""
+    blown = pattern.repeat(shown.scale, axis=0).repeat(shown.scale, axis=1)
+    frame = np.zeros(shown.frame, dtype=np.uint8)
+    top, left = (
+        (outer - inner) // 2 for outer, inner in zip(shown.frame, blown.shape, strict=True)
+    )
+    frame[top : top + blown.shape[0], left : left + blown.shape[1]] = blown
+    return frame

@@ -1,0 +1,1 @@
+"""A simulated projector and camera before a transport that is known."""

@@ -11,6 +11,7 @@ import pytest
 from nearfar.cli.main import app
 from nearfar.plan import Plan, paper_plan
 from nearfar.rigs.config import RigTable
+from nearfar.rigs.opening import RealTable
 from nearfar.transport.model import Transport
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
@@ -54,8 +55,9 @@ def test_every_command_it_shows_is_one():
     assert {words[1] for words in shown} <= known
 
 
-def test_the_rig_file_it_shows_is_read():
-    (text,) = _blocks("toml")
+def test_the_rig_files_it_shows_are_read():
+    text, real = _blocks("toml")
+    assert RealTable.model_validate(tomllib.loads(real)).camera.driver == "aravis"
     table = RigTable.model_validate(tomllib.loads(text))
     assert table.camera.bits == 14
     # Uncommented lines too.

@@ -42,6 +42,14 @@ class MissingPackageError(NearfarError, ImportError):
     """A package that an optional part needs and that is not installed."""
 
 
+class DeviceError(NearfarError, OSError):
+    """A projector or a camera that is not there, does not answer, or cannot do what was asked."""
+
+
+class LostPhotoError(DeviceError):
+    """A photo that did not arrive, or not whole: taking it again may help."""
+
+
 class ClusterError(NearfarError, ConnectionError):
     """A scheduler that is not there, or workers that cannot do the work."""
 

@@ -44,7 +44,7 @@ def _none_at_all(photos: list[Path]) -> tuple[str, ...]:
 def _raw_photos(photos: list[Path]) -> tuple[str, ...]:
     for photo in photos:
         photo.rename(photo.with_suffix(".dng"))
-    return ("0 photos", ".dng")
+    return ("pattern-00000.dng", "no camera raw file")
 
 
 def _another_size(photos: list[Path]) -> tuple[str, ...]:

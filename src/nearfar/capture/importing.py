@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nearfar.capture.store import Capture
 from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
-from nearfar.files import list_pictures, read_picture
+from nearfar.files import full_scale_of_file, list_pictures, read_picture
 from nearfar.plan.model import GrayCode, Picture, Plan, Stripe
 
 
@@ -160,7 +160,7 @@ def import_photos(
         path,
         plan,
         _read(photos),
-        full_scale=full_scale,
+        full_scale=full_scale_of_file(photos[0]) if full_scale is None and photos else full_scale,
         rig={"description": "imported photos", **(rig or {})},
         exposure=exposure,
         names=[photo.name for photo in photos],

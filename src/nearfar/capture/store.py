@@ -50,6 +50,11 @@ class Capture:
         When each photo was written, float64 seconds since the epoch.
     saturated : array
         Share of values at full scale or above in each photo, float64.
+    conditions : dict
+        What the rig told of each photo by name, such as its exposure in seconds or a temperature
+        in degrees Celsius; a list with None where it did not.
+    alarms : tuple of str
+        What the rig told of while the photos were taken, a sentence each.
     """
 
     path: Path
@@ -60,6 +65,8 @@ class Capture:
     exposure: float | None
     times: NDArray[np.float64]
     saturated: NDArray[np.float64]
+    conditions: dict[str, list[float | None]]
+    alarms: tuple[str, ...]
 
     @property
     def camera(self) -> Size:
@@ -130,6 +137,9 @@ def open_capture(path: AnyPath) -> Capture:
     times, saturated = read_array(group, "time"), read_array(group, "saturated")
     full_scale, rig = attributes.get("full_scale"), attributes.get("rig")
     exposure = attributes.get("exposure")
+    # Captures that were imported have none, and older ones.
+    conditions: Any = attributes.get("conditions")
+    alarms = attributes.get("alarms")
     if (
         not is_positive(full_scale)
         or (exposure is not None and not is_positive(exposure))
@@ -155,6 +165,8 @@ def open_capture(path: AnyPath) -> Capture:
         exposure=exposure,
         times=times,
         saturated=saturated,
+        conditions=conditions if isinstance(conditions, dict) else {},
+        alarms=tuple(map(str, alarms)) if isinstance(alarms, list) else (),
     )
 
 

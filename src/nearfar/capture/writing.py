@@ -30,6 +30,7 @@ from nearfar.capture.store import (
 )
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
+    UNFINISHED,
     add_array,
     create_durable_store,
     full_scale_of,
@@ -55,6 +56,10 @@ class _Taken(NamedTuple):
     mean: float
     # Whether it is the first photo again.
     same: bool
+    # What was as it was for this photo alone, such as temperatures.
+    conditions: Mapping[str, float] = {}
+    # What the rig told of since the photo before.
+    alarms: Sequence[str] = ()
 
 
 class CaptureWriter:
@@ -127,6 +132,7 @@ class CaptureWriter:
         *,
         full_scale: float | None = None,
         rig: Mapping[str, Any] | None = None,
+        exposure: float | None = None,
     ) -> Self:
         """Go on with a capture that another writer left.
 
@@ -134,7 +140,7 @@ class CaptureWriter:
         ----------
         folder : Path
             Where it is.
-        plan, full_scale, rig
+        plan, full_scale, rig, exposure
             As they were.
 
         Raises
@@ -145,7 +151,7 @@ class CaptureWriter:
             If it is damaged, or something else.
         """
         group = open_store(folder, KIND, FORMAT_VERSION)
-        writer = cls(folder, plan, full_scale=full_scale, rig=rig)
+        writer = cls(folder, plan, full_scale=full_scale, rig=rig, exposure=exposure)
         writer._open_log()
         try:
             writer._take_up(group)
@@ -179,13 +185,22 @@ class CaptureWriter:
         assert self._photos is not None
         return read_selection(self._photos, (number,))
 
-    def add(self, photo: NDArray[Any] | None) -> NDArray[Any]:
+    def add(
+        self,
+        photo: NDArray[Any] | None,
+        conditions: Mapping[str, float] | None = None,
+        alarms: Sequence[str] = (),
+    ) -> NDArray[Any]:
         """Write the next photo, and wait for the disk.
 
         Parameters
         ----------
         photo : ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
             uint8, uint16 or float32; none where photos end before patterns do.
+        conditions : mapping, optional
+            What may change from photo to photo, such as temperatures.
+        alarms : sequence of str
+            What the rig told of since the photo before.
 
         Returns
         -------
@@ -218,7 +233,9 @@ class CaptureWriter:
         check_white_and_black(self._white_black, self._means, self._called)
         check_order(self._white_black, self._means, self._called)
         saturated = float(np.mean(photo >= scale))
-        self._note(_Taken(time.time(), saturated, mean, bool(np.array_equal(photo, first))))
+        same = bool(np.array_equal(photo, first))
+        told = (dict(conditions or {}), list(alarms))
+        self._note(_Taken(time.time(), saturated, mean, same, *told))
         return photo
 
     def finish(self) -> None:
@@ -243,6 +260,11 @@ class CaptureWriter:
             # First of all: whoever goes on with this knows by it that no photo is missing.
             self._group.attrs["plan"] = json.loads(self._plan.first(count).to_json())
             self._photos.resize((count, *self._photos.shape[1:]))
+        told = {name for taken in self._taken for name in taken.conditions}
+        self._group.attrs["conditions"] = {
+            name: [taken.conditions.get(name) for taken in self._taken] for name in sorted(told)
+        }
+        self._group.attrs["alarms"] = [text for taken in self._taken for text in taken.alarms]
         for name in ("time", "saturated"):
             values = np.array([getattr(taken, name) for taken in self._taken])
             add_array(self._group, name, (count,), np.float64, (count,))[:] = values
@@ -259,12 +281,7 @@ class CaptureWriter:
         ended = json.loads(self._plan.first(self.taken).to_json())
         if before.get("plan") not in (now["plan"], ended):
             raise InputError(_other_plan(folder, before.get("plan"), now["plan"]))
-        if before.get("rig") != now["rig"]:
-            names = _different(before.get("rig"), now["rig"])
-            raise InputError(
-                f"{folder} was begun with another rig ({names}): set it up as it was, or begin "
-                f"anew with --force."
-            )
+        require_same_rig(folder, before.get("rig"), now["rig"], "begin anew with --force")
         photos, scale = open_array(group, "photos"), before.get("full_scale")
         many = self.taken > min(photos.shape[0], len(self._plan.patterns))
         if many or not is_positive(scale):
@@ -308,6 +325,28 @@ def count_photos(folder: Path) -> int:
         return 0
 
 
+class Begun(NamedTuple):
+    """What is known of a capture that was begun and not finished."""
+
+    photos: int
+    exposure: float | None
+
+
+def begun_capture(path: AnyPath) -> Begun:
+    """Tell of a capture that was begun and not finished; of none, no photos.
+
+    Raises
+    ------
+    UnreadableFileError
+        If what is there is no such capture.
+    """
+    folder = Path(f"{path}{UNFINISHED}")
+    if not folder.exists():
+        return Begun(0, None)
+    exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
+    return Begun(count_photos(folder), exposure if is_positive(exposure) else None)
+
+
 def _read_log(folder: Path) -> list[_Taken]:
     """Read what is noted of the photos; what a crash tore off the last line is cut away."""
     path = folder / LOG
@@ -342,6 +381,30 @@ def _other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
         cure = "give --until with --resume" if checked else "leave out --until"
         return f"{folder} was begun {'with' if checked else 'without'} --until: {cure}."
     return f"{folder} was begun with another plan: give that one, or begin anew with --force."
+
+
+def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwise: str) -> None:
+    """Refuse to go on with a rig that is not as it was.
+
+    Parameters
+    ----------
+    path : Path
+        The capture.
+    before, now : mapping
+        What the rig says of itself.
+    otherwise : str
+        What else can be done, in words.
+
+    Raises
+    ------
+    InputError
+    """
+    now = json.loads(json.dumps(now))
+    if before != now:
+        raise InputError(
+            f"{path} was begun with another rig ({_different(before, now)}): set it up as it was, "
+            f"or {otherwise}."
+        )
 
 
 def _different(before: object, now: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """``nearfar acquire`` and ``nearfar import``."""
 
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
 from math import nan
@@ -13,10 +14,12 @@ from nearfar.arrays import parse_bytes
 from nearfar.cli.options import Force, PlanFile, Quiet, Where, keep_input
 from nearfar.cli.progress import SATURATED, counted, progress_bar, say, warn
 from nearfar.cli.reconstructing import Seen
+from nearfar.cli.reshooting import photo_numbers, take_again
 from nearfar.errors import InputError
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
+    from nearfar.rigs.base import Rig
     from nearfar.workflow.running import Standing
 
 # Beyond this no photo of a real camera tells anything.
@@ -62,6 +65,10 @@ def acquire(
         bool,
         typer.Option("--resume", help="Go on with the photos of a capture that was stopped."),
     ] = False,
+    reshoot: Annotated[
+        str | None,
+        typer.Option(help="Take these photos of a finished capture again.", metavar="12,40-60"),
+    ] = None,
     memory: Annotated[
         str | None, typer.Option(help="Memory for --transport.", metavar="2GB")
     ] = None,
@@ -71,23 +78,28 @@ def acquire(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Shoot a plan on a simulated rig.
+    """Shoot a plan on a real rig or a simulated one.
 
     Example: nearfar acquire plan.json capture.zarr --rig cornell --transport transport.zarr
     """
-    from nearfar.files import check_output, check_resumable
+    from nearfar.capture.writing import begun_capture
+    from nearfar.files import check_resumable
     from nearfar.plan import read_plan
     from nearfar.plan.checks import with_checks
-    from nearfar.rigs.config import notes_of, open_rig
+    from nearfar.rigs.config import notes_of, opened_rig
     from nearfar.transport.store import write_transport
     from nearfar.workflow.acquire import acquire as shoot
     from nearfar.workflow.estimating import RunningEstimate
     from nearfar.workflow.running import RunningCheck
 
+    if reshoot is not None:
+        given = {"--until": until, "--transport": transport, "--resume": resume, "--force": force}
+        _refuse(given, "goes not with --reshoot.")
+        take_again(plan_file, output, rig, photo_numbers(reshoot), quiet=quiet)
+        return
     target = _decibels(until) if until is not None else None
-    for name, given in (("--memory", memory), ("--device", device)):
-        if transport is None and given is not None:
-            raise typer.BadParameter("is for --transport.", param_hint=name)
+    if transport is None:
+        _refuse({"--memory": memory, "--device": device}, "is for --transport.")
     available = parse_bytes(memory or "2GB", name="--memory")
     made = read_plan(plan_file)
     made.require_real("shoot")
@@ -96,15 +108,17 @@ def acquire(
     keep_input(output, plan_file, Path(rig))
     check_resumable(output, resume=resume, force=force)
     if transport is not None:
-        keep_input(transport, plan_file, Path(rig))
-        if transport.resolve() == output.resolve():
-            raise InputError(
-                f"{output} cannot be both capture and transport: choose another name for one."
-            )
-        check_output(transport, force=force)
+        _check_transport(transport, output, plan_file, Path(rig), force=force)
     with ExitStack() as stack:
         report = stack.enter_context(progress_bar("opening the rig", quiet=quiet))
-        opened = open_rig(rig, made.projector, progress=report)
+        # What was begun with one exposure is gone on with by it.
+        before, exposure = begun_capture(output) if resume else (0, None)
+        begun = partial(_tell_time, len(made.patterns) - before, quiet=quiet)
+        opened = stack.enter_context(
+            opened_rig(
+                rig, made.projector, exposure=exposure, progress=report, told=warn, begun=begun
+            )
+        )
         for note in notes_of(opened):
             warn(note)
         check = estimate = None
@@ -135,10 +149,43 @@ def acquire(
             write_transport(transport, transports, taken.camera.height, force=force)
             seen.conclude(taken, transport, quiet=quiet)
             say(f"{time.monotonic() - last:.1f} s after the last photo", quiet=quiet)
-    if opened.exposure != 1.0:
-        say(f"transport of {opened.name} exposed by {opened.exposure:.6g}", quiet=quiet)
+    _say_exposure(opened, quiet=quiet)
     if target is not None and check is not None and check.standing is not None:
         _say_what_limits(check.standing, target, quiet=quiet)
+
+
+def _tell_time(photos: int, seconds: float, *, quiet: bool) -> None:
+    """Say before the first photo how long all are going to take."""
+    minutes, rest = divmod(round(photos * seconds), 60)
+    long = f"{minutes} min {rest} s" if minutes else f"{rest} s"
+    say(f"{photos} photos at {seconds:.2f} s each: about {long}", quiet=quiet)
+
+
+def _say_exposure(rig: "Rig", *, quiet: bool) -> None:
+    """Say by what a simulated scene's transport has become that of the photos."""
+    from nearfar.rigs.simulated.rig import SimulatedRig
+
+    if isinstance(rig, SimulatedRig) and rig.exposure != 1.0:
+        say(f"transport of {rig.name} exposed by {rig.exposure:.6g}", quiet=quiet)
+
+
+def _refuse(given: Mapping[str, object], why: str) -> None:
+    """Refuse options that were given where they mean nothing."""
+    for name, value in given.items():
+        if value:
+            raise typer.BadParameter(why, param_hint=name)
+
+
+def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool) -> None:
+    """Refuse, before a photo is taken, a transport that could not be written."""
+    from nearfar.files import check_output
+
+    keep_input(transport, *inputs)
+    if transport.resolve() == capture.resolve():
+        raise InputError(
+            f"{capture} cannot be both capture and transport: choose another name for one."
+        )
+    check_output(transport, force=force)
 
 
 def _decibels(text: str) -> float:

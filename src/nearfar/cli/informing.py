@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +10,9 @@ from nearfar.cli.options import Quiet
 from nearfar.cli.planning import describe_plan
 from nearfar.cli.progress import say
 from nearfar.errors import MissingFileError, UnreadableFileError
+
+if TYPE_CHECKING:
+    from nearfar.capture import Capture
 
 
 def info(
@@ -115,8 +118,19 @@ def _describe_capture(path: Path) -> str:
             f"{capture.saturated_share:.3%} saturated",
             describe_plan(capture.plan),
             f"rig: {json.dumps(capture.rig)}",
+            *_told_while_taken(capture),
         ]
     )
+
+
+def _told_while_taken(capture: "Capture") -> list[str]:
+    """Say how long it took, what changed from photo to photo, and what went wrong."""
+    lines = [f"taken in {capture.times.max() - capture.times.min():.0f} s"]
+    for name, values in capture.conditions.items():
+        known = [value for value in values if value is not None]
+        if known:
+            lines.append(f"{name}: {min(known):.6g} to {max(known):.6g}")
+    return lines + [f"alarm: {text}" for text in capture.alarms]
 
 
 def _describe_transport(path: Path) -> str:

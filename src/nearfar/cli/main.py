@@ -24,6 +24,7 @@ from nearfar.cli import (
     looking,
     planning,
     reconstructing,
+    rigging,
     separating,
     transports,
 )
@@ -54,6 +55,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compare": comparing.compare,
     "figures": figuring.figures,
     "separate": separating.separate,
+    "devices": rigging.devices,
+    "init": rigging.init,
+    "calibrate": rigging.calibrate,
 }
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

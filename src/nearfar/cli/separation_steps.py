@@ -78,7 +78,7 @@ def shoot_photos(
 ) -> "tuple[PhotosToSeparate, dict[str, Any]]":
     """Shoot a method's patterns; tell what the rig says of itself."""
     from nearfar.baselines.separation_photos import shoot_to_separate
-    from nearfar.rigs.config import notes_of, open_rig
+    from nearfar.rigs.config import notes_of, opened_rig
     from nearfar.scenes import NAMES, sizes
 
     if projector is None:
@@ -90,11 +90,11 @@ def shoot_photos(
     assert method.draw is not None
     # Patterns that do not fit are refused before a scene is computed.
     patterns = method.draw(projector)
-    opened = open_rig(rig, projector, progress=report)
-    for note in notes_of(opened):
-        warn(note)
-    progress = counted(report, "photos", len(patterns) + 1)
-    return shoot_to_separate(opened, patterns, progress=progress), opened.describe()
+    with opened_rig(rig, projector, progress=report, told=warn) as opened:
+        for note in notes_of(opened):
+            warn(note)
+        progress = counted(report, "photos", len(patterns) + 1)
+        return shoot_to_separate(opened, patterns, progress=progress), opened.describe()
 
 
 def compare(

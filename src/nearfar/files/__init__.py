@@ -6,6 +6,7 @@ from nearfar.files.colour import from_srgb, luminance, to_srgb
 from nearfar.files.images import (
     check_picture_ending,
     full_scale_of,
+    full_scale_of_file,
     list_pictures,
     natural_key,
     read_light,
@@ -41,6 +42,7 @@ __all__ = [
     "encode_png",
     "from_srgb",
     "full_scale_of",
+    "full_scale_of_file",
     "kind_of_store",
     "list_pictures",
     "luminance",

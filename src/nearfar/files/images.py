@@ -12,10 +12,13 @@ from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import codecs
 from nearfar.files.colour import from_srgb, to_srgb
 from nearfar.files.output import new_output
+from nearfar.files.raw import decode_raw
 
 PICTURE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
 IMAGE_ENDINGS = (".npy", ".exr", ".tiff", ".tif", ".png")
 RAW_ENDINGS = (".dng", ".nef", ".cr2", ".cr3", ".arw", ".raf", ".orf", ".rw2", ".pef", ".raw")
+
+JPEG = b"\xff\xd8\xff"
 
 # A number in the middle of a name is compared as a number.
 _DIGITS = re.compile(r"([0-9]+)")
@@ -23,6 +26,8 @@ _DIGITS = re.compile(r"([0-9]+)")
 
 def read_picture(path: Path) -> NDArray[Any]:
     """Read a picture as it is stored: PNG, TIFF, OpenEXR or NPY, told by its first bytes.
+
+    Camera raw files, told by their names, come as `nearfar.files.raw.decode_raw` gives them.
 
     Parameters
     ----------
@@ -42,13 +47,17 @@ def read_picture(path: Path) -> NDArray[Any]:
         If the file is damaged, cut short, or of a kind that is not read.
     InputError
         If it holds NaN or infinities, or is no image of 8 or 16 bits or floats.
+    MissingPackageError
+        If it is a camera raw file and rawpy is not installed.
     """
-    data = _read_bytes(path)
-    if path.suffix.lower() in RAW_ENDINGS:
-        raise UnreadableFileError(
-            f"{path} is a camera raw file, which is not read: develop it to a linear 16-bit TIFF."
-        )
-    if data.startswith(b"\xff\xd8\xff"):
+    return decode_picture(_read_bytes(path), path)
+
+
+def decode_picture(data: bytes, path: Path) -> NDArray[Any]:
+    """Decode the bytes of a picture that `path` names; as `read_picture`."""
+    if is_raw(path):
+        return decode_raw(data, path).levels
+    if data.startswith(JPEG):
         raise UnreadableFileError(
             f"{path} is a JPEG, which has 8 bits and is not linear: save it as PNG or TIFF."
         )
@@ -65,6 +74,11 @@ def read_picture(path: Path) -> NDArray[Any]:
             f"{path} is damaged or cut short: copy or save it again."
         ) from error
     return _checked(path, pixels)
+
+
+def is_raw(path: Path) -> bool:
+    """Tell a camera raw file by its name; it begins like a TIFF, or like nothing."""
+    return path.suffix.lower() in RAW_ENDINGS
 
 
 def _read_bytes(path: Path) -> bytes:
@@ -97,6 +111,11 @@ def _checked(path: Path, pixels: NDArray[Any]) -> NDArray[Any]:
             f"{path} holds {pixels.dtype} numbers: save it as uint8, uint16 or float32."
         )
     return pixels
+
+
+def full_scale_of_file(path: Path) -> float | None:
+    """Read the value of full white that a camera raw file tells; None for other files."""
+    return decode_raw(_read_bytes(path), path).white if is_raw(path) else None
 
 
 def require_finite(pixels: NDArray[Any], name: str) -> None:
@@ -140,6 +159,8 @@ def read_linear(path: Path, *, full_scale: float | None = None) -> NDArray[np.fl
         As `read_picture`.
     """
     pixels = read_picture(path)
+    if full_scale is None:
+        full_scale = full_scale_of_file(path)
     scale = full_scale_of(pixels.dtype) if full_scale is None else full_scale
     return np.asarray(pixels.astype(np.float32) / np.float32(scale))
 
@@ -262,7 +283,7 @@ def list_pictures(folder: Path) -> list[Path]:
     pictures = (
         entry
         for entry in entries
-        if entry.suffix.lower() in PICTURE_ENDINGS
+        if entry.suffix.lower() in (*PICTURE_ENDINGS, *RAW_ENDINGS)
         and not entry.name.startswith(".")
         and not entry.is_dir()
     )

@@ -1,6 +1,6 @@
 """What a rig is: something that shows patterns and takes photos."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,6 +26,15 @@ class Rig(Protocol):
 
     def describe(self) -> dict[str, Any]:
         """Tell what the capture should remember of the rig, as JSON."""
+        ...
+
+    @property
+    def alarms(self) -> Sequence[str]:
+        """What has gone wrong so far and was mended or must be known, a sentence each."""
+        ...
+
+    def conditions(self) -> Mapping[str, float]:
+        """Tell of the last photo what may change from one to the next, such as temperatures."""
         ...
 
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:

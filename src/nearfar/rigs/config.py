@@ -1,6 +1,8 @@
 """Which rig: a scene by name or of Mitsuba, a stored transport, or a RIG.toml that says more."""
 
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -9,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from nearfar.arrays import Size, parse_size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import kind_of_store
+from nearfar.rigs.opening import RealTable, real_rig
+from nearfar.rigs.real import Begun, RealRig, Told
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig, World, brightest
@@ -118,7 +122,13 @@ def open_rig(rig: str, projector: Size, *, progress: Progress | None = None) -> 
         return _rig(RigTable(scene=SceneTable(name=rig)), Path(), projector, progress)
     path = Path(rig)
     if path.suffix.lower() == ".toml":
-        return _rig(read_rig_table(path), path.parent, projector, progress)
+        table = read_rig_table(path)
+        if isinstance(table, RealTable):
+            raise InputError(
+                f"{path} is a real rig, and this needs a simulated one: name a scene, or a "
+                f"RIG.toml with [scene]."
+            )
+        return _rig(table, path.parent, projector, progress)
     if not path.exists():
         raise MissingFileError(
             f"{rig} is no rig: name a scene ({', '.join(NAMES)}), a Mitsuba scene, a stored "
@@ -128,15 +138,55 @@ def open_rig(rig: str, projector: Size, *, progress: Progress | None = None) -> 
     return _rig(RigTable(scene=scene), path.parent, projector, progress)
 
 
-def read_rig_table(path: Path) -> RigTable:
-    """Read a RIG.toml.
+@contextmanager
+def opened_rig(
+    rig: str,
+    projector: Size,
+    *,
+    exposure: float | None = None,
+    progress: Progress | None = None,
+    told: Told | None = None,
+    begun: Begun | None = None,
+) -> Iterator[SimulatedRig | RealRig]:
+    """Open the rig that a command names, simulated or real, and give its devices back in the end.
+
+    Parameters
+    ----------
+    rig, projector, progress
+        As `open_rig`; or the RIG.toml of a real rig.
+    exposure : float, optional
+        Of a real rig, in seconds, instead of what its table says.
+    told, begun : callable, optional
+        Of a real rig: called with each alarm, a sentence; and before the first photo with the
+        seconds that each is going to take.
+
+    Raises
+    ------
+    NearfarError
+        As `open_rig` and `nearfar.rigs.opening.real_rig`.
+    """
+    path = Path(rig)
+    table = read_rig_table(path) if path.suffix.lower() == ".toml" else None
+    if isinstance(table, RealTable):
+        opening = real_rig(path, table, projector, exposure=exposure, told=told, begun=begun)
+        with opening as real:
+            yield real
+    else:
+        yield open_rig(rig, projector, progress=progress)
+
+
+def read_rig_table(path: Path) -> RigTable | RealTable:
+    """Read a RIG.toml; one whose camera has a driver is a real rig's.
 
     Raises
     ------
     MissingFileError, UnreadableFileError
     """
     try:
-        return RigTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        camera = data.get("camera")
+        real = "scene" not in data and isinstance(camera, dict) and "driver" in camera
+        return (RealTable if real else RigTable).model_validate(data)
     except FileNotFoundError:
         raise MissingFileError(f"{path} is not there: check the name of the rig.") from None
     except ValidationError as error:
@@ -187,9 +237,10 @@ def is_mitsuba(path: Path) -> bool:
     return path.suffix.lower() == ".xml"
 
 
-def notes_of(rig: SimulatedRig) -> tuple[str, ...]:
+def notes_of(rig: SimulatedRig | RealRig) -> tuple[str, ...]:
     """Return what a user should know of a rig, a sentence each."""
-    return rig.world.notes if isinstance(rig.world, RenderedWorld) else ()
+    world = rig.world if isinstance(rig, SimulatedRig) else None
+    return world.notes if isinstance(world, RenderedWorld) else ()
 
 
 def load_world(

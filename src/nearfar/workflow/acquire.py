@@ -1,6 +1,6 @@
 """Show a plan's patterns on a rig and keep the photos, on the disk or in memory."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
-from nearfar.capture.writing import LOG, count_photos
+from nearfar.capture.replacing import replace_photos
+from nearfar.capture.writing import LOG, count_photos, require_same_rig
 from nearfar.errors import CaptureInterrupted, InputError, NearfarError, UselessPhotosError
 from nearfar.files import resumable_output
 from nearfar.photometry.held import HeldPhotos
@@ -76,14 +77,15 @@ def acquire(
             _writer(folder, plan, rig, resume=resume) as writer,
         ):
             kept.folder = folder
-            ended, taken = writer.ended, writer.taken
+            ended, taken, told = writer.ended, writer.taken, 0
             for number in range(taken):
                 answer = enough is not None and enough(number, writer.read(number))
                 # Only the last may end it: photos are not taken back.
                 ended = ended or (answer and number + 1 == taken)
             photos = iter(()) if ended else _photos(plan, rig, taken)
             while not ended:
-                photo = writer.add(next(photos, None))
+                photo = writer.add(next(photos, None), rig.conditions(), rig.alarms[told:])
+                told = len(rig.alarms)
                 if progress is not None:
                     progress(writer.taken)
                 ended = (enough is not None and enough(writer.taken - 1, photo)) or writer.ended
@@ -99,6 +101,57 @@ def acquire(
     # Until it had its name, it was what the photos would have been gone on with by.
     (path.resolve() / LOG).unlink(missing_ok=True)
     return open_capture(path)
+
+
+def shoot_again(
+    plan: Plan,
+    path: AnyPath,
+    rig: Rig,
+    numbers: Sequence[int],
+    *,
+    progress: Callable[[int], None] | None = None,
+) -> Capture:
+    """Take named photos of a finished capture again; it changes as a whole or not at all.
+
+    Parameters
+    ----------
+    plan : Plan
+        The capture's.
+    path : str or Path
+        The capture.
+    rig : Rig
+        Set up as it was.
+    numbers : sequence of int
+        Which photos.
+    progress : callable, optional
+        Told the number of photos taken after each.
+
+    Returns
+    -------
+    Capture
+
+    Raises
+    ------
+    InputError
+        If plan or rig are not the capture's, there is no such photo, or one is not like the others.
+    NearfarError
+        As `nearfar.capture.replacing.replace_photos`.
+    """
+    _require(plan, rig)
+    capture = open_capture(path)
+    if capture.plan.patterns != plan.patterns[: len(capture.plan.patterns)]:
+        raise InputError(f"{path} is of another plan: give that one.")
+    require_same_rig(Path(path), capture.rig, rig.describe(), "take them all anew with --force")
+    known = [number for number in numbers if 0 <= number < len(plan.patterns)]
+    photos = rig.shoot((plan.draw(number) for number in known), known[0] if known else 0)
+    return replace_photos(
+        path,
+        numbers,
+        photos,
+        conditions=rig.conditions,
+        alarms=lambda: rig.alarms,
+        progress=progress,
+    )
 
 
 class _Kept:
@@ -128,7 +181,8 @@ class _Kept:
 
 def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWriter:
     begin = CaptureWriter.resume if resume else CaptureWriter
-    return begin(folder, plan, full_scale=rig.full_scale, rig=rig.describe())
+    about = rig.describe()
+    return begin(folder, plan, full_scale=rig.full_scale, rig=about, exposure=about.get("exposure"))
 
 
 def hold(plan: Plan, rig: Rig) -> HeldPhotos:

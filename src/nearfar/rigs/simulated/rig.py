@@ -80,6 +80,15 @@ class SimulatedRig:
             **self.details,
         }
 
+    @property
+    def alarms(self) -> tuple[str, ...]:
+        """None: a simulation does as it is told."""
+        return ()
+
+    def conditions(self) -> dict[str, float]:
+        """Nothing changes but by the settings."""
+        return {}
+
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
         """Yield a photo for each pattern, in order; `first` is the number of the first."""
         number = first

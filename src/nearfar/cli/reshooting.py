@@ -1,0 +1,40 @@
+"""``nearfar acquire --reshoot``: photos of a finished capture, once more."""
+
+from pathlib import Path
+
+import typer
+
+from nearfar.cli.progress import counted, progress_bar, say, warn
+
+
+def take_again(plan_file: Path, output: Path, rig: str, numbers: list[int], *, quiet: bool) -> None:
+    """Take photos of a finished capture again."""
+    from nearfar.capture import open_capture
+    from nearfar.plan import read_plan
+    from nearfar.rigs.config import opened_rig
+    from nearfar.workflow.acquire import shoot_again
+
+    made, before = read_plan(plan_file), open_capture(output)
+    with (
+        progress_bar("opening the rig", quiet=quiet) as report,
+        opened_rig(
+            rig, made.projector, exposure=before.exposure, progress=report, told=warn
+        ) as opened,
+    ):
+        progress = counted(report, "photos", len(numbers))
+        shoot_again(before.plan, output, opened, numbers, progress=progress)
+    say(f"{len(numbers)} photos of {output} taken again", quiet=quiet)
+
+
+def photo_numbers(text: str) -> list[int]:
+    """Read 12,40-60."""
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()):
+            raise typer.BadParameter(
+                f"{part.strip()!r} is no photo's number: write them as 12,40-60.",
+                param_hint="--reshoot",
+            )
+        found += range(int(first), int(last or first) + 1)
+    return sorted(set(found))

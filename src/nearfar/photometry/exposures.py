@@ -1,0 +1,96 @@
+"""Several frames of the same light made one: averages, and exposures of several lengths.
+
+Index convention: frames are (n, ...), raw levels; whatever follows is a frame's own shape.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats
+
+# The brightest levels bend before they clip.
+TRUSTED = 0.98
+
+
+class Sensor(NamedTuple):
+    """What a camera's levels are made of: level = black + gain * electrons, with noise.
+
+    Attributes
+    ----------
+    black : float
+        Level without light.
+    gain : float
+        Levels per electron.
+    read : float
+        Standard deviation of a reading, levels.
+    """
+
+    black: float = 0.0
+    gain: float = 1.0
+    read: float = 1.0
+
+    def variance(self, levels: Floats) -> Floats:
+        """Variance of levels, in levels squared: shot noise and read noise."""
+        return np.asarray(self.read**2 + self.gain * np.maximum(levels - self.black, 0.0))
+
+
+def average(frames: NDArray[Any], full_scale: float) -> NDArray[np.float32]:
+    """Average frames; a value that is saturated in one of them stays so.
+
+    Parameters
+    ----------
+    frames : array, shape (n, ...)
+        Of one light and exposure.
+    full_scale : float
+
+    Returns
+    -------
+    array
+        float32, levels.
+    """
+    mean = frames.mean(axis=0, dtype=np.float64)
+    return np.asarray(
+        np.where((frames >= full_scale).any(axis=0), full_scale, mean), dtype=np.float32
+    )
+
+
+def merge_exposures(
+    frames: NDArray[Any], times: Sequence[float], sensor: Sensor, full_scale: float
+) -> NDArray[np.float32]:
+    """Merge exposures of several lengths, each weighted by the inverse of its variance.
+
+    The rate of light that best explains all levels that are not clipped: with w = t^2 / variance,
+    rate = sum(w (level - black) / t) / sum(w), with the variance at the level that is expected of
+    the rate itself, so that weights do not follow the noise.
+
+    Parameters
+    ----------
+    frames : array, shape (n, ...)
+        The first is the shortest.
+    times : sequence of float
+        Exposure of each.
+    sensor : Sensor
+        For the weights.
+    full_scale : float
+        Level at which a value is saturated.
+
+    Returns
+    -------
+    array
+        float32: levels as of the first exposure; `full_scale` where even that is saturated.
+    """
+    lengths = np.asarray(times, dtype=np.float64).reshape(-1, *(1,) * (frames.ndim - 1))
+    trusted = frames < TRUSTED * full_scale
+    light = frames.astype(np.float64) - sensor.black
+    # Without read noise this is the answer already.
+    time = (trusted * lengths).sum(axis=0)
+    rate = (trusted * light).sum(axis=0) / np.where(time > 0, time, 1.0)
+    weight = trusted * lengths**2 / sensor.variance(rate * lengths + sensor.black)
+    total = weight.sum(axis=0)
+    rate = (weight * light / lengths).sum(axis=0) / np.where(total > 0, total, 1.0)
+    levels = sensor.black + rate * lengths[0]
+    # What is bright even in the shortest is that alone.
+    return np.asarray(np.where(total > 0, levels, frames[0]), dtype=np.float32)

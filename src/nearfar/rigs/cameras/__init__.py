@@ -1,0 +1,1 @@
+"""Real cameras: a small driver for each kind over one base class."""

@@ -1,0 +1,305 @@
+"""GigE Vision and USB3 Vision cameras, by the Aravis library."""
+
+import ctypes
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Size
+from nearfar.errors import DeviceError, InputError, LostPhotoError
+from nearfar.files.mosaic import bin_mosaic
+from nearfar.rigs.cameras.aravis_library import Aravis, aravis
+from nearfar.rigs.cameras.base import Camera, FoundCamera, Frame
+
+DRIVER = "aravis"
+CONTINUOUS = 0
+WHOLE = 0  # ARV_BUFFER_STATUS_SUCCESS
+STATUSES = {
+    2: "it did not come in time",
+    3: "packets were lost",
+    4: "packets were out of order",
+    5: "it was of another size",
+    7: "the camera stopped",
+}
+BUFFERS = 4
+# Seconds beyond the exposure within which a frame must be here.
+PATIENCE = 2.0
+MICROSECONDS = 1e6
+# Formats whose values are not packed across bytes, best first.
+FORMATS = re.compile(r"(Mono|Bayer(?P<cell>RG|GR|GB|BG))(?P<bits>8|10|12|14|16)$")
+CELLS = {"RG": "RGGB", "GR": "GRBG", "GB": "GBRG", "BG": "BGGR"}
+
+
+def find() -> list[FoundCamera]:
+    """List the cameras on the network and on USB.
+
+    Raises
+    ------
+    MissingPackageError
+        If Aravis is not installed.
+    """
+    library = aravis()
+    library.plain("arv_update_device_list")
+    found = []
+    for index in range(library.plain("arv_get_n_devices")):
+        told = (
+            library.plain(f"arv_get_device_{what}", index) for what in ("id", "vendor", "model")
+        )
+        device, vendor, model = ((text or b"").decode(errors="replace") for text in told)
+        found.append(FoundCamera(DRIVER, device, f"{vendor} {model}"))
+    return found
+
+
+class AravisCamera(Camera):
+    """A GigE Vision or USB3 Vision camera.
+
+    Parameters
+    ----------
+    device : str, optional
+        As `find` tells it, or an address; the first that is found if left out.
+    region : Size, optional
+        Rows and columns to read, from the middle of the sensor; all if left out.
+    pixel_format : str, optional
+        Such as Mono16; of those that are not packed the one of most bits if left out.
+    trigger : str
+        "software", one trigger a photo; "free", the camera runs by itself, and the first frame that
+        began after the pattern was shown counts; or the line of a hardware trigger, such as Line1.
+    features : mapping
+        GenICam features to set first, such as Gain or GevSCPSPacketSize.
+    frames, bracket
+        As `Camera`.
+
+    Raises
+    ------
+    MissingPackageError, DeviceError, InputError
+    """
+
+    def __init__(
+        self,
+        device: str | None = None,
+        *,
+        region: Size | None = None,
+        pixel_format: str | None = None,
+        trigger: str = "software",
+        features: Mapping[str, bool | int | float | str] | None = None,
+        frames: int = 1,
+        bracket: tuple[float, ...] = (1.0,),
+    ) -> None:
+        super().__init__(
+            f"camera {device}" if device else "the camera", frames=frames, bracket=bracket
+        )
+        self._library: Aravis = aravis()
+        self._camera = self._stream = None
+        self._trigger, self._features = trigger, dict(features or {})
+        try:
+            # On machines of several networks, cameras opened without this may send nothing.
+            self._library.plain("arv_update_device_list")
+            self._camera = self._call("arv_camera_new", device.encode() if device else None)
+            told = [
+                self._call(f"arv_camera_get_{what}", self._camera) or b""
+                for what in ("vendor_name", "model_name", "device_serial_number")
+            ]
+            self.name = " ".join(text.decode(errors="replace") for text in told)
+            self._set_up(region, pixel_format)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def full_scale(self) -> float:
+        """Highest level of the pixel format."""
+        return float(2**self._bits - 1)
+
+    @property
+    def exposure_limits(self) -> tuple[float, float] | None:
+        """Shortest and longest exposure in seconds; None if it cannot be set."""
+        if not self._call("arv_camera_is_exposure_time_available", self._camera):
+            return None
+        low, high = ctypes.c_double(), ctypes.c_double()
+        bounds = "arv_camera_get_exposure_time_bounds"
+        self._call(bounds, self._camera, ctypes.byref(low), ctypes.byref(high))
+        return max(low.value, 1.0) / MICROSECONDS, high.value / MICROSECONDS
+
+    def describe(self) -> dict[str, Any]:
+        """Tell what a capture remembers of the camera."""
+        return {
+            **super().describe(),
+            "driver": DRIVER,
+            "pixel_format": self._format,
+            "region": list(self._region),
+            "trigger": self._trigger,
+            "features": self._features,
+        }
+
+    def conditions(self) -> dict[str, float]:
+        """Exposure in seconds as the camera tells it, and its temperature where it has one."""
+        told = {}
+        if self.exposure is not None:
+            microseconds = self._call("arv_camera_get_exposure_time", self._camera)
+            told["exposure"] = microseconds / MICROSECONDS
+        if self._has("DeviceTemperature"):
+            name = b"DeviceTemperature"
+            told["temperature"] = self._call("arv_camera_get_float", self._camera, name)
+        return told
+
+    def close(self) -> None:
+        """Give the camera back."""
+        if self._stream is not None:
+            # It may be gone; what matters is that it is let go of.
+            with suppress(DeviceError):
+                self._library.call("arv_camera_stop_acquisition", self._camera)
+            self._library.release(self._stream)
+        if self._camera is not None:
+            self._library.release(self._camera)
+        self._stream = self._camera = None
+
+    def take(self) -> Frame:
+        """Take a frame, (Cy, Cx, channels), whose exposure begins after this is called.
+
+        Raises
+        ------
+        LostPhotoError
+            If no frame arrives in time, or with holes.
+        DeviceError
+            If the camera does not answer.
+        """
+        # What came unasked belongs to no pattern.
+        while old := self._library.plain("arv_stream_try_pop_buffer", self._stream):
+            self._library.plain("arv_stream_push_buffer", self._stream, old)
+        if self._trigger == "software":
+            self._call("arv_camera_software_trigger", self._camera)
+        elif self._trigger == "free":
+            # This one began before.
+            self._pop()
+        return self._pop()
+
+    def _pop(self) -> Frame:
+        wait = int(MICROSECONDS * ((self.exposure or 0.0) + PATIENCE))
+        buffer = self._library.plain("arv_stream_timeout_pop_buffer", self._stream, wait)
+        if not buffer:
+            raise LostPhotoError(
+                f"{self.name} sent no photo within {wait / MICROSECONDS:.1f} s: check its cable"
+                + (", and its trigger." if self._trigger not in {"software", "free"} else ".")
+            )
+        try:
+            status = self._library.plain("arv_buffer_get_status", buffer)
+            if status != WHOLE:
+                why = STATUSES.get(status, f"status {status}")
+                raise LostPhotoError(
+                    f"a photo of {self.name} did not arrive whole ({why}): check its cable, and on "
+                    f"Ethernet the packet size."
+                )
+            return self._as_frame(self._copied(buffer))
+        finally:
+            self._library.plain("arv_stream_push_buffer", self._stream, buffer)
+
+    def _copied(self, buffer: Any) -> NDArray[Any]:
+        size = ctypes.c_size_t()
+        data = self._library.plain("arv_buffer_get_data", buffer, ctypes.byref(size))
+        height = self._library.plain("arv_buffer_get_image_height", buffer)
+        width = self._library.plain("arv_buffer_get_image_width", buffer)
+        dtype = np.dtype(np.uint8 if self._bits == 8 else "<u2")
+        if (height, width) != self._region or size.value < height * width * dtype.itemsize:
+            raise LostPhotoError(
+                f"a photo of {self.name} is {height}x{width}, not {self._region}: leave the camera "
+                f"to this program."
+            )
+        raw = ctypes.string_at(data, height * width * dtype.itemsize)
+        return np.frombuffer(raw, dtype).reshape(height, width)
+
+    def _as_frame(self, levels: NDArray[Any]) -> Frame:
+        return bin_mosaic(levels, self._cell) if self._cell else levels[..., np.newaxis]
+
+    def _set_exposure(self, seconds: float) -> float:
+        name, microseconds = "arv_camera_set_exposure_time", MICROSECONDS * seconds
+        self._call(name, self._camera, microseconds)
+        return float(self._call("arv_camera_get_exposure_time", self._camera)) / MICROSECONDS
+
+    def _set_up(self, region: Size | None, pixel_format: str | None) -> None:
+        # What decides by itself would change between photos.
+        for automatic in ("ExposureAuto", "GainAuto", "BalanceWhiteAuto", "GammaEnable"):
+            if self._has(automatic):
+                self._set_feature(automatic, False if automatic == "GammaEnable" else "Off")
+        for name, value in self._features.items():
+            if not self._has(name):
+                raise InputError(f"{self.name} has no feature {name}: remove it from the rig.")
+            self._set_feature(name, value)
+        self._format = self._chosen_format(pixel_format)
+        self._call("arv_camera_set_pixel_format_from_string", self._camera, self._format.encode())
+        match = FORMATS.match(self._format)
+        assert match is not None
+        self._bits = int(match["bits"])
+        self._cell = CELLS[match["cell"]] if match["cell"] else None
+        self._region = self._set_region(region)
+        self._call("arv_camera_set_acquisition_mode", self._camera, CONTINUOUS)
+        if self._trigger == "free":
+            self._call("arv_camera_clear_triggers", self._camera)
+        else:
+            source = "Software" if self._trigger == "software" else self._trigger
+            self._call("arv_camera_set_trigger", self._camera, source.encode())
+        self._stream = self._call("arv_camera_create_stream", self._camera, None, None)
+        payload = self._call("arv_camera_get_payload", self._camera)
+        for _ in range(BUFFERS):
+            buffer = self._library.plain("arv_buffer_new_allocate", payload)
+            self._library.plain("arv_stream_push_buffer", self._stream, buffer)
+        self._call("arv_camera_start_acquisition", self._camera)
+
+    def _chosen_format(self, wanted: str | None) -> str:
+        formats = self._library.pixel_formats(self._camera)
+        usable = [name for name in formats if FORMATS.match(name)]
+        if wanted is not None and wanted not in usable:
+            raise InputError(
+                f"{self.name} has no pixel format {wanted!r} that can be read: choose one of "
+                f"{', '.join(usable)}."
+            )
+        if not usable:
+            raise DeviceError(
+                f"{self.name} has only pixel formats that are packed or processed "
+                f"({', '.join(formats)}): none of them can be read."
+            )
+
+        def worth(name: str) -> tuple[bool, int]:
+            match = FORMATS.match(name)
+            assert match is not None
+            # Of a colour camera Mono is made by a formula of its own.
+            return match["cell"] is not None, int(match["bits"])
+
+        return wanted or max(usable, key=worth)
+
+    def _set_region(self, wanted: Size | None) -> Size:
+        if wanted is not None:
+            sides = [ctypes.c_int(), ctypes.c_int()]
+            self._call("arv_camera_get_sensor_size", self._camera, *map(ctypes.byref, sides))
+            # In the middle, where lenses are best; offsets go by eights on any sensor.
+            corner = [
+                max(0, (side.value - part) // 16 * 8)
+                for side, part in zip(sides, (wanted.width, wanted.height), strict=True)
+            ]
+            self._call("arv_camera_set_region", self._camera, *corner, wanted.width, wanted.height)
+        x, y, w, h = (ctypes.c_int() for _ in range(4))
+        self._call("arv_camera_get_region", self._camera, *map(ctypes.byref, (x, y, w, h)))
+        got = Size(h.value, w.value)
+        if wanted is not None and got != wanted:
+            raise InputError(f"{self.name} cannot read {wanted}, only {got}: correct region.")
+        return got
+
+    def _has(self, feature: str) -> bool:
+        return bool(self._call("arv_camera_is_feature_available", self._camera, feature.encode()))
+
+    def _set_feature(self, name: str, value: bool | float | str) -> None:
+        kinds = {bool: "boolean", int: "integer", float: "float", str: "string"}
+        given = value.encode() if isinstance(value, str) else value
+        self._call(f"arv_camera_set_{kinds[type(value)]}", self._camera, name.encode(), given)
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        try:
+            return self._library.call(name, *arguments)
+        except DeviceError as error:
+            raise DeviceError(
+                f"{self.name} does not do as told ({error}): check its cable, and that no other "
+                f"program uses it."
+            ) from None

@@ -1,0 +1,211 @@
+"""What every camera has in common: exposure, brackets, averages, auto-exposure.
+
+A driver opens a device and takes single frames; all else is here.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.errors import DeviceError, InputError
+from nearfar.photometry.exposures import Sensor, average, merge_exposures
+from nearfar.rigs.base import Photo
+
+# Auto-exposure: the brightest light is to reach this share of full scale ...
+BRIGHT = 0.8
+# ... but for this share of values, which may be glints.
+GLINTS = 1e-3
+# Where as much is clipped the light can only be guessed.
+CLIPPED = 0.98
+STEPS = 10
+# An exposure this close to what is wanted will do.
+CLOSE = 0.05
+
+Frame = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+class FoundCamera(NamedTuple):
+    """A camera that a driver found: what to write as ``device`` in a RIG.toml, and what it is."""
+
+    driver: str
+    device: str
+    name: str
+
+
+class Camera(ABC):
+    """A camera that takes photos of one exposure, averaged or bracketed as asked.
+
+    A driver implements `take`, and where its device has them `exposure_limits` and
+    `_set_exposure`. Cameras are contexts; leaving one gives the device back.
+
+    Parameters
+    ----------
+    name : str
+        What a message calls it.
+    frames : int
+        Frames that are averaged to a photo.
+    bracket : tuple of float
+        Exposures of a photo over the first, which is the shortest: (1, 4, 16) takes three.
+    """
+
+    # What levels are made of, for the weights of a bracket; a calibration knows.
+    sensor = Sensor()
+    # False once a photo came whose levels are a screen's and not the light's, as a JPEG's.
+    linear = True
+
+    def __init__(self, name: str, *, frames: int = 1, bracket: tuple[float, ...] = (1.0,)) -> None:
+        if frames < 1:
+            raise InputError(f"a photo of {frames} frames cannot be: average 1 or more.")
+        if not bracket or bracket[0] != 1 or list(bracket) != sorted(set(bracket)):
+            raise InputError(
+                f"the bracket {list(bracket)} is none: begin with 1, the shortest, and go up."
+            )
+        self.name = name
+        self.exposure: float | None = None
+        self._frames, self._bracket = frames, bracket
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_fault: object) -> None:
+        self.close()
+
+    @property
+    @abstractmethod
+    def full_scale(self) -> float:
+        """Level at which a value is saturated."""
+
+    @abstractmethod
+    def take(self) -> Frame:
+        """Take a frame, (Cy, Cx, channels), whose exposure begins after this is called.
+
+        Raises
+        ------
+        LostPhotoError
+            If no frame arrives, or not a whole one.
+        DeviceError
+            If the camera is gone.
+        """
+
+    @property
+    def exposure_limits(self) -> tuple[float, float] | None:
+        """Shortest and longest exposure in seconds; None if it cannot be set."""
+        return None
+
+    def describe(self) -> dict[str, Any]:
+        """Tell what a capture remembers of the camera: what stays as it is, as JSON."""
+        return {"name": self.name, "frames": self._frames, "bracket": list(self._bracket)}
+
+    def conditions(self) -> dict[str, float]:
+        """Tell what may change from photo to photo, such as temperatures in degrees Celsius."""
+        return {}
+
+    def close(self) -> None:  # noqa: B027
+        """Give the device back."""
+
+    def set_exposure(self, seconds: float) -> float:
+        """Set the exposure; return what the camera made of it, in seconds.
+
+        Raises
+        ------
+        InputError
+            If the camera cannot expose so long or so short, or not be told to.
+        """
+        limits = self.exposure_limits
+        if limits is None:
+            raise InputError(
+                f"the exposure of {self.name} cannot be set from here: set it on the camera, and "
+                f"leave exposure out of the rig."
+            )
+        shortest, longest = limits
+        if not shortest <= seconds <= longest:
+            raise InputError(
+                f"{self.name} cannot expose {seconds:g} s: choose from {shortest:g} to "
+                f"{longest:g} s."
+            )
+        self.exposure = self._set_exposure(seconds)
+        return self.exposure
+
+    def photograph(self) -> Photo:
+        """Take a photo, (Cy, Cx, channels): one frame as it is, or several merged to float32.
+
+        Raises
+        ------
+        LostPhotoError, DeviceError
+            As `take`.
+        """
+        if len(self._bracket) == 1:
+            return self._averaged()
+        if self.exposure is None:
+            raise InputError(
+                f"a bracket needs an exposure that can be set, and that of {self.name} is not "
+                f"known: give exposure in the rig."
+            )
+        shortest, photos, times = self.exposure, [], []
+        try:
+            for factor in self._bracket:
+                times.append(self.set_exposure(factor * shortest))
+                photos.append(self._averaged())
+        finally:
+            self.set_exposure(shortest)
+        return merge_exposures(np.stack(photos), times, self.sensor, self.full_scale)
+
+    def expose_for_light(self, rounded: Callable[[float], float] = float) -> float:
+        """Choose the exposure at which the light there is now just fits the sensor.
+
+        Parameters
+        ----------
+        rounded : callable, optional
+            Rounds an exposure in seconds, such as to whole refreshes of a projector.
+
+        Returns
+        -------
+        float
+            Seconds.
+
+        Raises
+        ------
+        DeviceError
+            If no exposure will do.
+        InputError
+            If it cannot be set.
+        """
+        limits = self.exposure_limits
+        if limits is None:
+            return self.set_exposure(math.nan)
+        shortest, longest = limits
+        factor = max(self._bracket)
+        wanted = min(max(rounded(math.sqrt(shortest * longest)), shortest), longest / factor)
+        for _ in range(STEPS):
+            exposure = self.set_exposure(wanted)
+            frame = self.take()
+            brightest = float(np.quantile(frame, 1.0 - GLINTS))
+            reached = (brightest - self.sensor.black) / (self.full_scale - self.sensor.black)
+            better = exposure * (BRIGHT / max(reached, 0.02) if reached < CLIPPED else 0.25)
+            wanted = min(max(rounded(better), shortest), longest / factor)
+            if abs(wanted / exposure - 1) < CLOSE:
+                break
+        if reached >= CLIPPED:
+            raise DeviceError(
+                f"{self.name} is saturated by white even at {exposure:g} s: close its aperture, "
+                f"or make the projector darker."
+            )
+        if reached < BRIGHT / 8:
+            raise DeviceError(
+                f"{self.name} sees next to nothing of white even at {exposure:g} s: open its "
+                f"aperture, take its cap off, and look where it points."
+            )
+        return exposure
+
+    def _set_exposure(self, seconds: float) -> float:
+        """Tell the device."""
+        raise NotImplementedError
+
+    def _averaged(self) -> Photo:
+        if self._frames == 1:
+            return self.take()
+        return average(np.stack([self.take() for _ in range(self._frames)]), self.full_scale)

@@ -1,0 +1,153 @@
+"""Any camera that drops its photos into a folder: tethered, by a card in the air, by a script."""
+
+import os
+import shlex
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+from nearfar.errors import DeviceError, InputError, LostPhotoError, UnreadableFileError
+from nearfar.files.images import PICTURE_ENDINGS, RAW_ENDINGS
+from nearfar.files.photos import decode_camera_file
+from nearfar.rigs.cameras.base import Camera, Frame
+
+DRIVER = "folder"
+ENDINGS = (*PICTURE_ENDINGS, *RAW_ENDINGS, ".jpg", ".jpeg")
+# Seconds between looks; network folders tell nobody what comes.
+LOOK = 0.05
+# A file that has not grown for so many looks, and can be read, is whole.
+STILL = 3
+
+
+class FolderCamera(Camera):
+    """A watched folder: each photo is the next file that appears in it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    command : str, optional
+        Run for each photo, by the shell's rules of quoting but without a shell; ``{}`` in it is the
+        folder. Without one the camera is released by hand or by a remote control.
+    patience : float
+        Seconds to wait for a photo.
+    full_scale : float, optional
+        Level at which a photo is saturated, where its file does not tell.
+    frames : int
+        As `Camera`.
+
+    Raises
+    ------
+    DeviceError
+        If there is no such folder.
+    InputError
+        If the command cannot be read.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        command: str | None = None,
+        patience: float = 30.0,
+        full_scale: float | None = None,
+        frames: int = 1,
+    ) -> None:
+        super().__init__(f"folder {path}", frames=frames)
+        if not path.is_dir():
+            raise DeviceError(f"{path} is no folder to watch: make it, or correct the rig.")
+        try:
+            self._command = [part.replace("{}", str(path)) for part in shlex.split(command or "")]
+        except ValueError as error:
+            raise InputError(
+                f"the command {command!r} cannot be read ({error}): correct it."
+            ) from None
+        self._path, self._patience, self._full_scale = path, patience, full_scale
+
+    @property
+    def full_scale(self) -> float:
+        """Level at which a photo is saturated; the first photo tells."""
+        if self._full_scale is None:
+            self.take()
+        assert self._full_scale is not None
+        return self._full_scale
+
+    def describe(self) -> dict[str, Any]:
+        """Tell what a capture remembers of the camera."""
+        return {**super().describe(), "driver": DRIVER, "command": self._command}
+
+    def take(self) -> Frame:
+        """Have a photo taken and wait for its file.
+
+        Raises
+        ------
+        LostPhotoError
+            If none comes, or one that cannot be read.
+        DeviceError
+            If the command fails.
+        """
+        before = self._files()
+        if self._command:
+            self._run()
+        path = self._next(before)
+        try:
+            photo = decode_camera_file(path.read_bytes(), path)
+        except UnreadableFileError as error:
+            raise LostPhotoError(str(error)) from None
+        self._full_scale = self._full_scale or photo.full_scale
+        self.linear = photo.linear
+        return photo.levels
+
+    def _run(self) -> None:
+        try:
+            done = subprocess.run(
+                self._command, capture_output=True, timeout=self._patience, check=False
+            )
+        except FileNotFoundError:
+            raise DeviceError(
+                f"the command {self._command[0]} is not there: correct it in the rig."
+            ) from None
+        except subprocess.TimeoutExpired:
+            raise LostPhotoError(
+                f"the command {self._command[0]} did not end within {self._patience:g} s."
+            ) from None
+        if done.returncode:
+            words = " ".join(done.stderr.decode(errors="replace").split())[:200].rstrip(".")
+            raise LostPhotoError(
+                f"the command {self._command[0]} failed with status {done.returncode} ({words})."
+            )
+
+    def _next(self, before: set[str]) -> Path:
+        """Wait for a file that was not there, and until it is whole."""
+        until = time.monotonic() + self._patience
+        size, still = -1, 0
+        while time.monotonic() < until:
+            new = sorted(self._files() - before)
+            if len(new) > 1:
+                raise DeviceError(
+                    f"{len(new)} photos came into {self._path} for one pattern ({new[0]}, "
+                    f"{new[1]}): let the camera write one file a photo, and nothing else there."
+                )
+            if new:
+                path = self._path / new[0]
+                now = path.stat().st_size if path.exists() else -1
+                still = still + 1 if now == size and now > 0 else 0
+                size = now
+                if still >= STILL:
+                    return path
+            time.sleep(LOOK)
+        raise LostPhotoError(
+            f"no photo came into {self._path} within {self._patience:g} s: check that the camera "
+            f"writes there."
+        )
+
+    def _files(self) -> set[str]:
+        try:
+            with os.scandir(self._path) as entries:
+                names = [entry.name for entry in entries]
+        except OSError as error:
+            raise DeviceError(
+                f"{self._path} cannot be watched ({error.strerror}): connect it again."
+            ) from None
+        return {n for n in names if n.lower().endswith(ENDINGS) and not n.startswith(".")}

@@ -1,0 +1,238 @@
+"""Measure how a rig's projector and camera turn numbers into light and light into numbers.
+
+Index convention: photos are (Cy, Cx, channels), raw levels.
+"""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats
+from nearfar.errors import DeviceError
+from nearfar.photometry.exposures import Sensor
+from nearfar.photometry.response import (
+    Linearity,
+    fit_linearity,
+    fit_noise,
+    fit_response,
+    pair_noise,
+    unmix_response,
+)
+from nearfar.rigs.base import Photo
+from nearfar.rigs.calibration import Calibration
+from nearfar.rigs.linear import LinearProjector
+from nearfar.rigs.real import RealRig
+
+# The ramp's levels: close together where a gamma is steep.
+RAMP = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
+CHECKS = (32, 64, 96, 128, 160, 192, 224)
+# Multiples of the exposure at which the camera's own line is measured, of a light that fits.
+EXPOSURES = (1, 2, 3, 4, 5, 6, 8)
+# Camera pixels take part where white adds this share of what it adds to the brightest.
+LIT = 0.1
+# Findings beyond these are told.
+NOT_LINEAR = 0.01
+NOT_ADDED = 0.02
+NOT_STRAIGHT = 0.01
+MUCH_AMBIENT = 0.1
+# Primaries that a camera can tell apart.
+CONDITION = 30.0
+
+Step = Callable[[str, float], None]
+
+
+class Findings(NamedTuple):
+    """A calibration, what it was read from, and what a user should know.
+
+    Attributes
+    ----------
+    calibration : Calibration
+    levels, light : array, shape (n,) and (n, channels)
+        The ramp, light over white's.
+    checked : array, shape (m, 2)
+        Levels of the linearised ramp and their light, over 255 and white's.
+    exposures : array, shape (k, 2)
+        Seconds and mean level, where the exposure can be set.
+    noise : array, shape (g, 2)
+        Mean level and variance of groups of pixels.
+    notes : tuple of str
+        Sentences.
+    """
+
+    calibration: Calibration
+    levels: NDArray[np.int64]
+    light: Floats
+    checked: Floats
+    exposures: Floats
+    noise: Floats
+    notes: tuple[str, ...]
+
+
+def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
+    """Calibrate a rig before a scene that does not move.
+
+    Every light is photographed with the pattern grid full of it, in an order by chance, so that a
+    lamp that drifts does not look like a response.
+
+    Parameters
+    ----------
+    rig : RealRig
+        Not calibrated yet: its levels go out as they are.
+    progress : callable, optional
+        Told what is done, and the share of it.
+
+    Returns
+    -------
+    Findings
+
+    Raises
+    ------
+    DeviceError
+        If the camera saturates, sees nothing, or devices fail.
+    InputError
+        If the photos do not follow the levels.
+    """
+    report = progress or (lambda _what, _share: None)
+    ends = rig.in_step()
+    lit = _lit(ends.white - ends.black)
+    full = rig.camera.full_scale
+    if float(np.mean(ends.white[lit] >= 0.98 * full)) > 0.01:
+        raise DeviceError(
+            f"{rig.camera.name} is saturated by white: give a shorter exposure, or close its "
+            f"aperture."
+        )
+    generator = np.random.default_rng(0)
+    ramp = generator.permutation(np.repeat(RAMP, 2))
+    photos: dict[int, list[Photo]] = {level: [] for level in RAMP}
+    for i, level in enumerate(ramp):
+        photos[int(level)].append(rig.show_levels((level, level, level)))
+        report("grey ramp", (i + 1) / len(ramp))
+    black_light = _light(photos[0], lit)
+    light = np.stack([_light(photos[level], lit) - black_light for level in RAMP])
+    primaries = []
+    for primary in range(3):
+        red, green, blue = (255 if p == primary else 0 for p in range(3))
+        pair = [rig.show_levels((red, green, blue)) for _ in range(2)]
+        primaries.append(_light(pair, lit) - black_light)
+        report("primaries", (primary + 1) / 3)
+    mixing = np.stack(primaries, axis=-1)
+    white = light[-1]
+    superposition = float(mixing.sum() / white.sum() - 1)
+    notes = []
+    shown = np.asarray(RAMP)
+    if abs(superposition) > NOT_ADDED:
+        notes.append(
+            f"red, green and blue together give {1 + superposition:.1%} of white: turn the "
+            f"projector's white segment or brightness boost off; until then its levels are "
+            f"straightened for grey alone."
+        )
+    channels = len(white)
+    apart = channels >= 3 and np.linalg.cond(mixing) < CONDITION
+    if apart and abs(superposition) <= NOT_ADDED:
+        response = unmix_response(shown, light, mixing)
+    else:
+        response = np.repeat(fit_response(shown, light.sum(axis=-1))[:, np.newaxis], 3, axis=1)
+    line, exposures = _camera_line(rig, lit, light.sum(axis=-1) / white.sum(), report)
+    black = line.black if line else 0.0
+    sensor, noise = _noise(photos, black, full)
+    if line is None:
+        notes.append(
+            "the exposure cannot be set from here, so that the camera's own line and its black "
+            "level are not known: let it be linear, such as by raw files."
+        )
+    elif line.worst > NOT_LINEAR:
+        notes.append(
+            f"the camera's levels miss a line by up to {line.worst:.1%} of full scale: use raw or "
+            f"uncompressed files, and turn its gamma off."
+        )
+    checked = _checked(rig, response, lit, black_light, report)
+    residual = float(np.abs(checked[:, 1] - checked[:, 0]).max())
+    if residual > NOT_STRAIGHT:
+        notes.append(
+            f"the straightened ramp still misses a line by up to {residual:.1%} of white: the "
+            f"projector's response depends on the picture, so turn what makes it livelier off."
+        )
+    ambient = float(max(0.0, (black_light.mean() - black) / full))
+    if ambient > MUCH_AMBIENT * float(white.mean()) / full:
+        notes.append(
+            f"light under a black pattern is {ambient * full / float(white.mean()):.0%} of "
+            f"white's: darken the room."
+        )
+    calibration = Calibration(
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
+        monitor=rig.monitor.name,
+        camera=rig.camera.name,
+        exposure=rig.camera.exposure,
+        response=tuple(tuple(map(float, row)) for row in response),
+        mixing=tuple(tuple(map(float, row)) for row in mixing / white.max()),
+        black=black,
+        gain=sensor.gain,
+        read=sensor.read,
+        ambient=ambient,
+        linearity=line.worst if line else None,
+        superposition=superposition,
+        residual=residual,
+    )
+    return Findings(calibration, shown, light / white, checked, exposures, noise, tuple(notes))
+
+
+def _lit(contrast: Floats) -> NDArray[np.bool_]:
+    """Camera pixels that see the projector, (Cy, Cx)."""
+    seen = contrast.sum(axis=-1)
+    return np.asarray(seen > LIT * np.quantile(seen, 0.999))
+
+
+def _light(photos: list[Photo], lit: NDArray[np.bool_]) -> Floats:
+    """Mean level of lit camera pixels, (channels,)."""
+    means = [photo[lit].mean(axis=0, dtype=np.float64) for photo in photos]
+    return np.asarray(np.stack(means).mean(axis=0))
+
+
+def _camera_line(
+    rig: RealRig, lit: NDArray[np.bool_], light: Floats, report: Step
+) -> tuple[Linearity | None, Floats]:
+    camera, shortest = rig.camera, rig.camera.exposure
+    if shortest is None or camera.exposure_limits is None:
+        return None, np.zeros((0, 2))
+    level = RAMP[max(1, int(np.searchsorted(light, 1 / (1.2 * EXPOSURES[-1]))) - 1)]
+    lengths = [n * shortest for n in EXPOSURES if n * shortest <= camera.exposure_limits[1]]
+    found = []
+    try:
+        for i, length in enumerate(lengths):
+            seconds = camera.set_exposure(length)
+            photo = rig.show_levels((level, level, level))
+            if not (photo[lit] >= 0.98 * camera.full_scale).any():
+                found.append((seconds, float(photo[lit].mean(dtype=np.float64))))
+            report("exposures", (i + 1) / len(lengths))
+    finally:
+        camera.set_exposure(shortest)
+    points = np.asarray(found).reshape(-1, 2)
+    if len(points) < 2:
+        return None, points
+    return fit_linearity(points[:, 0], points[:, 1], camera.full_scale), points
+
+
+def _noise(photos: dict[int, list[Photo]], black: float, full: float) -> tuple[Sensor, Floats]:
+    pairs = [pair_noise(one, other, full) for one, other in photos.values()]
+    means = np.concatenate([mean for mean, _ in pairs])
+    variances = np.concatenate([variance for _, variance in pairs])
+    return fit_noise(means, variances, black), np.stack([means, variances], axis=-1)
+
+
+def _checked(
+    rig: RealRig, response: Floats, lit: NDArray[np.bool_], black: Floats, report: Step
+) -> Floats:
+    """Show a ramp through the new table; return levels and light, over 255 and white's."""
+    linear = LinearProjector(response, rig.shown)
+    grid = np.ones(rig.projector, dtype=np.uint8)
+    found = []
+    for i, level in enumerate((*CHECKS, 255)):
+        photo = rig.photograph(linear.draw(np.uint8(level) * grid))
+        found.append((level / 255, float((_light([photo], lit) - black).sum())))
+        report("straightened ramp", (i + 1) / (len(CHECKS) + 1))
+    points = np.asarray(found)
+    points[:, 1] /= points[-1, 1]
+    return points

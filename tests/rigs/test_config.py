@@ -1,0 +1,103 @@
+"""RIG.toml of real rigs: what is written, what is read, what is refused."""
+
+import re
+import tomllib
+
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError, UnreadableFileError
+from nearfar.rigs.cameras.base import FoundCamera
+from nearfar.rigs.config import open_rig, read_rig_table
+from nearfar.rigs.initial import OWN, draft_rig
+from nearfar.rigs.opening import RealTable
+from nearfar.rigs.screens import Monitor
+from tests.cli.conftest import run_nearfar
+
+MONITORS = (
+    Monitor(0, "eDP-1", Size(1080, 1920), (0, 0), 60.0),
+    Monitor(1, 'A "projector"', Size(800, 1280), (0, 1920), 120.0),
+)
+FOUND = [FoundCamera("aravis", "Maker-1", "Maker\nOne"), FoundCamera("opencv", "/dev/video0", "C")]
+
+
+@pytest.mark.parametrize("monitors", [(), MONITORS[:1], MONITORS])
+@pytest.mark.parametrize("cameras", [[], FOUND, FOUND[1:]])
+def test_what_init_writes_is_read(tmp_path, monitors, cameras):
+    text = draft_rig(monitors, cameras)
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    table = read_rig_table(tmp_path / "rig.toml")
+    assert isinstance(table, RealTable)
+    assert table.projector.monitor == (monitors[-1].name if monitors else None)
+    assert table.camera.driver == (cameras[0].driver if cameras else "folder")
+
+
+@pytest.mark.parametrize("driver", OWN)
+def test_every_setting_it_comments_on_is_one(driver):
+    text = draft_rig(MONITORS[:1], [FoundCamera(driver, "x", "y")])
+    if driver == "folder":
+        text = draft_rig(MONITORS[:1], [])
+    settings = re.sub(r"^# (\w+ = )", r"\1", text, flags=re.MULTILINE)
+    assert settings != text
+    RealTable.model_validate(tomllib.loads(settings))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[camera]\ndriver = "polaroid"\n', "camera"),
+        ('[camera]\ndriver = "aravis"\nexposures = 1\n', "no such key"),
+        ('[camera]\ndriver = "aravis"\nexposure = 0\n', "exposure"),
+        ('[camera]\ndriver = "aravis"\nexposure = "long"\n', "exposure"),
+        ('[camera]\ndriver = "aravis"\naverage = 0\n', "average"),
+        ('[camera]\ndriver = "aravis"\nbracket = [2.0, 1.0]\n', "begins with 1"),
+        ('[camera]\ndriver = "aravis"\nregion = "big"\n', "region"),
+        ('[camera]\ndriver = "folder"\n', "path"),
+        ('[projector]\nbrightness = 2.0\n[camera]\ndriver = "aravis"\n', "brightness"),
+        ('[projector]\nlamp = 1\n[camera]\ndriver = "aravis"\n', "no such key"),
+    ],
+)
+def test_a_real_rig_that_cannot_be_is_named(tmp_path, text, words):
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    with pytest.raises(UnreadableFileError, match=words) as refused:
+        read_rig_table(path)
+    assert "rig.toml" in str(refused.value)
+
+
+def test_a_real_rig_is_no_simulated_one(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text('[camera]\ndriver = "folder"\npath = "."\n')
+    with pytest.raises(InputError, match="is a real rig"):
+        open_rig(str(path), Size(4, 4))
+    simulated = tmp_path / "simulated.toml"
+    simulated.write_text('[scene]\nname = "corner"\n')
+    ran = run_nearfar("calibrate", simulated)
+    assert ran.status == 1
+    assert "is a simulated rig" in ran.err
+
+
+def test_without_a_display_commands_say_so(tmp_path, monkeypatch):
+    monkeypatch.setenv("DISPLAY", "")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    path = tmp_path / "rig.toml"
+    path.write_text('[camera]\ndriver = "folder"\npath = "photos"\n')
+    plan = tmp_path / "p.json"
+    run_nearfar("plan", "--projector", "8x8", "--near", 3, "--far", "3x3", "-o", plan)
+    for command in (("calibrate", path), ("acquire", plan, tmp_path / "c.zarr", "--rig", path)):
+        ran = run_nearfar(*command)
+        assert ran.status == 1, ran
+        assert "set DISPLAY" in ran.err
+    assert not (tmp_path / "c.zarr").exists()
+    ran = run_nearfar("devices")
+    assert ran.status == 0
+    assert "set DISPLAY" in ran.err
+    ran = run_nearfar("init", tmp_path / "new.toml")
+    assert ran.status == 0
+    assert isinstance(read_rig_table(tmp_path / "new.toml"), RealTable)
+    ran = run_nearfar("init", tmp_path / "new.toml")
+    assert ran.status == 1
+    assert "--force" in ran.err
+    assert run_nearfar("init", tmp_path / "new.ini").status == 1

@@ -1,0 +1,244 @@
+"""A real rig's doings, before a table that can do wrong: in step, noticed, mended or named."""
+
+import re
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.capture import open_capture
+from nearfar.errors import DeviceError, InputError
+from nearfar.plan.choose import choose_plan
+from nearfar.rigs.real import RealRig
+from nearfar.workflow.acquire import acquire
+from tests.cli.conftest import run_nearfar
+from tests.rigs.table import TableCamera, TableScreen
+
+PROJECTOR, CAMERA = Size(12, 16), Size(24, 32)
+
+
+@pytest.fixture(scope="module")
+def transport():
+    """Each camera pixel sees a projector pixel, and a little of all."""
+    generator = np.random.default_rng(3)
+    direct = np.zeros((*CAMERA, *PROJECTOR))
+    y, x = np.mgrid[: CAMERA.height, : CAMERA.width]
+    direct[y, x, y // 2, x // 2] = generator.uniform(0.3, 0.5, CAMERA)
+    return direct.reshape(CAMERA.pixels, -1) + 0.1 / PROJECTOR.pixels
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return choose_plan(PROJECTOR, 60)[0]
+
+
+@pytest.fixture
+def table(transport):
+    def lay(rig_options=(), **options):
+        screen = TableScreen()
+        camera = TableCamera(screen, transport, CAMERA, PROJECTOR, **options)
+        told = []
+        rig = RealRig(
+            screen, camera, PROJECTOR, told=told.append, **{"exposure": 0.1, **dict(rig_options)}
+        )
+        return rig, camera, told
+
+    return lay
+
+
+def _photos(rig, plan):
+    patterns = [plan.draw(i) for i in range(len(plan.patterns))]
+    return np.stack([photo.astype(np.float64) for photo in rig.shoot(patterns)])
+
+
+@pytest.fixture(scope="module")
+def expected(transport, plan):
+    """Photos without noise, in levels."""
+    lights = np.stack([plan.draw(i).reshape(-1) / 255 for i in range(len(plan.patterns))])
+    pictures = (lights @ transport.T).reshape(-1, *CAMERA, 1)
+    return 65535 * (pictures + 0.03)
+
+
+def _check(photos, expected):
+    # 30 000 electrons: half a percent of noise.
+    assert np.abs(photos - expected).max() < 0.04 * 65535
+    assert np.sqrt(np.mean((photos - expected) ** 2)) < 0.006 * 65535
+
+
+def test_photos_are_those_of_the_patterns(table, plan, expected):
+    rig, _, told = table()
+    _check(_photos(rig, plan), expected)
+    assert told == []
+
+
+@pytest.mark.parametrize("late", [0.03, 0.1, 0.4])
+def test_a_slow_projector_is_waited_for(table, plan, expected, late):
+    rig, _, told = table(late=late)
+    _check(_photos(rig, plan), expected)
+    assert told == []
+
+
+def test_a_projector_that_never_follows_is_named(table, plan):
+    rig, _, _ = table(late=5.0)
+    with pytest.raises(DeviceError, match=r"do not follow the patterns|looks like black"):
+        _photos(rig, plan)
+
+
+# Frames of the handshake come first.
+@pytest.mark.parametrize("fault", ["lost", "repeated", "torn"])
+@pytest.mark.parametrize("at", [9, 10, 23, 40, 55, 68])
+def test_a_bad_frame_is_taken_again(table, plan, expected, fault, at):
+    rig, camera, told = table()
+    camera.wrong = {at: fault}
+    _check(_photos(rig, plan), expected)
+    assert len(told) <= 1
+    if told:
+        assert "was taken again" in told[0]
+
+
+def test_most_bad_frames_are_told(table, plan, expected):
+    rig, camera, told = table()
+    camera.wrong = {at: ("repeated", "torn", "lost")[at % 3] for at in range(12, 60, 7)}
+    _check(_photos(rig, plan), expected)
+    assert len(told) >= 6
+
+
+def test_a_camera_that_repeats_for_ever_is_named(table, plan):
+    rig, camera, _ = table()
+    frames = rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))
+    for _ in range(10):
+        next(frames)
+    old = camera.before
+    camera.from_now_on = lambda _picture: old
+    with pytest.raises(DeviceError, match=r"photo 10 cannot be had: it is the photo before"):
+        list(frames)
+
+
+def test_a_camera_that_sends_nothing_is_named(table, plan):
+    rig, camera, _ = table()
+    frames = rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))
+    next(frames)
+    camera.from_now_on = "lost"
+    with pytest.raises(DeviceError, match=r"lost\. It was tried 6 times"):
+        list(frames)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda picture: picture + 0.1, r"ambient light changed by \+2"),
+        (lambda picture: 0.8 * picture, "exposure or lamp changed by -20"),
+    ],
+)
+def test_light_that_changes_is_named_with_the_photos_it_spoils(table, plan, change, word):
+    rig, camera, told = table()
+    frames = rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))
+    for _ in range(30):
+        next(frames)
+    assert told == []
+    camera.from_now_on = change
+    list(frames)
+    assert len(told) == 1
+    assert re.search(word, told[0])
+    first, last = map(int, told[0].split("--reshoot ")[1].rstrip(".").split("-"))
+    assert first <= 30 <= last
+
+
+def test_an_exposure_that_changes_by_itself_is_mended(table, plan, expected):
+    rig, camera, told = table()
+    frames = rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))
+    photos = [next(frames) for _ in range(20)]
+    camera.device_exposure = 0.05
+    photos += list(frames)
+    _check(np.stack(photos).astype(np.float64), expected)
+    assert any("exposed 0.05 s instead of 0.1 s" in alarm for alarm in told)
+
+
+def test_light_that_does_not_add_up_is_told(table, plan):
+    rig, _, told = table(gamma=2.2)
+    _photos(rig, plan)
+    assert "127 and 128 of 255 together give 4" in told[0]
+    assert "nearfar calibrate" in told[0]
+
+
+def test_a_camera_too_coarse_for_the_patterns_says_so_once(plan):
+    # Every camera pixel sees all of the projector.
+    screen = TableScreen()
+    flat = np.full((CAMERA.pixels, PROJECTOR.pixels), 0.7 / PROJECTOR.pixels)
+    camera = TableCamera(screen, flat, CAMERA, PROJECTOR)
+    rig = RealRig(screen, camera, PROJECTOR, exposure=0.1)
+    _photos(rig, plan)
+    assert sum("hardly resolves them" in alarm for alarm in rig.alarms) == 1
+    assert len(rig.alarms) == 1
+
+
+def test_exposures_are_whole_refreshes(table):
+    for wanted in (0.001, 0.02, 0.05, 0.1234):
+        rig, camera, told = table({"exposure": wanted})
+        turns = camera.exposure * 60
+        assert turns == pytest.approx(max(1, round(wanted * 60)))
+        assert rig.describe()["exposure"] == camera.exposure
+        assert told == []
+
+
+def test_the_exposure_is_chosen_by_white(table):
+    for unit in (0.04, 0.1, 1.0):
+        rig, camera, _ = table({"exposure": None}, unit=unit)
+        white = rig.photograph(rig.frame(255))
+        assert 0.55 < np.quantile(white, 0.999) / 65535 < 0.95, (unit, camera.exposure)
+
+
+def test_white_that_cannot_be_exposed_for_is_named(table):
+    with pytest.raises(DeviceError, match="saturated by white"):
+        table({"exposure": None}, unit=1e-4)
+    with pytest.raises(DeviceError, match="next to nothing"):
+        table({"exposure": None}, unit=1e4)
+
+
+def test_a_dark_projector_is_named(table, plan):
+    rig, camera, _ = table()
+    camera.from_now_on = lambda picture: 0 * picture
+    with pytest.raises(DeviceError, match="turn the projector on"):
+        _photos(rig, plan)
+
+
+def test_a_pattern_that_does_not_fit_is_refused(transport):
+    screen = TableScreen(Size(10, 10))
+    camera = TableCamera(screen, transport, CAMERA, PROJECTOR)
+    with pytest.raises(InputError, match="does not fit"):
+        RealRig(screen, camera, PROJECTOR)
+
+
+def test_a_capture_remembers_conditions_and_alarms(table, plan, tmp_path):
+    rig, camera, _ = table()
+    camera.wrong = {30: "repeated"}
+    taken = acquire(plan, tmp_path / "c.zarr", rig)
+    again = open_capture(tmp_path / "c.zarr")
+    assert taken.alarms == again.alarms
+    assert len(again.alarms) == 1
+    assert again.exposure == 0.1
+    assert len(again.conditions["temperature"]) == len(plan.patterns)
+    assert all(30 < t < 31 for t in again.conditions["temperature"])
+    assert again.rig["projector"]["monitor"] == "table"
+    told = run_nearfar("info", tmp_path / "c.zarr").out
+    assert "temperature: 30." in told
+    assert "alarm: photo" in told
+
+
+def test_averages_and_brackets_have_less_noise(transport):
+    screen = TableScreen()
+    noise = {}
+    for name, options in (
+        ("one", {}),
+        ("four", {"frames": 4}),
+        ("bracket", {"bracket": (1.0, 4.0, 16.0)}),
+    ):
+        camera = TableCamera(screen, transport, CAMERA, PROJECTOR, **options)
+        rig = RealRig(screen, camera, PROJECTOR, exposure=0.1)
+        dim = [rig.photograph(rig.frame(10)) for _ in range(2)]
+        noise[name] = np.std(dim[0].astype(float) - dim[1])
+        bright = rig.photograph(rig.frame(255))
+        assert bright.max() <= 65535
+    assert noise["four"] == pytest.approx(noise["one"] / 2, rel=0.15)
+    # 21 times the light; read noise and levels of the shortest hardly count.
+    assert noise["bracket"] < noise["one"] / 3.5

@@ -28,9 +28,13 @@ QUIET = SimulatedCamera(full_well=1e9, read_noise=0.0, bits=16, shot_noise=False
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """In CI a test that is skipped for a missing system part has failed."""
+    """In CI a test that is skipped for a missing system part has failed.
+
+    Photos that may not be handed on are no such part.
+    """
     report = yield
-    if os.environ.get("CI") and report.skipped and not hasattr(report, "wasxfail"):
+    others = "no real photos" in str(report.longrepr)
+    if os.environ.get("CI") and report.skipped and not hasattr(report, "wasxfail") and not others:
         report.outcome = "failed"
         report.longrepr = f"{item.nodeid} was skipped, which CI does not allow: {report.longrepr}"
     return report

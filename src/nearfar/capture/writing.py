@@ -238,8 +238,13 @@ class CaptureWriter:
         self._note(_Taken(time.time(), saturated, mean, same, *told))
         return photo
 
-    def finish(self) -> None:
+    def finish(self, alarms: Sequence[str] = ()) -> None:
         """Make a capture of the photos there are, and a plan of their patterns.
+
+        Parameters
+        ----------
+        alarms : sequence of str
+            What was told after the last photo.
 
         Raises
         ------
@@ -264,7 +269,8 @@ class CaptureWriter:
         self._group.attrs["conditions"] = {
             name: [taken.conditions.get(name) for taken in self._taken] for name in sorted(told)
         }
-        self._group.attrs["alarms"] = [text for taken in self._taken for text in taken.alarms]
+        told_before = [text for taken in self._taken for text in taken.alarms]
+        self._group.attrs["alarms"] = [*told_before, *alarms]
         for name in ("time", "saturated"):
             values = np.array([getattr(taken, name) for taken in self._taken])
             add_array(self._group, name, (count,), np.float64, (count,))[:] = values

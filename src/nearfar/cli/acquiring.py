@@ -140,6 +140,7 @@ def acquire(
             progress=counted(report, "photos", len(made.patterns)),
             # The estimate hears of every photo, for it never says that they are enough.
             enough=lambda number, photo: any(each(number, photo) for each in told),
+            told=warn,
         )
         last = time.monotonic()
         _conclude(taken, output, quiet=quiet)

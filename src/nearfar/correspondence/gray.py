@@ -35,7 +35,7 @@ LEAST_SHARE = 0.04
 SHARED = 0.5
 
 
-class _Axis(NamedTuple):
+class GrayAxis(NamedTuple):
     """One axis of every camera pixel, each of shape (C,)."""
 
     place: Floats
@@ -92,7 +92,7 @@ def correspond_by_gray_code(
             progress(2 * sum(len(differences) for differences, _ in read.values()))
     white, noise = _white_and_noise(np.concatenate([sums for _, sums in read.values()]))
     down, across = (
-        _decoded(differences, noise, side)
+        decode_axis(differences, noise, side)
         for (differences, _), side in zip(read.values(), plan.projector, strict=True)
     )
     confidence = 1.0 - np.minimum(1.0, down.false_alarm + across.false_alarm)
@@ -144,11 +144,22 @@ def _white_and_noise(sums: Floats) -> tuple[Floats, Floats]:
     return white, np.sqrt(2 * np.maximum(model.variance(white / 2), 1e-18))
 
 
-def _decoded(differences: Floats, noise: Floats, side: int) -> _Axis:
+def decode_axis(differences: Floats, noise: Floats, side: int) -> GrayAxis:
+    """Decode the Gray code of one axis.
+
+    Parameters
+    ----------
+    differences : array, shape (B, C)
+        Photo of each bit less that of its inverse, the finest bit first.
+    noise : array, shape (C,)
+        Standard deviation of a difference.
+    side : int
+        Rows or columns, or cells of them, that are told apart.
+    """
     bits, pixels = differences.shape
     if not bits:
         none = np.zeros(pixels)
-        return _Axis(none, none, np.full(pixels, np.inf), np.ones(pixels, dtype=bool))
+        return GrayAxis(none, none, np.full(pixels, np.inf), np.ones(pixels, dtype=bool))
     number, size = np.arange(pixels), np.abs(differences)
     place = _place_of(differences > 0)
     weakest = np.argmin(size, axis=0)
@@ -167,7 +178,7 @@ def _decoded(differences: Floats, noise: Floats, side: int) -> _Axis:
     share = np.where(beside & (ratio < SHARED), 0.5 * (1.0 - ratio), 0.0)
     if bits == 1:
         contrast, false_alarm = size[0], ndtr(-size[0] / noise)
-    return _Axis(place + share * (neighbour - place), false_alarm, contrast, place < side)
+    return GrayAxis(place + share * (neighbour - place), false_alarm, contrast, place < side)
 
 
 def _place_of(gray: Booleans) -> Integers:

@@ -16,6 +16,7 @@ from nearfar.files import resumable_output
 from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
 from nearfar.rigs.base import Photo, Rig
+from nearfar.workflow.alarms import CaptureAlarms
 
 
 def acquire(
@@ -27,6 +28,7 @@ def acquire(
     force: bool = False,
     progress: Callable[[int], None] | None = None,
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
+    told: Callable[[str], None] | None = None,
 ) -> Capture:
     """Shoot a plan.
 
@@ -49,6 +51,9 @@ def acquire(
     enough : callable, optional
         Told each photo's number and the photo, those that were there too; where it says so, no
         more are taken.
+    told : callable, optional
+        Called with each alarm that the photos give, a sentence; those of the rig are its own to
+        tell. The capture remembers both.
 
     Returns
     -------
@@ -71,25 +76,35 @@ def acquire(
     path = Path(path)
     _require(plan, rig)
     kept = _Kept(path, len(plan.patterns), resume=resume)
+    tell = told or (lambda _alarm: None)
     try:
         with (
             resumable_output(path, kept.worth, resume=resume, force=force) as folder,
             _writer(folder, plan, rig, resume=resume) as writer,
         ):
             kept.folder = folder
-            ended, taken, told = writer.ended, writer.taken, 0
+            ended, taken, heard = writer.ended, writer.taken, 0
+            look = CaptureAlarms(plan, rig.full_scale)
+            look.recall(writer.read, taken)
+            alarms: list[str] = []
             for number in range(taken):
                 answer = enough is not None and enough(number, writer.read(number))
                 # Only the last may end it: photos are not taken back.
                 ended = ended or (answer and number + 1 == taken)
             photos = iter(()) if ended else _photos(plan, rig, taken)
             while not ended:
-                photo = writer.add(next(photos, None), rig.conditions(), rig.alarms[told:])
-                told = len(rig.alarms)
+                photo = next(photos, None)
+                alarms += rig.alarms[heard:]
+                heard = len(rig.alarms)
+                photo = writer.add(photo, rig.conditions(), alarms)
+                # Of a photo that is good and kept: what it tells is noted with the next.
+                alarms = look(writer.taken - 1, photo)
+                for alarm in alarms:
+                    tell(alarm)
                 if progress is not None:
                     progress(writer.taken)
                 ended = (enough is not None and enough(writer.taken - 1, photo)) or writer.ended
-            writer.finish()
+            writer.finish(alarms)
     except KeyboardInterrupt as error:
         if not kept.photos:
             raise

@@ -1,0 +1,104 @@
+"""How much sinusoids move a camera pixel, which a linear response bounds.
+
+Transport is never negative, so no camera pixel answers a sinusoid with more than it answers white:
+modulation, the answer's amplitude over half of what white adds to black, is 1 at most. Above it the
+response is not linear, or black is clipped.
+
+Index convention: steps are (n, ...), one photo for each phase; what follows is a photo's own shape.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from nearfar.arrays import Booleans, Floats
+from nearfar.errors import InputError
+
+# Modulation above this ...
+TOO_MUCH = 1.05
+# ... at more than this share of lit camera pixels is an alarm.
+TOO_MANY = 0.02
+# Exponents that a response is looked for among.
+EXPONENTS = (0.2, 5.0)
+# Camera pixels that are enough for one number.
+ENOUGH = 50_000
+
+
+def of_pair(cosine: Floats, sine: Floats, black: Floats, white: Floats) -> Floats:
+    """Modulation by a cosine and a sine of one frequency, each 0.5 + 0.5 cos or sin.
+
+    Parameters
+    ----------
+    cosine, sine, black, white : array
+        Photos of one shape; white above black.
+
+    Returns
+    -------
+    array
+    """
+    middle = (white + black) / 2
+    return np.asarray(2 * np.hypot(cosine - middle, sine - middle) / (white - black))
+
+
+def of_steps(steps: Floats, phases: Sequence[float]) -> tuple[Floats, Floats]:
+    """Phase and modulation by fringes 0.5 + 0.5 cos(x + phase), shifted evenly.
+
+    Parameters
+    ----------
+    steps : array, shape (n, ...)
+        Photos less black; three or more.
+    phases : sequence of float
+        Of each, in radians, evenly over the circle.
+
+    Returns
+    -------
+    phase : array
+        x, in radians from -pi to pi.
+    modulation : array
+        Amplitude over mean.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three, or they are not even.
+    """
+    turns = np.exp(-1j * np.asarray(phases))
+    if len(phases) < 3 or abs(turns.sum()) > 1e-6 or abs((turns**2).sum()) > 1e-6:
+        raise InputError(
+            f"phases {list(phases)} are not shifted evenly over the circle: give three or more."
+        )
+    answer = np.tensordot(turns, steps, axes=1)
+    mean = steps.mean(axis=0)
+    amplitude = 2 / len(phases) * np.abs(answer)
+    return np.angle(answer), amplitude / np.maximum(mean, np.finfo(np.float32).tiny)
+
+
+def share_above_one(modulation: Floats, lit: Booleans) -> float:
+    """Share of lit camera pixels whose modulation no linear response gives; see `TOO_MANY`."""
+    return float((modulation[lit] > TOO_MUCH).mean()) if lit.any() else 0.0
+
+
+def fit_exponent(steps: Floats) -> float:
+    """Find the exponent that makes photos of evenly shifted fringes add up as light does.
+
+    Whatever a camera pixel's phase, its steps in light add up to half of white for each: a response
+    that is a power of the light is undone by the exponent at which they do.
+
+    Parameters
+    ----------
+    steps : array, shape (n, ...)
+        Photos less black over white less black, of lit camera pixels.
+
+    Returns
+    -------
+    float
+        Light over white = (photo over white) ** exponent; 1 where the response is linear.
+    """
+    flat = np.clip(steps.reshape(len(steps), -1), 0.0, 1.0)
+    chosen = flat[:, :: max(1, flat.shape[1] // ENOUGH)].astype(np.float64)
+
+    def missed(exponent: float) -> float:
+        return float(np.mean((np.mean(chosen**exponent, axis=0) - 0.5) ** 2))
+
+    return float(minimize_scalar(missed, bounds=EXPONENTS, method="bounded").x)

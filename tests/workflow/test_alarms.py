@@ -1,0 +1,64 @@
+"""Alarms of photos while they are taken: when there is a fault, once, and remembered."""
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.capture import open_capture
+from nearfar.errors import CaptureInterrupted
+from nearfar.plan import paper_plan
+from nearfar.plan.choose import choose_plan
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.workflow.acquire import acquire
+from tests.worlds import model_transport
+
+PAPER = paper_plan(Size(16, 20), 5, Size(3, 3))
+CHOSEN = choose_plan(Size(16, 20), 50)[0]
+
+
+def _rig(world, gamma=1.0, exposure=0.5):
+    return SimulatedRig(
+        world, "test", SimulatedProjector(gamma=gamma), SimulatedCamera(), exposure, 0
+    )
+
+
+@pytest.mark.parametrize("plan", [PAPER, CHOSEN])
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ({}, None),
+        ({"gamma": 2.2}, "what white adds, which no linear response does"),
+        ({"exposure": 3.0}, "is saturated: expose less"),
+    ],
+)
+def test_a_fault_is_told_once_and_remembered(small_world, tmp_path, plan, fault, words):
+    told = []
+    acquire(plan, tmp_path / "c.zarr", _rig(small_world, **fault), told=told.append)
+    assert open_capture(tmp_path / "c.zarr").alarms == tuple(told)
+    assert len(told) == (words is not None)
+    assert words is None or words in told[0]
+
+
+@pytest.mark.parametrize("plan", [PAPER, CHOSEN])
+def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, plan):
+    def stop(number, _photo):
+        if number == 6:
+            raise KeyboardInterrupt
+        return False
+
+    rig, told = _rig(small_world, gamma=2.2), []
+    with pytest.raises(CaptureInterrupted):
+        acquire(plan, tmp_path / "c.zarr", rig, enough=stop)
+    acquire(plan, tmp_path / "c.zarr", rig, resume=True, told=told.append)
+    assert any("which no linear response does" in alarm for alarm in told)
+
+
+def test_noise_alone_is_no_alarm(tmp_path):
+    world = model_transport(Size(16, 20), Size(64, 72), window=5, far=Size(3, 3), channels=1)
+    dim = SimulatedCamera(full_well=500.0)
+    rig = SimulatedRig(world, "test", SimulatedProjector(), dim, 0.5, 0)
+    told = []
+    acquire(CHOSEN, tmp_path / "c.zarr", rig, told=told.append)
+    assert told == [], np.array(told)

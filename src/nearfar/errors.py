@@ -54,5 +54,5 @@ class ClusterError(NearfarError, ConnectionError):
     """A scheduler that is not there, or workers that cannot do the work."""
 
 
-class CaptureInterrupted(KeyboardInterrupt):
-    """A capture that was told to stop; the message tells what is kept of it."""
+class KeptInterrupt(KeyboardInterrupt):
+    """Work that was told to stop; the message tells what is kept of it."""

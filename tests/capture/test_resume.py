@@ -16,9 +16,9 @@ from nearfar.arrays import Size
 from nearfar.capture import open_capture, white_and_black
 from nearfar.capture.writing import LOG
 from nearfar.errors import (
-    CaptureInterrupted,
     ExistingOutputError,
     InputError,
+    KeptInterrupt,
     MissingFileError,
     StorageError,
     UnreadableFileError,
@@ -59,9 +59,7 @@ def _stop_after(count, reason=KeyboardInterrupt):
 
 
 def _stopped(rig, path, count, plan=PLAN, resume=False):
-    with pytest.raises(
-        CaptureInterrupted, match=f"^interrupted; {count} of {COUNT} photos are kept"
-    ):
+    with pytest.raises(KeptInterrupt, match=f"^interrupted; {count} of {COUNT} photos are kept"):
         acquire(plan, path, rig, enough=_stop_after(count), resume=resume)
 
 
@@ -117,7 +115,7 @@ def test_what_was_stopped_before_the_second_photo_leaves_nothing(rig, tmp_path):
     for stop in (0, 1):
         with pytest.raises(KeyboardInterrupt) as stopped:
             acquire(PLAN, tmp_path / "c.zarr", _Odd(rig, stop, KeyboardInterrupt()))
-        assert not isinstance(stopped.value, CaptureInterrupted)
+        assert not isinstance(stopped.value, KeptInterrupt)
         assert list(tmp_path.iterdir()) == []
 
 
@@ -192,7 +190,7 @@ def test_a_dark_projector_keeps_nothing(rig, tmp_path):
 def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_path):
     first = acquire(PLAN, tmp_path / "c.zarr", replace(rig, seed=9))
     before = first.photos[:]
-    with pytest.raises(CaptureInterrupted, match="--resume --force goes on"):
+    with pytest.raises(KeptInterrupt, match="--resume --force goes on"):
         acquire(PLAN, tmp_path / "c.zarr", rig, enough=_stop_after(20), force=True)
     np.testing.assert_array_equal(open_capture(tmp_path / "c.zarr").photos[:], before)
     with pytest.raises(ExistingOutputError, match="--force"):
@@ -210,7 +208,7 @@ def test_the_same_plan_with_other_options_is_named(rig, tmp_path):
         (checked, PLAN, "give --until"),
     ):
         path = tmp_path / f"{len(before.patterns)}.zarr"
-        with pytest.raises(CaptureInterrupted):
+        with pytest.raises(KeptInterrupt):
             acquire(before, path, rig, enough=_stop_after(12))
         with pytest.raises(InputError, match=word):
             acquire(now, path, rig, resume=True)
@@ -220,7 +218,7 @@ def test_a_link_is_followed_and_the_folder_named(rig, tmp_path):
     (tmp_path / "else").mkdir()
     link, real = tmp_path / "link.zarr", tmp_path / "else" / "real.zarr"
     link.symlink_to(real)
-    with pytest.raises(CaptureInterrupted, match=str(tmp_path / "else" / "real.zarr.unfinished")):
+    with pytest.raises(KeptInterrupt, match=str(tmp_path / "else" / "real.zarr.unfinished")):
         acquire(PLAN, link, rig, enough=_stop_after(12))
     capture = acquire(PLAN, link, rig, resume=True)
     assert real.is_dir()
@@ -238,7 +236,7 @@ def test_what_was_whole_but_for_its_name_is_not_shot_again(
     def enough(number, _photo):
         return number + 1 == early
 
-    with monkeypatch.context() as patch, pytest.raises(CaptureInterrupted):
+    with monkeypatch.context() as patch, pytest.raises(KeptInterrupt):
         patch.setattr(output, "move_into_place", gone)
         acquire(PLAN, tmp_path / "c.zarr", rig, enough=enough)
     told = []

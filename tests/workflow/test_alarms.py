@@ -5,7 +5,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
-from nearfar.errors import CaptureInterrupted
+from nearfar.errors import KeptInterrupt
 from nearfar.plan import paper_plan
 from nearfar.plan.choose import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -49,7 +49,7 @@ def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, 
         return False
 
     rig, told = _rig(small_world, gamma=2.2), []
-    with pytest.raises(CaptureInterrupted):
+    with pytest.raises(KeptInterrupt):
         acquire(plan, tmp_path / "c.zarr", rig, enough=stop)
     acquire(plan, tmp_path / "c.zarr", rig, resume=True, told=told.append)
     assert any("which no linear response does" in alarm for alarm in told)

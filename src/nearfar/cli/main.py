@@ -28,7 +28,7 @@ from nearfar.cli import (
     separating,
     transports,
 )
-from nearfar.errors import CaptureInterrupted, NearfarError
+from nearfar.errors import KeptInterrupt, NearfarError
 
 app = typer.Typer(
     name="nearfar",
@@ -163,7 +163,7 @@ def _stopped_cleanly() -> Iterator[None]:
 def _interrupted(stopped: KeyboardInterrupt | None = None) -> NoReturn:
     status = 128 + (_stops[-1] if _stops else signal.SIGINT)
     what = "interrupted: nothing half-written was left behind."
-    _fail(str(stopped) if isinstance(stopped, CaptureInterrupted) else what, status=status)
+    _fail(str(stopped) if isinstance(stopped, KeptInterrupt) else what, status=status)
 
 
 def _discard_stdout() -> None:

@@ -73,6 +73,12 @@ def reconstruct(
             metavar="ADDRESS",
         ),
     ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume", help="Go on with the blocks of a reconstruction that was stopped."
+        ),
+    ] = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -82,10 +88,10 @@ def reconstruct(
     """
     from nearfar.capture import open_capture
     from nearfar.correspondence import read_correspondence
-    from nearfar.files import check_output
-    from nearfar.transport.store import save_transport, write_transport
+    from nearfar.files import check_output, check_resumable
+    from nearfar.transport.store import save_transport
     from nearfar.workflow.reconstruct import reconstruct as rebuild
-    from nearfar.workflow.reconstruct import reconstruct_in_blocks
+    from nearfar.workflow.resuming import reconstruct_into
 
     if square and scheduler is not None:
         raise typer.BadParameter("is not for --square.", param_hint="--scheduler")
@@ -95,7 +101,12 @@ def reconstruct(
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
     available = parse_bytes(memory, name="--memory")
     keep_input(output, capture, *([correspondence] if correspondence else []))
-    check_output(output, force=force)
+    if resume and (square or scheduler is not None):
+        raise typer.BadParameter("is not for --square or --scheduler.", param_hint="--resume")
+    if square or scheduler is not None:
+        check_output(output, force=force)
+    else:
+        check_resumable(output, resume=resume, force=force)
     opened = open_capture(capture)
     given = None
     if correspondence is not None:
@@ -130,17 +141,20 @@ def reconstruct(
             seen.add(transport, found)
             save_transport(output, transport, force=force)
         else:
-            parts = reconstruct_in_blocks(
+            made = reconstruct_into(
+                output,
                 opened,
                 given,
                 method=method.value,
                 memory=available,
                 device=device.value,
                 half=half,
+                resume=resume,
+                force=force,
                 progress=report,
             )
-            transports = (seen.add(*part) for part in parts)
-            write_transport(output, transports, opened.camera.height, force=force)
+            seen.lit, seen.pixels, seen.provenance = made
+            seen.camera = opened.camera
     seen.conclude(opened, output, quiet=quiet)
 
 

@@ -11,7 +11,7 @@ from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
 from nearfar.capture.replacing import replace_photos
 from nearfar.capture.writing import LOG, count_photos, require_same_rig
-from nearfar.errors import CaptureInterrupted, InputError, NearfarError, UselessPhotosError
+from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.files import resumable_output
 from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import Plan
@@ -70,7 +70,7 @@ def acquire(
         If the photos tell of a projector that is off: they are removed, unless they were there.
     NearfarError
         As `nearfar.files.resumable_output`. What was taken is kept, and the message says where.
-    CaptureInterrupted
+    KeptInterrupt
         If it was told to stop; likewise.
     """
     path = Path(path)
@@ -108,7 +108,7 @@ def acquire(
     except KeyboardInterrupt as error:
         if not kept.photos:
             raise
-        raise CaptureInterrupted(f"interrupted; {kept}.") from error
+        raise KeptInterrupt(f"interrupted; {kept}.") from error
     except NearfarError as error:
         if not kept.photos:
             raise

@@ -1,0 +1,176 @@
+"""Reconstructions that were stopped: gone on with, they are to the bit what was never stopped."""
+
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.capture import open_capture
+from nearfar.correspondence import Correspondence
+from nearfar.errors import ExistingOutputError, InputError, KeptInterrupt, MissingFileError
+from nearfar.plan.choose import choose_plan
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.transport.store import load_transport
+from nearfar.workflow import blocks
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.resuming import LOG, reconstruct_into
+from tests.cli.conftest import run_nearfar
+from tests.worlds import model_transport
+
+CAMERA = Size(100, 12)
+# Rows of a block, about.
+ROWS = 3
+SLOW = """
+import sys
+from nearfar.capture import open_capture
+from nearfar.workflow.resuming import reconstruct_into
+reconstruct_into(sys.argv[2], open_capture(sys.argv[1]), memory=int(sys.argv[3]),
+                 resume="--resume" in sys.argv)
+"""
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory):
+    world = model_transport(Size(16, 20), CAMERA, window=5, far=Size(3, 3), channels=1)
+    rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
+    path = tmp_path_factory.mktemp("capture") / "c.zarr"
+    return acquire(choose_plan(Size(16, 20), 50)[0], path, rig)
+
+
+@pytest.fixture(scope="module")
+def memory(capture):
+    """Bytes in which so few rows are worked at that there are many blocks."""
+    for size in range(400_000_000, 10**9, 100_000):
+        try:
+            cut = blocks.cut_rows(capture, method="joint", memory=size, given=False)
+        except InputError:
+            continue
+        if cut.rows >= ROWS:
+            return size
+    raise AssertionError
+
+
+@pytest.fixture(scope="module")
+def whole(capture, memory, tmp_path_factory):
+    path = tmp_path_factory.mktemp("whole") / "t.zarr"
+    reconstruct_into(path, capture, memory=memory)
+    return path
+
+
+def _check_same(one, other):
+    names = sorted(str(p.relative_to(one)) for p in one.rglob("*"))
+    assert names == sorted(str(p.relative_to(other)) for p in other.rglob("*"))
+    for name in names:
+        if (one / name).is_file():
+            assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+def _stop_after(count):
+    """Stop when so many blocks are done."""
+
+    def progress(what, share):
+        if what == "reconstructing" and share * CAMERA.height >= count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_it_is_cut_into_many_blocks(capture, whole, memory):
+    cut = blocks.cut_rows(capture, method="joint", memory=memory, given=False)
+    assert len(list(cut.blocks())) >= 25
+    assert not (whole / LOG).exists()
+
+
+def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
+    path = tmp_path / "t.zarr"
+    given = {"memory": memory}
+    with pytest.raises(KeptInterrupt, match=r"^interrupted; \d+ blocks .* and --resume goes on"):
+        reconstruct_into(path, capture, progress=_stop_after(50), **given)
+    assert not path.exists()
+    with pytest.raises(ExistingOutputError):
+        reconstruct_into(path, capture, **given)
+    for other in (
+        {**given, "half": True},
+        {**given, "method": "joint", "device": "torch"},
+        {"memory": 10**9},
+        {**given, "correspondence": Correspondence(
+            np.ones((*CAMERA, 2), np.float32), np.ones(CAMERA, np.float32))},
+    ):  # fmt: skip
+        with pytest.raises(InputError, match="was begun with another"):
+            reconstruct_into(path, capture, resume=True, **other)
+    done = []
+    reconstruct_into(
+        path, capture, resume=True, progress=lambda what, share: done.append((what, share)), **given
+    )
+    # What was there is not worked at again.
+    assert min(share for what, share in done if what == "reconstructing") < 0.5
+    _check_same(whole, path)
+    assert [p.name for p in tmp_path.iterdir()] == ["t.zarr"]
+    with pytest.raises(MissingFileError, match="nothing to go on with"):
+        reconstruct_into(path, capture, resume=True, force=True, **given)
+
+
+def test_what_was_stopped_before_its_first_block_leaves_nothing(capture, memory, tmp_path):
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        reconstruct_into(tmp_path / "t.zarr", capture, memory=memory, progress=_stop_after(0))
+    assert not isinstance(stopped.value, KeptInterrupt)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path):
+    generator = random.Random(0)
+    path = tmp_path / "t.zarr"
+    log = Path(f"{path}.unfinished") / LOG
+    command = [sys.executable, "-c", SLOW, str(capture.path), str(path), str(memory)]
+    kills = 0
+    while kills < 20:
+        resume = ["--resume"] if log.parent.exists() else []
+        process = subprocess.Popen([*command, *resume])
+        # From its first reading on, to a block or so.
+        while not log.parent.exists() and process.poll() is None:
+            time.sleep(0.001)
+        before = log.stat().st_size if log.exists() else 0
+        while process.poll() is None and (log.stat().st_size if log.exists() else 0) == before:
+            if kills % 4 == 0 and generator.random() < 0.02:
+                break
+            time.sleep(0.01)
+        time.sleep(generator.uniform(0, 0.02))
+        finished = process.poll()
+        process.kill()
+        process.wait()
+        kills += 1
+        if finished is not None:
+            assert finished == 0
+            break
+    if not path.exists():
+        resume = ["--resume"] if log.parent.exists() else []
+        subprocess.run([*command, *resume], check=True)
+    assert kills == 20, "it ended before it was killed twenty times: give it more blocks"
+    _check_same(whole, path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):
+    path = tmp_path / "t.zarr"
+    options = (capture.path, path, "--memory", f"{memory / 1e6}MB")
+    for wrong in (("--square",), ("--scheduler", "tcp://127.0.0.1:1")):
+        assert run_nearfar("reconstruct", *options, "--resume", *wrong).status == 2
+    ran = run_nearfar("reconstruct", *options, "--resume")
+    assert ran.status == 1
+    assert "nothing to go on with" in ran.err
+    with pytest.raises(KeptInterrupt):
+        reconstruct_into(path, open_capture(capture.path), memory=memory, progress=_stop_after(30))
+    log = tmp_path / "t.zarr.unfinished" / LOG
+    log.write_bytes(log.read_bytes()[:-9])
+    ran = run_nearfar("reconstruct", *options, "--resume")
+    assert ran.status == 0, ran.err
+    _check_same(whole, path)
+    assert load_transport(path).camera == CAMERA

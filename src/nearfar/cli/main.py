@@ -57,6 +57,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "separate": separating.separate,
     "devices": rigging.devices,
     "init": rigging.init,
+    "preview": rigging.preview,
     "calibrate": rigging.calibrate,
 }
 

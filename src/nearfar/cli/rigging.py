@@ -1,5 +1,6 @@
 """``nearfar devices`` and ``nearfar calibrate``: real projectors and cameras."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -111,6 +112,43 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
         warn(note)
     say(_told(found), quiet=quiet)
     say(f"calibration and plots written to {folder}", quiet=quiet)
+
+
+def preview(
+    rig: RigFile,
+    port: Annotated[
+        int, typer.Option(help="Port to serve on, 0 for any that is free.", min=0, max=65535)
+    ] = 8627,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+    ] = True,
+    quiet: Quiet = False,
+) -> None:
+    """Show what the camera sees, live: picture, histogram, focus and saturation.
+
+    Example: nearfar preview rig.toml
+    """
+    import webbrowser
+
+    from nearfar.rigs.config import read_rig_table
+    from nearfar.rigs.opening import RealTable, rig_to_preview
+    from nearfar.viewer.preview import run_preview
+
+    table = read_rig_table(rig)
+    if not isinstance(table, RealTable):
+        raise InputError(
+            f"{rig} is a simulated rig, which needs no focus: name the RIG.toml of a real one."
+        )
+
+    def started(address: str) -> None:
+        print(f"preview at {address}, Esc on the projector or Ctrl-C here ends it", flush=True)
+        if browser:
+            webbrowser.open(address)
+
+    # Esc on the projector and Ctrl-C are how a preview ends.
+    with rig_to_preview(rig, table) as opened, suppress(KeyboardInterrupt):
+        run_preview(opened, port, started)
+    say("preview ended", quiet=quiet)
 
 
 def _told(found: "Findings") -> str:

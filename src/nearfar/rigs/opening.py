@@ -3,15 +3,18 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from nearfar.arrays import Size
-from nearfar.rigs.calibration import Calibration, calibration_folder, read_calibration
+from nearfar.rigs.calibration import calibration_folder, read_calibration
+from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.cameras.settings import AnyCamera
 from nearfar.rigs.real import Begun, RealRig, Told
 from nearfar.rigs.screens import Window
+
+# Seconds, where a camera begins that is not aimed yet.
+FIRST_EXPOSURE = 1 / 30
 
 
 class ScreenTable(BaseModel):
@@ -77,8 +80,19 @@ def real_rig(
     MissingPackageError, DeviceError, InputError, UnreadableFileError
     """
     calibration = read_calibration(calibration_folder(path))
-    with _devices(path, table, projector, calibration, exposure, told, begun) as rig:
-        yield rig
+    with _devices(path, table) as (screen, camera):
+        yield RealRig(
+            screen,
+            camera,
+            projector,
+            calibration=calibration,
+            scale=table.projector.scale,
+            brightness=table.projector.brightness,
+            settle=table.projector.settle,
+            exposure=exposure or _wanted(table),
+            told=told,
+            begun=begun,
+        )
 
 
 @contextmanager
@@ -91,37 +105,48 @@ def rig_to_calibrate(
     ------
     MissingPackageError, DeviceError, InputError
     """
-    bare = table.model_copy(
-        update={"projector": table.projector.model_copy(update={"brightness": 1.0})}
-    )
-    with _devices(path, bare, None, None, None, told) as rig:
-        yield rig
+    with _devices(path, table) as (screen, camera):
+        yield _bare(screen, camera, table, _wanted(table), told)
 
 
 @contextmanager
-def _devices(
-    path: Path,
-    table: RealTable,
-    projector: Size | None,
-    calibration: Calibration | None,
-    exposure: float | None,
-    told: Told | None,
-    begun: Begun | None = None,
-) -> Iterator[RealRig]:
+def rig_to_preview(path: Path, table: RealTable) -> Iterator[RealRig]:
+    """Open a real rig as `rig_to_calibrate`, whatever its camera sees: it is to be set up yet.
+
+    Raises
+    ------
+    MissingPackageError, DeviceError, InputError
+    """
+    with _devices(path, table) as (screen, camera):
+        exposure = _wanted(table)
+        if exposure is None and camera.exposure_limits is not None:
+            shortest, longest = camera.exposure_limits
+            exposure = min(max(FIRST_EXPOSURE, shortest), longest)
+        yield _bare(screen, camera, table, exposure, None)
+
+
+def _bare(
+    screen: Window, camera: Camera, table: RealTable, exposure: float | None, told: Told | None
+) -> RealRig:
+    return RealRig(
+        screen,
+        camera,
+        screen.monitor.size,
+        scale=1,
+        settle=table.projector.settle,
+        exposure=exposure,
+        told=told,
+    )
+
+
+def _wanted(table: RealTable) -> float | None:
+    """Exposure of the table in seconds; None where it is to be chosen."""
+    return None if table.camera.exposure == "auto" else table.camera.exposure
+
+
+@contextmanager
+def _devices(path: Path, table: RealTable) -> Iterator[tuple[Window, Camera]]:
     with ExitStack() as stack:
         # The camera first: it fails more often, and leaves the monitor alone meanwhile.
         camera = stack.enter_context(table.camera.open(path.parent))
-        screen = stack.enter_context(Window(table.projector.monitor))
-        wanted: float | Literal["auto"] = table.camera.exposure
-        yield RealRig(
-            screen,
-            camera,
-            projector or screen.monitor.size,
-            calibration=calibration,
-            scale=table.projector.scale if projector else 1,
-            brightness=table.projector.brightness,
-            settle=table.projector.settle,
-            exposure=exposure or (None if wanted == "auto" else wanted),
-            told=told,
-            begun=begun,
-        )
+        yield stack.enter_context(Window(table.projector.monitor)), camera

@@ -196,6 +196,10 @@ class RealRig:
         frame[top : top + height, left : left + width] = levels
         return self.photograph(frame)
 
+    def wait(self, seconds: float) -> None:
+        """Let time pass; raises KeyboardInterrupt if Esc was pressed."""
+        self._screen.wait(seconds)
+
     def whole_refreshes(self, seconds: float) -> float:
         """Round an exposure to whole refreshes of the projector, one at least."""
         if _is_whole(seconds, self.refresh):

@@ -1,0 +1,194 @@
+"""The preview: its numbers, its server, and a browser's wishes, before a table."""
+
+import json
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import imagecodecs
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.rigs.real import RealRig
+from nearfar.viewer.preview import run_preview
+from nearfar.viewer.sight import BINS, MARK, look, picture
+from tests.absent import said_without
+from tests.cli.conftest import run_nearfar
+from tests.rigs.table import TableCamera, TableScreen
+
+
+def test_what_is_told_of_a_photo():
+    photo = np.zeros((40, 60, 3), dtype=np.uint16)
+    photo[:, :30] = (100, 200, 300)
+    photo[:4] = 1023
+    seen = look(photo, 1023.0)
+    assert [len(channel) for channel in seen.histogram] == [BINS] * 3
+    assert all(sum(channel) == 40 * 60 for channel in seen.histogram)
+    assert seen.histogram[0][-1] == 4 * 60
+    assert seen.saturated == pytest.approx(0.1)
+    assert seen.brightest == 1.0
+    assert seen.mean == pytest.approx(photo.mean() / 1023)
+    shown = imagecodecs.jpeg8_decode(picture(photo, 1023.0))
+    assert shown.shape == (40, 60, 3)
+    assert np.abs(shown[1, 30].astype(int) - MARK).max() < 40
+
+
+def test_the_sharper_picture_has_the_larger_focus():
+    from scipy import ndimage
+
+    generator = np.random.default_rng(0)
+    sharp = generator.uniform(0, 4000, (80, 100, 1))
+    focus = [
+        look(ndimage.gaussian_filter(sharp, (s, s, 0)), 4095.0).focus for s in (0, 0.5, 1, 2, 4)
+    ]
+    assert focus == sorted(focus, reverse=True)
+    assert focus[0] > 10 * focus[-1]
+    # The light's level does not matter.
+    assert look(sharp / 8, 4095.0).focus == pytest.approx(focus[0], rel=1e-4)
+    assert look(np.zeros((4, 4, 1), np.uint8), 255.0).focus == 0.0
+
+
+def test_a_large_photo_is_shown_smaller():
+    shown = imagecodecs.jpeg8_decode(picture(np.zeros((2000, 3000, 1), np.uint16), 65535.0))
+    assert shown.shape == (500, 750, 3)
+
+
+class _Slow(TableScreen):
+    """Waits as a real one does, a little."""
+
+    def wait(self, seconds):
+        super().wait(seconds)
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def served():
+    """A preview that runs, its camera, and a way to ask it."""
+    projector, size = Size(72, 96), Size(24, 32)
+    screen = _Slow()
+    transport = np.full((size.pixels, projector.pixels), 0.6 / projector.pixels)
+    camera = TableCamera(screen, transport, size, projector)
+    rig = RealRig(screen, camera, projector, scale=1, exposure=0.1)
+    addresses, faults = [], []
+
+    def run():
+        try:
+            run_preview(rig, 0, addresses.append)
+        except BaseException as error:
+            faults.append(error)
+            raise
+
+    thread = threading.Thread(target=run)
+    thread.start()
+
+    def ask(path, body=None, **headers):
+        data = None if body is None else json.dumps(body).encode()
+        headers = {"Content-Type": "application/json", **headers}
+        request = urllib.request.Request(addresses[0] + path, data=data, headers=headers)
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return answer.read()
+
+    def until(holds):
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            state = json.loads(ask("/state"))
+            if holds(state):
+                return state
+            time.sleep(0.02)
+        raise AssertionError(state)
+
+    while not addresses:
+        assert thread.is_alive()
+        time.sleep(0.01)
+    yield camera, ask, until
+    if thread.is_alive():
+        ask("/wish", {"stop": True})
+        thread.join(timeout=10)
+    assert not thread.is_alive()
+    assert faults == []
+
+
+def test_a_browser_sees_and_asks(served):
+    _, ask, until = served
+    page = ask("/").decode()
+    assert "<h1>Preview</h1>" in page
+    # Nothing is fetched from elsewhere.
+    assert "http://" not in page
+    assert "https://" not in page
+    white = until(lambda state: state.get("pattern") == "white")
+    assert white["saturated"] == 0
+    black = [ask("/wish", {"pattern": "black"}), until(lambda s: s["pattern"] == "black")][1]
+    assert black["mean"] < white["mean"] / 5
+    number = black["number"]
+    until(lambda state: state["number"] > number + 3)
+    assert imagecodecs.jpeg8_decode(ask("/photo.jpg")).shape == (24, 32, 3)
+    ask("/wish", {"pattern": "white", "exposure": 0.5})
+    bright = until(lambda state: state["exposure"] == 0.5 and state["saturated"] > 0.9)
+    assert bright["brightest"] == 1.0
+    ask("/wish", {"automatic": True})
+    until(lambda state: 0.5 < state["brightest"] < 0.95 and state["saturated"] == 0)
+
+
+def test_faults_are_said_and_it_goes_on(served):
+    camera, ask, until = served
+    ask("/wish", {"exposure": 100.0})
+    until(lambda state: "cannot expose 100 s" in state["fault"])
+    until(lambda state: state["fault"] == "")
+    camera.from_now_on = "lost"
+    until(lambda state: "the photo was lost" in state["fault"])
+    camera.from_now_on = None
+    until(lambda state: state["fault"] == "")
+
+
+@pytest.mark.parametrize(
+    ("body", "headers", "status"),
+    [
+        ({"pattern": "tartan"}, {}, 422),
+        ({"exposure": -1}, {}, 422),
+        ({"explode": True}, {}, 422),
+        ({"stop": True}, {"Host": "evil.example"}, 400),
+        ({"stop": True}, {"Content-Type": "text/plain"}, 422),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(served, body, headers, status):
+    _, ask, until = served
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        ask("/wish", body, **headers)
+    assert refused.value.code == status
+    refused.value.close()
+    number = until(lambda state: True)["number"]
+    until(lambda state: state["number"] > number + 1)
+
+
+def test_a_port_that_is_taken_is_named():
+    import socket
+
+    screen = TableScreen()
+    projector, size = Size(72, 96), Size(4, 4)
+    transport = np.full((size.pixels, projector.pixels), 0.6 / projector.pixels)
+    rig = RealRig(
+        screen, TableCamera(screen, transport, size, projector), projector, scale=1, exposure=0.1
+    )
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(InputError, match=r"port \d+ cannot be served on"):
+            run_preview(rig, taken.getsockname()[1])
+
+
+def test_without_its_packages_there_is_a_sentence():
+    program = (
+        "from nearfar.viewer.preview import _Shared, _served\nwith _served(_Shared(), 0):\n    pass"
+    )
+    assert "pip install 'nearfar[preview]'" in said_without("uvicorn", program)
+
+
+def test_a_simulated_rig_is_refused(tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[scene]\nname = "corner"\n')
+    ran = run_nearfar("preview", rig)
+    assert ran.status == 1
+    assert "is a simulated rig" in ran.err

@@ -331,6 +331,20 @@ def test_what_is_damaged_gets_a_sentence_and_is_left(rig, tmp_path, damage):
     assert folder.is_dir()
 
 
+def test_a_torn_line_does_not_spoil_the_next(rig, undisturbed, tmp_path):
+    path = tmp_path / "c.zarr"
+    log = tmp_path / "c.zarr.unfinished" / LOG
+    for photos in (20, 40):
+        with pytest.raises(KeptInterrupt):
+            acquire(PLAN, path, rig, enough=_stop_after(photos), resume=log.exists())
+        log.write_bytes(log.read_bytes()[:-5])
+    # What was noted after the torn line is still known: one photo is taken again, not twenty.
+    taken = []
+    acquire(PLAN, path, rig, resume=True, progress=taken.append)
+    assert taken[0] > 39
+    _check_same(open_capture(path), undisturbed)
+
+
 COMMAND = [sys.executable, "-m", "nearfar"]
 
 

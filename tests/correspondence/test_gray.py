@@ -14,6 +14,7 @@ from nearfar.correspondence import (
 )
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
+from nearfar.photometry.held import HeldPhotos
 from nearfar.plan import GrayCode, paper_plan, parse_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -146,3 +147,41 @@ def test_what_is_no_gray_code_is_said(shoot):
         type(plan).model_validate(
             {**plan.model_dump(), "patterns": [GrayCode(kind="gray rows", bit=4)]}
         )
+
+
+def _photos_of_bits(projector, bits, share):
+    """Photos in which camera pixels answer the code with `share` of white, as `bits` say."""
+    plan = paper_plan(projector, 3, Size(3, 3), correspondence="gray")
+    pixels = len(next(iter(bits.values())))
+    photos = np.full((len(plan.patterns), 1, pixels, 1), 0.5, dtype=np.float32)
+    for number, pattern in enumerate(plan.patterns):
+        if isinstance(pattern, GrayCode):
+            on = bits[pattern.kind][:, pattern.bit] != pattern.inverse
+            photos[number, 0, :, 0] += np.where(on, share / 2, -share / 2)
+    # Of surfaces dark and bright.
+    photos *= np.linspace(0.2, 1.0, pixels, dtype=np.float32)[:, None]
+    photos += np.random.default_rng(0).normal(0, 1e-4, photos.shape).astype(np.float32)
+    return HeldPhotos(plan, photos, 1.0)
+
+
+def _bits_of(places, count):
+    gray = places ^ (places >> 1)
+    return (gray[:, None] >> np.arange(count)) & 1 == 1
+
+
+def test_codes_that_no_pattern_pixel_has_are_no_direct_light():
+    projector = Size(20, 20)
+    places = np.arange(32)
+    bits = {kind: _bits_of(places, 5) for kind in ("gray rows", "gray columns")}
+    found = correspond_by_gray_code(_photos_of_bits(projector, bits, 0.4))
+    np.testing.assert_array_equal(found.lit[0], places < 20)
+    np.testing.assert_array_equal(found.pixels[0, :20, 0], places[:20])
+
+
+@pytest.mark.parametrize(("share", "lit"), [(0.4, True), (0.06, True), (0.02, False)])
+def test_light_that_is_next_to_none_of_white_is_not_direct(share, lit):
+    places = np.arange(16)
+    bits = {kind: _bits_of(places, 4) for kind in ("gray rows", "gray columns")}
+    found = correspond_by_gray_code(_photos_of_bits(Size(16, 16), bits, share))
+    assert found.lit.all() == lit
+    assert found.lit.any() == lit

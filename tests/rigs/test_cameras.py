@@ -183,7 +183,7 @@ def test_a_command_releases_the_shutter(tmp_path):
     ("command", "fault", "words"),
     [
         (None, LostPhotoError, "no photo came into"),
-        ("no-such-command", DeviceError, "no-such-command is not there"),
+        ("no-such-command", DeviceError, r"no-such-command cannot be run \(No such file"),
         (
             "'{python}' -c 'import sys; sys.exit(\"no film\")'",
             LostPhotoError,
@@ -211,6 +211,12 @@ def test_two_files_for_one_pattern_are_refused(tmp_path):
             (tmp_path / name).write_bytes(data)
         with pytest.raises(DeviceError, match="2 photos came into"):
             camera._next(before)
+    (tmp_path / "b").mkdir()
+    with FolderCamera(tmp_path / "b", patience=5) as camera:
+        _later(tmp_path / "b" / "IMG_1.png", data).join()
+        camera._used.add("IMG_1")
+        with pytest.raises(DeviceError, match="second file of a photo"):
+            camera._next(set())
     with pytest.raises(DeviceError, match="no folder to watch"):
         FolderCamera(Path(tmp_path / "none"))
 

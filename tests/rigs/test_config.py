@@ -1,6 +1,7 @@
 """RIG.toml of real rigs: what is written, what is read, what is refused."""
 
 import re
+import shutil
 import tomllib
 
 import pytest
@@ -51,6 +52,7 @@ def test_every_setting_it_comments_on_is_one(driver):
         ('[camera]\ndriver = "aravis"\nexposure = "long"\n', "exposure"),
         ('[camera]\ndriver = "aravis"\naverage = 0\n', "average"),
         ('[camera]\ndriver = "aravis"\nbracket = [2.0, 1.0]\n', "begins with 1"),
+        ('[camera]\ndriver = "aravis"\nbracket = [1.0, 2.5]\n', "whole"),
         ('[camera]\ndriver = "aravis"\nregion = "big"\n', "region"),
         ('[camera]\ndriver = "folder"\n', "path"),
         ('[projector]\nbrightness = 2.0\n[camera]\ndriver = "aravis"\n', "brightness"),
@@ -91,6 +93,18 @@ def test_without_a_display_commands_say_so(tmp_path, monkeypatch):
         assert ran.status == 1, ran
         assert "set DISPLAY" in ran.err
     assert not (tmp_path / "c.zarr").exists()
+    # A calibration that is there is replaced where that is asked for, and nothing else is.
+    (tmp_path / "rig.calibration").mkdir()
+    (tmp_path / "rig.calibration" / "calibration.json").write_text("{}")
+    assert "--force" in run_nearfar("calibrate", path).err
+    assert "set DISPLAY" in run_nearfar("calibrate", path, "--force").err
+    (tmp_path / "rig.calibration" / "calibration.json").rename(tmp_path / "rig.calibration" / "my")
+    assert "did not write" in run_nearfar("calibrate", path, "--force").err
+    (tmp_path / "rig.calibration" / "my").rename(tmp_path / "rig.calibration" / "calibration.json")
+    assert (
+        "is no calibration" in run_nearfar("acquire", plan, tmp_path / "c.zarr", "--rig", path).err
+    )
+    shutil.rmtree(tmp_path / "rig.calibration")
     ran = run_nearfar("devices")
     assert ran.status == 0
     assert "set DISPLAY" in ran.err

@@ -8,13 +8,17 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
 from nearfar.errors import DeviceError, InputError
+from nearfar.photometry.exposures import Sensor
+from nearfar.plan import paper_plan
 from nearfar.plan.choose import choose_plan
 from nearfar.rigs.real import RealRig
+from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.workflow.acquire import acquire
 from tests.cli.conftest import run_nearfar
 from tests.rigs.table import TableCamera, TableScreen
 
 PROJECTOR, CAMERA = Size(12, 16), Size(24, 32)
+BRACKET = (1.0, 4.0, 16.0)
 
 
 @pytest.fixture(scope="module")
@@ -242,3 +246,115 @@ def test_averages_and_brackets_have_less_noise(transport):
     assert noise["four"] == pytest.approx(noise["one"] / 2, rel=0.15)
     # 21 times the light; read noise and levels of the shortest hardly count.
     assert noise["bracket"] < noise["one"] / 3.5
+
+
+def test_brackets_and_averages_show_the_same_light(transport):
+    screen = TableScreen()
+    levels = {}
+    for name, options in (("one", {}), ("four", {"frames": 4}), ("bracket", {"bracket": BRACKET})):
+        camera = TableCamera(screen, transport, CAMERA, PROJECTOR, **options)
+        camera.sensor = Sensor(0.02 * 65535, 65535 / 30_000, 4 * 65535 / 30_000)
+        rig = RealRig(screen, camera, PROJECTOR, exposure=0.1)
+        levels[name] = [
+            np.mean([rig.photograph(rig.frame(v)) for _ in range(4)]) for v in (0, 10, 127, 255)
+        ]
+    white = levels["one"][-1] - levels["one"][0]
+    for name in ("four", "bracket"):
+        np.testing.assert_allclose(levels[name], levels["one"], atol=1e-3 * white)
+
+
+def test_stripes_are_no_tears(transport):
+    screen = TableScreen()
+    camera = TableCamera(screen, transport, CAMERA, PROJECTOR)
+    rig = RealRig(screen, camera, PROJECTOR, exposure=0.1)
+    plan = paper_plan(PROJECTOR, 3, Size(3, 3))
+    camera.wrong = {60: "repeated"}
+    _photos(rig, plan)
+    assert len(rig.alarms) == 1
+    assert "was taken again" in rig.alarms[0]
+    # And no more frames than it needs: nine to begin with, two for the one that came twice.
+    assert camera.taken <= len(plan.patterns) + 9 + 2 + 6
+
+
+def test_rows_that_see_no_direct_light_are_no_tears(transport, plan):
+    # The camera sees more than the projector lights.
+    dark = np.repeat(transport.mean(axis=0, keepdims=True), 8 * CAMERA.width, axis=0)
+    tall = Size(CAMERA.height + 8, CAMERA.width)
+    screen = TableScreen()
+    camera = TableCamera(screen, np.concatenate([dark, transport]), tall, PROJECTOR)
+    rig = RealRig(screen, camera, PROJECTOR, exposure=0.1)
+    camera.wrong = {40: "torn", 50: "repeated"}
+    _photos(rig, plan)
+    assert len(rig.alarms) == 2
+    assert all("was taken again" in alarm for alarm in rig.alarms)
+
+
+def test_a_bad_frame_after_light_that_changed_is_taken_again(table, plan, expected):
+    rig, camera, told = table()
+    frames = rig.shoot(plan.draw(i) for i in range(len(plan.patterns)))
+    photos = [next(frames) for _ in range(30)]
+    frame = camera.taken
+    camera.from_now_on = lambda picture: picture + 0.1
+    camera.wrong = {frame + 3: "repeated"}
+    photos += list(frames)
+    assert any("ambient light changed" in alarm for alarm in told), told
+    later = np.stack(photos[40:]).astype(np.float64) - 0.1 * 65535
+    _check(later, expected[40:])
+
+
+def test_a_response_that_is_not_linear_is_not_taken_for_light_that_changes(table):
+    rig, camera, told = table(gamma=2.2)
+    plan = paper_plan(PROJECTOR, 3, Size(3, 3))
+    _photos(rig, plan)
+    assert not any("--reshoot" in alarm for alarm in told)
+    assert sum("the response is not linear" in alarm for alarm in told) == 1
+    assert camera.taken < len(plan.patterns) + 9 + 12
+
+
+def test_a_small_part_of_the_view_is_enough(transport, plan):
+    small = np.zeros((40 * CAMERA.pixels, PROJECTOR.pixels))
+    small[: CAMERA.pixels] = transport
+    size = Size(40 * CAMERA.height, CAMERA.width)
+    screen = TableScreen()
+    dim = SimulatedCamera(bits=12, read_noise=60.0)
+    camera = TableCamera(screen, 0.3 * small, size, PROJECTOR, sensor=dim)
+    RealRig(screen, camera, PROJECTOR, exposure=0.1).in_step()
+
+
+def test_photos_of_floats_are_as_good(table, plan, expected):
+    rig, camera, told = table()
+    take = camera.take
+    camera.take = lambda: (take() / 65535).astype(np.float32)
+    type(camera).full_scale, whole = property(lambda _self: 1.0), type(camera).full_scale
+    try:
+        photos = _photos(rig, plan)
+    finally:
+        type(camera).full_scale = whole
+    _check(65535 * photos, expected)
+    assert told == []
+
+
+def test_a_photo_of_another_size_is_taken_again(table, plan, expected):
+    rig, camera, told = table()
+    take = camera.take
+    camera.take = lambda: take()[: 5 if camera.taken == 30 else None]
+    _check(_photos(rig, plan), expected)
+    assert "leave the camera's settings" in told[0]
+
+
+def test_a_lost_frame_does_not_end_the_choice_of_exposure(transport):
+    screen = TableScreen()
+    camera = TableCamera(screen, transport, CAMERA, PROJECTOR)
+    camera.wrong = {0: "lost", 2: "lost"}
+    RealRig(screen, camera, PROJECTOR)
+    assert camera.exposure is not None
+
+
+def test_alarms_of_a_capture_that_is_gone_on_with_name_its_own_photos(table, plan):
+    rig, camera, told = table()
+    patterns = [plan.draw(i) for i in range(31, len(plan.patterns))]
+    frames = rig.shoot(patterns, 31)
+    next(frames)
+    camera.from_now_on = lambda picture: picture + 0.1
+    list(frames)
+    assert "--reshoot 3" in told[0]

@@ -55,6 +55,35 @@ def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, 
     assert any("which no linear response does" in alarm for alarm in told)
 
 
+def test_light_that_changed_meanwhile_is_told(small_world, tmp_path):
+    def stop(number, _photo):
+        if number == 25:
+            raise KeyboardInterrupt
+        return False
+
+    for exposure, warned in ((0.5, 0), (0.45, 1)):
+        path = tmp_path / f"{exposure}.zarr"
+        with pytest.raises(KeptInterrupt):
+            acquire(CHOSEN, path, _rig(small_world), enough=stop)
+        # A lamp that is darker now, of which the rig knows nothing.
+        rig, told = _Darker(_rig(small_world), exposure / 0.5), []
+        acquire(CHOSEN, path, rig, resume=True, told=told.append)
+        assert len(told) == warned
+        assert all("before the capture was gone on with" in alarm for alarm in told)
+
+
+class _Darker:
+    def __init__(self, rig, share):
+        self._rig, self._share = rig, share
+
+    def __getattr__(self, name):
+        return getattr(self._rig, name)
+
+    def shoot(self, patterns, first=0):
+        for photo in self._rig.shoot(patterns, first):
+            yield (self._share * photo).astype(photo.dtype)
+
+
 def test_noise_alone_is_no_alarm(tmp_path):
     world = model_transport(Size(16, 20), Size(64, 72), window=5, far=Size(3, 3), channels=1)
     dim = SimulatedCamera(full_well=500.0)

@@ -1,6 +1,7 @@
 """Reconstructions that were stopped: gone on with, they are to the bit what was never stopped."""
 
 import random
+import shutil
 import subprocess
 import sys
 import time
@@ -11,6 +12,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
+from nearfar.capture.replacing import replace_photos
 from nearfar.correspondence import Correspondence
 from nearfar.errors import ExistingOutputError, InputError, KeptInterrupt, MissingFileError
 from nearfar.plan.choose import choose_plan
@@ -30,6 +32,7 @@ ROWS = 3
 SLOW = """
 import sys
 from nearfar.capture import open_capture
+from nearfar.capture.replacing import replace_photos
 from nearfar.workflow.resuming import reconstruct_into
 reconstruct_into(sys.argv[2], open_capture(sys.argv[1]), memory=int(sys.argv[3]),
                  resume="--resume" in sys.argv)
@@ -115,6 +118,16 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["t.zarr"]
     with pytest.raises(MissingFileError, match="nothing to go on with"):
         reconstruct_into(path, capture, resume=True, force=True, **given)
+
+
+def test_photos_that_were_taken_again_are_another_capture(capture, memory, tmp_path):
+    path, source = tmp_path / "t.zarr", tmp_path / "c.zarr"
+    shutil.copytree(capture.path, source)
+    with pytest.raises(KeptInterrupt):
+        reconstruct_into(path, open_capture(source), memory=memory, progress=_stop_after(20))
+    again = replace_photos(source, [3], [capture.photos[3]])
+    with pytest.raises(InputError, match="another capture"):
+        reconstruct_into(path, again, memory=memory, resume=True)
 
 
 def test_what_was_stopped_before_its_first_block_leaves_nothing(capture, memory, tmp_path):

@@ -346,7 +346,7 @@ def begun_capture(path: AnyPath) -> Begun:
     UnreadableFileError
         If what is there is no such capture.
     """
-    folder = Path(f"{path}{UNFINISHED}")
+    folder = Path(f"{Path(path).resolve()}{UNFINISHED}")
     if not folder.exists():
         return Begun(0, None)
     exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")

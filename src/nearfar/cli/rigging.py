@@ -88,7 +88,7 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
     Example: nearfar calibrate rig.toml
     """
     from nearfar.files import check_output
-    from nearfar.report.calibration import write_calibration
+    from nearfar.report.calibration import is_calibration, write_calibration
     from nearfar.rigs.calibration import calibration_folder
     from nearfar.rigs.config import read_rig_table
     from nearfar.rigs.opening import RealTable, rig_to_calibrate
@@ -101,7 +101,7 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
             f"RIG.toml of a real one."
         )
     folder = calibration_folder(rig)
-    check_output(folder, force=force)
+    check_output(folder, force=force, replaceable=is_calibration)
     with (
         progress_bar("opening the rig", quiet=quiet) as report,
         rig_to_calibrate(rig, table, told=warn) as opened,

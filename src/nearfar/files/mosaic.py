@@ -14,7 +14,7 @@ from nearfar.errors import InputError
 CELLS = ("RGGB", "GRBG", "GBRG", "BGGR")
 
 
-def bin_mosaic(mosaic: NDArray[Any], cell: str) -> NDArray[Any]:
+def bin_mosaic(mosaic: NDArray[Any], cell: str, full_scale: float | None = None) -> NDArray[Any]:
     """Make each 2x2 cell of a mosaic a pixel of red, green and blue.
 
     Linear, exact, and without a trace of a neighbouring cell. The two greens are averaged, halves
@@ -25,6 +25,8 @@ def bin_mosaic(mosaic: NDArray[Any], cell: str) -> NDArray[Any]:
     mosaic : array, shape (2 Cy, 2 Cx)
     cell : str
         Colours of a cell, row by row, such as ``RGGB``.
+    full_scale : float, optional
+        Level at which a value is saturated; a green of two of which one is stays so.
 
     Returns
     -------
@@ -45,6 +47,9 @@ def bin_mosaic(mosaic: NDArray[Any], cell: str) -> NDArray[Any]:
     red, blue = (cells[:, i // 2, :, i % 2] for i in (cell.index("R"), cell.index("B")))
     first, second = (cells[:, i // 2, :, i % 2] for i in (cell.index("G"), cell.rindex("G")))
     green = (first.astype(np.float64) + second) / 2
+    if full_scale is not None:
+        higher = np.maximum(first, second)
+        green = np.where(higher >= full_scale, higher, green)
     if mosaic.dtype.kind in "iu":
         green = np.rint(green)
     return np.stack([red, green.astype(mosaic.dtype), blue], axis=-1)

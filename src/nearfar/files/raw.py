@@ -65,4 +65,4 @@ def decode_raw(data: bytes, name: str | Path) -> RawPhoto:
             f"{name} is of a sensor without 2x2 cells of red, green and blue: develop it to a "
             f"linear 16-bit TIFF."
         )
-    return RawPhoto(bin_mosaic(mosaic, cell), float(white))
+    return RawPhoto(bin_mosaic(mosaic, cell, white), float(white))

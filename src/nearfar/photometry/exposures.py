@@ -3,7 +3,7 @@
 Index convention: frames are (n, ...), raw levels; whatever follows is a frame's own shape.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,13 +37,13 @@ class Sensor(NamedTuple):
         return np.asarray(self.read**2 + self.gain * np.maximum(levels - self.black, 0.0))
 
 
-def average(frames: NDArray[Any], full_scale: float) -> NDArray[np.float32]:
+def average(frames: Iterable[NDArray[Any]], full_scale: float) -> NDArray[np.float32]:
     """Average frames; a value that is saturated in one of them stays so.
 
     Parameters
     ----------
-    frames : array, shape (n, ...)
-        Of one light and exposure.
+    frames : iterable of arrays
+        Of one shape, light and exposure; one is held at a time.
     full_scale : float
 
     Returns
@@ -51,10 +51,11 @@ def average(frames: NDArray[Any], full_scale: float) -> NDArray[np.float32]:
     array
         float32, levels.
     """
-    mean = frames.mean(axis=0, dtype=np.float64)
-    return np.asarray(
-        np.where((frames >= full_scale).any(axis=0), full_scale, mean), dtype=np.float32
-    )
+    count, total, saturated = 0, np.zeros(()), np.zeros((), dtype=bool)
+    for frame in frames:
+        count, total = count + 1, total + frame
+        saturated = saturated | (frame >= full_scale)
+    return np.asarray(np.where(saturated, full_scale, total / count), dtype=np.float32)
 
 
 def merge_exposures(

@@ -43,7 +43,10 @@ ADVICE = """\
 exposure = "auto"
 # Frames that are averaged to a photo.
 # average = 4
-# Exposures of a photo over the first and shortest, merged by their noise.
+"""
+
+BRACKET = """\
+# Exposures of a photo over the first and shortest, merged by their noise; calibrate first.
 # bracket = [1.0, 4.0, 16.0]
 """
 
@@ -106,7 +109,8 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
             'path = "photos"',
         ]
         own = OWN["folder"]
-    return "\n".join(lines) + "\n" + ADVICE + own
+    bracket = BRACKET if cameras and cameras[0].driver != "folder" else ""
+    return "\n".join(lines) + "\n" + ADVICE + bracket + own
 
 
 def _quoted(text: str) -> str:

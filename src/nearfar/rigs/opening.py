@@ -7,6 +7,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from nearfar.arrays import Size
+from nearfar.errors import InputError
 from nearfar.rigs.calibration import calibration_folder, read_calibration
 from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.cameras.settings import AnyCamera
@@ -80,6 +81,11 @@ def real_rig(
     MissingPackageError, DeviceError, InputError, UnreadableFileError
     """
     calibration = read_calibration(calibration_folder(path))
+    if len(table.camera.bracket) > 1 and (calibration is None or calibration.linearity is None):
+        raise InputError(
+            f"{path} asks for a bracket, which cannot be merged without the camera's black level: "
+            f"run nearfar calibrate first, or remove bracket."
+        )
     with _devices(path, table) as (screen, camera):
         yield RealRig(
             screen,
@@ -105,7 +111,9 @@ def rig_to_calibrate(
     ------
     MissingPackageError, DeviceError, InputError
     """
-    with _devices(path, table) as (screen, camera):
+    # Single frames: averages have another noise, and a bracket needs what is to be found.
+    single = {"camera": table.camera.model_copy(update={"average": 1, "bracket": (1.0,)})}
+    with _devices(path, table.model_copy(update=single)) as (screen, camera):
         yield _bare(screen, camera, table, _wanted(table), told)
 
 

@@ -19,7 +19,7 @@ from nearfar.rigs.calibration import Calibration
 from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.linear import LinearProjector, identity
 from nearfar.rigs.screens import Monitor, Screen
-from nearfar.rigs.watch import Ends, Watch, look_at_ends
+from nearfar.rigs.watch import Change, Ends, Watch, are_alike, difference, look_at_ends, shows
 
 # A photo is tried so often before the capture is stopped.
 TRIES = 6
@@ -92,6 +92,7 @@ class RealRig:
         self._told = told or (lambda _alarm: None)
         self._begun = begun or (lambda _seconds: None)
         self.alarms: list[str] = []
+        self._like = ""
         self._conditions: dict[str, float] = {}
         self._set_exposure(exposure)
 
@@ -149,14 +150,14 @@ class RealRig:
         KeyboardInterrupt
             If Esc was pressed.
         """
-        watch = Watch(self.in_step())
+        watch = Watch(self.in_step(), first)
         self._add_up(watch)
         for number, pattern in enumerate(patterns, first):
             photo = self._of_pattern(number, pattern, watch)
             self._conditions = self.camera.conditions()
-            since, change = watch.accept(number, pattern, photo)
-            if change:
-                self._tell_of_change(since, number, change, watch)
+            change = watch.accept(number, pattern, photo)
+            if change is not None:
+                self._tell_of_change(number, change, watch)
             yield photo
 
     def photograph(
@@ -217,7 +218,7 @@ class RealRig:
             camera.set_exposure(self.whole_refreshes(wanted))
         elif camera.exposure_limits is not None:
             self._screen.show(self.frame(255))
-            self._screen.wait(LONGEST_SETTLE * refresh)
+            self._screen.wait(max(LONGEST_SETTLE, self._settle) * refresh)
             camera.expose_for_light(self.whole_refreshes)
         if camera.exposure is not None and not _is_whole(camera.exposure, refresh):
             self._alarm(
@@ -236,12 +237,14 @@ class RealRig:
         """
         white, black = self.frame(255), self.frame(0)
         while True:
-            darks = [self.photograph(black, LONGEST_SETTLE)]
+            long = max(LONGEST_SETTLE, self._settle)
+            darks = [self.photograph(black, long)]
             soon = self.photograph(white)
-            lights = [self.photograph(white, LONGEST_SETTLE), self.photograph(white)]
-            darks.append(self.photograph(black, LONGEST_SETTLE))
+            lights = [self.photograph(white, long), self.photograph(white)]
+            darks.append(self.photograph(black, long))
             ends = look_at_ends(darks, lights)
-            if Watch(ends).agrees(soon, lights[0]):
+            # A bad frame here would spoil all that follows.
+            if are_alike(darks, lights) and Watch(ends).agrees(soon, lights[0]):
                 return ends
             if self._settle >= LONGEST_SETTLE:
                 raise DeviceError(
@@ -282,6 +285,7 @@ class RealRig:
                     f"what makes the projector's picture livelier and the camera's automatics off, "
                     f"and {cure}."
                 )
+        watch.learn_bands(*photos)
         watch.begin(255 - left, photos[-1])
         self._begun((time.monotonic() - start) / sum(map(len, sums.values())))
 
@@ -294,14 +298,17 @@ class RealRig:
             return photo
         # From the other end any pattern's photo differs all over.
         bright = pattern.mean() > 127
-        away, known = (
-            (self.frame(0), watch.ends.black) if bright else (self.frame(255), watch.ends.white)
-        )
+        away = self.frame(0 if bright else 255)
         settle = max(PAUSE, self._settle)
         for _ in range(TRIES):
             between = self.photograph(away, settle, number=number)
             again = self.photograph(frame, settle, number=number)
-            if watch.alike(again, between) or not _close(between, known, watch.ends):
+            known = watch.ends.black if bright else watch.ends.white
+            if not shows(between, known, watch.ends):
+                # The light may have changed since black and white were learnt.
+                self._learn_ends_again(number, watch)
+                continue
+            if watch.alike(again, between):
                 continue
             if watch.agrees(photo, again):
                 watch.mistaken()
@@ -325,6 +332,14 @@ class RealRig:
         self._screen.wait((self._settle if settle is None else settle) * self.refresh)
         wanted = self.camera.exposure
         photo = self.camera.photograph()
+        like = f"{photo.shape} of {photo.dtype}"
+        if not self._like:
+            self._like = like
+        elif like != self._like:
+            raise LostPhotoError(
+                f"a photo of {self.camera.name} is {like}, and those before {self._like}: leave "
+                f"the camera's settings as they are."
+            )
         told = self.camera.conditions().get("exposure")
         if wanted is not None and told is not None and not math.isclose(told, wanted, rel_tol=1e-3):
             self.camera.set_exposure(wanted)
@@ -334,27 +349,50 @@ class RealRig:
             )
         return photo
 
-    def _tell_of_change(self, since: int, number: int, change: float, watch: Watch) -> None:
+    def _tell_of_change(self, number: int, change: Change, watch: Watch) -> None:
         """Find by black and white what has changed, name it, and go on from there."""
-        old = watch.ends
-        settle = max(PAUSE, self._settle)
-        darks = [self.photograph(self.frame(0), settle) for _ in range(2)]
-        lights = [self.photograph(self.frame(255), settle) for _ in range(2)]
-        now = look_at_ends(darks, lights)
-        dark = float(now.black.mean() - old.black.mean()) / old.contrast
-        lamp = now.contrast / old.contrast - 1
-        after = f"after photo {since}" if since >= 0 else "before the first comparison"
-        if abs(lamp) > abs(dark) and abs(lamp) > SUPERPOSITION / 2:
-            what = f"exposure or lamp changed by {lamp:+.1%}"
-        elif abs(dark) > SUPERPOSITION / 2:
-            what = f"ambient light changed by {dark:+.1%} of white"
-        else:
-            what = f"the light was off by {change:+.1%} of white for a while"
-        again = f"{since + 1}-{number}"
-        self._alarm(
-            f"{what}, {after} and up to photo {number}: shoot them again by --reshoot {again}."
+        old, now = watch.ends, self._ends()
+        what = difference(old, now)
+        after = (
+            f"after photo {change.since}" if change.since >= 0 else "before the first comparison"
         )
+        again = f"shoot them again by --reshoot {change.since + 1}-{number}"
+        if not what and change.by_inverse:
+            self._alarm(
+                f"photo {number} and that of the inverse pattern give {change.share:+.1%} of white "
+                f"too much or too little, while black and white are as they were: the response is "
+                f"not linear, or something is saturated; run nearfar calibrate."
+            )
+            watch.forget_inverses()
+        else:
+            what = what or f"the light was off by {change.share:+.1%} of white for a while"
+            self._alarm(f"{what}, {after} and up to photo {number}: {again}.")
+        self._go_on_from(now, watch)
+
+    def _learn_ends_again(self, number: int, watch: Watch) -> None:
+        """Learn black and white anew where they are not what they were."""
+        try:
+            now = self._ends()
+        except DeviceError:
+            # A camera that shows one picture for ever has neither.
+            return
+        if what := difference(watch.ends, now):
+            self._alarm(f"{what}, before photo {number}: see whether photos before it are good.")
+            self._go_on_from(now, watch)
+
+    def _ends(self) -> Ends:
+        settle = max(PAUSE, self._settle)
+        for _ in range(TRIES):
+            darks = [self.photograph(self.frame(0), settle) for _ in range(2)]
+            lights = [self.photograph(self.frame(255), settle) for _ in range(2)]
+            if are_alike(darks, lights):
+                break
+        self._last_white = lights[-1]
+        return look_at_ends(darks, lights)
+
+    def _go_on_from(self, now: Ends, watch: Watch) -> None:
         watch.start_again(now)
+        watch.begin(np.full(self._projector, 255, dtype=np.uint8), self._last_white)
 
     def _alarm(self, sentence: str) -> None:
         self.alarms.append(sentence)
@@ -367,8 +405,3 @@ class RealRig:
 def _is_whole(seconds: float, refresh: float) -> bool:
     turns = seconds / refresh
     return round(turns) >= 1 and abs(turns - round(turns)) < min(0.1, 0.01 * turns)
-
-
-def _close(photo: Photo, known: NDArray[np.float32], ends: Ends) -> bool:
-    """Tell whether a photo's mean is what is known of its frame."""
-    return bool(abs(float(photo.mean()) - float(known.mean())) < 0.1 * ends.contrast)

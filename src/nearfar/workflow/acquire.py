@@ -158,7 +158,11 @@ def shoot_again(
         raise InputError(f"{path} is of another plan: give that one.")
     require_same_rig(Path(path), capture.rig, rig.describe(), "take them all anew with --force")
     known = [number for number in numbers if 0 <= number < len(plan.patterns)]
-    photos = rig.shoot((plan.draw(number) for number in known), known[0] if known else 0)
+    # Those that follow one another at a time, so that the rig calls them by their numbers.
+    runs = _runs(known)
+    photos = (
+        photo for run in runs for photo in rig.shoot((plan.draw(number) for number in run), run[0])
+    )
     return replace_photos(
         path,
         numbers,
@@ -167,6 +171,17 @@ def shoot_again(
         alarms=lambda: rig.alarms,
         progress=progress,
     )
+
+
+def _runs(numbers: Sequence[int]) -> list[list[int]]:
+    """Cut numbers where they do not follow one another."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return runs
 
 
 class _Kept:

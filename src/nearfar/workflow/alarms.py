@@ -18,6 +18,8 @@ from nearfar.plan.model import Sinusoid
 
 # More than this share of a photo's values at full scale is told.
 SATURATED = 1e-3
+# White and black that differ by this share of white are of another light.
+CHANGE = 0.02
 # Camera pixels say something of modulation where white adds this share of what it adds to others.
 LIT = 0.2
 # Neighbours whose modulations are averaged.
@@ -47,16 +49,18 @@ class CaptureAlarms:
         self._halves: dict[Frequency, tuple[str, Floats]] = {}
         self._waiting: list[tuple[int, Frequency, Floats, Floats]] = []
         self._given: set[str] = set()
+        self._recalled = False
 
     def recall(self, read: Callable[[int], NDArray[Any]], taken: int) -> None:
         """Take up white and black of a capture that is gone on with."""
         for number in self._ends or ():
             if number < taken:
                 self._known[number] = self._rows(read(number))
+                self._recalled = True
 
     def __call__(self, number: int, photo: NDArray[Any]) -> list[str]:
         """Look at a photo; return alarms, a sentence each."""
-        alarms = [self._saturation(number, photo)]
+        alarms = [self._saturation(number, photo), self._since_before(number, photo)]
         if self._ends is not None and number in self._ends:
             self._known.setdefault(number, self._rows(photo))
         pattern = self._plan.patterns[number]
@@ -71,6 +75,24 @@ class CaptureAlarms:
         return (
             f"{share:.1%} of photo {number} is saturated: expose less, or those camera pixels will "
             f"be wrong."
+        )
+
+    def _since_before(self, number: int, photo: NDArray[Any]) -> str:
+        """Compare white and black with those of before a capture was gone on with."""
+        pattern = self._plan.patterns[number]
+        uniform = isinstance(pattern, Sinusoid) and pattern.frequency == DC
+        if not uniform or not self._recalled or self._ends is None or len(self._known) < 2:
+            return ""
+        white, black = (float(self._known[end].mean()) for end in self._ends)
+        inverse = isinstance(pattern, Sinusoid) and pattern.inverse
+        change = float(self._rows(photo).mean()) - (black if inverse else white)
+        share = change / (white - black)
+        if abs(share) <= CHANGE or not self._first("since before"):
+            return ""
+        return (
+            f"photo {number}, of {'black' if inverse else 'white'}, is {share:+.1%} of white off "
+            f"that of before the capture was gone on with: lamp, exposure or ambient light are "
+            f"others; see that they are as they were, or begin anew with --force."
         )
 
     def _modulation(self, number: int, pattern: Sinusoid, photo: Floats) -> str:

@@ -29,6 +29,8 @@ from nearfar.rigs.real import RealRig
 # The ramp's levels: close together where a gamma is steep.
 RAMP = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
 CHECKS = (32, 64, 96, 128, 160, 192, 224)
+# Levels from this share of full scale on are not trusted.
+CLIPPED = 0.98
 # Multiples of the exposure at which the camera's own line is measured, of a light that fits.
 EXPOSURES = (1, 2, 3, 4, 5, 6, 8)
 # Camera pixels take part where white adds this share of what it adds to the brightest.
@@ -99,7 +101,7 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
     ends = rig.in_step()
     lit = _lit(ends.white - ends.black)
     full = rig.camera.full_scale
-    if float(np.mean(ends.white[lit] >= 0.98 * full)) > 0.01:
+    if float(np.mean(ends.white[lit] >= CLIPPED * full)) > 0.01:
         raise DeviceError(
             f"{rig.camera.name} is saturated by white: give a shorter exposure, or close its "
             f"aperture."
@@ -137,11 +139,12 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
         response = np.repeat(fit_response(shown, light.sum(axis=-1))[:, np.newaxis], 3, axis=1)
     line, exposures = _camera_line(rig, lit, light.sum(axis=-1) / white.sum(), report)
     black = line.black if line else 0.0
-    sensor, noise = _noise(photos, black, full)
+    dark = _dark_pair(rig)
+    sensor, noise = _noise([*photos.values(), *([dark] if dark else [])], black, full)
     if line is None:
         notes.append(
-            "the exposure cannot be set from here, so that the camera's own line and its black "
-            "level are not known: let it be linear, such as by raw files."
+            "the camera's own line and its black level are not known, since its exposure cannot be "
+            "set from here, or only to what is too bright: let it be linear, such as by raw files."
         )
     elif line.worst > NOT_LINEAR:
         notes.append(
@@ -199,26 +202,44 @@ def _camera_line(
         return None, np.zeros((0, 2))
     level = RAMP[max(1, int(np.searchsorted(light, 1 / (1.2 * EXPOSURES[-1]))) - 1)]
     lengths = [n * shortest for n in EXPOSURES if n * shortest <= camera.exposure_limits[1]]
-    found = []
+    seconds, photos = [], []
     try:
         for i, length in enumerate(lengths):
-            seconds = camera.set_exposure(length)
-            photo = rig.show_levels((level, level, level))
-            if not (photo[lit] >= 0.98 * camera.full_scale).any():
-                found.append((seconds, float(photo[lit].mean(dtype=np.float64))))
+            seconds.append(camera.set_exposure(length))
+            photos.append(rig.show_levels((level, level, level)))
             report("exposures", (i + 1) / len(lengths))
     finally:
         camera.set_exposure(shortest)
-    points = np.asarray(found).reshape(-1, 2)
-    if len(points) < 2:
-        return None, points
+    # A glint is saturated long before the rest: the same camera pixels at every exposure.
+    while len(photos) > 1:
+        below = np.all([photo < CLIPPED * camera.full_scale for photo in photos], axis=(0, -1))
+        good = lit & below
+        if good.sum() > lit.sum() / 2:
+            break
+        del seconds[-1], photos[-1]
+    if len(photos) < 2:
+        return None, np.zeros((0, 2))
+    means = [float(photo[good].mean(dtype=np.float64)) for photo in photos]
+    points = np.stack([seconds, means], axis=-1)
     return fit_linearity(points[:, 0], points[:, 1], camera.full_scale), points
 
 
-def _noise(photos: dict[int, list[Photo]], black: float, full: float) -> tuple[Sensor, Floats]:
-    pairs = [pair_noise(one, other, full) for one, other in photos.values()]
-    means = np.concatenate([mean for mean, _ in pairs])
-    variances = np.concatenate([variance for _, variance in pairs])
+def _dark_pair(rig: RealRig) -> list[Photo]:
+    """Two photos of as little light as there is: their noise is the reading's alone."""
+    camera, usual = rig.camera, rig.camera.exposure
+    if usual is None or camera.exposure_limits is None:
+        return []
+    try:
+        camera.set_exposure(camera.exposure_limits[0])
+        return [rig.show_levels((0, 0, 0)) for _ in range(2)]
+    finally:
+        camera.set_exposure(usual)
+
+
+def _noise(pairs: list[list[Photo]], black: float, full: float) -> tuple[Sensor, Floats]:
+    told = [pair_noise(one, other, full) for one, other in pairs]
+    means = np.concatenate([mean for mean, _ in told])
+    variances = np.concatenate([variance for _, variance in told])
     return fit_noise(means, variances, black), np.stack([means, variances], axis=-1)
 
 

@@ -207,7 +207,8 @@ def _about(job: Job, correspondence: Correspondence | None) -> dict[str, Any]:
     """Tell what blocks must have in common."""
     described = (job.capture.path / "zarr.json").read_bytes()
     return {
-        "capture": hashlib.sha256(described).hexdigest(),
+        # Photos that were taken again have other times.
+        "capture": hashlib.sha256(described + job.capture.times.tobytes()).hexdigest(),
         "correspondence": _digest(correspondence),
         "method": job.method,
         "device": job.device,

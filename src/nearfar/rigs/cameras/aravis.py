@@ -30,6 +30,11 @@ BUFFERS = 4
 PATIENCE = 2.0
 MICROSECONDS = 1e6
 # Formats whose values are not packed across bytes, best first.
+KINDS: dict[type, list[str]] = {
+    int: ["integer", "float"],
+    float: ["float", "integer"],
+    str: ["string"],
+}
 FORMATS = re.compile(r"(Mono|Bayer(?P<cell>RG|GR|GB|BG))(?P<bits>8|10|12|14|16)$")
 CELLS = {"RG": "RGGB", "GR": "GRBG", "GB": "GBRG", "BG": "BGGR"}
 
@@ -70,6 +75,9 @@ class AravisCamera(Camera):
         began after the pattern was shown counts; or the line of a hardware trigger, such as Line1.
     features : mapping
         GenICam features to set first, such as Gain or GevSCPSPacketSize.
+    full_scale : float, optional
+        Level at which it is saturated, where that is less than the pixel format's highest: 12 bits
+        at the upper end of Mono16 reach 65520.
     frames, bracket
         As `Camera`.
 
@@ -86,6 +94,7 @@ class AravisCamera(Camera):
         pixel_format: str | None = None,
         trigger: str = "software",
         features: Mapping[str, bool | int | float | str] | None = None,
+        full_scale: float | None = None,
         frames: int = 1,
         bracket: tuple[float, ...] = (1.0,),
     ) -> None:
@@ -94,6 +103,7 @@ class AravisCamera(Camera):
         )
         self._library: Aravis = aravis()
         self._camera = self._stream = None
+        self._full_scale = full_scale
         self._trigger, self._features = trigger, dict(features or {})
         try:
             # On machines of several networks, cameras opened without this may send nothing.
@@ -111,8 +121,8 @@ class AravisCamera(Camera):
 
     @property
     def full_scale(self) -> float:
-        """Highest level of the pixel format."""
-        return float(2**self._bits - 1)
+        """Level at which a value is saturated."""
+        return self._full_scale or float(2**self._bits - 1)
 
     @property
     def exposure_limits(self) -> tuple[float, float] | None:
@@ -212,7 +222,9 @@ class AravisCamera(Camera):
         return np.frombuffer(raw, dtype).reshape(height, width)
 
     def _as_frame(self, levels: NDArray[Any]) -> Frame:
-        return bin_mosaic(levels, self._cell) if self._cell else levels[..., np.newaxis]
+        if self._cell:
+            return bin_mosaic(levels, self._cell, self.full_scale)
+        return levels[..., np.newaxis]
 
     def _set_exposure(self, seconds: float) -> float:
         name, microseconds = "arv_camera_set_exposure_time", MICROSECONDS * seconds
@@ -271,9 +283,17 @@ class AravisCamera(Camera):
         return wanted or max(usable, key=worth)
 
     def _set_region(self, wanted: Size | None) -> Size:
-        if wanted is not None:
-            sides = [ctypes.c_int(), ctypes.c_int()]
-            self._call("arv_camera_get_sensor_size", self._camera, *map(ctypes.byref, sides))
+        sides = [ctypes.c_int(), ctypes.c_int()]
+        self._call("arv_camera_get_sensor_size", self._camera, *map(ctypes.byref, sides))
+        sensor = Size(sides[1].value, sides[0].value)
+        if wanted is None and self._has("OffsetX"):
+            # Whatever another program has left.
+            self._call("arv_camera_set_region", self._camera, 0, 0, sensor.width, sensor.height)
+        elif wanted is not None:
+            if wanted.height > sensor.height or wanted.width > sensor.width:
+                raise InputError(
+                    f"the region {wanted} is more than the {sensor} of {self.name}: correct it."
+                )
             # In the middle, where lenses are best; offsets go by eights on any sensor.
             corner = [
                 max(0, (side.value - part) // 16 * 8)
@@ -291,9 +311,17 @@ class AravisCamera(Camera):
         return bool(self._call("arv_camera_is_feature_available", self._camera, feature.encode()))
 
     def _set_feature(self, name: str, value: bool | float | str) -> None:
-        kinds = {bool: "boolean", int: "integer", float: "float", str: "string"}
         given = value.encode() if isinstance(value, str) else value
-        self._call(f"arv_camera_set_{kinds[type(value)]}", self._camera, name.encode(), given)
+        # TOML's 0 and 0.0 are numbers; which of them a feature takes is the camera's affair.
+        kinds = ["boolean"] if isinstance(value, bool) else KINDS[type(value)]
+        for kind in kinds:
+            number = {"integer": int, "float": float}.get(kind, lambda same: same)(given)
+            with suppress(DeviceError):
+                self._library.call(f"arv_camera_set_{kind}", self._camera, name.encode(), number)
+                return
+        raise InputError(
+            f"{self.name} does not take {value!r} for {name}: look up its range and its kind."
+        )
 
     def _call(self, name: str, *arguments: Any) -> Any:
         try:

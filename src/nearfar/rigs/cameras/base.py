@@ -6,12 +6,14 @@ A driver opens a device and takes single frames; all else is here.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
+from itertools import chain
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.errors import DeviceError, InputError
+from nearfar.errors import DeviceError, InputError, LostPhotoError
 from nearfar.photometry.exposures import Sensor, average, merge_exposures
 from nearfar.rigs.base import Photo
 
@@ -22,6 +24,8 @@ GLINTS = 1e-3
 # Where as much is clipped the light can only be guessed.
 CLIPPED = 0.98
 STEPS = 10
+# A frame that is only looked at is tried so often.
+TRIES = 4
 # An exposure this close to what is wanted will do.
 CLOSE = 0.05
 
@@ -154,6 +158,21 @@ class Camera(ABC):
             self.set_exposure(shortest)
         return merge_exposures(np.stack(photos), times, self.sensor, self.full_scale)
 
+    def take_surely(self) -> Frame:
+        """Take a frame; another one, if it is lost.
+
+        Raises
+        ------
+        LostPhotoError
+            If it is lost time and again.
+        DeviceError
+            As `take`.
+        """
+        for _ in range(TRIES - 1):
+            with suppress(LostPhotoError):
+                return self.take()
+        return self.take()
+
     def expose_for_light(self, rounded: Callable[[float], float] = float) -> float:
         """Choose the exposure at which the light there is now just fits the sensor.
 
@@ -182,7 +201,7 @@ class Camera(ABC):
         wanted = min(max(rounded(math.sqrt(shortest * longest)), shortest), longest / factor)
         for _ in range(STEPS):
             exposure = self.set_exposure(wanted)
-            frame = self.take()
+            frame = self.take_surely()
             brightest = float(np.quantile(frame, 1.0 - GLINTS))
             reached = (brightest - self.sensor.black) / (self.full_scale - self.sensor.black)
             better = exposure * (BRIGHT / max(reached, 0.02) if reached < CLIPPED else 0.25)
@@ -208,4 +227,7 @@ class Camera(ABC):
     def _averaged(self) -> Photo:
         if self._frames == 1:
             return self.take()
-        return average(np.stack([self.take() for _ in range(self._frames)]), self.full_scale)
+        # Some cameras know their full scale by a photo.
+        first = self.take()
+        others = (self.take() for _ in range(self._frames - 1))
+        return average(chain([first], others), self.full_scale)

@@ -64,12 +64,13 @@ class FolderCamera(Camera):
                 f"the command {command!r} cannot be read ({error}): correct it."
             ) from None
         self._path, self._patience, self._full_scale = path, patience, full_scale
+        self._used: set[str] = set()
 
     @property
     def full_scale(self) -> float:
         """Level at which a photo is saturated; the first photo tells."""
         if self._full_scale is None:
-            self.take()
+            self.take_surely()
         assert self._full_scale is not None
         return self._full_scale
 
@@ -91,10 +92,16 @@ class FolderCamera(Camera):
         if self._command:
             self._run()
         path = self._next(before)
+        self._used.add(path.stem)
         try:
             photo = decode_camera_file(path.read_bytes(), path)
         except UnreadableFileError as error:
             raise LostPhotoError(str(error)) from None
+        except OSError as error:
+            raise LostPhotoError(
+                f"{path} went away before it was read ({error.strerror}): leave photos where they "
+                f"are."
+            ) from None
         self._full_scale = self._full_scale or photo.full_scale
         self.linear = photo.linear
         return photo.levels
@@ -104,9 +111,10 @@ class FolderCamera(Camera):
             done = subprocess.run(
                 self._command, capture_output=True, timeout=self._patience, check=False
             )
-        except FileNotFoundError:
+        except OSError as error:
             raise DeviceError(
-                f"the command {self._command[0]} is not there: correct it in the rig."
+                f"the command {self._command[0]} cannot be run ({error.strerror}): correct it in "
+                f"the rig."
             ) from None
         except subprocess.TimeoutExpired:
             raise LostPhotoError(
@@ -131,7 +139,12 @@ class FolderCamera(Camera):
                 )
             if new:
                 path = self._path / new[0]
-                now = path.stat().st_size if path.exists() else -1
+                if path.stem in self._used:
+                    raise DeviceError(
+                        f"{path} is a second file of a photo that was read already: let the camera "
+                        f"write one file a photo, raw alone."
+                    )
+                now = _size(path)
                 still = still + 1 if now == size and now > 0 else 0
                 size = now
                 if still >= STILL:
@@ -151,3 +164,11 @@ class FolderCamera(Camera):
                 f"{self._path} cannot be watched ({error.strerror}): connect it again."
             ) from None
         return {n for n in names if n.lower().endswith(ENDINGS) and not n.startswith(".")}
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file; -1 if it has gone."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return -1

@@ -1,7 +1,7 @@
 """Any GenICam camera whose maker gives a GenTL producer (a .cti file), by harvesters."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,8 @@ class HarvestersCamera(Camera):
         Serial number; the first camera that is found if left out.
     features : mapping
         GenICam features to set first.
+    full_scale : float, optional
+        Level at which it is saturated, where that is less than the pixel format's highest.
     frames, bracket
         As `Camera`.
 
@@ -43,6 +45,7 @@ class HarvestersCamera(Camera):
         device: str | None = None,
         *,
         features: Mapping[str, bool | int | float | str] | None = None,
+        full_scale: float | None = None,
         frames: int = 1,
         bracket: tuple[float, ...] = (1.0,),
     ) -> None:
@@ -58,7 +61,7 @@ class HarvestersCamera(Camera):
         self._late = TimeoutException
         self._harvester: Any = Harvester()
         self._acquirer: Any = None
-        self._features = dict(features or {})
+        self._features, self._full_scale = dict(features or {}), full_scale
         try:
             with self._in_sentences():
                 self._harvester.add_file(str(producer))
@@ -75,8 +78,8 @@ class HarvestersCamera(Camera):
 
     @property
     def full_scale(self) -> float:
-        """Highest level of the pixel format."""
-        return float(2**self._bits - 1)
+        """Level at which a value is saturated."""
+        return self._full_scale or float(2**self._bits - 1)
 
     @property
     def exposure_limits(self) -> tuple[float, float] | None:
@@ -101,9 +104,11 @@ class HarvestersCamera(Camera):
 
     def close(self) -> None:
         """Give the camera back."""
-        if self._acquirer is not None:
-            self._acquirer.destroy()
-        self._harvester.reset()
+        # It may be gone; what matters is that it is let go of.
+        with suppress(*self._faults):
+            if self._acquirer is not None:
+                self._acquirer.destroy()
+            self._harvester.reset()
 
     def take(self) -> Frame:
         """Take a frame by a software trigger; raises as `Camera.take`."""
@@ -114,7 +119,9 @@ class HarvestersCamera(Camera):
                 part = buffer.payload.components[0]
                 height, width = part.height, part.width
                 levels = np.array(part.data).reshape(height, width)
-        return bin_mosaic(levels, self._cell) if self._cell else levels[..., np.newaxis]
+        if self._cell:
+            return bin_mosaic(levels, self._cell, self.full_scale)
+        return levels[..., np.newaxis]
 
     def _require_cameras(self, producer: Path) -> None:
         if not self._harvester.device_info_list:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -88,7 +88,7 @@ class GphotoCamera(Camera):
     def full_scale(self) -> float:
         """Level at which a photo is saturated; a photo tells."""
         if self._full_scale is None:
-            self.take()
+            self.take_surely()
         assert self._full_scale is not None
         return self._full_scale
 
@@ -104,7 +104,9 @@ class GphotoCamera(Camera):
 
     def close(self) -> None:
         """Give the camera back."""
-        self._camera.exit()
+        # It may be gone; what matters is that it is let go of.
+        with suppress(self._gphoto.GPhoto2Error):
+            self._camera.exit()
 
     def take(self) -> Frame:
         """Take a photo, and bring it over.

@@ -39,6 +39,8 @@ class CameraTable(BaseModel):
     def _rises(cls, bracket: tuple[float, ...]) -> tuple[float, ...]:
         if not bracket or bracket[0] != 1 or list(bracket) != sorted(set(bracket)):
             raise ValueError("a bracket begins with 1, the shortest exposure, and goes up")
+        if any(not factor.is_integer() for factor in bracket):
+            raise ValueError("a bracket has whole numbers, so that each is of whole refreshes")
         return bracket
 
     def open(self, folder: Path) -> Camera:
@@ -59,6 +61,7 @@ class AravisTable(CameraTable):
     pixel_format: str | None = None
     trigger: str = "software"
     features: dict[str, bool | int | float | str] = {}
+    full_scale: Annotated[float, Field(gt=0.0)] | None = None
 
     @field_validator("region")
     @classmethod
@@ -77,6 +80,7 @@ class AravisTable(CameraTable):
             pixel_format=self.pixel_format,
             trigger=self.trigger,
             features=self.features,
+            full_scale=self.full_scale,
             frames=self.average,
             bracket=self.bracket,
         )
@@ -132,6 +136,7 @@ class HarvestersTable(CameraTable):
     driver: Literal["harvesters"]
     producer: str
     features: dict[str, bool | int | float | str] = {}
+    full_scale: Annotated[float, Field(gt=0.0)] | None = None
 
     def open(self, folder: Path) -> Camera:
         """Open the camera; raises as `CameraTable.open`."""
@@ -141,6 +146,7 @@ class HarvestersTable(CameraTable):
             folder / self.producer,
             self.device,
             features=self.features,
+            full_scale=self.full_scale,
             frames=self.average,
             bracket=self.bracket,
         )
@@ -154,6 +160,13 @@ class FolderTable(CameraTable):
     command: str | None = None
     patience: Seconds = 30.0
     full_scale: Annotated[float, Field(gt=0.0)] | None = None
+
+    @field_validator("bracket")
+    @classmethod
+    def _none(cls, bracket: tuple[float, ...]) -> tuple[float, ...]:
+        if len(bracket) > 1:
+            raise ValueError("whoever drops photos into a folder sets the exposure: remove it")
+        return bracket
 
     def open(self, folder: Path) -> Camera:
         """Open the camera; raises as `CameraTable.open`."""

@@ -176,6 +176,7 @@ def test_a_calibrated_rig_relights_as_in_memory_and_another_does_not(
     assert "warning" not in calibrated
     words = bench.do("acquire", "plan.json", "calibrated.zarr", "--rig", bench.rig)
     assert "warning" not in words
+    assert f"{PHOTOS} photos at 0." in words
     _check(bench, "calibrated")
     names = ("simulated", "calibrated", "uncalibrated")
     pictures, random = zip(*(_relit(bench, name) for name in names), strict=True)

@@ -62,10 +62,10 @@ def relight(
     from nearfar.files import (
         check_output,
         check_picture_ending,
-        luminance,
         read_light,
         write_picture,
     )
+    from nearfar.transport.colour import as_channels_see
     from nearfar.transport.store import open_transport
 
     gains = _gains(gain or [])
@@ -75,8 +75,7 @@ def relight(
     with progress_bar("relighting", quiet=quiet):
         opened = open_transport(transport)
         shown = read_light(light, opened.projector, srgb=srgb)
-        if shown.ndim == 3 and opened.channels == 1:
-            shown = luminance(shown)
+        shown = as_channels_see(shown, opened.channels, opened.provenance)
         parts = []
         for rows in opened.blocks():
             relit = ErrorBars(rows).picture if error_bars else rows.relight

@@ -87,6 +87,7 @@ class RealRig:
         self._linear = LinearProjector(response, self.shown, brightness)
         self._brightness, self._settle = brightness, settle
         self._calibrated = calibration.made if calibration else None
+        self._mixing = [list(row) for row in calibration.mixing] if calibration else None
         if calibration is not None:
             camera.sensor = calibration.sensor
         self._told = told or (lambda _alarm: None)
@@ -131,6 +132,8 @@ class RealRig:
             "camera": self.camera.describe(),
             "exposure": self.camera.exposure,
             "calibration": self._calibrated,
+            # What relighting in colour goes by.
+            "colour_mixing": self._mixing,
         }
 
     def conditions(self) -> dict[str, float]:

@@ -1,0 +1,55 @@
+"""Colour lights: what each channel of the camera sees of red, green and blue."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.errors import InputError
+from nearfar.files import luminance
+
+# Where a rig's description keeps what its calibration found.
+MIXING = "colour_mixing"
+
+
+def as_channels_see(light: Floats, channels: int, provenance: Mapping[str, Any]) -> Floats:
+    """Turn a colour light into one for each channel of the camera.
+
+    Patterns are white, so a channel's transport is that of white light. Of red, green and blue
+    alone it answers the shares that the calibration found, taken to be the same all over the
+    scene. Without a calibration red goes to the first channel and so on, and a camera of one
+    channel sees luminance.
+
+    Parameters
+    ----------
+    light : array, shape (Py, Px) or (Py, Px, 3)
+    channels : int
+        Of the transport.
+    provenance : mapping
+        The transport's.
+
+    Returns
+    -------
+    array, shape (Py, Px) or (Py, Px, channels)
+
+    Raises
+    ------
+    InputError
+        If what the calibration found is of another number of channels.
+    """
+    if light.ndim == 2:
+        return light
+    rig = provenance.get("rig")
+    mixing = rig.get(MIXING) if isinstance(rig, Mapping) else None
+    if mixing is None:
+        return luminance(light.astype(np.float32)) if channels == 1 else light
+    shares = np.asarray(mixing, dtype=np.float64)
+    if shares.shape != (channels, 3) or not (shares.sum(axis=1) > 0).all():
+        raise InputError(
+            f"the transport has {channels} channels, and the colour mixing of its rig is of shape "
+            f"{shares.shape}: calibrate the rig again."
+        )
+    shares /= shares.sum(axis=1, keepdims=True)
+    seen = (light @ shares.T).astype(light.dtype)
+    return np.asarray(seen[..., 0] if channels == 1 else seen)

@@ -20,6 +20,7 @@ from nearfar.arrays import Size
 from nearfar.capture import open_capture
 from nearfar.plan import Plan, read_plan
 from nearfar.scenes.cache import cached_scene
+from tests.cli.conftest import check_done, run_nearfar
 from tests.rigs.displays import one_monitor
 
 PROJECTOR, CAMERA, PHOTOS = Size(20, 24), Size(30, 36), 40
@@ -131,8 +132,9 @@ def display():
 @pytest.fixture(scope="module")
 def bench(folder, display):
     bench = Bench(folder, display, "NF01")
-    bench.do("plan", "--projector", PROJECTOR, "--photos", PHOTOS, "-o", "plan.json")
-    bench.do("acquire", "plan.json", "simulated.zarr", "--rig", "simulated.toml")
+    plan, simulated = folder / "plan.json", folder / "simulated.zarr"
+    check_done(run_nearfar("plan", "--projector", PROJECTOR, "--photos", PHOTOS, "-o", plan))
+    check_done(run_nearfar("acquire", plan, simulated, "--rig", folder / "simulated.toml"))
     assert "Aravis-Fake-NF01" in bench.do("devices")
     yield bench
     bench.close()
@@ -156,9 +158,11 @@ def plan(bench) -> Plan:
 
 def _relit(bench, name):
     """SNR_b of pictures and of random light."""
-    bench.do("reconstruct", f"{name}.zarr", f"{name}.transport.zarr", "--force")
-    told = bench.do("evaluate", f"{name}.transport.zarr", "--truth", "transport.npy", "--json")
-    numbers = json.loads(told)
+    capture, transport = (bench.folder / f"{name}{end}.zarr" for end in ("", ".transport"))
+    check_done(run_nearfar("reconstruct", capture, transport))
+    truth = bench.folder / "transport.npy"
+    told = check_done(run_nearfar("evaluate", transport, "--truth", truth, "--json"))
+    numbers = json.loads(told.out)
     return numbers["snr_b_pictures"], numbers["snr_b"]["random"]
 
 
@@ -219,15 +223,15 @@ def test_a_camera_that_stops_and_a_kill_cost_no_photo(bench, calibrated):
     assert "check its cable" in sentence
     assert "photos are kept" in sentence
     assert "--resume goes on" in sentence
-    # It takes the camera some seconds to notice that nobody holds it any more.
-    time.sleep(4)
+    # It takes the camera three seconds to notice that nobody holds it any more.
+    time.sleep(2.5)
     again = ("acquire", "plan.json", "stopped.zarr", "--rig", bench.rig, "--resume")
     running = bench.start(*again)
     bench.wait_for("stopped.zarr", 25)
     running.kill()
     running.communicate()
     assert 25 <= bench.taken("stopped.zarr") < PHOTOS
-    time.sleep(4)
+    time.sleep(2.5)
     bench.do(*again)
     _check(bench, "stopped")
 

@@ -1,6 +1,8 @@
 """The preview: its numbers, its server, and a browser's wishes, before a table."""
 
 import json
+import re
+import subprocess
 import threading
 import time
 import urllib.error
@@ -17,6 +19,7 @@ from nearfar.viewer.preview import run_preview
 from nearfar.viewer.sight import BINS, MARK, look, picture
 from tests.absent import said_without
 from tests.cli.conftest import run_nearfar
+from tests.rigs.displays import need
 from tests.rigs.table import TableCamera, TableScreen
 
 
@@ -103,6 +106,7 @@ def served():
     while not addresses:
         assert thread.is_alive()
         time.sleep(0.01)
+    ask.address = addresses[0]
     yield camera, ask, until
     if thread.is_alive():
         ask("/wish", {"stop": True})
@@ -130,6 +134,26 @@ def test_a_browser_sees_and_asks(served):
     assert bright["brightest"] == 1.0
     ask("/wish", {"automatic": True})
     until(lambda state: 0.5 < state["brightest"] < 0.95 and state["saturated"] == 0)
+
+
+@pytest.mark.slow
+def test_a_real_browser_shows_it(served, tmp_path):
+    need("chromium")
+    _, ask, until = served
+    until(lambda state: state["number"] > 0)
+    command = [
+        "chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}",
+        "--virtual-time-budget=3000", "--dump-dom", ask.address,
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    told = dict(re.findall(r'id="(\w+)"[^>]*>([^<]*)<', done.stdout))
+    assert told["about"].startswith("table camera, 24x32, 1 channel; projector 0: table")
+    assert told["exposure"] == "100 ms"
+    assert told["saturated"] == "0.0 %"
+    assert told["fault"] == ""
+    assert float(told["focus"]) >= 0
+    assert re.search(r'src="photo.jpg\?\d+"', done.stdout)
+    assert re.search(r'data-pattern="white"[^>]*aria-pressed="true"', done.stdout)
 
 
 def test_faults_are_said_and_it_goes_on(served):

@@ -66,16 +66,24 @@ def test_light_is_worth_decibels(found):
         assert order[0].white < order[-1].white
 
 
+def _few(scene):
+    return compare(scene, [60], methods=["joint", "CLT"], window=5).equal_photos
+
+
+@pytest.fixture(scope="module")
+def few(scene):
+    return _few(scene)
+
+
 @pytest.mark.parametrize("gain", [0.02, 50.0])
-def test_the_units_of_transport_do_not_count(scene, gain):
+def test_the_units_of_transport_do_not_count(scene, few, gain):
     other = replace(
         scene,
         direct=tuple(gain * part for part in scene.direct),
         near=tuple(gain * part for part in scene.near),
         far=gain * scene.far,
     )
-    trials = (compare(s, [60], methods=["joint", "CLT"], window=5) for s in (scene, other))
-    for one, same in zip(*(found.equal_photos for found in trials), strict=True):
+    for one, same in zip(few, _few(other), strict=True):
         assert same.pictures == pytest.approx(one.pictures, abs=1.0)
 
 

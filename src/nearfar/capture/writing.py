@@ -5,13 +5,14 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import zarr
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
+from nearfar.capture.begun import LOG, Taken, other_plan, read_log, require_same_rig
 from nearfar.capture.checks import (
     as_photo,
     check_count,
@@ -30,7 +31,6 @@ from nearfar.capture.store import (
 )
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
-    UNFINISHED,
     add_array,
     create_durable_store,
     full_scale_of,
@@ -43,23 +43,6 @@ from nearfar.files import (
 from nearfar.files.output import synchronise_entry
 from nearfar.plan.model import Plan
 from nearfar.version import version
-
-# A line for each photo that is on the disk; gone once the capture is whole.
-LOG = "photos.jsonl"
-
-
-class _Taken(NamedTuple):
-    """What is noted of a photo."""
-
-    time: float
-    saturated: float
-    mean: float
-    # Whether it is the first photo again.
-    same: bool
-    # What was as it was for this photo alone, such as temperatures.
-    conditions: Mapping[str, float] = {}
-    # What the rig told of since the photo before.
-    alarms: Sequence[str] = ()
 
 
 class CaptureWriter:
@@ -118,7 +101,7 @@ class CaptureWriter:
             ]
         self._white_black = white_and_black(plan)
         self._means = np.full(count, np.nan)
-        self._taken: list[_Taken] = []
+        self._taken: list[Taken] = []
         self._first: NDArray[Any] | None = None
         self._group: zarr.Group | None = None
         self._photos: zarr.Array[Any] | None = None
@@ -235,7 +218,7 @@ class CaptureWriter:
         saturated = float(np.mean(photo >= scale))
         same = bool(np.array_equal(photo, first))
         told = (dict(conditions or {}), list(alarms))
-        self._note(_Taken(time.time(), saturated, mean, same, *told))
+        self._note(Taken(time.time(), saturated, mean, same, *told))
         return photo
 
     def finish(self, alarms: Sequence[str] = ()) -> None:
@@ -278,7 +261,7 @@ class CaptureWriter:
     def _take_up(self, group: zarr.Group) -> None:
         """Take over what another writer left."""
         folder, before = self._folder, dict(group.attrs)
-        self._taken = _read_log(folder)
+        self._taken = read_log(folder)
         # What was being written when it was killed.
         for left in folder.rglob(".*.partial"):
             left.unlink()
@@ -286,7 +269,7 @@ class CaptureWriter:
         # A capture that ended early has the plan of its photos.
         ended = json.loads(self._plan.first(self.taken).to_json())
         if before.get("plan") not in (now["plan"], ended):
-            raise InputError(_other_plan(folder, before.get("plan"), now["plan"]))
+            raise InputError(other_plan(folder, before.get("plan"), now["plan"]))
         require_same_rig(folder, before.get("rig"), now["rig"], "begin anew with --force")
         photos, scale = open_array(group, "photos"), before.get("full_scale")
         many = self.taken > min(photos.shape[0], len(self._plan.patterns))
@@ -316,109 +299,11 @@ class CaptureWriter:
         synchronise_entry(self._folder)
         synchronise_entry(self._folder.parent)
 
-    def _note(self, taken: _Taken) -> None:
+    def _note(self, taken: Taken) -> None:
         assert self._log is not None
         os.write(self._log, (json.dumps(taken._asdict()) + "\n").encode())
         os.fsync(self._log)
         self._taken.append(taken)
-
-
-def count_photos(folder: Path) -> int:
-    """Tell how many photos of a capture that is not finished are on the disk."""
-    try:
-        return (folder / LOG).read_bytes().count(b"\n")
-    except FileNotFoundError:
-        return 0
-
-
-class Begun(NamedTuple):
-    """What is known of a capture that was begun and not finished."""
-
-    photos: int
-    exposure: float | None
-
-
-def begun_capture(path: AnyPath) -> Begun:
-    """Tell of a capture that was begun and not finished; of none, no photos.
-
-    Raises
-    ------
-    UnreadableFileError
-        If what is there is no such capture.
-    """
-    folder = Path(f"{Path(path).resolve()}{UNFINISHED}")
-    if not folder.exists():
-        return Begun(0, None)
-    exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
-    return Begun(count_photos(folder), exposure if is_positive(exposure) else None)
-
-
-def _read_log(folder: Path) -> list[_Taken]:
-    """Read what is noted of the photos; what a crash tore off the last line is cut away."""
-    path = folder / LOG
-    lines = path.read_bytes().splitlines(keepends=True)
-    taken: list[_Taken] = []
-    whole = 0
-    for line in lines:
-        try:
-            noted = _Taken(**json.loads(line))
-        except (ValueError, TypeError):
-            break
-        if not line.endswith(b"\n"):
-            break
-        taken.append(noted)
-        whole += len(line)
-    os.truncate(path, whole)
-    return taken
-
-
-def _other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
-    """Say that a plan is another, or how the same plan was called."""
-
-    def shown(plan: object) -> list[Any]:
-        patterns = plan.get("patterns") if isinstance(plan, Mapping) else None
-        return patterns if isinstance(patterns, list) else []
-
-    def of_transport(plan: object) -> list[Any]:
-        return [p for p in shown(plan) if not isinstance(p, dict) or p.get("purpose") != "check"]
-
-    if of_transport(before) and of_transport(before) == of_transport(now):
-        checked = len(shown(before)) > len(of_transport(before))
-        cure = "give --until with --resume" if checked else "leave out --until"
-        return f"{folder} was begun {'with' if checked else 'without'} --until: {cure}."
-    return f"{folder} was begun with another plan: give that one, or begin anew with --force."
-
-
-def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwise: str) -> None:
-    """Refuse to go on with a rig that is not as it was.
-
-    Parameters
-    ----------
-    path : Path
-        The capture.
-    before, now : mapping
-        What the rig says of itself.
-    otherwise : str
-        What else can be done, in words.
-
-    Raises
-    ------
-    InputError
-    """
-    now = json.loads(json.dumps(now))
-    if before != now:
-        raise InputError(
-            f"{path} was begun with another rig ({_different(before, now)}): set it up as it was, "
-            f"or {otherwise}."
-        )
-
-
-def _different(before: object, now: Mapping[str, Any]) -> str:
-    if not isinstance(before, Mapping):
-        return "its description is damaged"
-    return ", ".join(
-        name for name in {**before, **now} if before.get(name, ...) != now.get(name, ...)
-    )
 
 
 def write_capture(

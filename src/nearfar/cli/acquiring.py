@@ -82,7 +82,7 @@ def acquire(
 
     Example: nearfar acquire plan.json capture.zarr --rig cornell --transport transport.zarr
     """
-    from nearfar.capture.writing import begun_capture
+    from nearfar.capture.begun import begun_capture
     from nearfar.files import check_resumable
     from nearfar.plan import read_plan
     from nearfar.plan.checks import with_checks

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
+from nearfar.capture.begun import LOG, count_photos, require_same_rig
 from nearfar.capture.replacing import replace_photos
-from nearfar.capture.writing import LOG, count_photos, require_same_rig
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.files import resumable_output
 from nearfar.photometry.held import HeldPhotos

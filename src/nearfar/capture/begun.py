@@ -1,0 +1,127 @@
+"""Captures that are under way or were stopped: what is known of their photos."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from nearfar.arrays import AnyPath
+from nearfar.capture.store import FORMAT_VERSION, KIND, is_positive
+from nearfar.errors import InputError
+from nearfar.files import UNFINISHED, open_store
+
+# A line for each photo that is on the disk; gone once the capture is whole.
+LOG = "photos.jsonl"
+
+
+class Taken(NamedTuple):
+    """What is noted of a photo."""
+
+    time: float
+    saturated: float
+    mean: float
+    # Whether it is the first photo again.
+    same: bool
+    # What was as it was for this photo alone, such as temperatures.
+    conditions: Mapping[str, float] = {}
+    # What the rig told of since the photo before.
+    alarms: Sequence[str] = ()
+
+
+def count_photos(folder: Path) -> int:
+    """Tell how many photos of a capture that is not finished are on the disk."""
+    try:
+        return (folder / LOG).read_bytes().count(b"\n")
+    except FileNotFoundError:
+        return 0
+
+
+class Begun(NamedTuple):
+    """What is known of a capture that was begun and not finished."""
+
+    photos: int
+    exposure: float | None
+
+
+def begun_capture(path: AnyPath) -> Begun:
+    """Tell of a capture that was begun and not finished; of none, no photos.
+
+    Raises
+    ------
+    UnreadableFileError
+        If what is there is no such capture.
+    """
+    folder = Path(f"{Path(path).resolve()}{UNFINISHED}")
+    if not folder.exists():
+        return Begun(0, None)
+    exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
+    return Begun(count_photos(folder), exposure if is_positive(exposure) else None)
+
+
+def read_log(folder: Path) -> list[Taken]:
+    """Read what is noted of the photos; what a crash tore off the last line is cut away."""
+    path = folder / LOG
+    lines = path.read_bytes().splitlines(keepends=True)
+    taken: list[Taken] = []
+    whole = 0
+    for line in lines:
+        try:
+            noted = Taken(**json.loads(line))
+        except (ValueError, TypeError):
+            break
+        if not line.endswith(b"\n"):
+            break
+        taken.append(noted)
+        whole += len(line)
+    os.truncate(path, whole)
+    return taken
+
+
+def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
+    """Say that a plan is another, or how the same plan was called."""
+
+    def shown(plan: object) -> list[Any]:
+        patterns = plan.get("patterns") if isinstance(plan, Mapping) else None
+        return patterns if isinstance(patterns, list) else []
+
+    def of_transport(plan: object) -> list[Any]:
+        return [p for p in shown(plan) if not isinstance(p, dict) or p.get("purpose") != "check"]
+
+    if of_transport(before) and of_transport(before) == of_transport(now):
+        checked = len(shown(before)) > len(of_transport(before))
+        cure = "give --until with --resume" if checked else "leave out --until"
+        return f"{folder} was begun {'with' if checked else 'without'} --until: {cure}."
+    return f"{folder} was begun with another plan: give that one, or begin anew with --force."
+
+
+def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwise: str) -> None:
+    """Refuse to go on with a rig that is not as it was.
+
+    Parameters
+    ----------
+    path : Path
+        The capture.
+    before, now : mapping
+        What the rig says of itself.
+    otherwise : str
+        What else can be done, in words.
+
+    Raises
+    ------
+    InputError
+    """
+    now = json.loads(json.dumps(now))
+    if before != now:
+        raise InputError(
+            f"{path} was begun with another rig ({_different(before, now)}): set it up as it was, "
+            f"or {otherwise}."
+        )
+
+
+def _different(before: object, now: Mapping[str, Any]) -> str:
+    if not isinstance(before, Mapping):
+        return "its description is damaged"
+    return ", ".join(
+        name for name in {**before, **now} if before.get(name, ...) != now.get(name, ...)
+    )

@@ -1,7 +1,9 @@
 """A damaged store gives a sentence, never zeros."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import zarr
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import (
     add_array,
+    add_to_store,
     create_durable_store,
     create_store,
     kind_of_store,
@@ -160,3 +163,21 @@ def test_a_store_is_read_only(store: Path) -> None:
     array = open_array(open_store(store, KIND, 1), "a")
     with pytest.raises(ValueError, match="read-only"):
         array[0] = 1
+
+
+def test_writers_that_race_lay_a_store_out_once(tmp_path):
+    """Workers of a cluster all begin at once."""
+    writers = 6
+    together = Barrier(writers)
+
+    def write(path, row):
+        together.wait()
+        group = add_to_store(path, KIND, 1, {"about": 3})
+        add_array(group, "values", (writers, 4), np.float32, (1, 4))[row : row + 1] = row
+
+    for number in range(30):
+        path = tmp_path / f"{number}.zarr"
+        with ThreadPoolExecutor(writers) as pool:
+            list(pool.map(write, [path] * writers, range(writers)))
+        written = read_array(open_store(path, KIND, 1), "values")
+        np.testing.assert_array_equal(written[:, 0], np.arange(writers))

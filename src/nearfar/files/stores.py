@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from zarr.abc.store import ByteRequest, Store
 from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.core.buffer import Buffer, BufferPrototype
-from zarr.errors import NodeNotFoundError
+from zarr.errors import ContainsArrayError, ContainsGroupError, NodeNotFoundError
 from zarr.storage import LocalStore
 
 from nearfar.errors import InputError, MissingFileError, NearfarError, UnreadableFileError
@@ -138,9 +138,11 @@ def add_to_store(
     path: Path, kind: str, version: int, attributes: Mapping[str, Any] | None = None
 ) -> zarr.Group:
     """Open a group that `create_store` made, to go on writing; make it where it is not there."""
-    if (path / _METADATA).exists():
-        return zarr.open_group(_FolderStore(path), mode="r+", zarr_format=3)
-    return create_store(path, kind, version, attributes)
+    if not (path / _METADATA).exists():
+        # Another process that writes here may be quicker than this one.
+        with contextlib.suppress(ContainsGroupError):
+            return create_store(path, kind, version, attributes)
+    return zarr.open_group(_FolderStore(path), mode="r+", zarr_format=3)
 
 
 def _create(
@@ -164,12 +166,31 @@ def add_array(
 
     An array that was laid out in the same way is opened instead.
     """
-    if (_root(group.store) / name / _METADATA).exists():
-        found = group[name]
-        if not isinstance(found, zarr.Array) or (found.shape, found.chunks) != (shape, chunks):
-            raise ValueError(f"{name} is laid out otherwise in {_root(group.store)}")
-        # Not kept on the disk: chunks of zeros would be left out.
-        return found.with_config({"write_empty_chunks": True})
+    if not (_root(group.store) / name / _METADATA).exists():
+        # Another process that writes here may be quicker than this one.
+        with contextlib.suppress(ContainsArrayError):
+            return _new_array(group, name, shape, dtype, chunks)
+    return _laid_out(group, name, shape, chunks)
+
+
+def _laid_out(
+    group: zarr.Group, name: str, shape: tuple[int, ...], chunks: tuple[int, ...]
+) -> zarr.Array[Any]:
+    """Open an array that is laid out so already."""
+    found = group[name]
+    if not isinstance(found, zarr.Array) or (found.shape, found.chunks) != (shape, chunks):
+        raise ValueError(f"{name} is laid out otherwise in {_root(group.store)}")
+    # Not kept on the disk: chunks of zeros would be left out.
+    return found.with_config({"write_empty_chunks": True})
+
+
+def _new_array(
+    group: zarr.Group,
+    name: str,
+    shape: tuple[int, ...],
+    dtype: np.dtype[Any] | type[np.generic] | str,
+    chunks: tuple[int, ...],
+) -> zarr.Array[Any]:
     return group.create_array(
         name,
         shape=shape,

@@ -42,7 +42,7 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 		--no-annotate --custom-compile-command 'make lock' --quiet \
 		--extra dask --extra mitsuba --extra window --extra gphoto2 --extra raw --extra webcam \
-		--extra preview --group dev --group build pyproject.toml -o requirements.lock
+		--extra viewer --group dev --group docs --group build pyproject.toml -o requirements.lock
 
 clean:
 	rm -rf $(VENV) nearfar-demo .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

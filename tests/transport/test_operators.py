@@ -298,3 +298,22 @@ def test_many_lights_at_once_are_each_by_itself(count, colours, generator):
     assert transport.pictures(lights[:0]).shape == (0, *CAMERA, 2)
     with pytest.raises(InputError, match="projector"):
         transport.pictures(lights[:, :5])
+
+
+@pytest.mark.parametrize("window", [1, 4, 5])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_small_lights_are_relit_as_large_ones(generator, window, channels):
+    """Windows that see no light are left out, in every block that has many of them."""
+    transport = _transport(generator, window=window, channels=channels)
+    dense = transport.dense()
+    lights = [np.zeros((*PROJECTOR, 2)[: 1 + channels]) for _ in range(4)]
+    lights[1][0, 0] = 1.0
+    lights[2][6, 5:8] = 0.5
+    lights[3][12, 17] = 0.25
+    if channels == 2:
+        lights[2][6, 5:8, 0] = 0.0
+    for light in lights:
+        flat = np.broadcast_to(light.reshape(PROJECTOR.pixels, -1), (PROJECTOR.pixels, channels))
+        expected = np.einsum("cip,pi->ci", dense, flat).reshape(*CAMERA, channels)
+        found = (transport @ light).reshape(expected.shape)
+        np.testing.assert_allclose(found, expected, atol=1e-5)

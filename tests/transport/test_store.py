@@ -20,7 +20,8 @@ from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
-from nearfar.transport.rows import stacked
+from nearfar.transport.quality import Quality
+from nearfar.transport.rows import TRUSTED, stacked, thinned
 from nearfar.transport.store import (
     BELIEVED,
     FACTORS,
@@ -70,7 +71,10 @@ def _believed(transport: Transport) -> Transport:
         strength=generator.random(shape[:2]).astype(np.float32),
         **values,
     )
-    return replace(transport, belief=belief)
+    quality = Quality(
+        generator.random(shape[:2]).astype(np.float32), generator.random(shape[:2]) < 0.1
+    )
+    return replace(transport, belief=belief, quality=quality)
 
 
 def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
@@ -83,6 +87,33 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
         values = getattr(loaded, name)
         np.testing.assert_array_equal(values, getattr(transport.belief, name))
         assert values.dtype == getattr(transport.belief, name).dtype
+    for name in TRUSTED:
+        values = getattr(load_transport(tmp_path / "t.zarr").quality, name)
+        np.testing.assert_array_equal(values, getattr(transport.quality, name))
+        assert values.dtype == getattr(transport.quality, name).dtype
+
+
+def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):
+    path = tmp_path / "t.zarr"
+    save_transport(path, _believed(_transport(generator)))
+    about = path / "quality_saturated" / "zarr.json"
+    about.write_text(about.read_text().replace('"bool"', '"uint8"'))
+    with pytest.raises(UnreadableFileError, match="how far to trust it does not fit"):
+        load_transport(path)
+    about.unlink()
+    with pytest.raises(UnreadableFileError, match="quality_saturated"):
+        load_transport(path)
+
+
+@pytest.mark.parametrize(("step", "first"), [(1, 0), (2, 0), (3, 2), (20, 0)])
+def test_a_thinned_transport_relights_the_pixels_it_keeps(generator, step, first):
+    whole = _believed(_transport(generator))
+    light = generator.random(PROJECTOR)
+    thin = thinned(whole, step, first)
+    np.testing.assert_allclose(thin @ light, (whole @ light)[first::step, ::step], rtol=1e-5)
+    chosen = (slice(first, None, step), slice(None, None, step))
+    np.testing.assert_array_equal(thin.quality.saturated, whole.quality.saturated[chosen])
+    np.testing.assert_array_equal(thin.belief.white, whole.belief.white[chosen])
 
 
 def test_a_damaged_belief_gets_a_sentence(tmp_path, generator):
@@ -118,6 +149,9 @@ def test_rows_are_read_in_blocks(tmp_path, generator, size):
     for name in BELIEVED:
         got = getattr(whole.belief, name)
         np.testing.assert_array_equal(got, getattr(transport.belief, name))
+    for name in TRUSTED:
+        got = getattr(whole.quality, name)
+        np.testing.assert_array_equal(got, getattr(transport.quality, name))
     assert (stored.camera, stored.channels) == (transport.camera, transport.channels)
 
 

@@ -173,7 +173,8 @@ def test_faults_are_said_and_it_goes_on(served):
         ({"pattern": "tartan"}, {}, 422),
         ({"exposure": -1}, {}, 422),
         ({"explode": True}, {}, 422),
-        ({"stop": True}, {"Host": "evil.example"}, 400),
+        ({"stop": True}, {"Host": "evil.example"}, 403),
+        ({"stop": True}, {"Origin": "http://evil.example"}, 403),
         ({"stop": True}, {"Content-Type": "text/plain"}, 422),
     ],
 )
@@ -199,15 +200,18 @@ def test_a_port_that_is_taken_is_named():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        with pytest.raises(InputError, match=r"port \d+ cannot be served on"):
+        with pytest.raises(InputError, match=r"port \d+ at 127.0.0.1 cannot be served on"):
             run_preview(rig, taken.getsockname()[1])
 
 
 def test_without_its_packages_there_is_a_sentence():
+    program = "from nearfar.viewer.preview import _application, _Shared\n_application(_Shared())"
+    assert "pip install 'nearfar[viewer]'" in said_without("fastapi", program)
     program = (
-        "from nearfar.viewer.preview import _Shared, _served\nwith _served(_Shared(), 0):\n    pass"
+        "from nearfar.viewer.serving import Place, serve\n"
+        "with serve(None, Place('127.0.0.1', 0)):\n    pass"
     )
-    assert "pip install 'nearfar[preview]'" in said_without("uvicorn", program)
+    assert "pip install 'nearfar[viewer]'" in said_without("uvicorn", program)
 
 
 def test_a_simulated_rig_is_refused(tmp_path):

@@ -27,6 +27,7 @@ from nearfar.cli import (
     rigging,
     separating,
     transports,
+    viewing,
 )
 from nearfar.errors import KeptInterrupt, NearfarError
 
@@ -59,6 +60,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "init": rigging.init,
     "preview": rigging.preview,
     "calibrate": rigging.calibrate,
+    "view": viewing.view,
 }
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

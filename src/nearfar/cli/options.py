@@ -47,6 +47,12 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output that is 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdout.")]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
+Port = Annotated[
+    int, typer.Option(help="Port to serve on, 0 for any that is free.", min=0, max=65535)
+]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+]
 TransportPath = Annotated[Path, typer.Argument(metavar="TRANSPORT.zarr", help="Transport.")]
 ScenesProjector = Annotated[
     Size | None,

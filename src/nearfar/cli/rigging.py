@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nearfar.cli.options import Force, Quiet
+from nearfar.cli.options import Browser, Force, Port, Quiet
 from nearfar.cli.progress import progress_bar, say, warn
 from nearfar.errors import InputError
 
@@ -116,12 +116,8 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
 
 def preview(
     rig: RigFile,
-    port: Annotated[
-        int, typer.Option(help="Port to serve on, 0 for any that is free.", min=0, max=65535)
-    ] = 8627,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
-    ] = True,
+    port: Port = 8627,
+    browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
     """Show what the camera sees, live: picture, histogram, focus and saturation.

@@ -9,11 +9,22 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats
 from nearfar.files import encode_png, to_srgb
 
-STYLE = """
-:root { --ink: #1d2129; --soft: #5b6472; --line: #dfe3e8; --back: #f7f8fa; --card: #ffffff; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #e8eaed; --soft: #a0a8b4; --line: #343a44; --back: #14171c; --card: #1d2128; }
-}
+# What the page's own colours are by day and by night; data-theme on the root overrules the browser.
+_LIGHT = """--ink: #1d2129; --soft: #5b6472; --line: #dfe3e8; --back: #f7f8fa; --card: #ffffff;
+  --edge: #8a93a0; --mark: #1f6ec9; --bad: #b3261e; --near: #c2561a; --far: #2f855f;
+  color-scheme: light;"""
+_DARK = """--ink: #e8eaed; --soft: #a0a8b4; --line: #343a44; --back: #14171c; --card: #1d2128;
+  --edge: #6b7482; --mark: #6aa9f5; --bad: #ff8a80; --near: #f0874a; --far: #58c496;
+  color-scheme: dark;"""
+_THEMES = (
+    f":root {{ {_LIGHT} }}\n"
+    f"@media (prefers-color-scheme: dark) {{ :root:not([data-theme=light]) {{ {_DARK} }} }}\n"
+    f":root[data-theme=dark] {{ {_DARK} }}\n"
+)
+
+STYLE = (
+    _THEMES
+    + """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--back); color: var(--ink);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
@@ -50,9 +61,10 @@ figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
 .scale { display: flex; justify-content: space-between; font-size: .75rem; color: var(--soft); }
 .bar { height: 8px; border-radius: 4px; margin-top: .5rem; }
 """
+)
 
 # Dark blue to yellow by way of teal, of even steps in lightness: read in grey as in colour.
-_SCALE = np.array(
+SCALE = np.array(
     [[38, 20, 72], [52, 70, 140], [36, 120, 148], [50, 168, 130], [138, 205, 88], [248, 228, 60]],
     dtype=np.float64,
 )
@@ -88,17 +100,17 @@ def _img(pixels: NDArray[np.uint8], description: str) -> str:
 def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
     """Colour values between `low` and `high`, uint8 (y, x, 3); grey where there is none (NaN)."""
     share = np.clip((np.nan_to_num(values, nan=low) - low) / max(high - low, 1e-12), 0, 1)
-    place = share * (len(_SCALE) - 1)
-    below = np.minimum(place.astype(np.int64), len(_SCALE) - 2)
+    place = share * (len(SCALE) - 1)
+    below = np.minimum(place.astype(np.int64), len(SCALE) - 2)
     part = (place - below)[..., None]
-    colours = _SCALE[below] * (1 - part) + _SCALE[below + 1] * part
+    colours = SCALE[below] * (1 - part) + SCALE[below + 1] * part
     colours[~np.isfinite(values)] = 128
     return np.asarray(np.rint(colours).astype(np.uint8))
 
 
 def colour_map(values: Floats, low: float, high: float, unit: str, caption: str) -> str:
     """Return a <figure> of values in false colour with its scale."""
-    stops = ", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in _SCALE)
+    stops = ", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
     return (
         f"<figure>{_img(false_colour(values, low, high), caption)}"
         f'<div class="bar" style="background: linear-gradient(to right, {stops})"></div>'

@@ -16,6 +16,7 @@ from nearfar.transport import near as windows
 from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
+from nearfar.transport.quality import Quality
 
 # Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
 BLOCK = 8192
@@ -58,6 +59,8 @@ class Transport:
         Plan, estimator, exposure and version: whatever JSON holds.
     belief : Belief, optional
         What error bars follow from, where the estimate can tell them.
+    quality : Quality, optional
+        How far each camera pixel is to be trusted, where photos told.
     """
 
     projector: Size
@@ -70,6 +73,7 @@ class Transport:
     noise: Floats
     provenance: Mapping[str, Any] = field(default_factory=dict)
     belief: Belief | None = None
+    quality: Quality | None = None
 
     @property
     def camera(self) -> Size:

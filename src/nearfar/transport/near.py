@@ -66,6 +66,14 @@ def read(padded: Floats, centres: NDArray[np.int64], window: int) -> Floats:
     return np.asarray(views[first[:, 0], first[:, 1]].reshape(len(centres), -1))
 
 
+def reached(padded: Booleans, centres: NDArray[np.int64], window: int) -> Booleans:
+    """Tell of which windows a pixel of a padded light, (..., ...) of bool, is lit: (C,)."""
+    counts = np.pad(np.cumsum(np.cumsum(padded, axis=0), axis=1), [(1, 0), (1, 0)])
+    y, x = (centres + window - window // 2).T
+    inside = counts[y + window, x + window] + counts[y, x]
+    return np.asarray(inside > counts[y, x + window] + counts[y + window, x])
+
+
 def spread(values: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:
     """Adjoint of `look_up`: scatter window values (C, W^2) over the projector, (Py, Px)."""
     height, width = projector.height + 2 * window, projector.width + 2 * window

@@ -16,6 +16,8 @@ from nearfar.transport.far import RealBasis
 
 # Camera pixels at once: their windows stay near the processor while lights change.
 BLOCK = 1024
+# Where fewer windows see light than this share, the rest are left out: they are copied for it.
+MOSTLY = 0.6
 # Fewer lights are done before threads have started.
 FEW = 8
 
@@ -32,15 +34,24 @@ def near_pictures(
     window = round(np.sqrt(near.shape[2]))
     found = np.empty((len(lights), *near.shape[:2]), dtype=np.result_type(lights, near))
     padded = windows.pad(lights.reshape(*lights.shape[:2], *projector), window)
+    lit = [windows.reached(light.any(axis=0), centres, window) for light in padded]
 
     def work(block: slice) -> None:
         for number, light in enumerate(padded):
-            seen = [windows.read(channel, centres[block], window) for channel in light]
+            chosen: slice | NDArray[np.int64] = block
+            reached = lit[number][block]
+            if np.count_nonzero(reached) < MOSTLY * reached.size:
+                # A small light: most windows are dark.
+                found[number, block] = 0.0
+                if not reached.any():
+                    continue
+                chosen = block.start + np.flatnonzero(reached)
+            seen = [windows.read(channel, centres[chosen], window) for channel in light]
             if len(seen) == 1:
-                found[number, block] = np.einsum("ciw,cw->ci", near[block], seen[0])
+                found[number, chosen] = np.einsum("ciw,cw->ci", near[chosen], seen[0])
             else:
                 for i, own in enumerate(seen):
-                    found[number, block, i] = np.einsum("cw,cw->c", near[block, i], own)
+                    found[number, chosen, i] = np.einsum("cw,cw->c", near[chosen, i], own)
 
     if len(lights) < FEW:
         for block in blocks(len(near), BLOCK):

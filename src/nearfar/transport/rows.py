@@ -1,6 +1,6 @@
-"""Transports of some rows of the camera: cut out of one, and put together again."""
+"""Transports of some camera pixels: cut out of one, and put together again."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,15 +11,29 @@ from nearfar.transport.model import Transport
 # What each camera pixel has its own of.
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
 BELIEVED = ("kind", "strength", "white", "offset_noise", "light_noise", "share_of_white")
+TRUSTED = ("confidence", "saturated")
+# Parts that a transport may lack, and what each camera pixel has of them.
+OPTIONAL = {"belief": BELIEVED, "quality": TRUSTED}
 
 
 def of_rows(transport: Transport, rows: slice) -> Transport:
     """Return the transport of some rows of the camera, as views."""
-    belief = transport.belief
-    if belief is not None:
-        belief = replace(belief, **{name: getattr(belief, name)[rows] for name in BELIEVED})
-    factors = {name: getattr(transport, name)[rows] for name in FACTORS}
-    return replace(transport, belief=belief, **factors)
+    return _chosen(transport, lambda values: values[rows])
+
+
+def thinned(transport: Transport, step: int, first: int = 0) -> Transport:
+    """Return the transport of every `step`-th row, from `first`, and column, as a copy."""
+    return _chosen(transport, lambda values: values[first::step, ::step].copy())
+
+
+def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:
+    changes = {name: choose(getattr(transport, name)) for name in FACTORS}
+    for part, names in OPTIONAL.items():
+        owner: Any = getattr(transport, part)
+        if owner is not None:
+            own = {name: choose(getattr(owner, name)) for name in names}
+            changes[part] = replace(owner, **own)
+    return replace(transport, **changes)
 
 
 def stacked(parts: Sequence[Transport]) -> Transport:
@@ -30,7 +44,9 @@ def stacked(parts: Sequence[Transport]) -> Transport:
     def joined(owners: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:
         return {name: np.concatenate([getattr(one, name) for one in owners]) for name in names}
 
-    belief = parts[-1].belief
-    if belief is not None:
-        belief = replace(belief, **joined([part.belief for part in parts], BELIEVED))
-    return replace(parts[-1], belief=belief, **joined(parts, FACTORS))
+    changes = joined(parts, FACTORS)
+    for name, names in OPTIONAL.items():
+        owners: list[Any] = [getattr(part, name) for part in parts]
+        if owners[-1] is not None:
+            changes[name] = replace(owners[-1], **joined(owners, names))
+    return replace(parts[-1], **changes)

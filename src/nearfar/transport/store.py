@@ -24,7 +24,8 @@ from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
-from nearfar.transport.rows import BELIEVED, FACTORS
+from nearfar.transport.quality import Quality
+from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
@@ -34,8 +35,8 @@ CHUNK_BYTES = 8 * 2**20
 # Bytes of a transport that are read at once where it is gone through in blocks.
 READ_BYTES = 2**28
 
-# Of the belief, where there is one: a mapping of its own in the attributes, and arrays.
-BELIEF = "belief"
+# Parts that may be lacking: a mapping of their own in the attributes, and arrays PART_NAME.
+BELIEF, QUALITY = "belief", "quality"
 
 
 def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) -> None:
@@ -97,8 +98,10 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
         Rows of the whole camera.
     """
     values = {name: _as_stored(getattr(part, name)) for name in FACTORS}
-    if part.belief is not None:
-        values |= {f"{BELIEF}_{name}": getattr(part.belief, name) for name in BELIEVED}
+    for optional, names in OPTIONAL.items():
+        owner = getattr(part, optional)
+        if owner is not None:
+            values |= {f"{optional}_{name}": getattr(owner, name) for name in names}
     group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
     for name, one in values.items():
         # A single block has its chunks to itself, whatever their rows.
@@ -126,6 +129,8 @@ def _attributes(transport: Transport) -> dict[str, Any]:
     }
     if transport.belief is not None:
         attributes[BELIEF] = _described(transport.belief)
+    if transport.quality is not None:
+        attributes[QUALITY] = {}
     return attributes
 
 
@@ -188,6 +193,9 @@ class StoredTransport:
         read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
         believed: dict[str, Any] = {name: read.pop(f"{BELIEF}_{name}", None) for name in BELIEVED}
         belief = Belief(**self._belief, **believed) if self._belief is not None else None
+        trusted: dict[str, Any] = {
+            name: read.pop(f"{QUALITY}_{name}") for name in TRUSTED if f"{QUALITY}_{name}" in read
+        }
         if belief is not None and int(belief.kind.max(initial=0)) >= len(belief.kinds):
             raise _misfit(self.path)
         return Transport(
@@ -195,15 +203,24 @@ class StoredTransport:
             far_basis=self.far_basis,
             provenance=self.provenance,
             belief=belief,
+            quality=Quality(**trusted) if trusted else None,
             **read,
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that all of it takes in memory."""
+        return self.camera.height * self._row_bytes
+
+    @property
+    def _row_bytes(self) -> int:
+        return sum(
+            array.dtype.itemsize * math.prod(array.shape[1:]) for array in self._arrays.values()
         )
 
     def blocks(self, size: int = READ_BYTES) -> Iterator[Transport]:
         """Read the camera row by row in blocks of so many bytes, each when it is asked for."""
-        row = sum(
-            array.dtype.itemsize * math.prod(array.shape[1:]) for array in self._arrays.values()
-        )
-        for rows in blocks(self.camera.height, size // row):
+        for rows in blocks(self.camera.height, size // self._row_bytes):
             yield self.rows(rows)
 
 
@@ -250,6 +267,15 @@ def open_transport(path: AnyPath) -> StoredTransport:
         arrays |= {f"{BELIEF}_{name}": open_array(group, f"{BELIEF}_{name}") for name in BELIEVED}
         if not _belief_fits(belief, arrays, basis.projector, each):
             raise _misfit(path)
+    if QUALITY in group.attrs:
+        told = {f"{QUALITY}_{name}": open_array(group, f"{QUALITY}_{name}") for name in TRUSTED}
+        arrays |= told
+        kinds = [(array.shape, array.dtype.kind) for array in told.values()]
+        if kinds != [(each[:2], "f"), (each[:2], "b")]:
+            raise UnreadableFileError(
+                f"{path} is damaged: what tells how far to trust it does not fit the transport; "
+                f"reconstruct it again."
+            )
     return StoredTransport(
         path, basis.projector, Size(*each[:2]), basis, provenance, each[2], arrays, belief
     )

@@ -1,9 +1,6 @@
 """``nearfar preview``: what the camera sees, live in the browser, to aim, focus and expose by."""
 
-import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -16,9 +13,9 @@ from nearfar.errors import DeviceError, InputError
 from nearfar.packages import needed
 from nearfar.rigs.real import RealRig
 from nearfar.viewer.preview_page import PAGE
+from nearfar.viewer.serving import HERE, Place, serve
 from nearfar.viewer.sight import look, picture
 
-HOST = "127.0.0.1"
 # Side of the squares that are focused on, in the projector's pixels.
 SQUARE = 16
 # Seconds between photos, so that a camera that is quick leaves the browser time.
@@ -101,7 +98,7 @@ def run_preview(rig: RealRig, port: int, started: Any = None) -> None:
         If Esc was pressed.
     """
     shared = _Shared()
-    with _served(shared, port) as address:
+    with serve(_application(shared), Place(HERE, port)) as address:
         if started is not None:
             started(address)
         pattern: Pattern = "white"
@@ -151,47 +148,11 @@ def _draw(pattern: Pattern, size: Size) -> NDArray[np.uint8]:
     return (255 * ((x + y) % 2)).astype(np.uint8)
 
 
-@contextmanager
-def _served(shared: _Shared, port: int) -> Iterator[str]:
-    """Serve the page from a thread of its own."""
-    with needed(extra="preview", what="the preview in the browser"):
-        import uvicorn
-    listening = socket.socket()
-    try:
-        # A preview that was just ended has left the port waiting.
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind((HOST, port))
-        # From here on who asks waits, and is not turned away.
-        listening.listen()
-    except OSError as error:
-        listening.close()
-        raise InputError(
-            f"port {port} cannot be served on ({error.strerror}): give another by --port, or 0 for "
-            f"any that is free."
-        ) from None
-    address = f"http://{HOST}:{listening.getsockname()[1]}"
-    settings = uvicorn.Config(
-        _application(shared), log_level="error", access_log=False, lifespan="off"
-    )
-    server = uvicorn.Server(settings)
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
-    thread.start()
-    try:
-        yield address
-    finally:
-        server.should_exit = True
-        thread.join(timeout=5.0)
-        listening.close()
-
-
 def _application(shared: _Shared) -> Any:
-    with needed(extra="preview", what="the preview in the browser"):
+    with needed(extra="viewer", what="a page in the browser"):
         from fastapi import FastAPI
         from fastapi.responses import HTMLResponse, Response
-        from starlette.middleware.trustedhost import TrustedHostMiddleware
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    # A page elsewhere must not reach the rig by a name of its own for this machine.
-    application.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
 
     @application.get("/")
     def page() -> HTMLResponse:

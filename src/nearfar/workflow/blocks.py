@@ -31,6 +31,7 @@ from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
 from nearfar.transport.half import in_half, rounding_over_noise
 from nearfar.transport.model import Transport
+from nearfar.transport.quality import Quality
 from nearfar.transport.rows import of_rows
 from nearfar.version import version
 from nearfar.workflow.methods import ESTIMATORS, Estimate, Method
@@ -209,8 +210,22 @@ def reconstruct_block(
     provenance["excess_of_sums"] = measurements.excess_of_sums
     mine = of_rows(transport, core)
     provenance["rounding"] = rounding_over_noise(mine) if job.half else 0.0
-    mine = replace(in_half(mine) if job.half else mine, provenance=provenance)
-    return Part(mine, Correspondence(found.pixels[core], found.confidence[core]))
+    seen = Correspondence(found.pixels[core], found.confidence[core])
+    mine = replace(
+        in_half(mine) if job.half else mine,
+        provenance=provenance,
+        quality=_quality(job.capture, block, seen),
+    )
+    return Part(mine, seen)
+
+
+def _quality(capture: Capture, block: slice, seen: Correspondence) -> Quality | None:
+    """Look at the white photo for what is saturated: no pattern is brighter."""
+    found = white_and_black(capture.plan)
+    if found is None:
+        return None
+    (white,) = capture.read([found[0]], block)
+    return Quality(seen.confidence, (white >= 1).any(axis=-1))
 
 
 def of_all(before: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,57 @@
+"""``nearfar view``."""
+
+from contextlib import suppress
+from typing import Annotated
+
+import typer
+
+from nearfar.arrays import parse_bytes
+from nearfar.cli.options import Browser, Port, Quiet, TransportPath
+from nearfar.cli.progress import progress_bar, say
+
+
+def view(
+    transport: TransportPath,
+    port: Port = 8628,
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Address to serve at; beyond this machine the page asks for a token.",
+            metavar="ADDRESS",
+        ),
+    ] = "127.0.0.1",
+    memory: Annotated[
+        str,
+        typer.Option(
+            help="Memory for the transport; a larger one is read again for each light at rest.",
+            metavar="2GB",
+        ),
+    ] = "2GB",
+    browser: Browser = True,
+    quiet: Quiet = False,
+) -> None:
+    """Relight the scene in the browser: drag a light, and see direct, near and far answer apart.
+
+    Example: nearfar view transport.zarr
+    """
+    import webbrowser
+
+    from nearfar.viewer.serving import Place
+    from nearfar.viewer.view import run_view
+    from nearfar.viewer.viewed import ViewedTransport
+
+    available = parse_bytes(memory, name="--memory")
+    with progress_bar("reading", quiet=quiet) as report:
+        viewed = ViewedTransport(
+            transport, memory=available, progress=lambda share: report("reading", share)
+        )
+
+    def started(address: str) -> None:
+        print(f"{transport} at {address}, Ctrl-C here ends it", flush=True)
+        if browser:
+            webbrowser.open(address)
+
+    # Ctrl-C is how it ends.
+    with suppress(KeyboardInterrupt):
+        run_view(viewed, Place(host, port), started)
+    say("view ended", quiet=quiet)

@@ -1,0 +1,103 @@
+// Maps in false colour, and lines.
+
+export const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function colourOf(scale, share) {
+  const place = Math.min(1, Math.max(0, share)) * (scale.length - 1), below = Math.min(Math.floor(place), scale.length - 2);
+  return scale[below].map((v, c) => v + (place - below) * (scale[below + 1][c] - v));
+}
+
+export const gradient = scale => `linear-gradient(to right, ${scale.map(c => `rgb(${c})`).join(', ')})`;
+
+// Values (height, width) between low and high; grey where there is none.
+export function drawMap(canvas, values, [height, width], low, high, scale) {
+  Object.assign(canvas, { width, height });
+  const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height);
+  const table = Array.from({ length: 256 }, (_, i) => colourOf(scale, i / 255));
+  for (let i = 0; i < values.length; i++) {
+    const share = (values[i] - low) / (high - low);
+    const colour = Number.isFinite(values[i]) ? table[Math.round(255 * Math.min(1, Math.max(0, share)))] : [128, 128, 128];
+    image.data.set([...colour.map(Math.round), 255], 4 * i);
+  }
+  pen.putImageData(image, 0, 0);
+}
+
+export const logarithms = values => Float32Array.from(values, v => Math.log10(Math.max(Math.abs(v), 1e-12)));
+
+export function drawLog(canvas, values, shape, scale, decades = 5) {
+  const shown = logarithms(values);
+  let high = -12;
+  for (const v of shown) if (v > high) high = v;
+  drawMap(canvas, shown, shape, high - decades, high, scale);
+  return high;
+}
+
+export function crop(values, [height, width], [cy, cx], reach) {
+  const side = 2 * reach + 1, found = new Float32Array(side * side).fill(NaN);
+  for (let y = 0; y < side; y++)
+    for (let x = 0; x < side; x++) {
+      const py = Math.round(cy) + y - reach, px = Math.round(cx) + x - reach;
+      if (py >= 0 && py < height && px >= 0 && px < width) found[y * side + x] = values[py * width + px];
+    }
+  return { values: found, shape: [side, side] };
+}
+
+// A spectrum, enlarged so that frames and dots are fine, with DC in the middle.
+export function drawSpectrum(canvas, values, [height, width], words, scale) {
+  const small = new OffscreenCanvas(width, height);
+  drawMap(small, values, [height, width], -80, 0, scale);
+  const large = Math.max(2, Math.round(360 / Math.max(height, width)));
+  Object.assign(canvas, { width: large * width, height: large * height });
+  const pen = canvas.getContext('2d', { willReadFrequently: true });
+  pen.imageSmoothingEnabled = false;
+  pen.drawImage(small, 0, 0, canvas.width, canvas.height);
+  const at = (k, side) => (Math.floor(side / 2) + 0.5 + k * side) * large;
+  pen.fillStyle = '#ffffffa0';
+  for (const [ky, kx] of words.measured)
+    for (const sign of [1, -1]) {
+      pen.beginPath();
+      pen.arc(at(sign * kx, width), at(sign * ky, height), 1.4, 0, 7);
+      pen.fill();
+    }
+  for (const [name, [ky, kx]] of [['--near', words.k_near], ['--far', words.k_far]]) {
+    pen.strokeStyle = css(name);
+    pen.lineWidth = 2;
+    const x = at(-kx, width) - large / 2, y = at(-ky, height) - large / 2;
+    pen.strokeRect(x, y, 2 * kx * width * large + large, 2 * ky * height * large + large);
+  }
+}
+
+// Lines over the same places, log scale, each with a band of one deviation.
+export function drawProfile(canvas, lines, label) {
+  const ratio = devicePixelRatio || 1, w = canvas.clientWidth || 600, h = 170;
+  Object.assign(canvas, { width: w * ratio, height: h * ratio });
+  canvas.style.height = h + 'px';
+  const pen = canvas.getContext('2d', { willReadFrequently: true });
+  pen.scale(ratio, ratio);
+  let high = -12;
+  for (const { values } of lines) for (const v of values) high = Math.max(high, Math.log10(Math.abs(v) + 1e-12));
+  const top = Math.ceil(high), low = top - 6, left = 38, bottom = h - 20;
+  const y = v => bottom - (Math.max(low, Math.log10(Math.max(v, 1e-12))) - low) / (top - low) * (bottom - 6);
+  pen.font = '11px system-ui';
+  pen.fillStyle = css('--soft');
+  pen.strokeStyle = css('--line');
+  for (let power = low; power <= top; power += 2) {
+    pen.beginPath(); pen.moveTo(left, y(10 ** power)); pen.lineTo(w, y(10 ** power)); pen.stroke();
+    pen.fillText('1e' + power, 0, y(10 ** power) + 4);
+  }
+  pen.fillText(label, left, h - 5);
+  for (const { values, errors, colour } of lines) {
+    const x = i => left + (i + 0.5) / values.length * (w - left);
+    pen.fillStyle = pen.strokeStyle = css(colour);
+    pen.globalAlpha = 0.25;
+    pen.beginPath();
+    for (let i = 0; i < values.length; i++) pen.lineTo(x(i), y(values[i] + errors[i]));
+    for (let i = values.length - 1; i >= 0; i--) pen.lineTo(x(i), y(values[i] - errors[i]));
+    pen.fill();
+    pen.globalAlpha = 1;
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    for (let i = 0; i < values.length; i++) pen.lineTo(x(i), y(values[i]));
+    pen.stroke();
+  }
+}

@@ -1,0 +1,168 @@
+"""A transport that is looked at: at once while the light moves, exactly once it rests.
+
+Index convention: camera pixels are [y, x]; pictures for the page are (3, y, x, colours), direct,
+near and far, colours 1 or 3.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.transport.colour import as_channels_see
+from nearfar.transport.model import Transport
+from nearfar.transport.rows import FACTORS, stacked, thinned
+from nearfar.transport.store import StoredTransport, open_transport
+from nearfar.viewer.messages import Light
+
+# Bytes of the factors that are gone through while the light moves: some tens of milliseconds.
+QUICK = 160 * 2**20
+# Bytes of a block at rest: between two of them a light that moves on is noticed.
+STEADY = 64 * 2**20
+# Camera pixels that a page shows at most; of larger photos every second row and column, and so on.
+SHOWN = 2**22
+# Bytes that a whole transport may take in memory, unless told otherwise.
+MEMORY = 2 * 10**9
+GREY, COLOUR = 1, 3
+
+
+class Shown(NamedTuple):
+    """A picture for the page.
+
+    Attributes
+    ----------
+    parts : ndarray of float16, shape (3, y, x, colours)
+        Direct, near, far.
+    step : int
+        Every so many rows and columns of the camera are shown.
+    """
+
+    parts: NDArray[np.float16]
+    step: int
+
+
+class ViewedTransport:
+    """A transport on the disk, held as far as memory goes.
+
+    Parameters
+    ----------
+    path : str or Path
+    memory : int
+        Bytes that its factors may take; a larger one is read again for each light at rest.
+    progress : callable, optional
+        Called with the share that is read.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        As `nearfar.load_transport`.
+    """
+
+    def __init__(
+        self,
+        path: AnyPath,
+        *,
+        memory: int = MEMORY,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self.path = Path(path)
+        self.stored: StoredTransport = open_transport(path)
+        told = progress or (lambda _share: None)
+        size = self.stored.nbytes
+        camera = self.stored.camera
+        # What is moved through, and what a page shows at rest.
+        self.step = int(np.ceil(np.sqrt(size / QUICK)))
+        self.shown_step = int(np.ceil(np.sqrt(camera.pixels / SHOWN)))
+        self.step = max(self.step, self.shown_step)
+        self._held: list[Transport] | None = [] if size <= memory else None
+        quick: list[Transport] = []
+        blacks: list[Floats] = []
+        first = 0
+        for part in self.stored.blocks(STEADY):
+            if self._held is not None:
+                self._held.append(part)
+            quick.append(thinned(part, self.step, -first % self.step))
+            blacks.append(part.black)
+            first += part.camera.height
+            told(first / camera.height)
+        # The photo under black, (y, x, channels).
+        self.black: Floats = np.concatenate(blacks)
+        self.quick = _joined([part for part in quick if part.camera.height])
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+        return self.stored.projector
+
+    @property
+    def colours(self) -> int:
+        """Of the pictures that are shown: 1 or 3."""
+        return COLOUR if self.stored.channels >= COLOUR else GREY
+
+    def at_once(self, light: Light) -> Shown:
+        """Relight what is gone through while the light moves."""
+        return Shown(self._parts(self.quick, light), self.step)
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether what is shown while the light moves is all there is to show."""
+        return self.step == self.shown_step
+
+    def at_rest(self, light: Light) -> Iterator[Shown | None]:
+        """Relight every camera pixel that is shown: nothing after each block, then the picture."""
+        found, first = [], 0
+        for part in self.blocks():
+            kept = part
+            if self.shown_step > 1:
+                kept = thinned(part, self.shown_step, -first % self.shown_step)
+            first += part.camera.height
+            if kept.camera.height:
+                found.append(self._parts(kept, light))
+            yield None
+        yield Shown(np.concatenate(found, axis=1), self.shown_step)
+
+    def relight(self, light: Light, *, direct: float, near: float, far: float) -> Floats:
+        """Relight every camera pixel, float32, as ``nearfar relight`` does."""
+        seen = self._as_seen(light.whole())
+        gains = {"direct": direct, "near": near, "far": far}
+        parts = [part.relight(seen, **gains).astype(np.float32) for part in self.blocks()]
+        return np.concatenate(parts)
+
+    def row_of_camera(self, y: int) -> Transport:
+        """Return the transport of one row of the camera."""
+        return self.stored.rows(slice(y, y + 1))
+
+    def blocks(self) -> Iterator[Transport]:
+        """Go through blocks of camera rows."""
+        yield from self._held if self._held is not None else self.stored.blocks(STEADY)
+
+    def _as_seen(self, light: Floats) -> Floats:
+        """Turn a light or a colour into one for each channel of the camera."""
+        return as_channels_see(light, self.stored.channels, self.stored.provenance)
+
+    def _parts(self, transport: Transport, light: Light) -> NDArray[np.float16]:
+        if light.is_grey or light.levels.ndim == 3:
+            seen, tint = self._as_seen(light.whole()), np.ones(1, dtype=np.float32)
+        else:
+            # One light for all channels takes a third of the time of three.
+            seen, tint = light.levels, np.ravel(self._as_seen(light.colour[None, None]))
+        parts = transport.components(seen)
+        pictures = [part.reshape(*transport.camera, -1) * tint for part in parts]
+        return np.stack([self.in_colours(part) for part in pictures]).astype(np.float16)
+
+    def in_colours(self, picture: Floats) -> Floats:
+        """Turn a picture (y, x, channels) into one that a page can show, (y, x, colours)."""
+        if self.colours == COLOUR:
+            return picture[..., :COLOUR]
+        return picture if picture.shape[-1] == 1 else picture.mean(axis=-1, keepdims=True)
+
+
+def _joined(parts: list[Transport]) -> Transport:
+    """Put the quick copy together; windows and bands in float32, which is quicker to go through."""
+    whole = stacked(parts)
+    floats = {name: getattr(whole, name).astype(np.float32, copy=False) for name in FACTORS}
+    return replace(whole, **floats)

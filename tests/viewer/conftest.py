@@ -1,0 +1,89 @@
+"""A transport with error bars, and its page, served."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.plan import choose_plan
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.transport.model import Transport
+from nearfar.transport.store import load_transport, save_transport
+from nearfar.viewer.serving import Place
+from nearfar.viewer.view import run_view
+from nearfar.viewer.viewed import ViewedTransport
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.reconstruct import reconstruct
+from tests.worlds import model_transport
+
+PROJECTOR, CAMERA = Size(20, 24), Size(30, 42)
+ANYWHERE = Place("127.0.0.1", 0)
+
+
+@pytest.fixture(scope="session")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A transport from noisy photos: 20x24 projector, 30x42 camera, three channels."""
+    folder = tmp_path_factory.mktemp("viewer")
+    world = model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3), channels=3)
+    plan, _ = choose_plan(PROJECTOR, 60)
+    rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    capture = acquire(plan, folder / "capture.zarr", rig)
+    transport, _ = reconstruct(capture)
+    # A camera pixel without direct light, as every real scene has them.
+    q = transport.correspondence.copy()
+    q[3, 5] = np.nan
+    direct, near = transport.direct.copy(), transport.near.copy()
+    direct[3, 5] = near[3, 5] = 0
+    path = folder / "a scene.zarr"
+    save_transport(path, replace(transport, correspondence=q, direct=direct, near=near))
+    return path
+
+
+@pytest.fixture(scope="session")
+def transport(stored: Path) -> Transport:
+    return load_transport(stored)
+
+
+@contextmanager
+def served_view(viewed: ViewedTransport, place: Place = ANYWHERE) -> Iterator[str]:
+    """Serve a page; gives its address."""
+    ended, addresses = threading.Event(), []
+    there = threading.Event()
+
+    def started(address: str) -> None:
+        addresses.append(address)
+        there.set()
+
+    thread = threading.Thread(target=run_view, args=(viewed, place, started, ended), daemon=True)
+    thread.start()
+    assert there.wait(20)
+    try:
+        yield addresses[0]
+    finally:
+        ended.set()
+        thread.join(timeout=20)
+        assert not thread.is_alive()
+
+
+@pytest.fixture(scope="session")
+def address(stored: Path) -> Iterator[str]:
+    with served_view(ViewedTransport(stored)) as here:
+        yield here
+
+
+@pytest.fixture
+def serve_it(stored: Path) -> Iterator[Callable[..., str]]:
+    """Serve it in other ways: with little memory, with all quick copies coarse, elsewhere."""
+    with ExitStack() as stack:
+
+        def serve(place: Place = ANYWHERE, memory: int = 10**9) -> str:
+            return stack.enter_context(served_view(ViewedTransport(stored, memory=memory), place))
+
+        yield serve

@@ -1,0 +1,535 @@
+"""The viewer's server: its pictures, what it tells of pixels, and hostile guests."""
+
+import json
+import os
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+import zlib
+from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import websockets.exceptions
+from websockets.sync.client import connect
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError, MissingFileError
+from nearfar.estimate.joint import ErrorBars
+from nearfar.files import read_light, read_picture, write_picture
+from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
+from nearfar.transport.store import save_transport
+from nearfar.viewer import view, viewed
+from nearfar.viewer.messages import pack, unpack_light
+from nearfar.viewer.serving import Place, serve
+from nearfar.viewer.viewed import ViewedTransport
+from tests.absent import said_without
+from tests.cli.conftest import run_nearfar
+from tests.viewer.conftest import CAMERA, PROJECTOR, served_view
+from tests.worlds import model_transport
+
+TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2"}
+
+
+def unpack(data):
+    (length,) = struct.unpack_from("<I", data)
+    words = json.loads(data[4 : 4 + length])
+    at, arrays = 4 + length, []
+    assert at % 8 == 0
+    for told in words["arrays"]:
+        kind = np.dtype(TYPES[told["type"]])
+        count = int(np.prod(told["shape"]))
+        arrays.append(np.frombuffer(data, kind, count, at).reshape(told["shape"]))
+        at += -(-count * kind.itemsize // 8) * 8
+    return words, arrays
+
+
+def message(light, **words):
+    """Pack a light as the page does: levels of one channel or three."""
+    levels = np.rint(65535 * light.reshape(*light.shape[:2], -1)).astype(np.uint16)
+    text = json.dumps({"number": 1, "shape": levels.shape, **words}).encode()
+    text += b" " * (-(4 + len(text)) % 8)
+    return struct.pack("<I", len(text)) + text + levels.tobytes()
+
+
+def ask(address, path, body=None, **headers):
+    request = urllib.request.Request(address + path, data=body, headers=headers)
+    with urllib.request.urlopen(request, timeout=30) as answer:
+        return answer.read()
+
+
+def refused(address, path, body=None, **headers):
+    """Ask for what is refused; gives the status and what is said."""
+    with pytest.raises(urllib.error.HTTPError) as error:
+        ask(address, path, body, **headers)
+    said = error.value.read().decode()
+    error.value.close()
+    return error.value.code, said
+
+
+def socket_of(address, **options):
+    return connect(address.replace("http", "ws") + "/relight", max_size=None, **options)
+
+
+def relit(address, light, **words):
+    """Let the server relight until its picture is exact."""
+    with socket_of(address) as socket:
+        socket.send(message(light, **words))
+        while True:
+            told, (parts,) = unpack(socket.recv(timeout=30))
+            assert told["number"] == 1
+            if told["exact"]:
+                return told, parts
+
+
+@pytest.fixture
+def lights():
+    generator = np.random.default_rng(0)
+    spot = np.zeros(PROJECTOR)
+    spot[4:9, 6:12] = 1
+    return {
+        "white": np.ones(PROJECTOR),
+        "black": np.zeros(PROJECTOR),
+        "spot": spot,
+        "random": generator.random(PROJECTOR),
+        "coloured": generator.random((*PROJECTOR, 3)),
+    }
+
+
+# Pictures
+
+
+@pytest.mark.parametrize("name", ["white", "black", "spot", "random", "coloured"])
+def test_pictures_are_those_of_the_transport(address, transport, lights, name):
+    told, parts = relit(address, lights[name])
+    assert (told["step"], told["exact"]) == (1, True)
+    expected = np.stack(transport.components(lights[name]))
+    # Half precision keeps 11 digits; 65535 levels keep 16.
+    np.testing.assert_allclose(parts, expected, rtol=1e-3, atol=2e-5)
+
+
+def test_a_colour_is_that_of_a_coloured_light(address, transport, lights):
+    _, parts = relit(address, lights["spot"], colour=[1.0, 0.25, 0.0])
+    expected = np.stack(transport.components(lights["spot"][..., None] * [1.0, 0.25, 0.0]))
+    np.testing.assert_allclose(parts, expected, rtol=1e-3, atol=2e-5)
+
+
+@pytest.mark.parametrize("memory", [10**9, 10**5])
+def test_a_large_scene_is_coarse_while_the_light_moves_and_exact_at_rest(
+    serve_it, transport, lights, monkeypatch, memory
+):
+    monkeypatch.setattr(viewed, "QUICK", 60_000)
+    monkeypatch.setattr(viewed, "STEADY", 50_000)
+    address = serve_it(memory=memory)
+    expected = np.stack(transport.components(lights["random"]))
+    with socket_of(address) as socket:
+        socket.send(message(lights["random"]))
+        told, (coarse,) = unpack(socket.recv(timeout=30))
+        assert not told["exact"]
+        step = told["step"]
+        assert step > 1
+        np.testing.assert_allclose(coarse, expected[:, ::step, ::step], rtol=1e-3, atol=2e-5)
+        told, (exact,) = unpack(socket.recv(timeout=30))
+        assert (told["exact"], told["step"]) == (True, 1)
+        np.testing.assert_allclose(exact, expected, rtol=1e-3, atol=2e-5)
+
+
+def test_larger_photos_than_a_page_shows_are_thinned_out(serve_it, transport, lights, monkeypatch):
+    monkeypatch.setattr(viewed, "SHOWN", CAMERA.pixels // 3)
+    monkeypatch.setattr(viewed, "STEADY", 50_000)
+    told, parts = relit(serve_it(), lights["random"])
+    assert told["step"] == 2
+    expected = np.stack(transport.components(lights["random"]))[:, ::2, ::2]
+    np.testing.assert_allclose(parts, expected, rtol=1e-3, atol=2e-5)
+
+
+def test_lights_that_come_faster_than_pictures_do_not_queue(serve_it, transport, lights):
+    with socket_of(serve_it()) as socket:
+        for number in range(1, 200):
+            socket.send(message(lights["random"] * (number / 199), number=number))
+        pictures = 0
+        while True:
+            told, (parts,) = unpack(socket.recv(timeout=30))
+            pictures += 1
+            if told["number"] == 199:
+                break
+    assert pictures <= 199
+    expected = np.stack(transport.components(lights["random"]))
+    np.testing.assert_allclose(parts, expected, rtol=1e-3, atol=2e-5)
+
+
+def test_what_is_saved_is_what_the_command_line_relights(
+    address, stored, lights, tmp_path, transport
+):
+    gains = {"direct": 0.5, "near": 2.0, "far": 1.5}
+    body = message(lights["random"], gains=gains, colour=[1.0, 0.5, 0.25])
+    (tmp_path / "light.png").write_bytes(ask(address, "/light.png", body))
+    (tmp_path / "page.exr").write_bytes(ask(address, "/picture.exr", body))
+    options = [word for name, gain in gains.items() for word in ("--gain", f"{name}={gain}")]
+    ran = run_nearfar("relight", stored, tmp_path / "light.png", tmp_path / "cli.exr", *options)
+    assert ran.status == 0
+    page, cli = (read_picture(tmp_path / name) for name in ("page.exr", "cli.exr"))
+    assert page.shape == (*CAMERA, 3)
+    np.testing.assert_allclose(page, cli, atol=2e-5)
+    assert cli.max() > 0.1
+    light = read_light(tmp_path / "light.png", PROJECTOR)
+    np.testing.assert_allclose(light[..., 0], lights["random"], atol=1e-5)
+    np.testing.assert_allclose(light[..., 2], lights["random"] / 4, atol=1e-5)
+
+
+# Pixels and maps
+
+
+def test_a_camera_pixel_tells_its_row(address, transport):
+    y, x = 17, 30
+    words, (window, far, window_error, far_error, spectrum) = unpack(
+        ask(address, f"/row?y={y}&x={x}")
+    )
+    d, n, f = (part[0] for part in transport.component_rows(slice(y * 42 + x, y * 42 + x + 1)))
+    np.testing.assert_allclose(window, (d + n).mean(axis=0).reshape(PROJECTOR), atol=1e-6)
+    np.testing.assert_allclose(far, f.mean(axis=0).reshape(PROJECTOR), atol=1e-6)
+    assert words["q"] == pytest.approx(transport.correspondence[y, x].tolist())
+    assert words["floodlit"]["near"] == pytest.approx(n.mean(axis=0).sum(), abs=1e-5)
+    bars = ErrorBars(transport).component_rows(slice(y * 42 + x, y * 42 + x + 1))
+    np.testing.assert_allclose(far_error, bars.far[0].mean(axis=0).reshape(PROJECTOR), rtol=1e-4)
+    assert np.count_nonzero(window_error) <= transport.window**2
+    assert spectrum.max() == 0
+    assert np.unravel_index(spectrum.argmax(), PROJECTOR) == (10, 12)
+    assert words["k_far"][0] <= words["k_near"][0] <= 0.5
+    assert words["k_far"] == np.abs(transport.far_basis.cycles).max(axis=0).tolist()
+
+
+def test_a_camera_pixel_without_direct_light_says_so(address):
+    words, (window, *_) = unpack(ask(address, "/row?y=3&x=5"))
+    assert words["q"] is None
+    assert not window.any()
+
+
+def test_a_projector_pixel_tells_its_column(address, transport):
+    _, (column,) = unpack(ask(address, "/column?y=7&x=11"))
+    np.testing.assert_allclose(column, transport.column(7, 11).mean(axis=-1), atol=1e-6)
+
+
+def test_every_map_is_there(address, transport):
+    about = json.loads(ask(address, "/scene"))
+    assert about["projector"] == list(PROJECTOR)
+    assert set(about["maps"]) >= {"row", "column", "confidence", "error", "near-share", "saturated"}
+    found = {}
+    for name in about["maps"]:
+        words, (found[name],) = unpack(ask(address, f"/map/{name}"))
+        assert found[name].shape == CAMERA
+        assert words["low"] < words["high"]
+        assert words["title"]
+    np.testing.assert_array_equal(found["row"], transport.correspondence[..., 0])
+    np.testing.assert_array_equal(found["confidence"], transport.quality.confidence)
+    parts = [part.sum(axis=-1) for part in transport.components(np.ones(PROJECTOR))]
+    np.testing.assert_allclose(found["near-share"], 100 * parts[1] / sum(parts), rtol=1e-3)
+    white = transport @ np.ones(PROJECTOR, np.float32)
+    bars = ErrorBars(transport).picture(np.ones(PROJECTOR, np.float32))
+    ratio = 10 * np.log10((white**2).mean(axis=-1) / (bars**2).mean(axis=-1))
+    np.testing.assert_allclose(found["error"], ratio, atol=1e-3)
+
+
+def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
+    save_transport(tmp_path / "t.zarr", replace(transport, belief=None, quality=None))
+    with served_view(ViewedTransport(tmp_path / "t.zarr")) as address:
+        about = json.loads(ask(address, "/scene"))
+        assert "error" not in about["maps"]
+        assert "confidence" not in about["maps"]
+        unpack(ask(address, "/map/noise"))
+        words, (_, _, error, _, _) = unpack(ask(address, "/row?y=1&x=2"))
+        assert not words["has_errors"]
+        assert not error.any()
+
+
+# Files that a page sends
+
+
+def test_lights_and_photos_of_other_formats_are_read(address, transport, lights, tmp_path):
+    linear = lights["coloured"].astype(np.float32)
+    write_picture(tmp_path / "l.exr", linear)
+    for name, data in {
+        "l.exr": (tmp_path / "l.exr").read_bytes(),
+        "../../l.npy": encode_npy(linear),
+        "l.tiff": encode_tiff(linear),
+        "l.png": encode_png(np.rint(65535 * linear).astype(np.uint16)),
+    }.items():
+        _, (levels,) = unpack(ask(address, f"/read/light?name={name}", data))
+        np.testing.assert_allclose(levels / 65535, linear, atol=2e-5)
+    photo = np.random.default_rng(1).random((*CAMERA, 3)).astype(np.float32)
+    _, (seen,) = unpack(ask(address, "/read/photo?name=p.npy", encode_npy(photo)))
+    np.testing.assert_allclose(seen, photo - transport.black, atol=1e-3)
+    eight = np.full((*CAMERA, 3), 188, np.uint8)
+    _, (seen,) = unpack(ask(address, "/read/photo?name=p.png", encode_png(eight)))
+    # Of eight bits it is a picture for looking: 188 in sRGB is half of white.
+    np.testing.assert_allclose(seen, 0.5, atol=0.01)
+
+
+def _bomb():
+    """A PNG of a few bytes that claims 60000x60000 pixels."""
+
+    def chunk(kind, data):
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
+
+    head = struct.pack(">IIBBBBB", 60000, 60000, 16, 2, 0, 0, 0)
+    body = zlib.compress(bytes(10**6))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "data", "words"),
+    [
+        ("light", "a.png", encode_png(np.zeros((3, 4), np.uint8)), "resize it"),
+        ("photo", "a.png", encode_png(np.zeros((3, 4), np.uint8)), "take it with that camera"),
+        ("light", "a.png", b"hello", "no picture that can be read"),
+        ("light", "/etc/passwd", b"", "is empty"),
+        ("light", "..\\..\\x.exr", b"\x76\x2f\x31\x01" + bytes(40), "x.exr is damaged"),
+        ("light", "bomb.png", _bomb(), "bomb.png"),
+        ("secret", "a.png", b"", "send a light or a photo"),
+    ],
+)
+def test_files_that_cannot_be_used_get_a_sentence(address, kind, name, data, words):
+    status, said = refused(address, f"/read/{kind}?name={name}", data)
+    assert status == 400
+    assert words in json.loads(said)["fault"]
+    assert "/etc" not in said
+    assert json.loads(ask(address, "/scene"))["name"] == "a scene.zarr"
+
+
+# Hostile guests
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"",
+        b"\xff\xff\xff\xff",
+        b"\x04\0\0\0null",
+        struct.pack("<I", 40) + b"{" * 40,
+        "text where a light was to be",
+        message(np.ones((3, 4))),
+        message(np.ones((3, 4)), shape=[20, 24, 1]),
+        message(np.ones(PROJECTOR), number=-1),
+        message(np.ones(PROJECTOR), gains={"direct": 1e9}),
+        message(np.ones(PROJECTOR), colour=[2, 0, 0]),
+        message(np.ones(PROJECTOR), colour=["NaN", 0, 0]),
+        message(np.ones(PROJECTOR), evil=True),
+        message(np.ones(PROJECTOR))[:-1],
+        message(np.ones(PROJECTOR)) + b"more",
+    ],
+)
+def test_messages_that_are_no_light_are_refused(address, lights, sent):
+    with socket_of(address) as socket:
+        socket.send(sent)
+        with pytest.raises(websockets.exceptions.ConnectionClosedError) as closed:
+            socket.recv(timeout=30)
+    assert closed.value.rcvd.code == 1008
+    assert closed.value.rcvd.reason
+    relit(address, lights["spot"])
+
+
+def test_messages_that_are_too_large_are_refused(address, lights):
+    closed = pytest.raises(websockets.exceptions.ConnectionClosedError)
+    with socket_of(address) as socket, closed as gone:
+        socket.send(bytes(10**6))
+        socket.recv(timeout=30)
+    # The server does not wait for the rest, so its reason may be lost on the way.
+    assert gone.value.rcvd is None or gone.value.rcvd.code == 1009
+    status, said = refused(address, "/picture.exr", bytes(10**6))
+    assert status == 400
+    assert "send a smaller file" in said
+    relit(address, lights["spot"])
+
+
+def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
+    address = serve_it()
+    with ExitStack() as stack:
+        first = stack.enter_context(socket_of(address))
+        first.send(message(lights["spot"]))
+        first.recv(timeout=30)
+        closed = 0
+        for _ in range(300):
+            socket = stack.enter_context(socket_of(address))
+            try:
+                socket.recv(timeout=0.01)
+            except websockets.exceptions.ConnectionClosed as gone:
+                assert gone.rcvd.code == 1013
+                assert "close one of them" in gone.rcvd.reason
+                closed += 1
+            except TimeoutError:
+                pass
+        assert closed >= 300 - 2 * view.PAGES
+        first.send(message(lights["random"]))
+        first.recv(timeout=30)
+    # Those that went made room.
+    relit(address, lights["spot"])
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../view.py",
+        "/..%2fview.py",
+        "/%2e%2e/view.py",
+        "/page/main.js",
+        "//etc/passwd",
+        "/main.py",
+        "/main.js%00.py",
+        "/map/../../etc/passwd",
+        "/static/..%5c..%5cx",
+    ],
+)
+def test_there_is_nothing_but_the_page(address, path):
+    status, said = refused(address, path)
+    assert status in {400, 404}
+    assert "import" not in said
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/row?y=30&x=0", 400),
+        ("/row?y=0&x=42", 400),
+        ("/row?y=-1&x=0", 400),
+        ("/row?y=a&x=0", 422),
+        ("/row", 422),
+        ("/column?y=20&x=0", 400),
+        ("/column?y=1e3&x=0", 422),
+        ("/map/none", 400),
+    ],
+)
+def test_pixels_and_maps_that_are_not_there(address, path, status):
+    assert refused(address, path)[0] == status
+
+
+def test_a_page_from_elsewhere_is_kept_out(address):
+    assert refused(address, "/scene", Host="evil.example")[0] == 403
+    assert refused(address, "/scene", Origin="http://evil.example")[0] == 403
+    with pytest.raises(websockets.exceptions.InvalidStatus) as closed:
+        socket_of(address, origin="http://evil.example")
+    assert closed.value.response.status_code == 403
+    with socket_of(address, origin=address) as socket:
+        socket.close()
+    policy = urllib.request.urlopen(address + "/", timeout=10)
+    with policy:
+        told = policy.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in told
+    assert "unsafe" not in told
+
+
+def test_elsewhere_a_token_is_asked_for(serve_it):
+    address = serve_it(Place("0.0.0.0", 0))
+    base, _, token = address.partition("/?token=")
+    assert len(token) >= 40
+    assert refused(base, "/scene")[0] == 403
+    assert refused(base, "/?token=wrong")[0] == 403
+    assert refused(base, f"/scene?token={token[:-1]}")[0] == 403
+    assert refused(base, "/scene", Cookie="nearfar-1=x; =; a=\x01")[0] == 403
+    with pytest.raises(websockets.exceptions.InvalidStatus):
+        socket_of(base)
+    jar = urllib.request.HTTPCookieProcessor()
+    browser = urllib.request.build_opener(jar)
+    with browser.open(address, timeout=10) as page:
+        # The token is in no address that is passed on.
+        assert page.url == base + "/"
+        assert b"nearfar view" in page.read()
+    with browser.open(base + "/scene", timeout=10) as scene:
+        assert json.load(scene)["projector"] == list(PROJECTOR)
+    (cookie,) = jar.cookiejar
+    assert cookie.has_nonstandard_attr("HttpOnly")
+    with socket_of(base, additional_headers={"Cookie": f"{cookie.name}={cookie.value}"}) as socket:
+        socket.send(message(np.ones(PROJECTOR)))
+        socket.recv(timeout=30)
+
+
+def test_a_transport_that_is_damaged_while_it_is_shown_is_told(stored, tmp_path, monkeypatch):
+    path = tmp_path / "t.zarr"
+    shutil.copytree(stored, path)
+    monkeypatch.setattr(viewed, "QUICK", 60_000)
+    with served_view(ViewedTransport(path, memory=1)) as address:
+        for chunk in (path / "near").glob("c*"):
+            chunk.unlink()
+        with socket_of(address) as socket:
+            socket.send(message(np.ones(PROJECTOR)))
+            socket.recv(timeout=30)
+            with pytest.raises(websockets.exceptions.ConnectionClosedError) as closed:
+                socket.recv(timeout=30)
+        assert closed.value.rcvd.code == 1011
+        assert "is damaged" in closed.value.rcvd.reason
+        status, said = refused(address, "/row?y=1&x=1")
+        assert (status, "is damaged" in said) == (400, True)
+
+
+# Messages and addresses
+
+
+def test_a_message_comes_back_as_it_was_packed():
+    arrays = [np.arange(5, dtype=np.uint16), np.ones((2, 3), np.float32), np.zeros(3, np.float16)]
+    words, found = unpack(pack({"é": 1.5}, *arrays))
+    assert words["é"] == 1.5
+    for array, other in zip(arrays, found, strict=True):
+        np.testing.assert_array_equal(array, other)
+
+
+def test_three_equal_channels_are_one():
+    light = np.repeat(np.random.default_rng(0).random((*PROJECTOR, 1)), 3, axis=2)
+    _, found = unpack_light(message(light), PROJECTOR)
+    assert found.is_grey
+    np.testing.assert_allclose(found.whole(), light[..., 0], atol=1e-5)
+    _, found = unpack_light(message(light, colour=[1, 0.5, 0]), PROJECTOR)
+    np.testing.assert_allclose(found.whole(), light * [1, 0.5, 0], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        (Place("no.such.host.invalid", 0), "no address of this machine"),
+        (Place("8.8.8.8", 0), "cannot be served on"),
+    ],
+)
+def test_places_that_cannot_be_served_at(place, words):
+    with pytest.raises(InputError, match=words), serve(None, place):
+        pass
+
+
+def test_the_command_serves_until_it_is_interrupted(stored):
+    command = [sys.executable, "-m", "nearfar", "view", str(stored), "--port", "0", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        line = running.stdout.readline().decode()
+        address = line.split(" at ")[1].split(",")[0]
+        assert json.loads(ask(address, "/scene"))["camera"] == list(CAMERA)
+        os.kill(running.pid, signal.SIGINT)
+        rest, faults = running.communicate(timeout=30)
+    assert (running.returncode, rest.decode().strip(), faults) == (0, "view ended", b"")
+
+
+def test_what_is_no_transport_gets_a_sentence(tmp_path):
+    ran = run_nearfar("view", tmp_path / "none.zarr", "--no-browser")
+    assert ran.status == 1
+    assert "is not there" in ran.err
+    with pytest.raises(MissingFileError):
+        ViewedTransport(tmp_path / "none.zarr")
+
+
+def test_without_its_packages_there_is_a_sentence():
+    assert "pip install 'nearfar[viewer]'" in said_without("fastapi", "import nearfar.viewer.view")
+
+
+def test_a_camera_of_one_or_four_channels_is_shown(tmp_path):
+    for channels, colours in ((1, 1), (2, 1), (4, 3)):
+        world = model_transport(Size(8, 9), Size(5, 7), window=3, far=Size(3, 3), channels=channels)
+        save_transport(tmp_path / f"{channels}.zarr", world)
+        with served_view(ViewedTransport(tmp_path / f"{channels}.zarr")) as address:
+            light = np.random.default_rng(0).random((8, 9))
+            _, parts = relit(address, light)
+            assert parts.shape == (3, 5, 7, colours)
+            whole = (world @ light).reshape(5, 7, channels)
+            expected = whole[..., :3] if colours == 3 else whole.mean(axis=-1, keepdims=True)
+            np.testing.assert_allclose(parts.astype(np.float32).sum(axis=0), expected, atol=1e-3)

@@ -12,7 +12,7 @@ demo: $(READY)
 	$(BIN)/nearfar demo nearfar-demo --force
 
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
 
 check: lint types layers test
 

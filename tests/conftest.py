@@ -1,7 +1,9 @@
 """Scenes small enough for tests, and a camera without faults."""
 
 import os
+import shutil
 import signal
+import tempfile
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -40,10 +42,13 @@ def pytest_runtest_makereport(
     return report
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _scene_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Keep the scenes that tests compute away from the user's own cache."""
-    os.environ.setdefault("NEARFAR_CACHE", str(tmp_path_factory.mktemp("cache")))
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep the scenes that tests compute in one place, away from the user's own cache."""
+    # Processes that run tests side by side find it set by the one that started them.
+    if "NEARFAR_CACHE" not in os.environ:
+        cache = tempfile.mkdtemp(prefix="nearfar-cache-")
+        os.environ["NEARFAR_CACHE"] = cache
+        config.add_cleanup(lambda: shutil.rmtree(cache, ignore_errors=True))
 
 
 @pytest.fixture

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from nearfar.errors import NearfarError
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
+    from nearfar.progress import counted, progress_bar
     from nearfar.rigs.config import open_rig
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_store import load_exact, save_exact
@@ -44,6 +45,7 @@ _HOMES = {
     "Transport": "nearfar.transport.model",
     "acquire": "nearfar.workflow.acquire",
     "check_model": "nearfar.workflow.check",
+    "counted": "nearfar.progress",
     "condition_near": "nearfar.workflow.conditioning",
     "correspond_by_stripes": "nearfar.correspondence",
     "given_correspondence": "nearfar.correspondence",
@@ -56,6 +58,7 @@ _HOMES = {
     "paper_plan": "nearfar.plan",
     "parse_plan": "nearfar.plan",
     "parse_size": "nearfar.arrays",
+    "progress_bar": "nearfar.progress",
     "prepare_transport": "nearfar.transport.prepared",
     "penguin": "nearfar.illumination.pictures",
     "random_pattern": "nearfar.illumination.pictures",
@@ -86,6 +89,7 @@ __all__ = [
     "choose_plan",
     "condition_near",
     "correspond_by_stripes",
+    "counted",
     "given_correspondence",
     "load_exact",
     "load_transport",
@@ -97,6 +101,7 @@ __all__ = [
     "parse_size",
     "penguin",
     "prepare_transport",
+    "progress_bar",
     "random_pattern",
     "read_correspondence",
     "read_plan",

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from nearfar.files import encode_png
-from nearfar.report.page import colour_map, false_colour, gallery, page, picture
+from nearfar.markup import false_colour, picture
+from nearfar.report.page import colour_map, gallery, page
 
 
 def test_a_page_fetches_nothing():

@@ -21,12 +21,17 @@ from nearfar.files import (
     read_selection,
 )
 from nearfar.illumination.frequencies import DC
+from nearfar.markup import card, picture
 from nearfar.plan.model import Plan, Sinusoid, parse_plan
 
 # Bytes of a chunk at most: rows of a large camera are read without the rest of it.
 CHUNK_BYTES = 2**22
+# Pixels along the longer side of a photo that a notebook shows.
+THUMBNAIL = 256
 KIND = "nearfar capture"
 FORMAT_VERSION = 1
+# A share of saturated values above this is worth a warning.
+SATURATED = 1e-4
 DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 
@@ -82,6 +87,26 @@ class Capture:
     def saturated_share(self) -> float:
         """Share of all values of all photos that are at full scale or above."""
         return float(self.saturated.mean())
+
+    def _repr_html_(self) -> str:
+        """Show the capture in a notebook: its first photo and its brightest."""
+        step = -(-max(self.camera) // THUMBNAIL)
+        names = {"first photo": 0}
+        if (found := white_and_black(self.plan)) is not None:
+            names |= {"white": found[0], "black": found[1]}
+        images = []
+        for name, number in names.items():
+            photo = self.read([number])[0, ::step, ::step]
+            shown = photo if self.channels == 3 else photo.mean(axis=-1)
+            images.append((name, picture(shown, name)))
+        rows = [
+            ("file", str(self.path)),
+            ("photos", f"{len(self.plan.patterns)} of {self.camera}, {self.channels} channels"),
+            ("numbers", f"{self.photos.dtype}, full scale {self.full_scale:g}"),
+            ("saturated", f"{self.saturated_share:.3%}"),
+            *(("alarm", text) for text in self.alarms),
+        ]
+        return card("capture", rows, images)
 
     def read(
         self, photos: slice | Sequence[int] | NDArray[np.integer[Any]], rows: slice = slice(None)

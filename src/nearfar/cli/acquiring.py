@@ -12,10 +12,11 @@ import typer
 
 from nearfar.arrays import parse_bytes
 from nearfar.cli.options import Force, PlanFile, Quiet, Where, keep_input
-from nearfar.cli.progress import SATURATED, counted, progress_bar, say, warn
 from nearfar.cli.reconstructing import Seen
 from nearfar.cli.reshooting import photo_numbers, take_again
+from nearfar.cli.saying import say, warn
 from nearfar.errors import InputError
+from nearfar.progress import counted, progress_bar
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
@@ -267,6 +268,8 @@ def import_photos(
 
 
 def _conclude(taken: "Capture", output: Path, *, quiet: bool) -> None:
+    from nearfar.capture import SATURATED
+
     share = taken.saturated_share
     if share > SATURATED:
         warn(

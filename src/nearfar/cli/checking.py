@@ -8,7 +8,8 @@ import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.options import AsJson, Force, Quiet, keep_input, size
-from nearfar.cli.progress import progress_bar, say
+from nearfar.cli.saying import say
+from nearfar.progress import progress_bar
 
 
 def check(

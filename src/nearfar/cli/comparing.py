@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from nearfar.cli.options import AsJson, Force, Quiet, ScenesCamera, ScenesProjector
-from nearfar.cli.progress import progress_bar, say
+from nearfar.cli.saying import say
+from nearfar.progress import progress_bar
 
 
 def compare(

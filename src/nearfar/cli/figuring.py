@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from nearfar.cli.options import Force, Quiet
-from nearfar.cli.progress import progress_bar, say, warn
+from nearfar.cli.saying import say, warn
+from nearfar.progress import progress_bar
 
 
 def figures(

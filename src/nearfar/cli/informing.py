@@ -8,7 +8,7 @@ import typer
 
 from nearfar.cli.options import Quiet
 from nearfar.cli.planning import describe_plan
-from nearfar.cli.progress import say
+from nearfar.cli.saying import say
 from nearfar.errors import MissingFileError, UnreadableFileError
 
 if TYPE_CHECKING:

@@ -11,12 +11,14 @@ from nearfar.cli.options import (
     AsJson,
     Force,
     Quiet,
+    ReportPath,
     ScenesCamera,
     ScenesProjector,
     TransportPath,
     keep_input,
 )
-from nearfar.cli.progress import Report, progress_bar, say, warn
+from nearfar.cli.saying import say, warn
+from nearfar.progress import Report, progress_bar
 
 if TYPE_CHECKING:
     from nearfar.transport.exact import ExactTransport
@@ -39,27 +41,47 @@ def evaluate(
     full_scale: Annotated[
         float | None, typer.Option(help="Value of full scale of the photos.", metavar="VALUE")
     ] = None,
+    report: ReportPath = None,
     as_json: AsJson = False,
+    force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Measure a transport: SNR_b of relighting, SNR_t of rows, its components.
 
     Example: nearfar evaluate transport.zarr --truth truth.zarr --json
     """
+    from nearfar.files import check_output
     from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
-    from nearfar.workflow.judge import judge_by_photos, judge_by_truth
+    from nearfar.workflow.evaluate import row_snr
+    from nearfar.workflow.judge import (
+        beside_photos,
+        beside_truth,
+        judge_by_truth,
+        judge_pairs,
+    )
 
     if (truth is None) == (photos is None):
         raise typer.BadParameter("give either --truth or --photos.", param_hint="--truth")
-    with progress_bar("evaluating", quiet=quiet) as report:
+    if report is not None:
+        check_output(report, force=force)
+    with progress_bar("evaluating", quiet=quiet) as told:
         opened = load_transport(transport)
         if truth is not None:
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
-            found = judge_by_truth(opened, known, progress=report)
+            rows = row_snr(opened, known, progress=lambda share: told("rows", share))
+            found = judge_by_truth(opened, known, rows, progress=told)
+            pairs = beside_truth(opened, known)
         else:
             assert photos is not None
-            found = judge_by_photos(opened, photos, full_scale=full_scale)
+            rows, pairs = None, beside_photos(opened, photos, full_scale=full_scale)
+            found = judge_pairs(pairs)
+        if report is not None:
+            from nearfar.report.evaluation import evaluation_page
+            from nearfar.report.page import write_page
+
+            text = evaluation_page(opened, str(truth or photos), found, pairs, rows)
+            write_page(report, text, force=force)
     if as_json:
         print(json.dumps(found, allow_nan=False))
     else:

@@ -47,6 +47,10 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output that is 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdout.")]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
+ReportPath = Annotated[
+    Path | None,
+    typer.Option("--report", help="Write a page of pictures and maps too.", metavar="REPORT.html"),
+]
 Port = Annotated[
     int, typer.Option(help="Port to serve on, 0 for any that is free.", min=0, max=65535)
 ]

@@ -9,8 +9,9 @@ import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.options import AsJson, Force, PlanFile, Quiet, size
-from nearfar.cli.progress import counted, progress_bar, say
+from nearfar.cli.saying import say
 from nearfar.errors import InputError
+from nearfar.progress import counted, progress_bar
 
 if TYPE_CHECKING:
     from nearfar.plan import Plan

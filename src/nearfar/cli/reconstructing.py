@@ -8,20 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nearfar.arrays import Size, parse_bytes
-from nearfar.cli.options import CapturePath, Force, Quiet, Where, keep_input
-from nearfar.cli.progress import SATURATED, progress_bar, say, warn
+from nearfar.cli.options import CapturePath, Force, Quiet, ReportPath, Where, keep_input
+from nearfar.cli.saying import say, warn
+from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
     from nearfar.correspondence import Correspondence
     from nearfar.transport.model import Transport
-
-# Lamp or ambient light that changed by more than this share of the lamp's is worth a warning.
-DRIFT = 0.05
-# Rounding of more than this share of the noise is worth a warning.
-ROUNDED = 0.5
-# Pairs that sum to more or less than white and black by this share of white are worth a warning.
-NOT_LINEAR = 0.01
 
 
 class Method(StrEnum):
@@ -79,6 +73,7 @@ def reconstruct(
             "--resume", help="Go on with the blocks of a reconstruction that was stopped."
         ),
     ] = False,
+    report: ReportPath = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -101,6 +96,8 @@ def reconstruct(
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
     available = parse_bytes(memory, name="--memory")
     keep_input(output, capture, *([correspondence] if correspondence else []))
+    if report is not None:
+        check_output(report, force=force)
     if resume and (square or scheduler is not None):
         raise typer.BadParameter("is not for --square or --scheduler.", param_hint="--resume")
     if square or scheduler is not None:
@@ -112,7 +109,7 @@ def reconstruct(
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
     seen = Seen()
-    with progress_bar("reconstructing", quiet=quiet) as report:
+    with progress_bar("reconstructing", quiet=quiet) as told:
         if scheduler is not None:
             from nearfar.workflow.cluster import reconstruct_on
 
@@ -125,7 +122,7 @@ def reconstruct(
                 memory=available,
                 half=half,
                 force=force,
-                progress=report,
+                progress=told,
             )
             seen.lit, seen.pixels, seen.provenance = done
             seen.camera = opened.camera
@@ -136,7 +133,7 @@ def reconstruct(
                 method=method.value,
                 square=True,
                 device=device.value,
-                progress=report,
+                progress=told,
             )
             seen.add(transport, found)
             save_transport(output, transport, force=force)
@@ -151,11 +148,22 @@ def reconstruct(
                 half=half,
                 resume=resume,
                 force=force,
-                progress=report,
+                progress=told,
             )
             seen.lit, seen.pixels, seen.provenance = made
             seen.camera = opened.camera
     seen.conclude(opened, output, quiet=quiet)
+    if report is not None:
+        _write_report(report, output, opened, force=force)
+        say(f"report written to {report}", quiet=quiet)
+
+
+def _write_report(report: Path, output: Path, capture: "Capture", *, force: bool) -> None:
+    from nearfar.report.page import write_page
+    from nearfar.report.reconstruction import reconstruction_page
+    from nearfar.transport.store import open_transport
+
+    write_page(report, reconstruction_page(open_transport(output), capture), force=force)
 
 
 class Seen:
@@ -176,39 +184,13 @@ class Seen:
 
     def conclude(self, capture: "Capture", output: Path, *, quiet: bool) -> None:
         """Say what was made, and what is wrong with the photos."""
-        _warn_of_faults(capture, self.provenance)
+        from nearfar.report.faults import faults_of
+
+        for fault in faults_of(capture, self.provenance):
+            warn(fault)
         say(
             f"transport of {self.camera} camera pixels with {capture.channels} "
             f"channel{'s' if capture.channels > 1 else ''}, "
             f"{self.lit / self.pixels:.1%} of the camera's directly lit, written to {output}",
             quiet=quiet,
-        )
-
-
-def _warn_of_faults(capture: "Capture", provenance: Mapping[str, Any]) -> None:
-    """Say what the photos themselves tell of a rig that is not linear or not steady."""
-    excess = float(provenance["excess_of_sums"])
-    if abs(excess) > NOT_LINEAR:
-        warn(
-            f"in {capture.path} a pattern and its inverse sum to {abs(excess):.1%} "
-            f"{'more' if excess > 0 else 'less'} than white and black: projector or camera is not "
-            f"linear, or the lamp drifts; relighting will be wrong by about as much."
-        )
-    rounding = float(provenance["rounding"])
-    if rounding > ROUNDED:
-        warn(
-            f"float16 strays from the windows and bands by {rounding:.2g} of their noise: "
-            f"reconstruct again without --half if that matters."
-        )
-    drift = provenance["drift"]
-    if drift is not None and max(drift.values()) > DRIFT:
-        warn(
-            f"in {capture.path} the lamp changed by {drift['lamp']:.1%}, and ambient light by "
-            f"{drift['ambient']:.1%} of white: both were followed by the references and taken out, "
-            f"but what changes between two of them is not seen."
-        )
-    if capture.saturated_share > SATURATED:
-        warn(
-            f"{capture.saturated_share:.2%} of the values in {capture.path} are saturated: their "
-            f"camera pixels will be wrong."
         )

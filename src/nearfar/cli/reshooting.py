@@ -4,7 +4,8 @@ from pathlib import Path
 
 import typer
 
-from nearfar.cli.progress import counted, progress_bar, say, warn
+from nearfar.cli.saying import say, warn
+from nearfar.progress import counted, progress_bar
 
 
 def take_again(plan_file: Path, output: Path, rig: str, numbers: list[int], *, quiet: bool) -> None:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.cli.options import Browser, Force, Port, Quiet
-from nearfar.cli.progress import progress_bar, say, warn
+from nearfar.cli.saying import say, warn
 from nearfar.errors import InputError
+from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.workflow.calibrate import Findings

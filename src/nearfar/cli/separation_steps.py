@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.progress import SATURATED, Report, counted, progress_bar, say, warn
+from nearfar.cli.saying import say, warn
+from nearfar.progress import Report, counted, progress_bar
 
 if TYPE_CHECKING:
     from nearfar.baselines.separation import Separation
@@ -122,6 +123,7 @@ def compare(
 def warn_of_faults(taken: "PhotosToSeparate", method: "Method", source: str) -> None:
     """Say what the photos themselves tell of a fault."""
     from nearfar.baselines.separation_photos import unsteadiness
+    from nearfar.capture import SATURATED
 
     if taken.saturated_share > SATURATED:
         warn(

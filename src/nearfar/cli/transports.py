@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
-from nearfar.cli.progress import progress_bar, say
+from nearfar.cli.saying import say
 from nearfar.errors import InputError
+from nearfar.progress import progress_bar
 
 COMPONENTS = ("direct", "near", "far")
 

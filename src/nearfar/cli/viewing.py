@@ -7,7 +7,8 @@ import typer
 
 from nearfar.arrays import parse_bytes
 from nearfar.cli.options import Browser, Port, Quiet, TransportPath
-from nearfar.cli.progress import progress_bar, say
+from nearfar.cli.saying import say
+from nearfar.progress import progress_bar
 
 
 def view(

@@ -27,6 +27,7 @@ from nearfar.illumination.frequencies import (
     frequency_to_text,
 )
 from nearfar.illumination.pictures import natural_picture
+from nearfar.markup import card, picture
 
 # Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by,
 # version 3 Gray code; all of an earlier version is of the next as well.
@@ -217,6 +218,20 @@ class Plan(_Frozen):
             self.require_real("draw")
             raise PlanError(f"pattern {index} of the plan is complex and cannot be drawn.")
         return pattern.draw(self.projector)
+
+    def _repr_html_(self) -> str:
+        """Show the plan in a notebook."""
+        counted = ", ".join(f"{count} {name}" for name, count in self.counts.items() if count)
+        rows = [
+            ("projector", str(self.projector)),
+            ("window W, far band", f"{self.window}, {self.far}"),
+            ("offset, correspondence", f"{self.offset}, {self.correspondence}"),
+            ("photos", f"{len(self.patterns)}: {counted}"),
+            ("brute force over photos of transport", f"{self.savings:.2f}"),
+        ]
+        shown = [] if self.offset == "none" else [0, *range(3, len(self.patterns), 7)][:5]
+        images = [(f"pattern {i}", picture(self.draw(i) / np.float32(255), "")) for i in shown]
+        return card("plan", rows, images)
 
     def to_json(self) -> str:
         """Write the plan as JSON text, a pattern per line."""

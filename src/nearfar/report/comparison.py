@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nearfar.files import new_output
+from nearfar.markup import numbers
 from nearfar.report.figures.style import new_figure, save, styled
-from nearfar.report.page import numbers, page
+from nearfar.report.page import page
 from nearfar.workflow.compare import METHODS, Comparison, Trial
 
 INDEX = "index.html"

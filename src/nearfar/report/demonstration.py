@@ -7,8 +7,9 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.correspondence import Correspondence
+from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
-from nearfar.report.page import colour_map, facts, gallery, numbers, page, picture
+from nearfar.report.page import colour_map, facts, gallery, page
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import Rows

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Size
-from nearfar.report.page import colour_map, facts, numbers, page
+from nearfar.markup import numbers
+from nearfar.report.page import colour_map, facts, page
 from nearfar.workflow.check import ModelCheck, numbers_of
 from nearfar.workflow.conditioning import Conditioning
 

@@ -2,12 +2,15 @@
 
 import base64
 from html import escape
+from io import BytesIO
+from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
+from matplotlib.figure import Figure
 
 from nearfar.arrays import Floats
-from nearfar.files import encode_png, to_srgb
+from nearfar.files import new_output
+from nearfar.markup import SCALE, embedded, false_colour
+from nearfar.report.figures.style import DPI, styled
 
 # What the page's own colours are by day and by night; data-theme on the root overrules the browser.
 _LIGHT = """--ink: #1d2129; --soft: #5b6472; --line: #dfe3e8; --back: #f7f8fa; --card: #ffffff;
@@ -59,14 +62,9 @@ figure { margin: 0; }
 .sheet img { image-rendering: auto; background: #ffffff; }
 figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
 .scale { display: flex; justify-content: space-between; font-size: .75rem; color: var(--soft); }
+.told { max-width: 46rem; padding-left: 1.2rem; }
 .bar { height: 8px; border-radius: 4px; margin-top: .5rem; }
 """
-)
-
-# Dark blue to yellow by way of teal, of even steps in lightness: read in grey as in colour.
-SCALE = np.array(
-    [[38, 20, 72], [52, 70, 140], [36, 120, 148], [50, 168, 130], [138, 205, 88], [248, 228, 60]],
-    dtype=np.float64,
 )
 
 
@@ -80,43 +78,21 @@ def page(title: str, body: str) -> str:
     )
 
 
-def picture(image: Floats, description: str) -> str:
-    """Return an <img> of linear light, clipped to [0, 1] and shown as sRGB.
-
-    Parameters
-    ----------
-    image : ndarray, shape (y, x) or (y, x, 3)
-    description : str
-        For those who cannot see it.
-    """
-    return _img(np.rint(255 * to_srgb(np.clip(image, 0, 1))).astype(np.uint8), description)
-
-
-def _img(pixels: NDArray[np.uint8], description: str) -> str:
-    data = base64.b64encode(encode_png(np.ascontiguousarray(pixels))).decode("ascii")
-    return f'<img alt="{escape(description)}" src="data:image/png;base64,{data}">'
-
-
-def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
-    """Colour values between `low` and `high`, uint8 (y, x, 3); grey where there is none (NaN)."""
-    share = np.clip((np.nan_to_num(values, nan=low) - low) / max(high - low, 1e-12), 0, 1)
-    place = share * (len(SCALE) - 1)
-    below = np.minimum(place.astype(np.int64), len(SCALE) - 2)
-    part = (place - below)[..., None]
-    colours = SCALE[below] * (1 - part) + SCALE[below + 1] * part
-    colours[~np.isfinite(values)] = 128
-    return np.asarray(np.rint(colours).astype(np.uint8))
-
-
 def colour_map(values: Floats, low: float, high: float, unit: str, caption: str) -> str:
     """Return a <figure> of values in false colour with its scale."""
     stops = ", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
     return (
-        f"<figure>{_img(false_colour(values, low, high), caption)}"
+        f"<figure>{embedded(false_colour(values, low, high), caption)}"
         f'<div class="bar" style="background: linear-gradient(to right, {stops})"></div>'
         f'<div class="scale"><span>{low:.0f} {unit}</span><span>{high:.0f} {unit}</span></div>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
+
+
+def listed(sentences: list[str]) -> str:
+    """Return a list of sentences."""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    return f'<ul class="told">{items}</ul>'
 
 
 def gallery(columns: list[str], rows: list[tuple[str, list[str]]]) -> str:
@@ -140,10 +116,25 @@ def facts(pairs: list[tuple[str, str]]) -> str:
     return f'<div class="facts">{cards}</div>'
 
 
-def numbers(head: list[str], rows: list[list[str]]) -> str:
-    """Return a table of figures."""
-    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+def write_page(path: Path, text: str, *, force: bool = False) -> None:
+    """Write a page, whole or not at all.
+
+    Raises
+    ------
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`.
+    """
+    with new_output(path, force=force) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def plot(figure: Figure, description: str) -> str:
+    """Return an <img> of a figure."""
+    data = BytesIO()
+    with styled():
+        figure.savefig(data, format="png", dpi=DPI, metadata={"Software": None})
+    shown = base64.b64encode(data.getvalue()).decode("ascii")
+    return (
+        f'<figure class="sheet"><img alt="{escape(description)}" '
+        f'src="data:image/png;base64,{shown}"></figure>'
     )
-    return f'<div class="wide"><table class="numbers"><tr>{top}</tr>{body}</table></div>'

@@ -11,15 +11,19 @@ from scipy.sparse.linalg import LinearOperator
 
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.errors import InputError
+from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
+from nearfar.transport.plots import Plots, colours
 from nearfar.transport.quality import Quality
 
 # Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
 BLOCK = 8192
+# Pixels along the longer side of a picture that a notebook shows.
+THUMBNAIL = 256
 
 
 class Components(NamedTuple):
@@ -102,6 +106,31 @@ class Transport:
     @cached_property
     def _centres(self) -> NDArray[np.int64]:
         return windows.centre(self.correspondence, self.projector)
+
+    @property
+    def plot(self) -> Plots:
+        """Drawings of it, as matplotlib axes; see `nearfar.transport.plots`."""
+        return Plots(self)
+
+    def _repr_html_(self) -> str:
+        """Show the transport in a notebook, floodlit and taken apart."""
+        step = -(-max(self.camera) // THUMBNAIL)
+        parts = self.components(np.ones(self.projector, dtype=np.float32))
+        pictures = {"floodlit": np.asarray(sum(parts)), **parts._asdict()}
+        brightest = float(np.percentile(pictures["floodlit"], 99.5))
+        images = [
+            (name, picture(colours(part)[::step, ::step] / max(brightest, 1e-9), name))
+            for name, part in pictures.items()
+        ]
+        rows = [
+            ("projector", str(self.projector)),
+            ("camera", f"{self.camera}, {self.channels} channels"),
+            ("window W, far coefficients", f"{self.window}, {self.far_basis.count}"),
+            ("directly lit", f"{self.lit.mean():.1%} of the camera"),
+            ("error bars", "yes" if self.belief is not None else "no"),
+            ("method", str(self.provenance.get("method", "unknown"))),
+        ]
+        return card("transport", rows, images)
 
     def __matmul__(self, light: Floats) -> Floats:
         return np.asarray(sum(self.components(light)))

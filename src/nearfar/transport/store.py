@@ -25,7 +25,7 @@ from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED
+from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED, stacked, thinned
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
@@ -222,6 +222,14 @@ class StoredTransport:
         """Read the camera row by row in blocks of so many bytes, each when it is asked for."""
         for rows in blocks(self.camera.height, size // self._row_bytes):
             yield self.rows(rows)
+
+    def thinned(self, step: int) -> Transport:
+        """Read every `step`-th row and column of the camera, no more of it at once than a block."""
+        parts, first = [], 0
+        for part in self.blocks():
+            parts.append(thinned(part, step, -first % step))
+            first += part.camera.height
+        return stacked([part for part in parts if part.camera.height])
 
 
 def open_transport(path: AnyPath) -> StoredTransport:

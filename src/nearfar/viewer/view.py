@@ -16,11 +16,13 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError, NearfarError
 from nearfar.files import encode_png, from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
+from nearfar.markup import SCALE
 from nearfar.packages import needed
-from nearfar.report.page import SCALE, STYLE
+from nearfar.report.maps import Map, map_named, maps_of
+from nearfar.report.page import STYLE
 from nearfar.version import version
 from nearfar.viewer.decoding import LARGEST, decode_apart
-from nearfar.viewer.inspecting import Map, inspect_row, map_named, maps_of
+from nearfar.viewer.inspecting import inspect_row
 from nearfar.viewer.messages import WHITE, Gains, Light, largest_light, pack, unpack_light
 from nearfar.viewer.serving import Place, serve
 from nearfar.viewer.viewed import ViewedTransport

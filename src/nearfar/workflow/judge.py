@@ -1,9 +1,9 @@
 """Judge a transport by the truth, or by photos that it never saw."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,19 +14,36 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import (
+    Rows,
     floodlit_snr,
     model_truth,
     percentiles,
     relighting_snr,
+    require_same_kind,
     row_snr,
     snr,
     split_snr,
+    transport_exposure,
 )
+
+
+class Pair(NamedTuple):
+    """A relit picture beside what it should be.
+
+    Attributes
+    ----------
+    light, relit, known : ndarray
+    """
+
+    light: Floats
+    relit: Floats
+    known: Floats
 
 
 def judge_by_truth(
     transport: Transport,
     truth: ExactTransport,
+    rows: Rows | None = None,
     *,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Any]:
@@ -36,6 +53,8 @@ def judge_by_truth(
     ----------
     transport : Transport
     truth : ExactTransport
+    rows : Rows, optional
+        As `nearfar.row_snr` gives them, if they are there already.
     progress : callable, optional
         Told what is done and the share done.
 
@@ -55,7 +74,8 @@ def judge_by_truth(
     report = progress or (lambda _what, _share: None)
     lights = standard_lights(transport.projector)
     found = relighting_snr(transport, truth, lights)
-    rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
+    if rows is None:
+        rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
     components = dict(rows.components)
     answer: dict[str, Any] = {
         "snr_b": found,
@@ -87,10 +107,40 @@ def _mean_of_pictures(found: dict[str, float]) -> float:
     return float(np.mean([value for name, value in found.items() if name.startswith("picture")]))
 
 
+def beside_truth(transport: Transport, truth: ExactTransport) -> dict[str, Pair]:
+    """Relight under lights of every sort, beside the exact pictures.
+
+    Raises
+    ------
+    InputError
+        If the truth is of other sizes.
+    """
+    require_same_kind(transport, truth)
+    exposure = np.float32(transport_exposure(transport))
+    found = {}
+    for name, light in standard_lights(transport.projector).items():
+        relit = transport @ light
+        found[name] = Pair(light, relit, (exposure * (truth @ light)).reshape(relit.shape))
+    return found
+
+
+def judge_pairs(pairs: Mapping[str, Pair]) -> dict[str, Any]:
+    """Return ``snr_b`` per light and ``snr_b_mean``, dB."""
+    found = {name: snr(pair.known, pair.relit) for name, pair in pairs.items()}
+    return {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
+
+
 def judge_by_photos(
     transport: Transport, folder: Path, *, full_scale: float | None = None
 ) -> dict[str, Any]:
-    """Compare relighting with photos under lights: pairs NAME.light.*, NAME.photo.*.
+    """Compare relighting with photos; see `beside_photos` and `judge_pairs`."""
+    return judge_pairs(beside_photos(transport, folder, full_scale=full_scale))
+
+
+def beside_photos(
+    transport: Transport, folder: Path, *, full_scale: float | None = None
+) -> dict[str, Pair]:
+    """Relight under lights beside photos of them: pairs NAME.light.*, NAME.photo.*.
 
     Parameters
     ----------
@@ -104,8 +154,8 @@ def judge_by_photos(
 
     Returns
     -------
-    dict
-        ``snr_b`` per light, dB.
+    dict of str to Pair
+        Photos less black.
 
     Raises
     ------
@@ -135,8 +185,9 @@ def judge_by_photos(
     judged = [name for name in lights if name not in dark]
     if not judged:
         raise InputError(f"{folder} has a black light only: add pairs under other lights.")
-    found = {name: snr(photos[name] - black, transport @ lights[name]) for name in judged}
-    return {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
+    return {
+        name: Pair(lights[name], transport @ lights[name], photos[name] - black) for name in judged
+    }
 
 
 def _photo(transport: Transport, path: Path, full_scale: float | None) -> Floats:

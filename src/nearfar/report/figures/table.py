@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from nearfar.markup import numbers
 from nearfar.report.figures.rival import LIGHTS
-from nearfar.report.page import numbers
 from nearfar.workflow.experiments.data import Data
 
 HEAD = (

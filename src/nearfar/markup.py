@@ -1,0 +1,79 @@
+"""Scraps of HTML that stand on their own: pictures inside, nothing fetched, no script."""
+
+import base64
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats
+from nearfar.files import encode_png, to_srgb
+
+# Dark blue to yellow by way of teal, of even steps in lightness: read in grey as in colour.
+SCALE = np.array(
+    [[38, 20, 72], [52, 70, 140], [36, 120, 148], [50, 168, 130], [138, 205, 88], [248, 228, 60]],
+    dtype=np.float64,
+)
+
+
+def picture(image: Floats, description: str) -> str:
+    """Return an <img> of linear light, clipped to [0, 1] and shown as sRGB.
+
+    Parameters
+    ----------
+    image : ndarray, shape (y, x) or (y, x, 3)
+    description : str
+        For those who cannot see it.
+    """
+    return embedded(np.rint(255 * to_srgb(np.clip(image, 0, 1))).astype(np.uint8), description)
+
+
+def embedded(pixels: NDArray[np.uint8], description: str) -> str:
+    """Return an <img> of 8-bit pixels, (y, x) or (y, x, 3)."""
+    data = base64.b64encode(encode_png(np.ascontiguousarray(pixels))).decode("ascii")
+    return f'<img alt="{escape(description)}" src="data:image/png;base64,{data}">'
+
+
+def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
+    """Colour values between `low` and `high`, uint8 (y, x, 3); grey where there is none (NaN)."""
+    share = np.clip((np.nan_to_num(values, nan=low) - low) / max(high - low, 1e-12), 0, 1)
+    place = share * (len(SCALE) - 1)
+    below = np.minimum(place.astype(np.int64), len(SCALE) - 2)
+    part = (place - below)[..., None]
+    colours = SCALE[below] * (1 - part) + SCALE[below + 1] * part
+    colours[~np.isfinite(values)] = 128
+    return np.asarray(np.rint(colours).astype(np.uint8))
+
+
+def numbers(head: list[str], rows: list[list[str]]) -> str:
+    """Return a table of figures."""
+    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f'<div class="wide"><table class="numbers"><tr>{top}</tr>{body}</table></div>'
+
+
+def card(title: str, rows: list[tuple[str, str]], images: list[tuple[str, str]]) -> str:
+    """Return what a notebook shows of something: facts, and small pictures under their names.
+
+    Parameters
+    ----------
+    title : str
+    rows : list of (name, value)
+    images : list of (name, <img>)
+    """
+    facts = "".join(
+        f'<tr><th style="text-align:left;padding-right:1em;font-weight:500">{escape(name)}</th>'
+        f'<td style="text-align:left">{escape(value)}</td></tr>'
+        for name, value in rows
+    )
+    shown = "".join(
+        f'<figure style="margin:0;width:140px">{one}'
+        f'<figcaption style="font-size:.85em;opacity:.75">{escape(name)}</figcaption></figure>'
+        for name, one in images
+    )
+    return (
+        f"<div><b>{escape(title)}</b><table>{facts}</table>"
+        f'<div style="display:flex;flex-wrap:wrap;gap:.8em;margin-top:.5em">{shown}</div></div>'
+    )

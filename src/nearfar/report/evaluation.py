@@ -1,0 +1,114 @@
+"""The report of an evaluation: relit beside exact or photographed, and the figures."""
+
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from nearfar.markup import numbers, picture
+from nearfar.report.figures.style import new_figure, styled
+from nearfar.report.page import colour_map, facts, gallery, page, plot
+from nearfar.report.reconstruction import exposure_of, visible
+from nearfar.transport.model import Transport
+from nearfar.workflow.evaluate import HIGHEST, Rows
+from nearfar.workflow.judge import Pair
+
+# Small differences are shown this much brighter.
+MAGNIFIED = 10
+
+
+def evaluation_page(
+    transport: Transport,
+    source: str,
+    judgement: Mapping[str, Any],
+    pairs: Mapping[str, Pair],
+    rows: Rows | None = None,
+) -> str:
+    """Return the report of an evaluation as one self-contained HTML page.
+
+    Parameters
+    ----------
+    transport : Transport
+    source : str
+        What it was compared with.
+    judgement : mapping
+        As `nearfar.workflow.judge` gives it.
+    pairs : mapping of str to Pair
+        By the names of lights.
+    rows : Rows, optional
+        Where all of the true transport is known.
+    """
+    found: Mapping[str, float] = judgement["snr_b"]
+    ceiling = judgement.get("ceiling", {}).get("snr_b", {})
+    cards = [(f"{np.mean(list(found.values())):.1f} dB", f"SNR_b, mean of {len(found)} lights")]
+    if rows is not None:
+        cards.append((f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"))
+        cards.append((f"{judgement['snr_t']['p5']:.1f} dB", "SNR_t, 5 of 100 are below"))
+    head = ["light", "SNR_b", *(["ceiling of the model, no noise"] if ceiling else [])]
+    table = [
+        [name, f"{value:.1f} dB", *([f"{ceiling[name]:.1f} dB"] if ceiling else [])]
+        for name, value in found.items()
+    ]
+    exposure = exposure_of(transport)
+    shown = [(name, _cells(name, pair, exposure)) for name, pair in pairs.items()]
+    columns = ["light", "relit", "known", f"difference × {MAGNIFIED}"]
+    body = f"""
+<h1>How close the transport comes</h1>
+<p>Compared with {escape(source)}. SNR_b is 20 log10 of the known picture over the difference,
+SNR_t the same of a camera pixel's row of the transport.</p>
+{facts(cards)}
+<h2>Relit beside what is known</h2>
+{gallery(columns, shown)}
+<h2>Figures</h2>
+{numbers(head, table)}
+{_components(judgement)}
+{_of_rows(rows)}
+"""
+    return page("nearfar: evaluation", body)
+
+
+def _cells(name: str, pair: Pair, exposure: float) -> list[str]:
+    difference = MAGNIFIED * np.abs(pair.relit - pair.known)
+    images = {"relit": pair.relit, "known": pair.known, "difference": difference}
+    return [picture(pair.light, f"light: {name}")] + [
+        picture(visible(exposure * image), f"{what} under {name}") for what, image in images.items()
+    ]
+
+
+def _components(judgement: Mapping[str, Any]) -> str:
+    split = judgement.get("snr", {})
+    if "physical" not in split:
+        return ""
+    rows = [
+        [what, *(_decibels(split[how][key]) for how in ("floodlit", "physical", "model"))]
+        for what, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
+    ]
+    head = ["component", "its floodlit picture", "its rows, by physics", "its rows, by the model"]
+    return f"<p></p>{numbers(head, rows)}"
+
+
+def _decibels(value: float) -> str:
+    return f"{value:.1f} dB" if value > -HIGHEST else "the scene has none"
+
+
+def _of_rows(rows: Rows | None) -> str:
+    if rows is None:
+        return ""
+    with styled():
+        figure = new_figure(2.2)
+        axes = figure.subplots()
+        axes.hist(rows.snr_t.ravel(), bins=60, color="#1f4e9c")
+        axes.set(xlabel="SNR_t, dB", ylabel="camera pixels")
+    maps = [
+        (rows.snr_t, "SNR_t of every camera pixel"),
+        (rows.snr_b_of_frequency, "SNR_b under every frequency, DC in the middle"),
+    ]
+    drawn = ""
+    for values, caption in maps:
+        low, high = np.percentile(values, [1, 99])
+        drawn += colour_map(values, float(low), float(high), "dB", caption)
+    return (
+        f"<h2>Every camera pixel, every frequency</h2>{plot(figure, 'histogram of SNR_t')}"
+        f'<div class="maps">{drawn}</div>'
+    )

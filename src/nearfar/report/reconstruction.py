@@ -1,0 +1,163 @@
+"""The report of a reconstruction: pictures, maps, how sure it is, of what it was made."""
+
+import json
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from nearfar.arrays import Floats
+from nearfar.capture import Capture
+from nearfar.illumination.pictures import natural_picture, white
+from nearfar.markup import numbers, picture
+from nearfar.plan import Plan
+from nearfar.report.faults import faults_of
+from nearfar.report.figures.style import new_figure, styled
+from nearfar.report.maps import Map, maps_of
+from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
+from nearfar.transport.model import Transport
+from nearfar.transport.store import StoredTransport
+
+# Camera pixels of a report's pictures, at most.
+PIXELS = 2**17
+PURPOSES = {
+    "direct": "direct light: the checkerboard",
+    "near": "near-range light",
+    "far": "far-range light",
+    "reference": "white and black, to measure against",
+    "correspondence": "which projector pixel lights which camera pixel",
+    "check": "pictures to check relighting by",
+}
+
+
+def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
+    """Return the report of a transport as one self-contained HTML page.
+
+    Parameters
+    ----------
+    stored : StoredTransport
+        Large ones are shown by every second row and column, and so on.
+    capture : Capture
+        That it was made from.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the transport is damaged.
+    """
+    step = int(np.ceil(np.sqrt(stored.camera.pixels / PIXELS)))
+    transport = stored.thinned(step)
+    exposure = exposure_of(transport)
+    maps = {name: compute() for name, compute in maps_of(transport).items()}
+    sure = maps.get("error", maps.get("noise"))
+    assert sure is not None
+    told = np.isfinite(sure.values)
+    median = f"{np.median(sure.values[told]):.1f} dB" if told.any() else "none"
+    plan = capture.plan
+    cards = facts(
+        [
+            (str(len(plan.patterns)), "photos"),
+            (f"{plan.projector.pixels / len(plan.patterns):.1f}×", "fewer than by brute force"),
+            (str(stored.camera), f"camera pixels, {stored.channels} channels"),
+            (str(stored.projector), "projector pixels"),
+            (f"{transport.lit.mean():.1%}", "of the camera directly lit"),
+            (median, f"{sure.title}, median"),
+        ]
+    )
+    faults = [*faults_of(capture, stored.provenance), *capture.alarms]
+    thinned = "" if step == 1 else f" Every {step}th row and column of the camera is shown."
+    body = f"""
+<h1>{escape(stored.path.name)}</h1>
+<p>The light transport of a scene, reconstructed from the photos in
+{escape(capture.path.name)} by the {stored.provenance["method"]} method.{thinned}</p>
+{cards}
+<h2>What to look at</h2>
+{listed(faults) if faults else "<p>Nothing that the photos tell speaks against them.</p>"}
+<h2>Relit, and taken apart</h2>
+<p>Direct light comes from one projector pixel, near-range light from the window around it,
+far-range light from everywhere. {_exposed(exposure)}</p>
+{gallery(["light", "direct", "near-range", "far-range", "relit"], _rows(transport, exposure))}
+<h2>Maps</h2>
+<div class="maps">{"".join(_map(each) for each in maps.values())}</div>
+<h2>How sure</h2>
+{plot(_histogram(sure), "histogram of " + sure.title)}
+<h2>The plan</h2>
+{_plan_table(plan)}
+<h2>Where it comes from</h2>
+{numbers(["", ""], _provenance(stored, capture))}
+"""
+    return page(f"nearfar: {stored.path.name}", body)
+
+
+def exposure_of(transport: Transport) -> float:
+    """Return the gain under which the floodlit picture is bright."""
+    brightest = float(np.percentile(transport @ white(transport.projector), 99.5))
+    return float(2.0 ** np.round(np.log2(0.9 / brightest))) if brightest > 0 else 1.0
+
+
+def _exposed(exposure: float) -> str:
+    return "" if exposure == 1 else f"Pictures are shown {exposure:g} times as bright."
+
+
+def _rows(transport: Transport, exposure: float) -> list[tuple[str, list[str]]]:
+    lights = {
+        "white": white(transport.projector),
+        "a picture": natural_picture(transport.projector, 1),
+    }
+    rows = []
+    for name, light in lights.items():
+        parts = transport.components(light)
+        shown = [*(exposure * part for part in parts), exposure * sum(parts)]
+        what = ["direct", "near-range", "far-range", "relit"]
+        cells = [picture(light, f"light: {name}")]
+        for image, part in zip(shown, what, strict=True):
+            cells.append(picture(visible(np.asarray(image)), f"{part} under {name}"))
+        rows.append((name, cells))
+    return rows
+
+
+def visible(image: Floats) -> Floats:
+    """Turn a picture of any number of channels into one of 1 or 3."""
+    if image.ndim == 2 or image.shape[2] == 3:
+        return image
+    return image[..., :3] if image.shape[2] > 3 else image.mean(axis=-1)
+
+
+def _map(each: Map) -> str:
+    return colour_map(each.values, each.low, each.high, each.unit, each.title)
+
+
+def _histogram(each: Map) -> Figure:
+    with styled():
+        figure = new_figure(2.2)
+        axes = figure.subplots()
+        axes.hist(each.values[np.isfinite(each.values)], bins=60, color="#1f4e9c")
+        axes.set(xlabel=f"{each.title}, {each.unit}", ylabel="camera pixels")
+    return figure
+
+
+def _plan_table(plan: Plan) -> str:
+    rows = [[PURPOSES[name], str(count)] for name, count in plan.counts.items() if count]
+    rows.append(["all photos", str(len(plan.patterns))])
+    rows.append(["window of near-range light", f"{plan.window} x {plan.window}"])
+    rows.append(["far band", str(plan.far)])
+    return numbers(["photos for", "number"], rows)
+
+
+def _provenance(stored: StoredTransport, capture: Capture) -> list[list[str]]:
+    known: Mapping[str, Any] = {"capture": str(capture.path), **stored.provenance}
+    rows = [[name, told] for name, told in _flat(known) if not name.startswith("plan")]
+    seconds = capture.times.max() - capture.times.min() if len(capture.times) else 0.0
+    return [*rows, ["taken in", f"{seconds:.0f} s"]]
+
+
+def _flat(values: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, str]]:
+    """Lay nested values out as names and texts."""
+    for name, value in values.items():
+        named = f"{within}{name}".replace("_", " ")
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{named}: ")
+        else:
+            yield named, value if isinstance(value, str) else json.dumps(value)

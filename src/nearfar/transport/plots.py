@@ -1,0 +1,192 @@
+"""Drawings of a transport: ``transport.plot.relit(light)`` and others, as matplotlib axes.
+
+Each draws on the axes that it is given, or on new ones, and returns them, for titles and the rest.
+"""
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.errors import InputError
+from nearfar.files import to_srgb
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from nearfar.transport.model import Transport
+
+# Decades of a logarithmic scale.
+DECADES = 5.0
+PARTS = ("direct", "near", "far")
+
+
+class _ErrorsOfRows(Protocol):
+    """What tells standard deviations of rows, as `nearfar.ErrorBars` does."""
+
+    def component_rows(self, pixels: slice) -> Any:
+        """Return those of D, N and F."""
+
+
+def colours(picture: Floats) -> Floats:
+    """Turn a picture of any number of channels into one that can be shown, of 1 or 3."""
+    if picture.ndim == 2 or picture.shape[2] == 3:
+        return picture
+    return picture[..., :3] if picture.shape[2] > 3 else np.asarray(picture.mean(axis=-1))
+
+
+class Plots:
+    """Drawings of one transport; `Transport.plot` gives them.
+
+    Parameters
+    ----------
+    transport : Transport
+    """
+
+    def __init__(self, transport: "Transport") -> None:
+        self._transport = transport
+
+    def relit(self, light: Floats, *, exposure: float = 1.0, ax: "Axes | None" = None) -> "Axes":
+        """Draw the picture under a light, as sRGB.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        exposure : float
+            Photo units are shown this many times as bright.
+        ax : Axes, optional
+        """
+        return _show(_axes(ax), exposure * (self._transport @ light), "relit")
+
+    def components(
+        self, light: Floats, *, exposure: float = 1.0, ax: "list[Axes] | None" = None
+    ) -> "list[Axes]":
+        """Draw the relit direct, near- and far-range pictures; three axes."""
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = list(pyplot.subplots(1, 3, figsize=(9, 3.2), layout="constrained")[1])
+        if len(ax) != len(PARTS):
+            raise InputError(f"{len(ax)} axes were given for three components: give three.")
+        parts = self._transport.components(light)
+        return [
+            _show(each, exposure * part, name)
+            for each, part, name in zip(ax, parts, PARTS, strict=True)
+        ]
+
+    def correspondence(self, axis: str = "x", *, ax: "Axes | None" = None) -> "Axes":
+        """Draw q: the projector's column ("x") or row ("y") that lights each camera pixel."""
+        if axis not in {"x", "y"}:
+            raise InputError(f"{axis!r} is no axis of q: give 'x' or 'y'.")
+        drawn = _axes(ax)
+        image = drawn.imshow(self._transport.correspondence[..., "yx".index(axis)], cmap="viridis")
+        drawn.figure.colorbar(image, ax=drawn, label=f"q along {axis}, projector pixels")
+        return _bare(drawn, "correspondence")
+
+    def row(
+        self,
+        y: int,
+        x: int,
+        *,
+        errors: _ErrorsOfRows | None = None,
+        ax: "Axes | None" = None,
+    ) -> "Axes":
+        """Draw what a camera pixel answers along the projector's row through its q.
+
+        Parameters
+        ----------
+        y, x : int
+            Camera pixel.
+        errors : ErrorBars, optional
+            Draws a band of one standard deviation.
+        ax : Axes, optional
+        """
+        transport, pixel = self._transport, self._pixel(y, x)
+        q = transport.correspondence[y, x]
+        height, width = transport.projector
+        line = int(np.rint(q[0])) if np.isfinite(q[0]) else height // 2
+        drawn = _axes(ax)
+        rows = transport.component_rows(pixel)
+        bars = errors.component_rows(pixel) if errors is not None else None
+        for number, (name, values) in enumerate(zip(PARTS, rows, strict=True)):
+            level = np.abs(values[0].mean(axis=0).reshape(height, width)[line])
+            (drawn_line,) = drawn.semilogy(level, label=name)
+            if bars is not None:
+                off = bars[number][0].mean(axis=0).reshape(height, width)[line]
+                low = np.maximum(level - off, 1e-12)
+                drawn.fill_between(
+                    np.arange(width), low, level + off, alpha=0.25, color=drawn_line.get_color()
+                )
+        drawn.set(xlabel=f"projector column, row {line}", ylabel="answer, photo units")
+        drawn.set_title(f"camera pixel ({y}, {x})")
+        drawn.legend()
+        return drawn
+
+    def transport_row(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw a camera pixel's row of T over the projector, log scale."""
+        transport = self._transport
+        row = transport.rows(self._pixel(y, x))[0].mean(axis=0).reshape(transport.projector)
+        drawn = _logarithm(_axes(ax), row)
+        return _bare(drawn, f"row of camera pixel ({y}, {x})")
+
+    def spectrum(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw the spectrum of a camera pixel's row, DC in the middle, and k_far around it."""
+        transport = self._transport
+        height, width = transport.projector
+        row = transport.rows(self._pixel(y, x))[0].mean(axis=0).reshape(height, width)
+        size = np.abs(np.fft.fftshift(np.fft.fft2(row)))
+        decibels = 20 * np.log10(np.maximum(size / max(size.max(), 1e-30), 1e-6))
+        drawn = _axes(ax)
+        image = drawn.imshow(
+            decibels, extent=(-0.5, 0.5, 0.5, -0.5), cmap="magma", vmin=-80, vmax=0, aspect="auto"
+        )
+        drawn.figure.colorbar(image, ax=drawn, label="dB below its largest")
+        ky, kx = np.abs(transport.far_basis.cycles).max(axis=0, initial=0.0)
+        drawn.plot([-kx, kx, kx, -kx, -kx], [-ky, -ky, ky, ky, -ky], color="white", label="k_far")
+        drawn.set(xlabel="fx, cycles per projector pixel", ylabel="fy")
+        drawn.set_title(f"spectrum of camera pixel ({y}, {x})")
+        drawn.legend()
+        return drawn
+
+    def column(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw what a projector pixel lights, log scale."""
+        height, width = self._transport.projector
+        if not (0 <= y < height and 0 <= x < width):
+            raise InputError(f"({y}, {x}) is no pixel of the projector of {height}x{width}.")
+        picture = self._transport.column(y, x)
+        picture = picture if picture.ndim == 2 else picture.mean(axis=-1)
+        return _bare(_logarithm(_axes(ax), picture), f"lit by projector pixel ({y}, {x})")
+
+    def _pixel(self, y: int, x: int) -> slice:
+        height, width = self._transport.camera
+        if not (0 <= y < height and 0 <= x < width):
+            raise InputError(f"({y}, {x}) is no pixel of the camera of {height}x{width}.")
+        return slice(y * width + x, y * width + x + 1)
+
+
+def _axes(ax: "Axes | None") -> "Axes":
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    return pyplot.subplots(layout="constrained")[1]
+
+
+def _show(ax: "Axes", picture: Floats, title: str) -> "Axes":
+    ax.imshow(to_srgb(np.clip(colours(picture), 0, 1)), cmap="gray", vmin=0, vmax=1)
+    return _bare(ax, title)
+
+
+def _logarithm(ax: "Axes", values: Floats) -> "Axes":
+    shown = np.log10(np.maximum(np.abs(values), 1e-30))
+    high = float(shown.max())
+    image = ax.imshow(shown, cmap="magma", vmin=high - DECADES, vmax=high)
+    ax.figure.colorbar(image, ax=ax, label="log10 of the answer")
+    return ax
+
+
+def _bare(ax: "Axes", title: str) -> "Axes":
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.set_title(title)
+    return ax

@@ -1,0 +1,148 @@
+"""Reports of reconstruct and evaluate, from the command line to what a browser would show."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.files import write_picture
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.report.maps import maps_of
+from nearfar.report.reconstruction import PIXELS, reconstruction_page
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.transport.store import load_transport, open_transport
+from nearfar.workflow.acquire import acquire
+from tests.cli.conftest import run_nearfar
+from tests.worlds import model_transport
+
+PROJECTOR, CAMERA = Size(12, 16), Size(14, 18)
+
+
+@pytest.fixture(scope="module")
+def world():
+    return model_transport(PROJECTOR, CAMERA, window=3, far=Size(3, 3), channels=3)
+
+
+def take(plan, world, path, projector=None, **camera):
+    rig = SimulatedRig(
+        world, "test", projector or SimulatedProjector(), SimulatedCamera(**camera), 1.0, 0
+    )
+    return acquire(plan, path, rig)
+
+
+@pytest.fixture(scope="module")
+def made(world, tmp_path_factory):
+    """A capture, its transport and the report that was written with it."""
+    folder = tmp_path_factory.mktemp("made")
+    plan, _ = choose_plan(PROJECTOR, 40)
+    take(plan, world, folder / "capture.zarr")
+    ran = run_nearfar(
+        "reconstruct", folder / "capture.zarr", folder / "t.zarr", "--report", folder / "r.html"
+    )
+    assert ran.status == 0, ran.err
+    assert "report written to" in ran.out
+    return folder
+
+
+def stands_alone(text):
+    assert not re.search(r'(src|href)="(?!data:)', text)
+    assert "<script" not in text
+    assert "http:" not in text
+    assert "https:" not in text
+
+
+def test_a_report_tells_of_a_reconstruction(made):
+    text = (made / "r.html").read_text()
+    stands_alone(text)
+    transport = load_transport(made / "t.zarr")
+    for name, compute in maps_of(transport).items():
+        assert compute().title in text, name
+    assert "Nothing that the photos tell speaks against them." in text
+    # Lights and their parts, maps, and the histogram.
+    assert text.count("<img") == 10 + len(maps_of(transport)) + 1
+    assert "white and black, to measure against" in text
+    assert "nearfar" in text
+    assert "<td>joint</td>" in text
+
+
+def test_warnings_stand_in_the_report_and_on_the_terminal(world, tmp_path):
+    plan = paper_plan(PROJECTOR, 3, Size(3, 3))
+    take(plan, world, tmp_path / "c.zarr", projector=SimulatedProjector(gamma=1.6))
+    ran = run_nearfar(
+        "reconstruct", tmp_path / "c.zarr", tmp_path / "t.zarr", "--report", tmp_path / "r.html"
+    )
+    assert ran.status == 0
+    assert "projector or camera is not linear" in ran.err
+    text = (tmp_path / "r.html").read_text()
+    assert "projector or camera is not linear" in text
+    assert "Nothing that the photos tell" not in text
+
+
+def test_a_report_is_not_overwritten_and_refused_before_any_work(made, tmp_path):
+    (tmp_path / "r.html").write_text("kept")
+    where = ("reconstruct", made / "capture.zarr", tmp_path / "t.zarr")
+    ran = run_nearfar(*where, "--report", tmp_path / "r.html")
+    assert ran.status == 1
+    assert "r.html" in ran.err
+    assert not (tmp_path / "t.zarr").exists()
+    assert (tmp_path / "r.html").read_text() == "kept"
+    ran = run_nearfar(*where, "--report", tmp_path / "r.html", "--force")
+    assert ran.status == 0
+    assert "Relit, and taken apart" in (tmp_path / "r.html").read_text()
+
+
+def test_a_large_camera_is_thinned_out(made, monkeypatch):
+    from nearfar.capture import open_capture
+
+    monkeypatch.setattr("nearfar.report.reconstruction.PIXELS", CAMERA.pixels // 3)
+    page = reconstruction_page(open_transport(made / "t.zarr"), open_capture(made / "capture.zarr"))
+    assert "Every 2th row and column" in page
+    assert CAMERA.pixels < PIXELS
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_a_transport_of_any_channels_has_one(tmp_path, channels):
+    world = model_transport(PROJECTOR, CAMERA, window=3, far=Size(3, 3), channels=channels)
+    plan, _ = choose_plan(PROJECTOR, 40)
+    take(plan, world, tmp_path / "c.zarr")
+    ran = run_nearfar(
+        "reconstruct", tmp_path / "c.zarr", tmp_path / "t.zarr", "--method", "joint",
+        "--report", tmp_path / "r.html",
+    )  # fmt: skip
+    assert ran.status == 0, ran.err
+    stands_alone((tmp_path / "r.html").read_text())
+
+
+def test_an_evaluation_by_truth(made, world, tmp_path):
+    np.save(tmp_path / "T.npy", np.moveaxis(world.dense(), 1, 2))
+    ran = run_nearfar(
+        "evaluate", made / "t.zarr", "--truth", tmp_path / "T.npy", "--report", tmp_path / "e.html"
+    )
+    assert ran.status == 0, ran.err
+    text = (tmp_path / "e.html").read_text()
+    stands_alone(text)
+    assert "SNR_t of every camera pixel" in text
+    found = float(re.search(r"white +(\d+\.\d+) dB", ran.out).group(1))
+    assert f"<td>{found:.1f} dB</td>" in text
+
+
+def test_an_evaluation_by_photos(made, world, tmp_path):
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    light = np.random.default_rng(0).random(PROJECTOR).astype(np.float32)
+    write_picture(folder / "a<b.light.npy", light)
+    transport = load_transport(made / "t.zarr")
+    write_picture(folder / "a<b.photo.npy", (world @ light).astype(np.float32) + transport.black)
+    ran = run_nearfar(
+        "evaluate", made / "t.zarr", "--photos", folder, "--report", tmp_path / "e.html", "--json"
+    )
+    assert ran.status == 0, ran.err
+    text = (tmp_path / "e.html").read_text()
+    stands_alone(text)
+    assert "a&lt;b" in text
+    assert "a<b" not in text
+    shutil.rmtree(folder)

@@ -1,0 +1,77 @@
+"""Drawings of a transport."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.files import to_srgb
+from tests.worlds import model_transport
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    mpl.use("agg")
+    yield
+    pyplot.close("all")
+
+
+@pytest.fixture(params=[1, 2, 3, 4])
+def transport(request):
+    return model_transport(
+        Size(9, 12), Size(7, 8), window=3, far=Size(3, 3), channels=request.param
+    )
+
+
+def test_a_relit_picture_is_drawn_as_it_is(transport):
+    light = np.ones(transport.projector)
+    ax = transport.plot.relit(light, exposure=0.5)
+    assert isinstance(ax, Axes)
+    drawn = ax.images[0].get_array()
+    picture = (transport @ light).reshape(7, 8, -1)
+    known = picture[..., :3] if picture.shape[2] >= 3 else picture.mean(axis=-1)
+    np.testing.assert_allclose(drawn, to_srgb(0.5 * known), atol=1e-5)
+
+
+def test_every_drawing_takes_axes_and_returns_them(transport):
+    plot = transport.plot
+    for draw in (
+        lambda ax: plot.relit(np.ones(transport.projector), ax=ax),
+        lambda ax: plot.correspondence("y", ax=ax),
+        lambda ax: plot.row(3, 4, ax=ax),
+        lambda ax: plot.transport_row(3, 4, ax=ax),
+        lambda ax: plot.spectrum(3, 4, ax=ax),
+        lambda ax: plot.column(2, 5, ax=ax),
+    ):
+        _, given = pyplot.subplots()
+        assert draw(given) is given
+        assert given.get_title()
+    three = plot.components(np.ones(transport.projector))
+    assert [ax.get_title() for ax in three] == ["direct", "near", "far"]
+    assert plot.components(np.ones(transport.projector), ax=three) == three
+
+
+def test_a_row_draws_what_the_pixel_answers(transport):
+    ax = transport.plot.row(3, 4)
+    q = np.rint(transport.correspondence[3, 4]).astype(int)
+    direct = ax.lines[0].get_ydata()
+    row = transport.component_rows(slice(3 * 8 + 4, 3 * 8 + 5)).direct[0].mean(axis=0)
+    np.testing.assert_allclose(direct, row.reshape(9, 12)[q[0]])
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["direct", "near", "far"]
+
+
+@pytest.mark.parametrize("draw", ["row", "transport_row", "spectrum", "column"])
+def test_pixels_that_are_not_there_get_a_sentence(transport, draw):
+    for y, x in ((9, 0), (-1, 3), (0, 12)):
+        with pytest.raises(InputError, match="is no pixel of the"):
+            getattr(transport.plot, draw)(y, x)
+
+
+def test_other_bad_input(transport):
+    with pytest.raises(InputError, match="give 'x' or 'y'"):
+        transport.plot.correspondence("z")
+    with pytest.raises(InputError, match="give three"):
+        transport.plot.components(np.ones(transport.projector), ax=[])

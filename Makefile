@@ -6,13 +6,17 @@ BIN := $(VENV)/bin
 # Rebuilt when the lock or the project's own description changes.
 READY := $(VENV)/.ready
 
-.PHONY: demo test check lint types layers lock benchmark clean
+.PHONY: demo test docs check lint types layers lock benchmark clean
 
 demo: $(READY)
 	$(BIN)/nearfar demo nearfar-demo --force
 
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
+
+# Runs every command and example in them; then open docs/_build/html/index.html.
+docs: $(READY)
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going -q -b html docs docs/_build/html
 
 check: lint types layers test
 
@@ -45,4 +49,4 @@ lock:
 		--extra viewer --group dev --group docs --group build pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf $(VENV) nearfar-demo .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) nearfar-demo docs/_build docs/gallery docs/reference/api dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

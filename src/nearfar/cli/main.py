@@ -36,7 +36,7 @@ app = typer.Typer(
     help="Measure how light travels between a projector and a camera, and relight the scene.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
 )
 

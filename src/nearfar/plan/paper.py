@@ -46,7 +46,7 @@ def paper_plan(
         Far band, in DFT frequencies of the pattern grid.
     dropped : Size, optional
         Block of lowest near frequencies to leave out, odd by odd. By default those with both
-        |k| <= k_far, at least DC.
+        ``|k| <= k_far``, at least DC.
     offset : {"inverse", "reference", "none"}
         Each pattern with its inverse; each once, with whites and blacks at intervals to take the
         offset out; or the theory's complex patterns (simulation only).
@@ -57,7 +57,7 @@ def paper_plan(
     Returns
     -------
     Plan
-        With inverse pairs, 2 (1 + W^2 - dropped + |K_far|) photos of transport for odd bands;
+        With inverse pairs, ``2 (1 + W^2 - dropped + |K_far|)`` photos of transport for odd bands;
         half as many by reference.
 
     Raises

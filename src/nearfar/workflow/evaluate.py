@@ -24,7 +24,7 @@ PERCENTILES = (0, 5, 25, 50, 75, 95, 100)
 
 
 def snr(truth: Floats, estimate: Floats) -> float:
-    """20 log10 |truth| / |truth - estimate|, in dB, between -HIGHEST and HIGHEST.
+    """``20 log10 |truth| / |truth - estimate|`` in dB, between -HIGHEST and HIGHEST.
 
     Parameters
     ----------

@@ -1,0 +1,50 @@
+"""Sphinx: examples and commands are run while the pages are built, and warnings are errors."""
+
+import sys
+import warnings
+from pathlib import Path
+
+from nearfar.version import version as _version
+
+sys.path.insert(0, str(Path(__file__).parent / "extensions"))
+
+project = "nearfar"
+author = "The nearfar developers"
+copyright = "the nearfar developers"
+release = version = _version()
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "reference",
+    "running",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "extensions", "examples/*", "README.md"]
+html_theme = "furo"
+html_title = "nearfar"
+html_static_path = ["static"]
+html_css_files = ["nearfar.css"]
+myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
+myst_heading_anchors = 3
+autosummary_generate = True
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+suppress_warnings = ["config.cache"]
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r".*\.py",
+    "abort_on_example_error": True,
+    "show_memory": False,
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "matplotlib_animations": False,
+    "min_reported_time": 600,
+}
+# An example that warns is wrong.
+warnings.filterwarnings("error", module="nearfar")

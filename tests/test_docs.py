@@ -1,0 +1,120 @@
+"""What the pages show was run: by their build, or here on a virtual rig."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nearfar.cli.main import COMMANDS
+from nearfar.scenes.cache import cached_scene
+from tests.rigs.displays import one_monitor
+from tests.rigs.test_loop import CAMERA, PROJECTOR, Bench
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = sorted(page for page in DOCS.rglob("*.md") if not {"_build", "decisions"} & set(page.parts))
+WRITTEN = {"command-line.md", "licences.md"}
+# Shown without being run as they stand: installing, what blocks until someone ends it, and one
+# that takes a plan's whole run. Each is run by the tests that are named.
+ELSEWHERE = {
+    "pip": "tests/test_packaging.py",
+    "nearfar view": "tests/viewer/test_view.py",
+}
+
+
+def fences(page):
+    """Yield the kind and the text of each fenced block of a page."""
+    yield from re.findall(r"^```\{?([\w-]*)\}?[^\n]*\n(.*?)^```$", page.read_text(), re.M | re.S)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_block_of_a_page_is_run(page):
+    if page.name in WRITTEN:
+        pytest.importorskip("sphinx")
+        return
+    for kind, text in fences(page):
+        if kind in {"run", "on-a-rig", "toctree", "eval-rst"}:
+            continue
+        assert kind == "", f"{page.name}: a block of {kind}"
+        for line in text.splitlines():
+            known = [start for start in ELSEWHERE if line.startswith(start)]
+            assert known, f"{page.name}: {line!r} is shown and not run"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_that_are_named_in_passing_are_there(page):
+    for shown in re.findall(r"`nearfar ([a-z]+)[^`]*`", page.read_text()):
+        assert shown in COMMANDS
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """A display, and a camera that sees a scene lit by it; as on a desk."""
+    folder = tmp_path_factory.mktemp("desk")
+    world = cached_scene("cornell", PROJECTOR, CAMERA)
+    lights = np.eye(PROJECTOR.pixels, dtype=np.float32).reshape(-1, *PROJECTOR)
+    transport = world.pictures(lights).mean(axis=-1).reshape(PROJECTOR.pixels, -1).T
+    np.save(folder / "transport.npy", 0.7 / transport.sum(axis=1).max() * transport)
+    with one_monitor() as display:
+        bench = Bench(folder, display, "DESK")
+        yield bench
+        bench.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("name", ["tutorial.md", "howto/real-rig.md"])
+def test_what_is_shown_on_a_rig_runs_on_one(rig, name, tmp_path):
+    rig.folder = tmp_path
+    first = True
+    for kind, text in fences(DOCS / name):
+        if kind != "on-a-rig":
+            continue
+        for line in text.strip().splitlines():
+            command = shlex.split(line)
+            assert command[0] == "nearfar"
+            said = rig.do(*command[1:])
+            if command[1] == "devices":
+                assert "Aravis-Fake-DESK" in said
+            if command[1] == "init":
+                # What a user is asked to look over: this camera is smaller than a real one.
+                _look_over(tmp_path / "rig.toml")
+                first = False
+    assert not first
+
+
+def _look_over(path):
+    text = path.read_text()
+    assert 'driver = "aravis"' in text
+    assert "Aravis-Fake-DESK" in text
+    lines = [line for line in text.splitlines() if not line.lstrip().startswith("#")]
+    kept = [
+        line for line in lines if not re.match(r"(exposure|settle|region|pixel_format)\b", line)
+    ]
+    camera = kept.index("[camera]")
+    settings = ['region = "30x36"', 'pixel_format = "Mono16"', "exposure = 0.016667"]
+    kept[camera + 1 : camera + 1] = settings
+    projector = kept.index("[projector]")
+    kept.insert(projector + 1, "settle = 1")
+    path.write_text("\n".join(kept) + "\n")
+
+
+def test_every_command_has_its_place_in_the_reference():
+    import sys
+
+    sys.path.insert(0, str(DOCS / "extensions"))
+    try:
+        from reference import GROUPS, dependencies, licence_of
+    finally:
+        sys.path.remove(str(DOCS / "extensions"))
+    assert sorted(name for names in GROUPS.values() for name in names) == sorted(COMMANDS)
+    needed = dependencies()
+    assert {"numpy", "zarr"} <= set(needed[""])
+    assert "fastapi" in needed["viewer"]
+    for name in needed[""]:
+        licence = licence_of(name)
+        assert licence != "not told", name
+        assert not re.search(r"(?<![L])A?GPL|non-?commercial", licence, re.I), f"{name}: {licence}"
+    assert json.dumps(needed)

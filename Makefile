@@ -16,6 +16,7 @@ test: $(READY)
 
 # Runs every command and example in them; then open docs/_build/html/index.html.
 docs: $(READY)
+	rm -rf docs/_build docs/gallery docs/reference/api
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -q -b html docs docs/_build/html
 
 check: lint types layers test

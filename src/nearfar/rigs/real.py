@@ -390,12 +390,12 @@ class RealRig:
             lights = [self.photograph(self.frame(255), settle) for _ in range(2)]
             if are_alike(darks, lights):
                 break
-        self._last_white = lights[-1]
         return look_at_ends(darks, lights)
 
     def _go_on_from(self, now: Ends, watch: Watch) -> None:
         watch.start_again(now)
-        watch.begin(np.full(self._projector, 255, dtype=np.uint8), self._last_white)
+        # White was shown last.
+        watch.begin(np.full(self._projector, 255, dtype=np.uint8), now.white)
 
     def _alarm(self, sentence: str) -> None:
         self.alarms.append(sentence)

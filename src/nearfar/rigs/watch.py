@@ -233,19 +233,18 @@ class Watch:
         self._everywhere = False
         inverse = self._means.get(_key(255 - pattern))
         earlier = self._means.get(key)
-        ends = self.ends
-        both = float(ends.white.mean(dtype=np.float64) + ends.black.mean(dtype=np.float64))
+        ends, by_inverse = self.ends, False
         if pattern.min() == pattern.max() and pattern[0, 0] in {0, 255}:
             end = ends.white if pattern[0, 0] else ends.black
             change = mean - float(end.mean(dtype=np.float64))
         elif earlier is not None:
             change = mean - earlier[1]
         elif inverse is not None and self._inverses:
-            change = mean + inverse[1] - both
+            both = float(ends.white.mean(dtype=np.float64) + ends.black.mean(dtype=np.float64))
+            change, by_inverse = mean + inverse[1] - both, True
         else:
             self._means[key] = (number, mean)
             return None
-        by_inverse = earlier is None and change == mean + (inverse[1] if inverse else 0.0) - both
         self._means.setdefault(key, (number, mean))
         share = change / ends.contrast
         if abs(share) > CHANGE:

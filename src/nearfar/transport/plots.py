@@ -7,18 +7,51 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
+from nearfar.transport.far import RealBasis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nearfar.transport.model import Transport
-
 # Decades of a logarithmic scale.
 DECADES = 5.0
 PARTS = ("direct", "near", "far")
+
+
+class Drawable(Protocol):
+    """What is drawn of a transport, as `nearfar.Transport` has it."""
+
+    @property
+    def projector(self) -> Size:
+        """Pattern grid."""
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+
+    @property
+    def correspondence(self) -> Floats:
+        """Return q, (Cy, Cx, 2)."""
+
+    @property
+    def far_basis(self) -> RealBasis:
+        """Frequencies of the far band."""
+
+    def __matmul__(self, light: Floats) -> Floats: ...
+
+    def components(self, light: Floats) -> Any:
+        """Return the pictures of D, N and F."""
+
+    def rows(self, pixels: slice) -> Floats:
+        """Return rows of T, (n, channels, P)."""
+
+    def component_rows(self, pixels: slice) -> Any:
+        """Return rows of D, N and F."""
+
+    def column(self, y: int, x: int) -> Floats:
+        """Return the picture under one projector pixel."""
 
 
 class _ErrorsOfRows(Protocol):
@@ -43,7 +76,7 @@ class Plots:
     transport : Transport
     """
 
-    def __init__(self, transport: "Transport") -> None:
+    def __init__(self, transport: Drawable) -> None:
         self._transport = transport
 
     def relit(self, light: Floats, *, exposure: float = 1.0, ax: "Axes | None" = None) -> "Axes":

@@ -29,12 +29,13 @@ BUFFERS = 4
 # Seconds beyond the exposure within which a frame must be here.
 PATIENCE = 2.0
 MICROSECONDS = 1e6
-# Formats whose values are not packed across bytes, best first.
+# How the library names the kinds of its features, by what is written to them.
 KINDS: dict[type, list[str]] = {
     int: ["integer", "float"],
     float: ["float", "integer"],
     str: ["string"],
 }
+# Formats whose values are not packed across bytes.
 FORMATS = re.compile(r"(Mono|Bayer(?P<cell>RG|GR|GB|BG))(?P<bits>8|10|12|14|16)$")
 CELLS = {"RG": "RGGB", "GR": "GRBG", "GB": "GBRG", "BG": "BGGR"}
 

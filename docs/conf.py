@@ -13,16 +13,17 @@ author = "The nearfar developers"
 copyright = "the nearfar developers"
 release = version = _version()
 extensions = [
+    "equations",
     "myst_parser",
     "numpydoc",
     "reference",
     "running",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["_build", "extensions", "examples/*", "README.md"]
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "nearfar"
 html_static_path = ["static"]
@@ -40,6 +41,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "gallery",
     "filename_pattern": r".*\.py",
     "abort_on_example_error": True,
+    "capture_repr": ("_repr_html_",),
     "show_memory": False,
     "remove_config_comments": True,
     "download_all_examples": False,

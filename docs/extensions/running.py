@@ -2,7 +2,8 @@
 
 ``{run}`` runs lines of bash in a folder that all directives of one page share, and shows them with
 what they print. Options: ``status`` is the exit status that is expected, several apart by commas
-(0); ``silent`` shows no output; ``pictures`` names files to show below.
+(0); ``silent`` shows no output, ``hidden`` neither that nor the lines; ``pictures`` names files to
+show below.
 
 ``{on-a-rig}`` shows lines that need a projector and a camera; tests/test_docs.py runs them, in
 their order, on a virtual display before a virtual camera.
@@ -38,6 +39,7 @@ class Run(SphinxDirective):
     option_spec: ClassVar = {
         "status": directives.unchanged,
         "silent": directives.flag,
+        "hidden": directives.flag,
         "pictures": directives.unchanged,
     }
 
@@ -63,9 +65,10 @@ class Run(SphinxDirective):
         wanted = {int(status) for status in self.options.get("status", "0").split(",")}
         if done.returncode not in wanted:
             raise self.error(f"{script}\nended with {done.returncode}: {done.stderr}{done.stdout}")
-        found: list[nodes.Node] = [_block(script, "console-input")]
+        hidden = "hidden" in self.options
+        found: list[nodes.Node] = [] if hidden else [_block(script, "console-input")]
         told = re.sub(r"[^\n]*\r", "", done.stdout + done.stderr).rstrip().replace(str(folder), ".")
-        if told and "silent" not in self.options:
+        if told and not hidden and "silent" not in self.options:
             lines = told.splitlines()
             cut = [*lines[: LONGEST - 1], "..."] if len(lines) > LONGEST else lines
             found.append(_block("\n".join(cut), "console-output"))

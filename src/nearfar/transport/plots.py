@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Decades of a logarithmic scale.
 DECADES = 5.0
+# Decades below its largest value at which a line of a row ends.
+DEEPEST = 6.0
 PARTS = ("direct", "near", "far")
 
 
@@ -151,6 +153,8 @@ class Plots:
                     np.arange(width), low, level + off, alpha=0.25, color=drawn_line.get_color()
                 )
         drawn.set(xlabel=f"projector column, row {line}", ylabel="answer, photo units")
+        most = max(float(np.abs(part).max()) for part in rows)
+        drawn.set_ylim(bottom=most * 10.0**-DEEPEST if most > 0 else None)
         drawn.set_title(f"camera pixel ({y}, {x})")
         drawn.legend()
         return drawn
@@ -171,7 +175,7 @@ class Plots:
         decibels = 20 * np.log10(np.maximum(size / max(size.max(), 1e-30), 1e-6))
         drawn = _axes(ax)
         image = drawn.imshow(
-            decibels, extent=(-0.5, 0.5, 0.5, -0.5), cmap="magma", vmin=-80, vmax=0, aspect="auto"
+            decibels, extent=(-0.5, 0.5, 0.5, -0.5), cmap="magma", vmax=0, aspect="auto"
         )
         drawn.figure.colorbar(image, ax=drawn, label="dB below its largest")
         ky, kx = np.abs(transport.far_basis.cycles).max(axis=0, initial=0.0)

@@ -45,7 +45,8 @@ export function crop(values, [height, width], [cy, cx], reach) {
 // A spectrum, enlarged so that frames and dots are fine, with DC in the middle.
 export function drawSpectrum(canvas, values, [height, width], words, scale) {
   const small = new OffscreenCanvas(width, height);
-  drawMap(small, values, [height, width], -80, 0, scale);
+  const low = Math.max(-80, Math.min(-10, values.reduce((a, b) => Math.min(a, b), 0)));
+  drawMap(small, values, [height, width], low, 0, scale);
   const large = Math.max(2, Math.round(360 / Math.max(height, width)));
   Object.assign(canvas, { width: large * width, height: large * height });
   const pen = canvas.getContext('2d', { willReadFrequently: true });

@@ -22,7 +22,8 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "extensions", "examples/*", "README.md"]
+templates_path = ["templates"]
+exclude_patterns = ["_build", "extensions", "examples/*", "templates"]
 html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "nearfar"

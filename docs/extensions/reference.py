@@ -31,7 +31,7 @@ def write_command_line(folder: Path) -> None:
         parts.append(f"## {title}\n")
         for name in names:
             done = subprocess.run(
-                [sys.executable, "-m", "nearfar", name, "--help"],
+                [Path(sys.executable).parent / "nearfar", name, "--help"],
                 capture_output=True, text=True, check=True, env={"COLUMNS": "88", "PATH": ""},
             )  # fmt: skip
             parts += [f"### nearfar {name}\n", "```text", done.stdout.strip(), "```", ""]

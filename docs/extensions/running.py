@@ -25,7 +25,7 @@ from sphinx.util.docutils import SphinxDirective
 # Seconds that a block may take.
 PATIENCE = 300
 # Lines of output that are shown at most.
-LONGEST = 40
+LONGEST = 60
 
 
 # What was started beside a block ends with it.

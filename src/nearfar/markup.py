@@ -68,8 +68,9 @@ def card(title: str, rows: list[tuple[str, str]], images: list[tuple[str, str]])
         f'<td style="text-align:left">{escape(value)}</td></tr>'
         for name, value in rows
     )
+    large = '<img style="width:100%;image-rendering:pixelated;border:1px solid #8888" '
     shown = "".join(
-        f'<figure style="margin:0;width:140px">{one}'
+        f'<figure style="margin:0;width:140px">{one.replace("<img ", large)}'
         f'<figcaption style="font-size:.85em;opacity:.75">{escape(name)}</figcaption></figure>'
         for name, one in images
     )

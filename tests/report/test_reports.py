@@ -61,7 +61,7 @@ def test_a_report_tells_of_a_reconstruction(made):
     transport = load_transport(made / "t.zarr")
     for name, compute in maps_of(transport).items():
         assert compute().title in text, name
-    assert "Nothing that the photos tell speaks against them." in text
+    assert "The photos give no cause for concern." in text
     # Lights and their parts, maps, and the histogram.
     assert text.count("<img") == 10 + len(maps_of(transport)) + 1
     assert "white and black, to measure against" in text
@@ -79,7 +79,7 @@ def test_warnings_stand_in_the_report_and_on_the_terminal(world, tmp_path):
     assert "projector or camera is not linear" in ran.err
     text = (tmp_path / "r.html").read_text()
     assert "projector or camera is not linear" in text
-    assert "Nothing that the photos tell" not in text
+    assert "no cause for concern" not in text
 
 
 def test_a_report_is_not_overwritten_and_refused_before_any_work(made, tmp_path):
@@ -93,6 +93,34 @@ def test_a_report_is_not_overwritten_and_refused_before_any_work(made, tmp_path)
     ran = run_nearfar(*where, "--report", tmp_path / "r.html", "--force")
     assert ran.status == 0
     assert "Relit, and taken apart" in (tmp_path / "r.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("report", "words"),
+    [
+        ("capture.zarr", "does not end in .html"),
+        ("t.zarr", "does not end in .html"),
+        ("r.txt", ".html"),
+        ("none/r.html", "none"),
+    ],
+)
+def test_a_report_replaces_no_other_file_of_the_command(made, tmp_path, report, words):
+    shutil.copytree(made / "capture.zarr", tmp_path / "capture.zarr")
+    (tmp_path / "q.html").write_text("an input")
+    ran = run_nearfar(
+        "reconstruct", tmp_path / "capture.zarr", tmp_path / "t.zarr", "--report",
+        tmp_path / report, "--force",
+    )  # fmt: skip
+    assert ran.status == 1
+    assert words in ran.err
+    assert (tmp_path / "capture.zarr" / "zarr.json").exists()
+    assert not (tmp_path / "t.zarr").exists()
+    ran = run_nearfar(
+        "evaluate", made / "t.zarr", "--truth", tmp_path / "q.html", "--report",
+        tmp_path / "q.html", "--force",
+    )  # fmt: skip
+    assert "is an input of this command and is kept" in ran.err
+    assert (tmp_path / "q.html").read_text() == "an input"
 
 
 def test_a_large_camera_is_thinned_out(made, monkeypatch):

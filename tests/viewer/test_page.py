@@ -324,7 +324,7 @@ def test_before_and_after(open_page, address, transport, tmp_path):
     page.wait_for_selector("#before", state="visible")
     assert np.abs(seen(page, "before").astype(int) - white).max() <= 1
     drop(page, "#stage", "small.png", encode_png(np.zeros((3, 3), np.uint8)))
-    page.wait_for_selector("#fault:has-text('take it with that camera')")
+    page.wait_for_selector("#fault:has-text('small.png is 3x3')")
 
 
 # Pixels and maps
@@ -435,7 +435,9 @@ def test_a_dropped_picture_comes_back(open_page, address):
         "#null",
         "#[]",
         '#{"kind":5,"x":"a","strokes":[1,{}],"pixel":[1e9,"<"]}',
-        '#{"colour":"red;<script>","pictures":["javascript:alert(1)",7]}',
+        '#{"colour":"red;<script>"}',
+        '#{"strokes":[{"colour":"#ffffff","radius":1e-9,"points":[0,0,100,100]}]}',
+        '#{"strokes":[{"colour":"#ffffff","radius":1,"points":[0,0,1e300,0]}]}',
     ],
 )
 def test_an_address_that_was_tampered_with_shows_the_start(open_page, address, browser, hash_):
@@ -445,6 +447,44 @@ def test_an_address_that_was_tampered_with_shows_the_start(open_page, address, b
     page.goto(address + "/" + hash_)
     settled(page)
     np.testing.assert_array_equal(seen(page), start)
+
+
+def test_pictures_that_the_address_does_not_hold_are_named(open_page, address):
+    for pictures in (["javascript:alert(1)", 7], ["data:image/png;base64,A"]):
+        page = open_page(address, {"kind": "picture", "pictures": pictures, "shown": 9})
+        assert "not in the address" in page.inner_text("#fault")
+        assert seen(page, "light").max() == 0
+        assert page.inner_text("[data-for=picture] output") == f"{len(pictures)} of {len(pictures)}"
+    # A linear picture is more than an address holds; the others are found where they were.
+    page = open_page(address)
+    drop(page, "#light", "l.png", encode_png(np.full((*PROJECTOR, 3), 40000, np.uint16)))
+    page.wait_for_selector("output:has-text('1 of 1')")
+    drop(page, "#light", "e.png", encode_png(np.full((*PROJECTOR, 3), 60, np.uint8)))
+    page.wait_for_selector("output:has-text('2 of 2')")
+    settled(page)
+    time.sleep(0.5)
+    page.reload()
+    settled(page)
+    assert "1 of the pictures is not in the address" in page.inner_text("#fault")
+    assert (seen(page, "light") == 60).all()
+
+
+def test_the_picture_that_is_saved_is_of_the_light_that_is_shown(open_page, address, tmp_path):
+    page = open_page(address, {"kind": "white"})
+    white = decode_png(saved(page, "#save-png", tmp_path).read_bytes())
+    with page.expect_download() as download:
+        page.evaluate("""() => { document.querySelector('[data-kind=pixel]').click();
+            document.getElementById('save-png').click(); }""")
+    download.value.save_as(tmp_path / "pixel.png")
+    assert decode_png((tmp_path / "pixel.png").read_bytes()).sum() < white.sum() / 2
+
+
+@pytest.mark.parametrize("gamma", [1, 2, 3])
+def test_dark_light_is_shown_in_all_its_steps(open_page, address, transport, gamma):
+    page = open_page(address, {"kind": "pixel", "x": 7, "y": 3, "gamma": gamma, "exposure": 5})
+    column = transport.column(3, 7)
+    expected = np.rint(255 * to_srgb(np.clip(32 * column, 0, 1)) ** (1 / gamma))
+    assert np.abs(seen(page) - expected).max() <= 1
 
 
 def contrast(page, selector):
@@ -479,6 +519,10 @@ def test_it_is_readable_by_day_and_night_and_on_a_phone(
     texts = "h1, #about, #told, [data-kind=spot], [data-kind=stripe], .card p, .card small, output"
     for selector in f"{texts}, figcaption, .k-far, .k-near, .keys".split(", "):
         assert contrast(page, selector) >= 4.5, selector
+    if width == 390:
+        # Light and scene on one screen.
+        boxes = [page.locator(part).bounding_box() for part in ("#picture", "#light")]
+        assert max(box["y"] + box["height"] for box in boxes) <= 844
     # Nothing sticks out to the side.
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.screenshot(path=tmp_path / "page.png", full_page=True)
@@ -503,6 +547,9 @@ def test_it_is_used_by_the_keyboard(open_page, address, tmp_path):
     settled(page)
     light = read_light(saved(page, "#save-light", tmp_path), PROJECTOR)
     assert light.argmax() == 2 * 24 + 14
+    for name in ("pictures", "photo"):
+        page.focus("#" + name)
+        assert page.evaluate("document.activeElement.id") == name
     page.focus("#light")
     page.keyboard.press("Enter")
     page.wait_for_selector("#column:has-text('row 2, column 14')")

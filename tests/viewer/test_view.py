@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
 import zlib
@@ -76,12 +77,18 @@ def socket_of(address, **options):
     return connect(address.replace("http", "ws") + "/relight", max_size=None, **options)
 
 
+def picture(socket):
+    """Receive the parts of a picture, in photo units."""
+    told, (halves,) = unpack(socket.recv(timeout=30))
+    return told, halves.astype(np.float32) / told["scale"]
+
+
 def relit(address, light, **words):
     """Let the server relight until its picture is exact."""
     with socket_of(address) as socket:
         socket.send(message(light, **words))
         while True:
-            told, (parts,) = unpack(socket.recv(timeout=30))
+            told, parts = picture(socket)
             assert told["number"] == 1
             if told["exact"]:
                 return told, parts
@@ -129,12 +136,12 @@ def test_a_large_scene_is_coarse_while_the_light_moves_and_exact_at_rest(
     expected = np.stack(transport.components(lights["random"]))
     with socket_of(address) as socket:
         socket.send(message(lights["random"]))
-        told, (coarse,) = unpack(socket.recv(timeout=30))
+        told, coarse = picture(socket)
         assert not told["exact"]
         step = told["step"]
         assert step > 1
         np.testing.assert_allclose(coarse, expected[:, ::step, ::step], rtol=1e-3, atol=2e-5)
-        told, (exact,) = unpack(socket.recv(timeout=30))
+        told, exact = picture(socket)
         assert (told["exact"], told["step"]) == (True, 1)
         np.testing.assert_allclose(exact, expected, rtol=1e-3, atol=2e-5)
 
@@ -154,7 +161,7 @@ def test_lights_that_come_faster_than_pictures_do_not_queue(serve_it, transport,
             socket.send(message(lights["random"] * (number / 199), number=number))
         pictures = 0
         while True:
-            told, (parts,) = unpack(socket.recv(timeout=30))
+            told, parts = picture(socket)
             pictures += 1
             if told["number"] == 199:
                 break
@@ -196,7 +203,9 @@ def test_a_camera_pixel_tells_its_row(address, transport):
     assert words["q"] == pytest.approx(transport.correspondence[y, x].tolist())
     assert words["floodlit"]["near"] == pytest.approx(n.mean(axis=0).sum(), abs=1e-5)
     bars = ErrorBars(transport).component_rows(slice(y * 42 + x, y * 42 + x + 1))
-    np.testing.assert_allclose(far_error, bars.far[0].mean(axis=0).reshape(PROJECTOR), rtol=1e-4)
+    # Of the mean of three channels.
+    expected = np.sqrt((bars.far[0] ** 2).sum(axis=0)) / 3
+    np.testing.assert_allclose(far_error, expected.reshape(PROJECTOR), rtol=1e-4)
     assert np.count_nonzero(window_error) <= transport.window**2
     assert spectrum.max() == 0
     assert np.unravel_index(spectrum.argmax(), PROJECTOR) == (10, 12)
@@ -218,9 +227,10 @@ def test_a_projector_pixel_tells_its_column(address, transport):
 def test_every_map_is_there(address, transport):
     about = json.loads(ask(address, "/scene"))
     assert about["projector"] == list(PROJECTOR)
-    assert set(about["maps"]) >= {"row", "column", "confidence", "error", "near-share", "saturated"}
+    names = [one["name"] for one in about["maps"]]
+    assert set(names) >= {"row", "column", "confidence", "error", "near-share", "saturated"}
     found = {}
-    for name in about["maps"]:
+    for name in names:
         words, (found[name],) = unpack(ask(address, f"/map/{name}"))
         assert found[name].shape == CAMERA
         assert words["low"] < words["high"]
@@ -239,8 +249,9 @@ def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
     save_transport(tmp_path / "t.zarr", replace(transport, belief=None, quality=None))
     with served_view(ViewedTransport(tmp_path / "t.zarr")) as address:
         about = json.loads(ask(address, "/scene"))
-        assert "error" not in about["maps"]
-        assert "confidence" not in about["maps"]
+        names = [one["name"] for one in about["maps"]]
+        assert "error" not in names
+        assert "confidence" not in names
         unpack(ask(address, "/map/noise"))
         words, (_, _, error, _, _) = unpack(ask(address, "/row?y=1&x=2"))
         assert not words["has_errors"]
@@ -262,10 +273,12 @@ def test_lights_and_photos_of_other_formats_are_read(address, transport, lights,
         _, (levels,) = unpack(ask(address, f"/read/light?name={name}", data))
         np.testing.assert_allclose(levels / 65535, linear, atol=2e-5)
     photo = np.random.default_rng(1).random((*CAMERA, 3)).astype(np.float32)
-    _, (seen,) = unpack(ask(address, "/read/photo?name=p.npy", encode_npy(photo)))
+    words, (seen,) = unpack(ask(address, "/read/photo?name=p.npy", encode_npy(photo)))
+    seen = seen.astype(np.float32) / words["scale"]
     np.testing.assert_allclose(seen, photo - transport.black, atol=1e-3)
     eight = np.full((*CAMERA, 3), 188, np.uint8)
-    _, (seen,) = unpack(ask(address, "/read/photo?name=p.png", encode_png(eight)))
+    words, (seen,) = unpack(ask(address, "/read/photo?name=p.png", encode_png(eight)))
+    seen = seen.astype(np.float32) / words["scale"]
     # Of eight bits it is a picture for looking: 188 in sRGB is half of white.
     np.testing.assert_allclose(seen, 0.5, atol=0.01)
 
@@ -286,8 +299,10 @@ def _bomb():
 @pytest.mark.parametrize(
     ("kind", "name", "data", "words"),
     [
-        ("light", "a.png", encode_png(np.zeros((3, 4), np.uint8)), "resize it"),
-        ("photo", "a.png", encode_png(np.zeros((3, 4), np.uint8)), "take it with that camera"),
+        ("light", "a.png", encode_png(np.zeros((3, 4), np.uint8)), "a.png is 3x4, and 20x24 is"),
+        ("photo", "a.png", encode_png(np.zeros((3, 4), np.uint8)), "a.png is 3x4, and 30x42 is"),
+        ("light", "a.npy", encode_npy(np.full(PROJECTOR, 1.5, np.float32)), "goes from 1.5 to 1.5"),
+        ("light", "a%00.npy", b"x", "no picture that can be read"),
         ("light", "a.png", b"hello", "no picture that can be read"),
         ("light", "/etc/passwd", b"", "is empty"),
         ("light", "..\\..\\x.exr", b"\x76\x2f\x31\x01" + bytes(40), "x.exr is damaged"),
@@ -411,7 +426,17 @@ def test_pixels_and_maps_that_are_not_there(address, path, status):
 
 def test_a_page_from_elsewhere_is_kept_out(address):
     assert refused(address, "/scene", Host="evil.example")[0] == 403
-    assert refused(address, "/scene", Origin="http://evil.example")[0] == 403
+    for origin in (
+        "http://evil.example",
+        "null",
+        "http://[::1",
+        "https://" + address[7:] + ".evil",
+    ):
+        assert refused(address, "/scene", Origin=origin)[0] == 403
+    # Embedded in a page elsewhere; a link that is clicked there opens it.
+    cross = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
+    assert refused(address, "/map/error", **cross)[0] == 403
+    assert b"nearfar view" in ask(address, "/", **{**cross, "Sec-Fetch-Mode": "navigate"})
     with pytest.raises(websockets.exceptions.InvalidStatus) as closed:
         socket_of(address, origin="http://evil.example")
     assert closed.value.response.status_code == 403
@@ -444,6 +469,16 @@ def test_elsewhere_a_token_is_asked_for(serve_it):
         assert json.load(scene)["projector"] == list(PROJECTOR)
     (cookie,) = jar.cookiejar
     assert cookie.has_nonstandard_attr("HttpOnly")
+    # Other applications on the host have cookies of their own.
+    kept = f"{cookie.name}={cookie.value}"
+    for header in (
+        f"x; {kept}",
+        f'j={{"a":1}}; {kept}',
+        f"{kept}; k[0]=1",
+        f"_ga=1; theme; {kept}",
+    ):
+        assert ask(base, "/scene", Cookie=header)
+    assert refused(base, "/scene", Cookie=f"{kept}x")[0] == 403
     with socket_of(base, additional_headers={"Cookie": f"{cookie.name}={cookie.value}"}) as socket:
         socket.send(message(np.ones(PROJECTOR)))
         socket.recv(timeout=30)
@@ -520,6 +555,77 @@ def test_what_is_no_transport_gets_a_sentence(tmp_path):
 
 def test_without_its_packages_there_is_a_sentence():
     assert "pip install 'nearfar[viewer]'" in said_without("fastapi", "import nearfar.viewer.view")
+
+
+def test_what_lies_in_the_folder_is_not_run(address, tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").write_text("raise SystemExit('run')")
+    monkeypatch.chdir(tmp_path)
+    light = np.zeros(PROJECTOR, np.float32)
+    unpack(ask(address, "/read/light?name=l.npy", encode_npy(light)))
+
+
+def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypatch):
+    import threading
+
+    under, most, lock = 0, [], threading.Lock()
+    at_once = ViewedTransport.at_once
+
+    def counted(self, light):
+        nonlocal under
+        with lock:
+            under += 1
+            most.append(under)
+        time.sleep(0.05)
+        try:
+            return at_once(self, light)
+        finally:
+            with lock:
+                under -= 1
+
+    monkeypatch.setattr(ViewedTransport, "at_once", counted)
+    address = serve_it()
+    for _ in range(20):
+        with socket_of(address) as socket:
+            socket.send(message(lights["spot"]))
+    relit(address, lights["spot"])
+    assert max(most) == 1
+
+
+def test_too_much_at_once_is_told_to_wait(serve_it, monkeypatch):
+    from concurrent.futures import ThreadPoolExecutor
+
+    from nearfar.viewer import answers, following
+
+    monkeypatch.setattr(following, "MOST", 2)
+    inspect = answers.inspect_row
+    monkeypatch.setattr(
+        answers, "inspect_row", lambda *given: [time.sleep(0.5), inspect(*given)][1]
+    )
+    address = serve_it()
+
+    def row(_):
+        try:
+            return 200 if ask(address, "/row?y=1&x=1") else 0
+        except urllib.error.HTTPError as error:
+            error.close()
+            return error.code
+
+    with ThreadPoolExecutor(8) as pool:
+        statuses = list(pool.map(row, range(8)))
+    assert set(statuses) == {200, 503}
+    assert statuses.count(200) >= 2
+
+
+def test_a_projector_of_one_row_is_shown(tmp_path):
+    world = model_transport(Size(1, 24), Size(3, 5), window=3, far=Size(1, 3), entries=0)
+    save_transport(tmp_path / "row.zarr", replace(world, near=np.zeros_like(world.near)))
+    with served_view(ViewedTransport(tmp_path / "row.zarr")) as address:
+        words, _ = unpack(ask(address, "/map/row"))
+        assert words["low"] < words["high"]
+        words, (window, *_) = unpack(ask(address, "/row?y=1&x=2"))
+        assert window.shape == (1, 24)
+        assert words["k_near"][0] == 0
+        assert words["k_far"][1] <= words["k_near"][1] <= 0.5
 
 
 def test_a_camera_of_one_or_four_channels_is_shown(tmp_path):

@@ -35,7 +35,7 @@ SATURATED = 1e-4
 DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Capture:
     """A capture open for reading; photos are read when asked for.
 
@@ -87,6 +87,9 @@ class Capture:
     def saturated_share(self) -> float:
         """Share of all values of all photos that are at full scale or above."""
         return float(self.saturated.mean())
+
+    def __repr__(self) -> str:
+        return f"<nearfar capture: {len(self.plan.patterns)} photos of {self.camera}, {self.path}>"
 
     def _repr_html_(self) -> str:
         """Show the capture in a notebook: its first photo and its brightest."""

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, Quiet, keep_input, size
+from nearfar.cli.options import AsJson, Force, Quiet, keep_for_page, size
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -39,7 +39,7 @@ def check(
 
     Example: nearfar check truth.zarr --near 19 --far 13x13 --html check.html
     """
-    from nearfar.files import check_output, new_output
+    from nearfar.files import new_output
     from nearfar.plan import paper_plan
     from nearfar.report.model_check import check_page, check_rows
     from nearfar.rigs.config import load_world
@@ -47,8 +47,7 @@ def check(
     from nearfar.workflow.conditioning import condition_near
 
     if output is not None:
-        keep_input(output, transport)
-        check_output(output, force=force)
+        keep_for_page(output, transport, force=force)
     with progress_bar("checking", quiet=quiet) as report:
         world = load_world(transport, None, None)
         plan = paper_plan(world.projector, near, far, dropped=drop, correspondence="none")

@@ -15,6 +15,7 @@ from nearfar.cli.options import (
     ScenesCamera,
     ScenesProjector,
     TransportPath,
+    keep_for_page,
     keep_input,
 )
 from nearfar.cli.saying import say, warn
@@ -50,7 +51,6 @@ def evaluate(
 
     Example: nearfar evaluate transport.zarr --truth truth.zarr --json
     """
-    from nearfar.files import check_output
     from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
     from nearfar.workflow.evaluate import row_snr
@@ -64,7 +64,7 @@ def evaluate(
     if (truth is None) == (photos is None):
         raise typer.BadParameter("give either --truth or --photos.", param_hint="--truth")
     if report is not None:
-        check_output(report, force=force)
+        keep_for_page(report, transport, *(path for path in (truth, photos) if path), force=force)
     with progress_bar("evaluating", quiet=quiet) as told:
         opened = load_transport(transport)
         if truth is not None:

@@ -40,6 +40,24 @@ def keep_input(output: Path, *inputs: Path) -> None:
         )
 
 
+def keep_for_page(page: Path, *others: Path, force: bool) -> None:
+    """Refuse, before any work, a page that cannot be written, or over another file of the command.
+
+    Raises
+    ------
+    InputError
+        If its name does not end in .html, or it is an input or another output.
+    NearfarError
+        As `nearfar.files.check_output`.
+    """
+    from nearfar.files import check_output
+
+    if page.suffix.lower() not in {".html", ".htm"}:
+        raise InputError(f"{page} does not end in .html: choose a name that does.")
+    keep_input(page, *others)
+    check_output(page, force=force)
+
+
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print nothing but faults and warnings.")
 ]

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nearfar.arrays import Size, parse_bytes
-from nearfar.cli.options import CapturePath, Force, Quiet, ReportPath, Where, keep_input
+from nearfar.cli.options import (
+    CapturePath,
+    Force,
+    Quiet,
+    ReportPath,
+    Where,
+    keep_for_page,
+    keep_input,
+)
 from nearfar.cli.saying import say, warn
 from nearfar.progress import progress_bar
 
@@ -97,7 +105,9 @@ def reconstruct(
     available = parse_bytes(memory, name="--memory")
     keep_input(output, capture, *([correspondence] if correspondence else []))
     if report is not None:
-        check_output(report, force=force)
+        keep_for_page(
+            report, capture, output, *([correspondence] if correspondence else []), force=force
+        )
     if resume and (square or scheduler is not None):
         raise typer.BadParameter("is not for --square or --scheduler.", param_hint="--resume")
     if square or scheduler is not None:

@@ -91,7 +91,7 @@ def choose_plan(
     photos: int,
     *,
     window: int | None = None,
-    typical: Typical = TYPICAL,
+    typical: Typical | None = None,
     noise: float = NOISE,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[Plan, Expected]:
@@ -139,7 +139,7 @@ def choose_plan(
             f"{min(projector)}."
         )
     choice = choose_frequencies(
-        projector, photos, window, typical=typical, noise=noise, progress=progress
+        projector, photos, window, typical=typical or TYPICAL, noise=noise, progress=progress
     )
     band = Size(*(min(BAND, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))

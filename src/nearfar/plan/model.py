@@ -219,6 +219,9 @@ class Plan(_Frozen):
             raise PlanError(f"pattern {index} of the plan is complex and cannot be drawn.")
         return pattern.draw(self.projector)
 
+    def __repr__(self) -> str:
+        return f"<nearfar plan: projector {self.projector}, {len(self.patterns)} photos>"
+
     def _repr_html_(self) -> str:
         """Show the plan in a notebook."""
         counted = ", ".join(f"{count} {name}" for name, count in self.counts.items() if count)

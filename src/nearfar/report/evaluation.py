@@ -41,10 +41,15 @@ def evaluation_page(
     """
     found: Mapping[str, float] = judgement["snr_b"]
     ceiling = judgement.get("ceiling", {}).get("snr_b", {})
-    cards = [(f"{np.mean(list(found.values())):.1f} dB", f"SNR_b, mean of {len(found)} lights")]
+    if "snr_b_pictures" in judgement:
+        cards = [(f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of natural pictures")]
+    else:
+        cards = [(f"{judgement['snr_b_mean']:.1f} dB", f"SNR_b, mean of {len(found)} lights")]
     if rows is not None:
         cards.append((f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"))
-        cards.append((f"{judgement['snr_t']['p5']:.1f} dB", "SNR_t, 5 of 100 are below"))
+        cards.append(
+            (f"{judgement['snr_t']['p5']:.1f} dB", "SNR_t that 95 of 100 camera pixels exceed")
+        )
     head = ["light", "SNR_b", *(["ceiling of the model, no noise"] if ceiling else [])]
     table = [
         [name, f"{value:.1f} dB", *([f"{ceiling[name]:.1f} dB"] if ceiling else [])]

@@ -13,6 +13,19 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import ErrorBars
 from nearfar.transport.model import Transport
 
+# What maps are called by people, by name.
+TITLES = {
+    "column": "projector column of q",
+    "row": "projector row of q",
+    "confidence": "confidence in q",
+    "error": "floodlit picture over its error",
+    "direct-error": "direct light over its error",
+    "noise": "floodlit picture over a measurement's noise",
+    "near-share": "near-range share of the floodlit picture",
+    "far-share": "far-range share of the floodlit picture",
+    "saturated": "saturated under white",
+}
+
 
 class Map(NamedTuple):
     """A value for each camera pixel.
@@ -38,30 +51,26 @@ def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
     height, width = transport.projector
     q = transport.correspondence
     found: dict[str, Callable[[], Map]] = {
-        "column": lambda: Map("projector column of q", "px", 0, width - 1, q[..., 1]),
-        "row": lambda: Map("projector row of q", "px", 0, height - 1, q[..., 0]),
+        "column": lambda: Map(TITLES["column"], "px", 0, max(1, width - 1), q[..., 1]),
+        "row": lambda: Map(TITLES["row"], "px", 0, max(1, height - 1), q[..., 0]),
     }
     quality = transport.quality
     if quality is not None:
         found["confidence"] = lambda: Map(
-            "confidence in q", "", 0, 1, quality.confidence.astype(np.float32)
+            TITLES["confidence"], "", 0, 1, quality.confidence.astype(np.float32)
         )
     if transport.belief is not None:
-        found["error"] = lambda: _ratio(
-            "floodlit picture over its error", _floodlit(transport), _error(transport)
-        )
+        found["error"] = lambda: _ratio(TITLES["error"], _floodlit(transport), _error(transport))
         found["direct-error"] = lambda: _ratio(
-            "direct light over its error", transport.direct, ErrorBars(transport).direct()
+            TITLES["direct-error"], transport.direct, ErrorBars(transport).direct()
         )
     else:
-        found["noise"] = lambda: _ratio(
-            "floodlit picture over a measurement's noise", _floodlit(transport), transport.noise
-        )
-    found["near-share"] = lambda: _share(transport, 1, "near-range share of the floodlit picture")
-    found["far-share"] = lambda: _share(transport, 2, "far-range share of the floodlit picture")
+        found["noise"] = lambda: _ratio(TITLES["noise"], _floodlit(transport), transport.noise)
+    found["near-share"] = lambda: _share(transport, 1, TITLES["near-share"])
+    found["far-share"] = lambda: _share(transport, 2, TITLES["far-share"])
     if quality is not None:
         found["saturated"] = lambda: Map(
-            "saturated under white", "", 0, 1, quality.saturated.astype(np.float32)
+            TITLES["saturated"], "", 0, 1, quality.saturated.astype(np.float32)
         )
     return found
 
@@ -104,8 +113,9 @@ def _share(transport: Transport, which: int, title: str) -> Map:
     parts = transport.components(np.ones(transport.projector, dtype=np.float32))
     sums = np.stack([part.reshape(*transport.camera, -1).sum(axis=-1) for part in parts])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = (100 * sums[which] / sums.sum(axis=0)).astype(np.float32)
-    share[~np.isfinite(share)] = np.nan
+        total = sums.sum(axis=0)
+        share = (100 * sums[which] / total).astype(np.float32)
+    share[(total <= 0) | ~np.isfinite(share)] = np.nan
     known = share[np.isfinite(share)]
     high = float(np.percentile(known, 99)) if known.size else 1.0
     return Map(title, "%", 0.0, float(np.clip(high, 1.0, 100.0)), share)

@@ -59,10 +59,13 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
     cards = facts(
         [
             (str(len(plan.patterns)), "photos"),
-            (f"{plan.projector.pixels / len(plan.patterns):.1f}×", "fewer than by brute force"),
-            (str(stored.camera), f"camera pixels, {stored.channels} channels"),
+            (
+                f"{plan.projector.pixels / len(plan.patterns):.1f}×",
+                "fewer photos than by brute force, all counted",
+            ),
+            (str(stored.camera), f"camera pixels, {counted(stored.channels, 'channel')}"),
             (str(stored.projector), "projector pixels"),
-            (f"{transport.lit.mean():.1%}", "of the camera directly lit"),
+            (f"{transport.lit.mean():.1%}", "of camera pixels see direct light"),
             (median, f"{sure.title}, median"),
         ]
     )
@@ -74,19 +77,21 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
 {escape(capture.path.name)} by the {stored.provenance["method"]} method.{thinned}</p>
 {cards}
 <h2>What to look at</h2>
-{listed(faults) if faults else "<p>Nothing that the photos tell speaks against them.</p>"}
+{listed(faults) if faults else "<p>The photos give no cause for concern.</p>"}
 <h2>Relit, and taken apart</h2>
 <p>Direct light comes from one projector pixel, near-range light from the window around it,
 far-range light from everywhere. {_exposed(exposure)}</p>
 {gallery(["light", "direct", "near-range", "far-range", "relit"], _rows(transport, exposure))}
 <h2>Maps</h2>
+<p>Grey where there is no value: no direct light is seen there.</p>
 <div class="maps">{"".join(_map(each) for each in maps.values())}</div>
 <h2>How sure</h2>
+<p>{_sure(sure)}</p>
 {plot(_histogram(sure), "histogram of " + sure.title)}
 <h2>The plan</h2>
 {_plan_table(plan)}
 <h2>Where it comes from</h2>
-{numbers(["", ""], _provenance(stored, capture))}
+{numbers(["what", "value"], _provenance(stored, capture))}
 """
     return page(f"nearfar: {stored.path.name}", body)
 
@@ -125,6 +130,25 @@ def visible(image: Floats) -> Floats:
     return image[..., :3] if image.shape[2] > 3 else image.mean(axis=-1)
 
 
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
+def _sure(each: Map) -> str:
+    """Say what the histogram shows."""
+    if each.title.startswith("floodlit picture over its error"):
+        return (
+            "Signal over one standard deviation, under white, of every camera pixel: 20 dB is an "
+            "error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %. It is of relit pictures; how light is "
+            "split into direct, near and far is less sure."
+        )
+    return (
+        "Light under white over the noise of one measurement. Error bars are told by the joint "
+        "estimate."
+    )
+
+
 def _map(each: Map) -> str:
     return colour_map(each.values, each.low, each.high, each.unit, each.title)
 
@@ -143,7 +167,7 @@ def _plan_table(plan: Plan) -> str:
     rows.append(["all photos", str(len(plan.patterns))])
     rows.append(["window of near-range light", f"{plan.window} x {plan.window}"])
     rows.append(["far band", str(plan.far)])
-    return numbers(["photos for", "number"], rows)
+    return numbers(["photos", "number"], rows)
 
 
 def _provenance(stored: StoredTransport, capture: Capture) -> list[list[str]]:

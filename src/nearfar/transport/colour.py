@@ -36,12 +36,18 @@ def as_channels_see(light: Floats, channels: int, provenance: Mapping[str, Any])
     Raises
     ------
     InputError
-        If what the calibration found is of another number of channels.
+        If what the calibration found is of another number of channels, or there is none and the
+        camera has neither one channel nor three.
     """
     if light.ndim == 2:
         return light
     rig = provenance.get("rig")
     mixing = rig.get(MIXING) if isinstance(rig, Mapping) else None
+    if mixing is None and channels not in (1, 3):
+        raise InputError(
+            f"what {channels} channels see of red, green and blue is not known: calibrate the "
+            f"rig, or give a grey light."
+        )
     if mixing is None:
         return luminance(light.astype(np.float32)) if channels == 1 else light
     shares = np.asarray(mixing, dtype=np.float64)

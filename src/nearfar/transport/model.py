@@ -34,7 +34,7 @@ class Components(NamedTuple):
     far: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Transport:
     """Light transport between a projector and a camera, in photo units.
 
@@ -112,6 +112,12 @@ class Transport:
         """Drawings of it, as matplotlib axes; see `nearfar.transport.plots`."""
         return Plots(self)
 
+    def __repr__(self) -> str:
+        return (
+            f"<nearfar transport: projector {self.projector}, camera {self.camera}, channels "
+            f"{self.channels}, W = {self.window}>"
+        )
+
     def _repr_html_(self) -> str:
         """Show the transport in a notebook, floodlit and taken apart."""
         step = -(-max(self.camera) // THUMBNAIL)
@@ -159,7 +165,25 @@ class Transport:
     def relight(
         self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
     ) -> Floats:
-        """Relight with a gain for each component; see `components`."""
+        """Relight with a gain for each component.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        direct, near, far : float
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
+            Photo units.
+
+        Raises
+        ------
+        InputError
+            As `components`; if a gain is no finite number.
+        """
+        if not np.isfinite([direct, near, far]).all():
+            raise InputError(f"the gains {direct}, {near}, {far} are no finite numbers.")
         parts = self.components(light)
         return np.asarray(direct * parts.direct + near * parts.near + far * parts.far)
 
@@ -260,7 +284,24 @@ class Transport:
         return self.rows(slice(None))
 
     def column(self, y: int, x: int) -> Floats:
-        """Return the picture under one projector pixel at full white."""
+        """Return the picture under one projector pixel at full white.
+
+        Parameters
+        ----------
+        y, x : int
+            Projector pixel.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
+
+        Raises
+        ------
+        InputError
+            If there is no such projector pixel.
+        """
+        if not (0 <= y < self.projector.height and 0 <= x < self.projector.width):
+            raise InputError(f"({y}, {x}) is no pixel of the projector of {self.projector}.")
         light = np.zeros(self.projector, dtype=np.float32)
         light[y, x] = 1.0
         return self @ light

@@ -187,9 +187,6 @@ class Plots:
 
     def column(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
         """Draw what a projector pixel lights, log scale."""
-        height, width = self._transport.projector
-        if not (0 <= y < height and 0 <= x < width):
-            raise InputError(f"({y}, {x}) is no pixel of the projector of {height}x{width}.")
         picture = self._transport.column(y, x)
         picture = picture if picture.ndim == 2 else picture.mean(axis=-1)
         return _bare(_logarithm(_axes(ax), picture), f"lit by projector pixel ({y}, {x})")

@@ -1,24 +1,23 @@
 """What the viewer's page is answered, as bytes; none of it knows how it is asked for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.files import from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
 from nearfar.markup import SCALE
-from nearfar.report.maps import Map, map_named
+from nearfar.report.maps import TITLES, Map, map_named
 from nearfar.report.page import STYLE
 from nearfar.version import version
 from nearfar.viewer.decoding import decode_apart
 from nearfar.viewer.inspecting import inspect_row
 from nearfar.viewer.messages import WHITE, Gains, Light, pack
-from nearfar.viewer.viewed import ViewedTransport
+from nearfar.viewer.viewed import ViewedTransport, in_half
 
 
 def read_asset(name: str) -> bytes:
@@ -27,7 +26,7 @@ def read_asset(name: str) -> bytes:
     return (STYLE + text if name == "style.css" else text).encode()
 
 
-def tell_scene(viewed: ViewedTransport, maps: list[str]) -> dict[str, Any]:
+def tell_scene(viewed: ViewedTransport, maps: Iterable[str]) -> dict[str, Any]:
     """Tell the page what it shows."""
     stored = viewed.stored
     plan = stored.provenance.get("plan")
@@ -40,7 +39,7 @@ def tell_scene(viewed: ViewedTransport, maps: list[str]) -> dict[str, Any]:
         "window": viewed.quick.window,
         "method": stored.provenance.get("method"),
         "plan": plan if isinstance(plan, dict) else None,
-        "maps": maps,
+        "maps": [{"name": name, "title": TITLES[name]} for name in maps],
         "scale": SCALE.tolist(),
         "step": viewed.step,
         "exact_step": viewed.shown_step,
@@ -80,13 +79,14 @@ def read_light_file(viewed: ViewedTransport, data: bytes, name: str) -> bytes:
     UnreadableFileError, InputError
         If it is no picture, or of another size.
     """
-    pixels = decode_apart(data, name)
+    pixels = decode_apart(data, name, viewed.projector)
     light = pixels.astype(np.float32) / np.float32(full_scale_of(pixels.dtype))
-    if light.shape[:2] != viewed.projector:
+    if light.min() < 0 or light.max() > 1:
         raise InputError(
-            f"the light is {Size(*light.shape[:2])}, the projector {viewed.projector}: resize it."
+            f"the light goes from {light.min():.4g} to {light.max():.4g}, and a projector shows 0 "
+            f"to 1: scale it."
         )
-    levels = np.rint(np.clip(_coloured(light), 0, 1) * np.float32(WHITE)).astype(np.uint16)
+    levels = np.rint(_coloured(light) * np.float32(WHITE)).astype(np.uint16)
     return pack({}, levels)
 
 
@@ -100,10 +100,7 @@ def read_photo_file(viewed: ViewedTransport, data: bytes, name: str) -> bytes:
     UnreadableFileError, InputError
         If it is no picture, or not of the camera's size.
     """
-    pixels = decode_apart(data, name)
-    size, camera = Size(*pixels.shape[:2]), viewed.stored.camera
-    if size != camera:
-        raise InputError(f"the photo is {size}, the camera {camera}: take it with that camera.")
+    pixels = decode_apart(data, name, viewed.stored.camera)
     taken = viewed.stored.provenance.get("photos")
     photo = pixels.astype(np.float32)
     if isinstance(taken, dict) and taken.get("dtype") == str(pixels.dtype):
@@ -118,7 +115,8 @@ def read_photo_file(viewed: ViewedTransport, data: bytes, name: str) -> bytes:
         photo = _coloured(photo)[::step, ::step] - viewed.in_colours(black)
     else:
         photo = _coloured(from_srgb(photo))[:: viewed.shown_step, :: viewed.shown_step]
-    return pack({}, photo.astype(np.float16))
+    scale, shown = in_half(photo)
+    return pack({"scale": scale}, shown)
 
 
 # What a page may send to be read.

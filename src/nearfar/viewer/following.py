@@ -2,16 +2,20 @@
 
 import asyncio
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from nearfar.errors import NearfarError
 from nearfar.packages import needed
 from nearfar.viewer.messages import Light, pack, unpack_light
-from nearfar.viewer.viewed import ViewedTransport
+from nearfar.viewer.viewed import Shown, ViewedTransport
 
 with needed(extra="viewer", what="a page in the browser"):
     from starlette.websockets import WebSocket, WebSocketDisconnect
 
+# Pieces of work that wait at once, of one kind.
+MOST = 16
 # Seconds after which a light counts as at rest.
 REST = 0.12
 
@@ -27,16 +31,32 @@ class Newest:
     light: Light | None = None
 
 
+class BusyError(NearfarError):
+    """More is asked for at once than is answered."""
+
+
 class Work:
-    """One piece of work at a time, in a thread beside the server's."""
+    """One piece of work at a time, in a thread of its own; those asked for meanwhile wait."""
 
     def __init__(self) -> None:
-        self._one = asyncio.Lock()
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._waiting = 0
 
     async def do(self, work: Callable[..., R], *given: Any) -> R:
-        """Do it once what is under way is done."""
-        async with self._one:
-            return await asyncio.to_thread(work, *given)
+        """Do it once what is under way is done, whoever gave that up.
+
+        Raises
+        ------
+        BusyError
+            If too much waits already.
+        """
+        if self._waiting >= MOST:
+            raise BusyError("too much is asked for at once: wait a moment, and ask again.")
+        self._waiting += 1
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._thread, work, *given)
+        finally:
+            self._waiting -= 1
 
 
 async def take_lights(viewed: ViewedTransport, newest: Newest, socket: WebSocket) -> None:
@@ -50,6 +70,11 @@ async def take_lights(viewed: ViewedTransport, newest: Newest, socket: WebSocket
         newest.waiting.set()
 
 
+def _packed(number: int, shown: Shown, *, exact: bool) -> bytes:
+    words = {"number": number, "exact": exact, "step": shown.step, "scale": shown.scale}
+    return pack(words, shown.parts)
+
+
 async def answer_lights(
     viewed: ViewedTransport, work: Work, newest: Newest, socket: WebSocket
 ) -> None:
@@ -60,8 +85,7 @@ async def answer_lights(
         number, light = newest.number, newest.light
         assert light is not None
         shown = await work.do(viewed.at_once, light)
-        words = {"number": number, "exact": viewed.is_quick, "step": shown.step}
-        await socket.send_bytes(pack(words, shown.parts))
+        await socket.send_bytes(_packed(number, shown, exact=viewed.is_quick))
         if viewed.is_quick or await _moves_on(newest, REST):
             continue
         steps = viewed.at_rest(light)
@@ -71,8 +95,7 @@ async def answer_lights(
             except _EndedError:
                 break
             if exact is not None:
-                words = {"number": number, "exact": True, "step": exact.step}
-                await socket.send_bytes(pack(words, exact.parts))
+                await socket.send_bytes(_packed(number, exact, exact=True))
 
 
 class _EndedError(Exception):

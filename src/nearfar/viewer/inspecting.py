@@ -14,6 +14,8 @@ from nearfar.transport.model import Transport
 
 # Below this share of its largest value a row's spectrum is not told apart from nothing.
 LEAST = 1e-7
+# Projector pixels up to which error bars of a row take no more than some hundred megabytes.
+FINEST = 2**16
 
 
 class Row(NamedTuple):
@@ -26,7 +28,8 @@ class Row(NamedTuple):
     window, far : ndarray, shape (Py, Px), float32
         D + N, and F.
     window_error, far_error : ndarray, shape (Py, Px), float32
-        Standard deviations of one channel; 0 where the transport does not tell.
+        Standard deviations, for errors of channels that are independent; 0 where the transport
+        does not tell, and for projectors of more than `FINEST` pixels.
     spectrum : ndarray, shape (Py, Px), float32
         |t^| over its largest value in dB, DC in the middle.
     """
@@ -53,17 +56,17 @@ def inspect_row(transport: Transport, x: int) -> Row:
     d, n, f = (part[0].mean(axis=0) for part in transport.component_rows(pixel))
     window, far = (part.reshape(projector) for part in (d + n, f))
     errors = np.zeros((2, *projector), dtype=np.float32)
-    if transport.belief is not None:
+    told = transport.belief is not None and projector.pixels <= FINEST
+    if told:
         d_error, n_error, f_error = ErrorBars(transport).component_rows(pixel)
-        together = np.sqrt(d_error[0] ** 2 + n_error[0] ** 2)
-        errors[0] = together.mean(axis=0).reshape(projector)
-        errors[1] = f_error[0].mean(axis=0).reshape(projector)
+        errors[0] = _of_mean(d_error[0] ** 2 + n_error[0] ** 2).reshape(projector)
+        errors[1] = _of_mean(f_error[0] ** 2).reshape(projector)
     q = transport.correspondence[0, x]
     quality = transport.quality
     words: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
         "window": transport.window,
-        "has_errors": transport.belief is not None,
+        "has_errors": told,
         "confidence": None if quality is None else float(quality.confidence[0, x]),
         "saturated": None if quality is None else bool(quality.saturated[0, x]),
         "noise": float(transport.noise[0, x].mean()),
@@ -71,6 +74,11 @@ def inspect_row(transport: Transport, x: int) -> Row:
         **_bands(transport),
     }
     return Row(words, window, far, errors[0], errors[1], _spectrum(window + far))
+
+
+def _of_mean(variances: Floats) -> Floats:
+    """Return the deviation of a mean over channels of these variances, (channels, P)."""
+    return np.asarray(np.sqrt(variances.sum(axis=0)) / len(variances))
 
 
 def _spectrum(row: Floats) -> Floats:
@@ -88,10 +96,11 @@ def _bands(transport: Transport) -> dict[str, Any]:
         side = Size(transport.window, transport.window)
         measured = [(float(k.fy), float(k.fx)) for k in grid(side, side)]
     beyond = [k for k in measured if abs(k[0]) > far[0] or abs(k[1]) > far[1]]
-    # What lies at half a cycle answers direct light alone.
-    near = [k for k in beyond if max(map(abs, k)) < 0.5] or [(float(far[0]), float(far[1]))]
+    # The checkerboard is there for direct light; along a side of one pixel there is no frequency.
+    near = [k for k in beyond if min(map(abs, k)) < 0.5] or [(float(far[0]), float(far[1]))]
+    there = np.array(transport.projector) > 1
     return {
         "k_far": far.tolist(),
-        "k_near": np.abs(near).max(axis=0).tolist(),
+        "k_near": (np.abs(near).max(axis=0) * there).tolist(),
         "measured": [list(k) for k in measured],
     }

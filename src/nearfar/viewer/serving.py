@@ -5,12 +5,12 @@ machine a page from elsewhere is kept out: by the host that it names, and by its
 """
 
 import hmac
+import logging
 import secrets
 import socket
 import threading
 from collections.abc import Awaitable, Callable, Iterator, MutableMapping
 from contextlib import contextmanager
-from http.cookies import CookieError, SimpleCookie
 from typing import Any, NamedTuple
 from urllib.parse import parse_qs, urlencode, urlsplit
 
@@ -102,6 +102,8 @@ def serve(application: Application, place: Place, *, largest: int = 2**16) -> It
     try:
         yield f"http://{named}:{port}{query}"
     finally:
+        # What was under way is given up: nobody waits for it any more.
+        logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
         server.should_exit = True
         thread.join(timeout=PATIENCE)
         listening.close()
@@ -153,13 +155,19 @@ def guarded(application: Application, port: int, token: str = "") -> Application
         host = headers.get("host", b"").decode("latin-1")
         origin = headers.get("origin", b"").decode("latin-1")
         allowed = token or _hostname(host) in LOCAL
-        if not allowed or (origin and urlsplit(origin).netloc != host):
+        # What a page elsewhere embeds or asks for; a link that is clicked there is another matter.
+        embedded = (
+            headers.get("sec-fetch-site") == b"cross-site"
+            and headers.get("sec-fetch-mode") != b"navigate"
+        )
+        here = {"", f"http://{host}", f"https://{host}"}
+        if not allowed or embedded or origin not in here:
             await _refuse(scope, send, b"This page is for a browser on the same machine.")
         elif not token or _same(_kept(headers.get("cookie", b""), cookie), token):
             await application(scope, receive, send)
         elif scope["type"] == "http" and _same(_asked(scope), token):
             # From here on the cookie tells, and the token is in no address that is passed on.
-            kept = f"{cookie}={token}; HttpOnly; SameSite=Strict; Path=/"
+            kept = f"{cookie}={token}; HttpOnly; SameSite=Lax; Path=/"
             headers_back = [(b"location", b"/"), (b"set-cookie", kept.encode())]
             await _answer(send, 303, headers_back, b"")
         else:
@@ -176,11 +184,12 @@ def _hostname(host: str) -> str:
 
 
 def _kept(header: bytes, name: str) -> str:
-    try:
-        cookies = SimpleCookie(header.decode("latin-1"))
-    except CookieError:
-        return ""
-    return cookies[name].value if name in cookies else ""
+    # By hand: other applications on the host may have set what a strict parser stumbles over.
+    for part in header.decode("latin-1").split(";"):
+        given, _, value = part.strip().partition("=")
+        if given == name:
+            return value
+    return ""
 
 
 def _asked(scope: Scope) -> str:

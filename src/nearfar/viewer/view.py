@@ -24,7 +24,7 @@ from nearfar.viewer.answers import (
     tell_scene,
 )
 from nearfar.viewer.decoding import LARGEST
-from nearfar.viewer.following import Newest, Work, answer_lights, take_lights
+from nearfar.viewer.following import BusyError, Newest, Work, answer_lights, take_lights
 from nearfar.viewer.messages import WHITE, largest_light, unpack_light
 from nearfar.viewer.serving import Place, serve
 from nearfar.viewer.viewed import ViewedTransport
@@ -82,19 +82,24 @@ def run_view(
     largest = largest_light(viewed.projector)
     with serve(application(viewed), place, largest=largest) as address:
         started(address)
-        over.wait()
+        try:
+            over.wait()
+        finally:
+            viewed.give_up()
 
 
 class Desk:
     """What a page may ask of a transport; each method answers one kind of question."""
 
     def __init__(self, viewed: ViewedTransport) -> None:
-        self._viewed, self._work = viewed, Work()
+        self._viewed = viewed
+        # Lights go on moving while a map is computed or a file is read.
+        self._lights, self._answers, self._files = Work(), Work(), Work()
         self._maps = maps_of(viewed.quick)
         self._mapped: dict[str, bytes] = {}
         self._assets = {name: read_asset(name) for name in ASSETS}
         self._largest = largest_light(viewed.projector)
-        self._about = tell_scene(viewed, list(self._maps))
+        self._about = tell_scene(viewed, self._maps)
         self._pages = 0
 
     async def asset(self, name: str) -> Response:
@@ -111,38 +116,38 @@ class Desk:
     async def row(self, y: int, x: int) -> Response:
         """Answer what a camera pixel sees of each projector pixel."""
         _require_within("camera", self._viewed.stored.camera, y, x)
-        return _packed(await self._work.do(answer_row, self._viewed, y, x))
+        return _packed(await self._answers.do(answer_row, self._viewed, y, x))
 
     async def column(self, y: int, x: int) -> Response:
         """Answer what a projector pixel lights."""
         _require_within("projector", self._viewed.projector, y, x)
-        return _packed(await self._work.do(answer_column, self._viewed, y, x))
+        return _packed(await self._answers.do(answer_column, self._viewed, y, x))
 
     async def map(self, name: str) -> Response:
         """Answer a map."""
         if name not in self._mapped:
-            self._mapped[name] = await self._work.do(answer_map, self._maps, name)
+            self._mapped[name] = await self._answers.do(answer_map, self._maps, name)
         return _packed(self._mapped[name])
 
     async def picture(self, request: Request) -> Response:
         """Answer the picture under a light, every camera pixel of it, as OpenEXR."""
         words, light = unpack_light(await _body(request, self._largest), self._viewed.projector)
         return _packed(
-            await self._work.do(answer_exr, self._viewed, light, words.gains), "image/x-exr"
+            await self._answers.do(answer_exr, self._viewed, light, words.gains), "image/x-exr"
         )
 
     async def light(self, request: Request) -> Response:
         """Answer a light as a PNG of 16 bits, which ``nearfar relight`` reads as it is."""
         _, light = unpack_light(await _body(request, self._largest), self._viewed.projector)
         levels = np.rint(light.whole() * np.float32(WHITE)).astype(np.uint16)
-        return _packed(await self._work.do(encode_png, levels), "image/png")
+        return _packed(await self._answers.do(encode_png, levels), "image/png")
 
     async def read(self, kind: str, request: Request, name: str = "") -> Response:
         """Read a light or a photo that a browser cannot."""
         if kind not in READERS:
             raise InputError(f"there is nothing to read as {kind!r}: send a light or a photo.")
         data = await _body(request, LARGEST)
-        return _packed(await self._work.do(READERS[kind], self._viewed, data, name[:255]))
+        return _packed(await self._files.do(READERS[kind], self._viewed, data, name[:255]))
 
     async def relight(self, socket: WebSocket) -> None:
         """Answer each light that a page sends by the picture under it."""
@@ -154,7 +159,7 @@ class Desk:
         newest = Newest()
         both = [
             asyncio.create_task(take_lights(self._viewed, newest, socket)),
-            asyncio.create_task(answer_lights(self._viewed, self._work, newest, socket)),
+            asyncio.create_task(answer_lights(self._viewed, self._lights, newest, socket)),
         ]
         try:
             done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
@@ -170,6 +175,7 @@ class Desk:
         finally:
             for task in both:
                 task.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
             self._pages -= 1
 
 
@@ -200,13 +206,14 @@ def application(viewed: ViewedTransport) -> FastAPI:
 
 
 async def _told(_request: Request, error: Exception) -> Response:
-    return JSONResponse({"fault": str(error)}, status_code=400)
+    return JSONResponse({"fault": str(error)}, 503 if isinstance(error, BusyError) else 400)
 
 
 async def _careful(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
     response = await answer(request)
     response.headers["Content-Security-Policy"] = POLICY
     response.headers["X-Content-Type-Options"] = "nosniff"
+    response.headers["Cross-Origin-Resource-Policy"] = "same-origin"
     response.headers["Referrer-Policy"] = "no-referrer"
     response.headers["Cache-Control"] = "no-store"
     return response

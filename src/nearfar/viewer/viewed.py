@@ -4,6 +4,7 @@ Index convention: camera pixels are [y, x]; pictures for the page are (3, y, x, 
 near and far, colours 1 or 3.
 """
 
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.errors import InputError, NearfarError
+from nearfar.files import luminance
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import FACTORS, stacked, thinned
@@ -28,6 +31,12 @@ SHOWN = 2**22
 # Bytes that a whole transport may take in memory, unless told otherwise.
 MEMORY = 2 * 10**9
 GREY, COLOUR = 1, 3
+# float16 ends at 65504; the larger, the fewer digits are lost in the dark.
+HIGHEST = 32768.0
+
+
+class GivenUpError(NearfarError):
+    """What was under way when the server was told to end."""
 
 
 class Shown(NamedTuple):
@@ -37,11 +46,14 @@ class Shown(NamedTuple):
     ----------
     parts : ndarray of float16, shape (3, y, x, colours)
         Direct, near, far.
+    scale : float
+        What they are multiplied by, a power of 2.
     step : int
         Every so many rows and columns of the camera are shown.
     """
 
     parts: NDArray[np.float16]
+    scale: float
     step: int
 
 
@@ -89,6 +101,7 @@ class ViewedTransport:
             blacks.append(part.black)
             first += part.camera.height
             told(first / camera.height)
+        self._given_up = threading.Event()
         # The photo under black, (y, x, channels).
         self.black: Floats = np.concatenate(blacks)
         self.quick = _joined([part for part in quick if part.camera.height])
@@ -105,7 +118,7 @@ class ViewedTransport:
 
     def at_once(self, light: Light) -> Shown:
         """Relight what is gone through while the light moves."""
-        return Shown(self._parts(self.quick, light), self.step)
+        return self._shown(self._parts(self.quick, light), self.step)
 
     @property
     def is_quick(self) -> bool:
@@ -123,7 +136,7 @@ class ViewedTransport:
             if kept.camera.height:
                 found.append(self._parts(kept, light))
             yield None
-        yield Shown(np.concatenate(found, axis=1), self.shown_step)
+        yield self._shown(np.concatenate(found, axis=1), self.shown_step)
 
     def relight(self, light: Light, *, direct: float, near: float, far: float) -> Floats:
         """Relight every camera pixel, float32, as ``nearfar relight`` does."""
@@ -137,14 +150,29 @@ class ViewedTransport:
         return self.stored.rows(slice(y, y + 1))
 
     def blocks(self) -> Iterator[Transport]:
-        """Go through blocks of camera rows."""
-        yield from self._held if self._held is not None else self.stored.blocks(STEADY)
+        """Go through blocks of camera rows; GivenUpError after `give_up`."""
+        for part in self._held if self._held is not None else self.stored.blocks(STEADY):
+            if self._given_up.is_set():
+                raise GivenUpError("the page's server ends.")
+            yield part
+
+    def give_up(self) -> None:
+        """End what is under way: nobody waits for it any more."""
+        self._given_up.set()
 
     def _as_seen(self, light: Floats) -> Floats:
         """Turn a light or a colour into one for each channel of the camera."""
-        return as_channels_see(light, self.stored.channels, self.stored.provenance)
+        try:
+            return as_channels_see(light, self.stored.channels, self.stored.provenance)
+        except InputError:
+            return luminance(light)
 
-    def _parts(self, transport: Transport, light: Light) -> NDArray[np.float16]:
+    @staticmethod
+    def _shown(parts: Floats, step: int) -> Shown:
+        scale, halves = in_half(parts)
+        return Shown(halves, scale, step)
+
+    def _parts(self, transport: Transport, light: Light) -> Floats:
         if light.is_grey or light.levels.ndim == 3:
             seen, tint = self._as_seen(light.whole()), np.ones(1, dtype=np.float32)
         else:
@@ -152,13 +180,20 @@ class ViewedTransport:
             seen, tint = light.levels, np.ravel(self._as_seen(light.colour[None, None]))
         parts = transport.components(seen)
         pictures = [part.reshape(*transport.camera, -1) * tint for part in parts]
-        return np.stack([self.in_colours(part) for part in pictures]).astype(np.float16)
+        return np.stack([self.in_colours(part) for part in pictures])
 
     def in_colours(self, picture: Floats) -> Floats:
         """Turn a picture (y, x, channels) into one that a page can show, (y, x, colours)."""
         if self.colours == COLOUR:
             return picture[..., :COLOUR]
         return picture if picture.shape[-1] == 1 else picture.mean(axis=-1, keepdims=True)
+
+
+def in_half(values: Floats) -> tuple[float, NDArray[np.float16]]:
+    """Return a power of 2, and values times it in float16, none of which it is too short for."""
+    most = float(np.abs(values).max(initial=0.0))
+    scale = 2.0 ** np.floor(np.log2(HIGHEST / most)) if most > 0 else 1.0
+    return float(scale), (values * np.float32(scale)).astype(np.float16)
 
 
 def _joined(parts: list[Transport]) -> Transport:

@@ -71,7 +71,8 @@ class ErrorBars:
     """Posterior standard deviations of a transport.
 
     They hold what the photos' noise and what was never measured leave open, for light as the
-    kinds of `nearfar.transport.kinds` expect it and q as it was found.
+    kinds of `nearfar.transport.kinds` expect it and q as it was found. Those of components are of
+    the model's split (d at q, n in the window, f in the band), not of the physical one.
 
     Parameters
     ----------

@@ -53,7 +53,8 @@ export class Light {
     // What was painted in one colour is relit as quickly as what has one.
     const one = state.strokes.every(s => s.colour === state.strokes[0].colour);
     this.levels = state.kind === 'picture' || state.kind === 'paint' && !one ? coloured : grey;
-    this.colour = linearColour(state.kind === 'paint' ? one && state.strokes[0]?.colour || '#ffffff' : state.colour);
+    this.colour = linearColour(state.kind === 'paint' ? one && state.strokes[0]?.colour || '#ffffff'
+      : ['white', 'picture'].includes(state.kind) ? '#ffffff' : state.colour);
     if (state.kind === 'paint') {
       this.paint(state.strokes);
       const brightest = this.colour.indexOf(Math.max(...this.colour)), most = this.colour[brightest] || 1;
@@ -108,6 +109,8 @@ export class Light {
   }
 
   addLinear(levels) { this.rasters.push(levels.slice()); }
+
+  addNothing() { this.rasters.push(new Uint16Array(this.coloured.length)); }
 
   // A picture for looking, of 8 bits, from the address or a file: its sRGB is undone.
   async addPicture(source) {

@@ -54,10 +54,12 @@ export class Link {
     url.hash = '';
     this.socket = new WebSocket(url);
     this.socket.binaryType = 'arraybuffer';
-    this.socket.onopen = () => { this.wait = 500; this.answered = this.number; this.changed = true; this.told(''); this.send(); };
+    this.socket.onopen = () => { this.answered = this.number; this.send(); };
     this.socket.onmessage = event => this.take(unpack(event.data));
     this.socket.onclose = event => {
-      this.told(event.reason || 'The server does not answer; trying again.');
+      // What the server refused or failed at is not sent again by itself.
+      this.changed = ![1007, 1008, 1009, 1011].includes(event.code);
+      this.told(event.reason || (this.changed ? 'The server does not answer; trying again.' : 'The server failed at this light.'));
       setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(2 * this.wait, 8000);
     };
@@ -75,6 +77,8 @@ export class Link {
 
   take({ words, arrays }) {
     this.answered = Math.max(this.answered, words.number);
+    if (this.wait > 500) this.told('');
+    this.wait = 500;
     this.send();
     this.shown(words, arrays[0], words.number === this.number && !this.changed);
   }

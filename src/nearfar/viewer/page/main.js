@@ -20,22 +20,26 @@ async function begin() {
   start = startFor(scene.projector);
   state = fromAddress(location.hash, start);
   light = new Light(...scene.projector);
-  for (const url of state.pictures) await light.addPicture(pictureOf(url)).catch(() => {});
+  let lost = 0;
+  for (const url of state.pictures)
+    try { await light.addPicture(pictureOf(url)); } catch { light.addNothing(); lost += 1; }
+  state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.rasters.length - 1));
   const [height, width] = scene.projector, [rows, columns] = scene.camera;
   get('name').textContent = scene.name;
   document.title = `${scene.name} · nearfar`;
   get('about').textContent = `camera ${rows}x${columns}, ${scene.channels} channel${scene.channels > 1 ? 's' : ''}; ` +
     `projector ${height}x${width}; W = ${scene.window}` +
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
-  get('stage').style.maxWidth = `min(100%, calc(78vh * ${columns / rows}))`;
+  get('stage').style.setProperty('--aspect', columns / rows);
   const most = { radius: Math.max(height, width) / 2, width: Math.max(height, width), side: Math.max(height, width) / 2,
     cycles: Math.max(height, width) / 2, shift: Math.max(height, width), brush: Math.max(height, width) / 4 };
   for (const [name, value] of Object.entries(most)) document.querySelector(`[data-of=${name}]`).max = Math.max(1, value);
-  get('maps').append(new Option('choose a map', ''), ...scene.maps.map(name => new Option(name.replace('-', ' '), name)));
+  get('maps').append(new Option('choose a map', ''), ...scene.maps.map(({ name, title }) => new Option(title, name)));
   get('map-bar').style.background = gradient(scene.scale);
   controls();
   refresh();
   link = new Link(() => light, shown, fault);
+  if (lost) fault(`${lost} of the pictures ${lost > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
   if (state.pixel) showRow(...state.pixel);
   if (state.column) showColumn(...state.column);
   if (state.map) showMap(state.map);
@@ -57,6 +61,9 @@ function refresh() {
   put(get('wiping'), 'hidden', !before);
   put(get('forget'), 'hidden', !before);
   put(document.documentElement.dataset, 'theme', theme());
+  put(get('play'), 'disabled', !playing && (['white', 'paint'].includes(state.kind) || state.kind === 'picture' && light.rasters.length < 2));
+  put(get('hint'), 'hidden', !(state.kind === 'paint' && !state.strokes.length || state.kind === 'picture' && !light.rasters.length));
+  put(get('hint'), 'textContent', state.kind === 'paint' ? 'drag here to paint' : 'drop pictures here');
   put(get('theme'), 'textContent', theme() === 'dark' ? 'light page' : 'dark page');
   showLevels(get('light'), light.draw(state));
   clearTimeout(saving);
@@ -79,6 +86,7 @@ function spoken(name) {
 let drawn = 0;
 function relight(changes) {
   Object.assign(state, changes);
+  fault('');
   // However often a pointer tells where it is, once for each time the screen is drawn.
   drawn ||= requestAnimationFrame(() => { drawn = 0; refresh(); link.change(); });
 }
@@ -93,13 +101,14 @@ function look(changes) {
 
 let times = [], pictures = 0;
 function shown(words, parts, newest) {
-  frame = { ...words, parts };
+  frame = { ...words, newest, parts: { ...parts, scale: words.scale } };
   times = times.filter(time => time > performance.now() - 1000);
   times.push(performance.now());
   paintFrame();
   const what = words.exact ? (words.step > 1 ? `every ${words.step}th row and column` : 'every camera pixel')
     : `while it moves: every ${words.step}th row and column`;
-  put(get('told'), 'textContent', `${times.length} pictures a second · ${what}`);
+  const rate = times.length > 2 ? `${times.length} pictures a second · ` : '';
+  put(get('told'), 'textContent', rate + what);
   pictures += 1;
   document.body.dataset.shown = JSON.stringify({ pictures, exact: words.exact, newest });
 }
@@ -139,11 +148,12 @@ function mark() {
 
 // One pixel, or a map
 
-let asked = 0;
+let under = null;
 async function newestOf(path) {
-  const number = ++asked;
-  const answer = await askPacked(path);
-  return number === asked ? answer : null;
+  under?.abort();
+  const mine = under = new AbortController();
+  const answer = await askPacked(path, { signal: mine.signal }).catch(error => { if (!mine.signal.aborted) throw error; });
+  return mine.signal.aborted ? null : answer;
 }
 
 const showRow = heard(async (y, x) => {
@@ -187,7 +197,7 @@ const showColumn = heard(async (y, x) => {
   get('column-map').hidden = false;
   get('column').textContent = `row ${y}, column ${x}`;
   const high = drawLog(get('column-map'), values.data, values.shape, scene.scale);
-  get('column-told').textContent = `1e${(high - 5).toFixed(1)} to 1e${high.toFixed(1)}` +
+  get('column-told').textContent = `${(10 ** (high - 5)).toPrecision(2)} to ${(10 ** high).toPrecision(2)} photo units` +
     (words.step > 1 ? `, every ${words.step}th camera pixel` : '');
 });
 
@@ -198,7 +208,8 @@ const showMap = heard(async name => {
   for (const id of ['map-low', 'map-high', 'map-told', 'map-value']) get(id).textContent = '';
   if (!name) return;
   get('map-told').textContent = 'computing';
-  const { words, arrays: [values] } = await askPacked(`map/${name}`);
+  const { words, arrays: [values] } = await askPacked(`map/${name}`)
+    .catch(error => { get('map-told').textContent = ''; throw error; });
   if (state.map !== name) return;
   mapped = { ...words, ...values };
   drawMap(get('map'), values.data, values.shape, words.low, words.high, scene.scale);
@@ -237,7 +248,7 @@ function controls() {
   get('clear').onclick = () => relight({ strokes: [] });
   get('expose').onclick = () => frame && look({ exposure: exposureFor(sum(frame.parts, gains())) });
   get('reset').onclick = () => look({ exposure: 0, gamma: 1, direct: 1, near: 1, far: 1, solo: '' });
-  get('keep').onclick = () => { if (frame) { before = sum(frame.parts, gains()); look({ wipe: 50 }); } };
+  get('keep').onclick = () => { if (frame?.exact) { before = sum(frame.parts, gains()); look({ wipe: 50 }); } };
   get('forget').onclick = () => { before = null; look({}); };
   get('maps').onchange = () => showMap(get('maps').value);
   get('map').onpointermove = event => {
@@ -275,9 +286,10 @@ function drawing(canvas) {
     } else relight({ x, y });
   };
   canvas.onpointerdown = event => {
-    if (event.button) return;
+    if (event.button || pressed) return;
     canvas.setPointerCapture(event.pointerId);
     pressed = placeOn(event, scene.projector);
+    Object.assign(pressed, { id: event.pointerId, at: [event.clientX, event.clientY] });
     if (state.kind === 'paint') {
       state.strokes = [...state.strokes, { colour: state.colour, radius: state.brush, points: [] }];
     }
@@ -285,12 +297,13 @@ function drawing(canvas) {
     if (!['white', 'sinusoid', 'checkerboard', 'picture'].includes(state.kind)) move(event);
   };
   canvas.onpointermove = event => {
-    if (pressed) dragged(event, pressed, move);
+    if (pressed?.id === event.pointerId) dragged(event, pressed, move);
   };
-  canvas.onpointerup = canvas.onpointercancel = event => {
-    if (!pressed) return;
+  canvas.onpointercancel = event => { if (pressed?.id === event.pointerId) pressed = null; };
+  canvas.onpointerup = event => {
+    if (pressed?.id !== event.pointerId) return;
     const [y, x] = placeOn(event, scene.projector);
-    const still = Math.hypot(y - pressed[0], x - pressed[1]) < 1;
+    const still = Math.hypot(event.clientX - pressed.at[0], event.clientY - pressed.at[1]) < 4;
     pressed = null;
     if (still && state.kind !== 'paint' || state.kind === 'pixel') showColumn(...within([y, x], scene.projector));
   };
@@ -335,6 +348,7 @@ function keys(event) {
 
 // A sequence: whatever the kind of light does over time.
 function play() {
+  if (!playing && (['white', 'paint'].includes(state.kind) || state.kind === 'picture' && light.rasters.length < 2)) return;
   playing = playing ? 0 : performance.now();
   get('play').setAttribute('aria-pressed', Boolean(playing));
   get('play').textContent = playing ? 'stop' : 'play';
@@ -371,6 +385,8 @@ async function addLights(files) {
   for (const file of files) {
     if (await isLinear(file)) {
       light.addLinear((await send('light', file)).arrays[0].data);
+      // It holds more than an address does; its place is kept.
+      state.pictures = [...state.pictures, ''];
     } else {
       const url = await light.addPicture(file).catch(() => { throw new Error(`${file.name} is no picture that the browser knows.`); });
       state.pictures = [...state.pictures, url];
@@ -388,8 +404,8 @@ async function addPhoto(file) {
     canvas.getContext('2d', { willReadFrequently: true }).drawImage(bitmap, 0, 0);
     sent = new File([await canvas.convertToBlob({ type: 'image/png' })], file.name + '.png');
   }
-  const [{ shape, data }] = (await send('photo', sent)).arrays;
-  before = { height: shape[0], width: shape[1], colours: shape[2], values: unhalve(data) };
+  const { words, arrays: [{ shape, data }] } = await send('photo', sent);
+  before = { height: shape[0], width: shape[1], colours: shape[2], values: unhalve(data, words.scale) };
   look({ wipe: 50 });
 }
 
@@ -406,7 +422,11 @@ function download(blob, name) {
 
 // As it is seen; the exact picture, once it is there.
 async function savePng() {
-  while (!frame?.exact) await new Promise(done => setTimeout(done, 100));
+  const end = performance.now() + 60000;
+  while (!frame?.exact || !frame.newest || drawn) {
+    if (performance.now() > end || playing) throw new Error('The exact picture is not there yet: let the light rest, and save again.');
+    await new Promise(done => setTimeout(done, 50));
+  }
   get('picture').toBlob(blob => download(blob, 'relit.png'), 'image/png');
 }
 

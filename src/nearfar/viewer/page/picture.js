@@ -3,7 +3,8 @@
 const halves = new Float32Array(65536);
 for (let i = 0; i < 65536; i++) {
   const sign = i & 0x8000 ? -1 : 1, exponent = i >> 10 & 31, part = i & 1023;
-  halves[i] = sign * (exponent === 0 ? part * 2 ** -24 : (1 + part / 1024) * 2 ** (exponent - 15));
+  halves[i] = exponent === 31 ? (part ? 0 : sign * 65504)
+    : sign * (exponent === 0 ? part * 2 ** -24 : (1 + part / 1024) * 2 ** (exponent - 15));
 }
 
 const STEPS = 65535;
@@ -14,31 +15,33 @@ let toneOf = 0;
 function fillTone(gamma) {
   if (toneOf === gamma) return;
   for (let i = 0; i <= STEPS; i++) {
-    const v = i / STEPS;
+    // By the square root of the light: the dark has as many steps as the eye needs.
+    const v = (i / STEPS) ** 2;
     const shown = v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055;
     tone[i] = Math.round(255 * shown ** (1 / gamma));
   }
   toneOf = gamma;
 }
 
-export function unhalve(bits) {
+// Numbers come as float16 times a scale.
+export function unhalve(bits, scale) {
   const values = new Float32Array(bits.length);
-  for (let i = 0; i < bits.length; i++) values[i] = halves[bits[i]];
+  for (let i = 0; i < bits.length; i++) values[i] = halves[bits[i]] / scale;
   return values;
 }
 
 // The sum of parts (3, y, x, colours), each with its gain, in photo units.
-export function sum({ shape, data }, gains) {
+export function sum({ shape, data, scale }, gains) {
   const count = data.length / 3, found = new Float32Array(count);
-  const [d, n, f] = gains;
+  const [d, n, f] = gains.map(gain => gain / scale);
   for (let i = 0; i < count; i++)
     found[i] = d * halves[data[i]] + n * halves[data[i + count]] + f * halves[data[i + 2 * count]];
   return { height: shape[1], width: shape[2], colours: shape[3], values: found };
 }
 
-export function onePart({ shape, data }, which, gain) {
+export function onePart({ shape, data, scale }, which, gain) {
   const count = data.length / 3, found = new Float32Array(count), at = which * count;
-  for (let i = 0; i < count; i++) found[i] = gain * halves[data[at + i]];
+  for (let i = 0; i < count; i++) found[i] = gain / scale * halves[data[at + i]];
   return { height: shape[1], width: shape[2], colours: shape[3], values: found };
 }
 
@@ -46,8 +49,8 @@ export function show(canvas, { height, width, colours, values }, { exposure, gam
   fillTone(gamma);
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height), out = image.data;
-  const scale = STEPS * 2 ** exposure;
-  const level = v => tone[v <= 0 ? 0 : Math.min(STEPS, v * scale + 0.5 | 0)];
+  const scale = 2 ** exposure;
+  const level = v => tone[v <= 0 ? 0 : Math.min(STEPS, STEPS * Math.sqrt(v * scale) + 0.5 | 0)];
   if (colours === 1)
     for (let i = 0, j = 0; i < values.length; i++, j += 4) {
       out[j] = out[j + 1] = out[j + 2] = level(values[i]); out[j + 3] = 255;

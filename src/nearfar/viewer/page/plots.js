@@ -15,18 +15,20 @@ export function drawMap(canvas, values, [height, width], low, high, scale) {
   const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height);
   const table = Array.from({ length: 256 }, (_, i) => colourOf(scale, i / 255));
   for (let i = 0; i < values.length; i++) {
-    const share = (values[i] - low) / (high - low);
+    const share = (values[i] - low) / (high - low || 1);
     const colour = Number.isFinite(values[i]) ? table[Math.round(255 * Math.min(1, Math.max(0, share)))] : [128, 128, 128];
     image.data.set([...colour.map(Math.round), 255], 4 * i);
   }
   pen.putImageData(image, 0, 0);
 }
 
-export const logarithms = values => Float32Array.from(values, v => Math.log10(Math.max(Math.abs(v), 1e-12)));
+// Of nothing there is no logarithm: it is grey.
+const LEAST = 1e-12;
+export const logarithms = values => Float32Array.from(values, v => Math.abs(v) > LEAST ? Math.log10(Math.abs(v)) : NaN);
 
 export function drawLog(canvas, values, shape, scale, decades = 5) {
   const shown = logarithms(values);
-  let high = -12;
+  let high = Math.log10(LEAST);
   for (const v of shown) if (v > high) high = v;
   drawMap(canvas, shown, shape, high - decades, high, scale);
   return high;

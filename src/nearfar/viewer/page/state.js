@@ -13,7 +13,7 @@ const LONGEST = 400000;
 export function startFor(projector) {
   const [height, width] = projector, side = Math.min(height, width);
   return { ...structuredClone(START), x: (width - 1) / 2, y: (height - 1) / 2,
-    radius: Math.max(1, Math.round(side / 6)), width: Math.max(1, Math.round(side / 16)),
+    radius: Math.max(1, Math.round(side / 4)), width: Math.max(1, Math.round(side / 16)),
     side: Math.max(1, Math.round(side / 16)), brush: Math.max(0.5, Math.round(side / 16)) };
 }
 
@@ -21,7 +21,8 @@ export function toAddress(state, start) {
   const changed = {};
   for (const name of Object.keys(start))
     if (JSON.stringify(state[name]) !== JSON.stringify(start[name])) changed[name] = state[name];
-  if (changed.pictures && JSON.stringify(changed.pictures).length > LONGEST) delete changed.pictures;
+  // Places stay, so that the others are found where they were.
+  if (changed.pictures && JSON.stringify(changed.pictures).length > LONGEST) changed.pictures = changed.pictures.map(() => '');
   return Object.keys(changed).length ? '#' + encodeURIComponent(JSON.stringify(changed)) : '#';
 }
 
@@ -44,9 +45,10 @@ export function fromAddress(hash, start) {
       state[name] = told[name];
   if (Array.isArray(told.strokes)) state.strokes = told.strokes.filter(isStroke).slice(0, 2000);
   if (Array.isArray(told.pictures))
-    state.pictures = told.pictures.filter(p => typeof p === 'string' && /^data:image\/png;base64,[A-Za-z0-9+/]+=*$/.test(p));
+    state.pictures = told.pictures.slice(0, 100).map(p => typeof p === 'string' && /^data:image\/png;base64,[A-Za-z0-9+/]+=*$/.test(p) ? p : '');
   return state;
 }
 
-const isStroke = s => s && /^#[0-9a-f]{6}$/i.test(s.colour) && Number.isFinite(s.radius) && s.radius > 0 &&
-  s.radius < 10000 && Array.isArray(s.points) && s.points.length % 2 === 0 && s.points.every(Number.isFinite);
+const isStroke = s => s && /^#[0-9a-f]{6}$/i.test(s.colour) && s.radius >= 0.5 && s.radius < 10000 &&
+  Array.isArray(s.points) && s.points.length > 1 && s.points.length % 2 === 0 &&
+  s.points.every(p => Number.isFinite(p) && Math.abs(p) < 20000);

@@ -34,8 +34,8 @@ light = nearfar.penguin(plan.projector)
 transport.plot.relit(light)
 
 # %%
-# The same, taken apart, as far as 100 photos tell: light from under the candle's skin is near-range,
-# the walls' red and green on the cup far-range.
+# The same, taken apart, as far as 100 photos tell: light from under the candle's skin is
+# near-range, the walls' red and green on the cup far-range.
 transport.plot.components(light, exposure=1.5)
 
 # %%

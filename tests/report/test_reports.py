@@ -27,11 +27,9 @@ def world():
     return model_transport(PROJECTOR, CAMERA, window=3, far=Size(3, 3), channels=3)
 
 
-def take(plan, world, path, projector=None, **camera):
-    rig = SimulatedRig(
-        world, "test", projector or SimulatedProjector(), SimulatedCamera(**camera), 1.0, 0
-    )
-    return acquire(plan, path, rig)
+def take(plan, world, path, projector=None, exposure=1.0):
+    optics = projector or SimulatedProjector()
+    return acquire(plan, path, SimulatedRig(world, "test", optics, SimulatedCamera(), exposure, 0))
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +78,22 @@ def test_warnings_stand_in_the_report_and_on_the_terminal(world, tmp_path):
     text = (tmp_path / "r.html").read_text()
     assert "projector or camera is not linear" in text
     assert "no cause for concern" not in text
+
+
+def test_what_is_saturated_is_mapped_and_told(world, tmp_path):
+    plan, _ = choose_plan(PROJECTOR, 40)
+    capture = take(plan, world, tmp_path / "c.zarr", exposure=1.8)
+    ran = run_nearfar(
+        "reconstruct", tmp_path / "c.zarr", tmp_path / "t.zarr", "--report", tmp_path / "r.html"
+    )
+    assert ran.status == 0, ran.err
+    assert "are saturated" in ran.err
+    assert "are saturated" in (tmp_path / "r.html").read_text()
+    quality = load_transport(tmp_path / "t.zarr").quality
+    white = next(i for i in range(40) if plan.draw(i).min() == 255)
+    expected = (capture.photos[white] >= capture.full_scale).any(axis=-1)
+    np.testing.assert_array_equal(quality.saturated, expected)
+    assert 0 < expected.mean() < 1
 
 
 def test_a_report_is_not_overwritten_and_refused_before_any_work(made, tmp_path):

@@ -24,8 +24,10 @@ from nearfar.errors import InputError, MissingFileError
 from nearfar.estimate.joint import ErrorBars
 from nearfar.files import read_light, read_picture, write_picture
 from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
+from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
 from nearfar.viewer import view, viewed
+from nearfar.viewer.inspecting import inspect_row
 from nearfar.viewer.messages import pack, unpack_light
 from nearfar.viewer.serving import Place, serve
 from nearfar.viewer.viewed import ViewedTransport
@@ -614,6 +616,14 @@ def test_too_much_at_once_is_told_to_wait(serve_it, monkeypatch):
         statuses = list(pool.map(row, range(8)))
     assert set(statuses) == {200, 503}
     assert statuses.count(200) >= 2
+
+
+@pytest.mark.parametrize(("window", "k_near"), [(3, 1 / 3), (4, 0.5), (5, 0.4), (6, 0.5)])
+def test_the_highest_near_frequency_is_that_of_the_papers_plan(window, k_near):
+    world = model_transport(Size(12, 12), Size(3, 5), window=window, far=Size(3, 3))
+    words = inspect_row(of_rows(world, slice(1, 2)), 2).words
+    assert words["k_near"] == pytest.approx([k_near, k_near])
+    assert words["k_far"] == pytest.approx([1 / 12, 1 / 12])
 
 
 def test_a_projector_of_one_row_is_shown(tmp_path):

@@ -3,7 +3,7 @@
 ``{run}`` runs lines of bash in a folder that all directives of one page share, and shows them with
 what they print. Options: ``status`` is the exit status that is expected, several apart by commas
 (0); ``silent`` shows no output, ``hidden`` neither that nor the lines; ``pictures`` names files to
-show below.
+show below; ``needs`` names a program of the system without which the block is left out.
 
 ``{on-a-rig}`` shows lines that need a projector and a camera; tests/test_docs.py runs them, in
 their order, on a virtual display before a virtual camera.
@@ -41,9 +41,13 @@ class Run(SphinxDirective):
         "silent": directives.flag,
         "hidden": directives.flag,
         "pictures": directives.unchanged,
+        "needs": directives.unchanged,
     }
 
     def run(self) -> list[nodes.Node]:
+        needed = self.options.get("needs")
+        if needed and shutil.which(needed) is None:
+            return []
         page = self.env.docname.replace("/", "-")
         folder = Path(self.env.app.outdir).parent / "run" / page
         folder.mkdir(parents=True, exist_ok=True)

@@ -223,6 +223,10 @@ class StoredTransport:
         for rows in blocks(self.camera.height, size // self._row_bytes):
             yield self.rows(rows)
 
+    def black(self) -> Floats:
+        """Read the photo under black, (Cy, Cx, channels)."""
+        return read_selection(self._arrays["black"], (slice(None),))
+
     def thinned(self, step: int) -> Transport:
         """Read every `step`-th row and column of the camera, no more of it at once than a block."""
         parts, first = [], 0

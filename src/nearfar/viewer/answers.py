@@ -111,7 +111,7 @@ def read_photo_file(viewed: ViewedTransport, data: bytes, name: str) -> bytes:
         is_linear = pixels.dtype != np.uint8
     if is_linear:
         step = viewed.shown_step
-        black = viewed.black[::step, ::step]
+        black = viewed.stored.black()[::step, ::step]
         photo = _coloured(photo)[::step, ::step] - viewed.in_colours(black)
     else:
         photo = _coloured(from_srgb(photo))[:: viewed.shown_step, :: viewed.shown_step]

@@ -90,20 +90,21 @@ class ViewedTransport:
         self.step = int(np.ceil(np.sqrt(size / QUICK)))
         self.shown_step = int(np.ceil(np.sqrt(camera.pixels / SHOWN)))
         self.step = max(self.step, self.shown_step)
+        self._given_up = threading.Event()
         self._held: list[Transport] | None = [] if size <= memory else None
         quick: list[Transport] = []
-        blacks: list[Floats] = []
-        first = 0
-        for part in self.stored.blocks(STEADY):
-            if self._held is not None:
+        if self._held is None:
+            # Of what is not held only the rows that are gone through are read.
+            for row in range(0, camera.height, self.step):
+                quick.append(thinned(self.row_of_camera(row), self.step))
+                told(row / camera.height)
+        else:
+            first = 0
+            for part in self.stored.blocks(STEADY):
                 self._held.append(part)
-            quick.append(thinned(part, self.step, -first % self.step))
-            blacks.append(part.black)
-            first += part.camera.height
-            told(first / camera.height)
-        self._given_up = threading.Event()
-        # The photo under black, (y, x, channels).
-        self.black: Floats = np.concatenate(blacks)
+                quick.append(thinned(part, self.step, -first % self.step))
+                first += part.camera.height
+                told(first / camera.height)
         self.quick = _joined([part for part in quick if part.camera.height])
 
     @property

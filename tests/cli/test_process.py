@@ -128,7 +128,7 @@ def test_an_interrupted_capture_keeps_its_photos(long_job, tmp_path: Path, stop:
     assert list(tmp_path.iterdir()) == [out]
 
 
-IMPATIENT = "from nearfar.cli import main, progress\nprogress.PATIENCE = 0.05\n"
+IMPATIENT = "from nearfar import progress\nfrom nearfar.cli import main\nprogress.PATIENCE = 0.05\n"
 PATIENT = "from nearfar.cli import main\n"
 
 

@@ -27,7 +27,6 @@ from nearfar.illumination.frequencies import (
     frequency_to_text,
 )
 from nearfar.illumination.pictures import natural_picture
-from nearfar.markup import card, picture
 
 # Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by,
 # version 3 Gray code; all of an earlier version is of the next as well.
@@ -224,6 +223,9 @@ class Plan(_Frozen):
 
     def _repr_html_(self) -> str:
         """Show the plan in a notebook."""
+        # Plans are made without what pictures need.
+        from nearfar.markup import card, picture
+
         counted = ", ".join(f"{count} {name}" for name, count in self.counts.items() if count)
         rows = [
             ("projector", str(self.projector)),

@@ -256,7 +256,7 @@ def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
         assert "confidence" not in names
         unpack(ask(address, "/map/noise"))
         words, (_, _, error, _, _) = unpack(ask(address, "/row?y=1&x=2"))
-        assert not words["has_errors"]
+        assert words["no_errors"] == "the joint estimate tells them"
         assert not error.any()
 
 

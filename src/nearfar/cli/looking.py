@@ -71,7 +71,6 @@ def evaluate(
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
             rows = row_snr(opened, known, progress=lambda share: told("rows", share))
             found = judge_by_truth(opened, known, rows, progress=told)
-            pairs = beside_truth(opened, known)
         else:
             assert photos is not None
             rows, pairs = None, beside_photos(opened, photos, full_scale=full_scale)
@@ -80,6 +79,8 @@ def evaluate(
             from nearfar.report.evaluation import evaluation_page
             from nearfar.report.page import write_page
 
+            if truth is not None:
+                pairs = beside_truth(opened, known)
             text = evaluation_page(opened, str(truth or photos), found, pairs, rows)
             write_page(report, text, force=force)
     if as_json:

@@ -70,7 +70,7 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
         ]
     )
     faults = [*faults_of(capture, stored.provenance), *capture.alarms]
-    thinned = "" if step == 1 else f" Every {step}th row and column of the camera is shown."
+    thinned = "" if step == 1 else f" One row and column of the camera in {step} is shown."
     body = f"""
 <h1>{escape(stored.path.name)}</h1>
 <p>The light transport of a scene, reconstructed from the photos in

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
+from nearfar.transport.apart import Apart
 from nearfar.transport.far import RealBasis
 
 if TYPE_CHECKING:
@@ -22,20 +23,8 @@ DEEPEST = 6.0
 PARTS = ("direct", "near", "far")
 
 
-class Drawable(Protocol):
+class Drawable(Apart, Protocol):
     """What is drawn of a transport, as `nearfar.Transport` has it."""
-
-    @property
-    def projector(self) -> Size:
-        """Pattern grid."""
-
-    @property
-    def camera(self) -> Size:
-        """Height and width of the photos."""
-
-    @property
-    def correspondence(self) -> Floats:
-        """Return q, (Cy, Cx, 2)."""
 
     @property
     def far_basis(self) -> RealBasis:
@@ -48,9 +37,6 @@ class Drawable(Protocol):
 
     def rows(self, pixels: slice) -> Floats:
         """Return rows of T, (n, channels, P)."""
-
-    def component_rows(self, pixels: slice) -> Any:
-        """Return rows of D, N and F."""
 
     def column(self, y: int, x: int) -> Floats:
         """Return the picture under one projector pixel."""

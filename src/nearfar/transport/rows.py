@@ -1,6 +1,6 @@
 """Transports of some camera pixels: cut out of one, and put together again."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +24,14 @@ def of_rows(transport: Transport, rows: slice) -> Transport:
 def thinned(transport: Transport, step: int, first: int = 0) -> Transport:
     """Return the transport of every `step`-th row, from `first`, and column, as a copy."""
     return _chosen(transport, lambda values: values[first::step, ::step].copy())
+
+
+def thinned_blocks(blocks: Iterable[Transport], step: int) -> Iterator[Transport]:
+    """Thin blocks of camera rows out as the whole camera would be; some may be left empty."""
+    first = 0
+    for part in blocks:
+        yield thinned(part, step, -first % step)
+        first += part.camera.height
 
 
 def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:

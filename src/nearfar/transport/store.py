@@ -25,7 +25,7 @@ from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED, stacked, thinned
+from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED, stacked, thinned_blocks
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
@@ -229,11 +229,7 @@ class StoredTransport:
 
     def thinned(self, step: int) -> Transport:
         """Read every `step`-th row and column of the camera, no more of it at once than a block."""
-        parts, first = [], 0
-        for part in self.blocks():
-            parts.append(thinned(part, step, -first % step))
-            first += part.camera.height
-        return stacked([part for part in parts if part.camera.height])
+        return stacked(list(thinned_blocks(self.blocks(), step)))
 
 
 def open_transport(path: AnyPath) -> StoredTransport:

@@ -41,8 +41,6 @@ def tell_scene(viewed: ViewedTransport, maps: Iterable[str]) -> dict[str, Any]:
         "plan": plan if isinstance(plan, dict) else None,
         "maps": [{"name": name, "title": TITLES[name]} for name in maps],
         "scale": SCALE.tolist(),
-        "step": viewed.step,
-        "exact_step": viewed.shown_step,
     }
 
 

@@ -85,7 +85,7 @@ def main(name: str, height: str, width: str) -> int:
         print(error, file=sys.stderr)  # noqa: T201
         return 1
     except MemoryError:
-        print(InputError(f"{name} is too large: make it smaller."), file=sys.stderr)  # noqa: T201
+        print(f"{name} is too large: make it smaller.", file=sys.stderr)  # noqa: T201
         return 1
     return 0
 

@@ -56,8 +56,12 @@ def inspect_row(transport: Transport, x: int) -> Row:
     d, n, f = (part[0].mean(axis=0) for part in transport.component_rows(pixel))
     window, far = (part.reshape(projector) for part in (d + n, f))
     errors = np.zeros((2, *projector), dtype=np.float32)
-    told = transport.belief is not None and projector.pixels <= FINEST
-    if told:
+    no_errors = ""
+    if transport.belief is None:
+        no_errors = "the joint estimate tells them"
+    elif projector.pixels > FINEST:
+        no_errors = f"the grid has more than {FINEST} pixels"
+    else:
         d_error, n_error, f_error = ErrorBars(transport).component_rows(pixel)
         errors[0] = _of_mean(d_error[0] ** 2 + n_error[0] ** 2).reshape(projector)
         errors[1] = _of_mean(f_error[0] ** 2).reshape(projector)
@@ -66,10 +70,9 @@ def inspect_row(transport: Transport, x: int) -> Row:
     words: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
         "window": transport.window,
-        "has_errors": told,
+        "no_errors": no_errors,
         "confidence": None if quality is None else float(quality.confidence[0, x]),
         "saturated": None if quality is None else bool(quality.saturated[0, x]),
-        "noise": float(transport.noise[0, x].mean()),
         "floodlit": {"direct": float(d.sum()), "near": float(n.sum()), "far": float(f.sum())},
         **_bands(transport),
     }

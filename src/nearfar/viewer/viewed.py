@@ -18,7 +18,7 @@ from nearfar.errors import InputError, NearfarError
 from nearfar.files import luminance
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
-from nearfar.transport.rows import FACTORS, stacked, thinned
+from nearfar.transport.rows import FACTORS, stacked, thinned, thinned_blocks
 from nearfar.transport.store import StoredTransport, open_transport
 from nearfar.viewer.messages import Light
 
@@ -102,10 +102,10 @@ class ViewedTransport:
             first = 0
             for part in self.stored.blocks(STEADY):
                 self._held.append(part)
-                quick.append(thinned(part, self.step, -first % self.step))
                 first += part.camera.height
                 told(first / camera.height)
-        self.quick = _joined([part for part in quick if part.camera.height])
+            quick = list(thinned_blocks(self._held, self.step))
+        self.quick = _joined(quick)
 
     @property
     def projector(self) -> Size:
@@ -128,14 +128,13 @@ class ViewedTransport:
 
     def at_rest(self, light: Light) -> Iterator[Shown | None]:
         """Relight every camera pixel that is shown: nothing after each block, then the picture."""
-        found, first = [], 0
-        for part in self.blocks():
-            kept = part
-            if self.shown_step > 1:
-                kept = thinned(part, self.shown_step, -first % self.shown_step)
-            first += part.camera.height
-            if kept.camera.height:
-                found.append(self._parts(kept, light))
+        found = []
+        shown = self.blocks()
+        if self.shown_step > 1:
+            shown = thinned_blocks(shown, self.shown_step)
+        for part in shown:
+            if part.camera.height:
+                found.append(self._parts(part, light))
             yield None
         yield self._shown(np.concatenate(found, axis=1), self.shown_step)
 

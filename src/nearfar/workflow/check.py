@@ -9,7 +9,7 @@ Index convention: rows are (n, channels, Py, Px), n camera pixels in a block.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import gcd
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band
 from nearfar.transport import near
+from nearfar.transport.apart import Apart
 from nearfar.workflow.conditioning import Conditioning
 
 BLOCK = 64
@@ -26,29 +27,6 @@ BLOCK = 64
 SAMPLE = 4096
 # Shares of the energy for which a bandwidth is told.
 SHARES = (0.5, 0.9, 0.99)
-
-
-class Apart(Protocol):
-    """A transport whose components are known apart."""
-
-    @property
-    def projector(self) -> Size:
-        """Pattern grid."""
-        ...
-
-    @property
-    def camera(self) -> Size:
-        """Height and width of the photos."""
-        ...
-
-    @property
-    def correspondence(self) -> Floats:
-        """q, shape (Cy, Cx, 2); NaN without direct light."""
-        ...
-
-    def component_rows(self, pixels: slice) -> tuple[Floats, Floats, Floats]:
-        """Dense rows of D, N and F, each (n, channels, P)."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ async function begin() {
   get('maps').append(new Option('choose a map', ''), ...scene.maps.map(({ name, title }) => new Option(title, name)));
   get('map-bar').style.background = gradient(scene.scale);
   controls();
+  drawLight();
   refresh();
   link = new Link(() => light, shown, fault);
   if (lost) fault(`${lost} of the pictures ${lost > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
@@ -61,11 +62,10 @@ function refresh() {
   put(get('wiping'), 'hidden', !before);
   put(get('forget'), 'hidden', !before);
   put(document.documentElement.dataset, 'theme', theme());
-  put(get('play'), 'disabled', !playing && (['white', 'paint'].includes(state.kind) || state.kind === 'picture' && light.rasters.length < 2));
+  put(get('play'), 'disabled', !playing && !canPlay());
   put(get('hint'), 'hidden', !(state.kind === 'paint' && !state.strokes.length || state.kind === 'picture' && !light.rasters.length));
   put(get('hint'), 'textContent', state.kind === 'paint' ? 'drag here to paint' : 'drop pictures here');
   put(get('theme'), 'textContent', theme() === 'dark' ? 'light page' : 'dark page');
-  showLevels(get('light'), light.draw(state));
   clearTimeout(saving);
   saving = setTimeout(keepInAddress, 250);
 }
@@ -83,12 +83,16 @@ function spoken(name) {
   return (PARTS.includes(name) || name === 'gamma' || name === 'soft' ? value.toFixed(2) : +value.toFixed(1)) + (UNITS[name] || '');
 }
 
+const drawLight = () => showLevels(get('light'), light.draw(state));
+// What has nothing to move does not play.
+const canPlay = () => !['white', 'paint'].includes(state.kind) && (state.kind !== 'picture' || light.rasters.length > 1);
+
 let drawn = 0;
 function relight(changes) {
   Object.assign(state, changes);
   fault('');
   // However often a pointer tells where it is, once for each time the screen is drawn.
-  drawn ||= requestAnimationFrame(() => { drawn = 0; refresh(); link.change(); });
+  drawn ||= requestAnimationFrame(() => { drawn = 0; drawLight(); refresh(); link.change(); });
 }
 
 function look(changes) {
@@ -105,8 +109,8 @@ function shown(words, parts, newest) {
   times = times.filter(time => time > performance.now() - 1000);
   times.push(performance.now());
   paintFrame();
-  const what = words.exact ? (words.step > 1 ? `every ${words.step}th row and column` : 'every camera pixel')
-    : `while it moves: every ${words.step}th row and column`;
+  const what = (words.exact ? '' : 'while it moves: ') +
+    (words.step > 1 ? `one row and column in ${words.step}` : 'every camera pixel');
   const rate = times.length > 2 ? `${times.length} pictures a second · ` : '';
   put(get('told'), 'textContent', rate + what);
   pictures += 1;
@@ -177,7 +181,7 @@ function drawRow() {
     (q ? `q = (${q[0]}, ${q[1]})` : 'no direct light') +
     (words.confidence === null ? '' : `, confidence ${words.confidence.toFixed(2)}`) +
     `; floodlit ${total.toPrecision(3)}: ${PARTS.map(share).join(', ')}` +
-    (words.has_errors ? '' : '; no error bars: the joint estimate tells them') +
+    (words.no_errors && `; no error bars: ${words.no_errors}`) +
     (words.saturated ? '; saturated under white' : '');
   const centre = words.q || [height / 2, width / 2];
   const around = crop(near.data, projector, centre, Math.ceil(words.window / 2) + 1);
@@ -198,7 +202,7 @@ const showColumn = heard(async (y, x) => {
   get('column').textContent = `row ${y}, column ${x}`;
   const high = drawLog(get('column-map'), values.data, values.shape, scene.scale);
   get('column-told').textContent = `${(10 ** (high - 5)).toPrecision(2)} to ${(10 ** high).toPrecision(2)} photo units` +
-    (words.step > 1 ? `, every ${words.step}th camera pixel` : '');
+    (words.step > 1 ? `, one row and column in ${words.step}` : '');
 });
 
 let mapped = null;
@@ -348,7 +352,7 @@ function keys(event) {
 
 // A sequence: whatever the kind of light does over time.
 function play() {
-  if (!playing && (['white', 'paint'].includes(state.kind) || state.kind === 'picture' && light.rasters.length < 2)) return;
+  if (!playing && !canPlay()) return;
   playing = playing ? 0 : performance.now();
   get('play').setAttribute('aria-pressed', Boolean(playing));
   get('play').textContent = playing ? 'stop' : 'play';

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nearfar.arrays import Size
+from nearfar.arrays import Size, blocks
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -21,7 +21,7 @@ from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import TRUSTED, stacked, thinned
+from nearfar.transport.rows import TRUSTED, of_rows, stacked, thinned, thinned_blocks
 from nearfar.transport.store import (
     BELIEVED,
     FACTORS,
@@ -91,6 +91,17 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
         values = getattr(load_transport(tmp_path / "t.zarr").quality, name)
         np.testing.assert_array_equal(values, getattr(transport.quality, name))
         assert values.dtype == getattr(transport.quality, name).dtype
+
+
+@pytest.mark.parametrize("step", [1, 2, 3, 4, 20])
+@pytest.mark.parametrize("rows", [1, 2, 4, 5, 9])
+def test_blocks_are_thinned_as_the_whole_camera(generator, step, rows):
+    whole = _believed(_transport(generator))
+    parts = [of_rows(whole, block) for block in blocks(whole.camera.height, rows)]
+    found, known = stacked(list(thinned_blocks(parts, step))), thinned(whole, step)
+    for name in FACTORS:
+        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+    np.testing.assert_array_equal(found.quality.saturated, known.quality.saturated)
 
 
 def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):

@@ -45,6 +45,23 @@ camera = "30x36"
 bits = 16
 """
 
+# A program that opens the camera, waits before it sets it up, takes a photo, and holds it.
+HOLDING = """
+import sys, time
+from nearfar.arrays import Size
+from nearfar.rigs.cameras.aravis import AravisCamera
+
+class Slow(AravisCamera):
+    def _set_up(self, *given):
+        time.sleep(float(sys.argv[2]))
+        super()._set_up(*given)
+
+camera = Slow(sys.argv[1], region=Size(30, 36), pixel_format="Mono16")
+camera.set_exposure(0.016667)
+print(camera.take().shape, flush=True)
+time.sleep(60)
+"""
+
 pytestmark = pytest.mark.slow
 
 
@@ -224,16 +241,32 @@ def test_a_camera_that_stops_and_a_kill_cost_no_photo(bench, calibrated):
     assert "photos are kept" in sentence
     assert "--resume goes on" in sentence
     # It takes the camera three seconds to notice that nobody holds it any more.
-    time.sleep(2.5)
+    time.sleep(3.5)
     again = ("acquire", "plan.json", "stopped.zarr", "--rig", bench.rig, "--resume")
     running = bench.start(*again)
     bench.wait_for("stopped.zarr", 25)
     running.kill()
     running.communicate()
     assert 25 <= bench.taken("stopped.zarr") < PHOTOS
-    time.sleep(2.5)
+    time.sleep(3.5)
     bench.do(*again)
     _check(bench, "stopped")
+
+
+def test_a_camera_that_a_killed_program_left_sending_sends_to_the_next(bench):
+    for wait in (0.0, 0.5):
+        holding = subprocess.Popen(
+            [sys.executable, "-c", HOLDING, "Aravis-Fake-NF01", str(wait)],
+            stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert holding.stdout is not None
+        try:
+            assert holding.stdout.readline() == "(30, 36, 1)\n"
+        finally:
+            holding.kill()
+            holding.communicate()
+        # Until the camera lets go of it.
+        time.sleep(3.5)
 
 
 def test_what_goes_wrong_on_the_way_is_mended_or_named(bench, calibrated, plan):

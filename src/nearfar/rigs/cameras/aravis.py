@@ -160,9 +160,7 @@ class AravisCamera(Camera):
     def close(self) -> None:
         """Give the camera back."""
         if self._stream is not None:
-            # It may be gone; what matters is that it is let go of.
-            with suppress(DeviceError):
-                self._library.call("arv_camera_stop_acquisition", self._camera)
+            self._stop()
             self._library.release(self._stream)
         if self._camera is not None:
             self._library.release(self._camera)
@@ -187,6 +185,11 @@ class AravisCamera(Camera):
             # This one began before.
             self._pop()
         return self._pop()
+
+    def _stop(self) -> None:
+        # It may be gone, or at rest and mind being stopped; what matters comes after.
+        with suppress(DeviceError):
+            self._library.call("arv_camera_stop_acquisition", self._camera)
 
     def _pop(self) -> Frame:
         wait = int(MICROSECONDS * ((self.exposure or 0.0) + PATIENCE))
@@ -233,6 +236,8 @@ class AravisCamera(Camera):
         return float(self._call("arv_camera_get_exposure_time", self._camera)) / MICROSECONDS
 
     def _set_up(self, region: Size | None, pixel_format: str | None) -> None:
+        # A program that was killed leaves it sending, and it would go on sending there.
+        self._stop()
         # What decides by itself would change between photos.
         for automatic in ("ExposureAuto", "GainAuto", "BalanceWhiteAuto", "GammaEnable"):
             if self._has(automatic):

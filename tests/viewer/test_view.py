@@ -7,12 +7,15 @@ import signal
 import struct
 import subprocess
 import sys
+import threading
 import time
 import urllib.error
 import urllib.request
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
+from socket import create_connection
 
 import numpy as np
 import pytest
@@ -27,6 +30,7 @@ from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
 from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
 from nearfar.viewer import view, viewed
+from nearfar.viewer.answers import answer_map
 from nearfar.viewer.inspecting import inspect_row
 from nearfar.viewer.messages import pack, unpack_light
 from nearfar.viewer.serving import Place, serve
@@ -260,6 +264,29 @@ def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
         assert not error.any()
 
 
+def test_pixels_are_answered_while_a_map_is_computed(serve_it, monkeypatch):
+    begun, over = threading.Event(), threading.Event()
+
+    def slow(maps, name):
+        begun.set()
+        assert over.wait(30)
+        return answer_map(maps, name)
+
+    monkeypatch.setattr(view, "answer_map", slow)
+    address = serve_it()
+    with ThreadPoolExecutor() as asking:
+        drawn = asking.submit(ask, address, "/map/error")
+        assert begun.wait(30)
+        try:
+            assert ask(address, "/row?y=1&x=2")
+            assert ask(address, "/column?y=1&x=2")
+            assert not drawn.done()
+        finally:
+            over.set()
+        words, _ = unpack(drawn.result(30))
+        assert words["unit"] == "dB"
+
+
 # Files that a page sends
 
 
@@ -387,6 +414,28 @@ def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
         first.recv(timeout=30)
     # Those that went made room.
     relit(address, lights["spot"])
+
+
+def test_hundreds_of_connections_that_say_nothing_or_do_not_end_keep_nobody_out(
+    serve_it, lights, monkeypatch
+):
+    monkeypatch.setattr(view, "SENDING", 1.0)
+    address = serve_it()
+    place = ("127.0.0.1", int(address.rsplit(":", 1)[1]))
+    head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n"
+    with socket_of(address) as first:
+        for said in ("", "GET / HTTP/1.1\r\nHost:", head + "\r\n{"):
+            with ExitStack() as stack:
+                for _ in range(600):
+                    opened = stack.enter_context(create_connection(place, timeout=30))
+                    opened.sendall(said.encode())
+                if said.endswith("{"):
+                    # Those that were let in are answered, that it took too long.
+                    time.sleep(view.SENDING + 1)
+                relit(address, lights["spot"])
+                assert ask(address, "/main.js")
+                first.send(message(lights["random"]))
+                first.recv(timeout=30)
 
 
 @pytest.mark.parametrize(

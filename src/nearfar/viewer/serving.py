@@ -79,6 +79,8 @@ def serve(application: Application, place: Place, *, largest: int = 2**16) -> It
     """
     with needed(extra="viewer", what="a page in the browser"):
         import uvicorn
+
+        from nearfar.viewer.connections import Connection
     listening = _listen(place)
     port = listening.getsockname()[1]
     token = "" if place.is_local else secrets.token_urlsafe(TOKEN)
@@ -87,6 +89,7 @@ def serve(application: Application, place: Place, *, largest: int = 2**16) -> It
         log_level="error",
         access_log=False,
         lifespan="off",
+        http=Connection,
         ws="websockets-sansio",
         ws_max_size=largest,
         # Numbers hardly shrink, and trying takes as long as relighting.

@@ -34,6 +34,8 @@ with needed(extra="viewer", what="a page in the browser"):
     from fastapi.responses import JSONResponse, Response
     from starlette.websockets import WebSocketDisconnect
 
+# Seconds in which what a page sends is here.
+SENDING = 60.0
 # Pages that may be open at once.
 PAGES = 8
 # Bytes of the reason for which a socket is closed, of the 123 that there may be.
@@ -93,8 +95,9 @@ class Desk:
 
     def __init__(self, viewed: ViewedTransport) -> None:
         self._viewed = viewed
-        # Lights go on moving while a map is computed or a file is read.
-        self._lights, self._answers, self._files = Work(), Work(), Work()
+        # Lights go on moving while pixels are looked at, both while a map or a whole picture is
+        # computed, and all of it while a file is read.
+        self._lights, self._pixels, self._wholes, self._files = Work(), Work(), Work(), Work()
         self._maps = maps_of(viewed.quick)
         self._mapped: dict[str, bytes] = {}
         self._assets = {name: read_asset(name) for name in ASSETS}
@@ -116,31 +119,31 @@ class Desk:
     async def row(self, y: int, x: int) -> Response:
         """Answer what a camera pixel sees of each projector pixel."""
         _require_within("camera", self._viewed.stored.camera, y, x)
-        return _packed(await self._answers.do(answer_row, self._viewed, y, x))
+        return _packed(await self._pixels.do(answer_row, self._viewed, y, x))
 
     async def column(self, y: int, x: int) -> Response:
         """Answer what a projector pixel lights."""
         _require_within("projector", self._viewed.projector, y, x)
-        return _packed(await self._answers.do(answer_column, self._viewed, y, x))
+        return _packed(await self._pixels.do(answer_column, self._viewed, y, x))
 
     async def map(self, name: str) -> Response:
         """Answer a map."""
         if name not in self._mapped:
-            self._mapped[name] = await self._answers.do(answer_map, self._maps, name)
+            self._mapped[name] = await self._wholes.do(answer_map, self._maps, name)
         return _packed(self._mapped[name])
 
     async def picture(self, request: Request) -> Response:
         """Answer the picture under a light, every camera pixel of it, as OpenEXR."""
         words, light = unpack_light(await _body(request, self._largest), self._viewed.projector)
         return _packed(
-            await self._answers.do(answer_exr, self._viewed, light, words.gains), "image/x-exr"
+            await self._wholes.do(answer_exr, self._viewed, light, words.gains), "image/x-exr"
         )
 
     async def light(self, request: Request) -> Response:
         """Answer a light as a PNG of 16 bits, which ``nearfar relight`` reads as it is."""
         _, light = unpack_light(await _body(request, self._largest), self._viewed.projector)
         levels = np.rint(light.whole() * np.float32(WHITE)).astype(np.uint16)
-        return _packed(await self._answers.do(encode_png, levels), "image/png")
+        return _packed(await self._pixels.do(encode_png, levels), "image/png")
 
     async def read(self, kind: str, request: Request, name: str = "") -> Response:
         """Read a light or a photo that a browser cannot."""
@@ -229,11 +232,17 @@ def _require_within(what: str, size: Size, y: int, x: int) -> None:
 
 
 async def _body(request: Request, most: int) -> bytes:
-    """Read what is sent, but no more than so many bytes."""
+    """Read what is sent, but no more than so many bytes, and within `SENDING`."""
     parts, size = [], 0
-    async for part in request.stream():
-        size += len(part)
-        if size > most:
-            raise InputError(f"more than {most} bytes were sent: send a smaller file.")
-        parts.append(part)
+    try:
+        async with asyncio.timeout(SENDING):
+            async for part in request.stream():
+                size += len(part)
+                if size > most:
+                    raise InputError(f"more than {most} bytes were sent: send a smaller file.")
+                parts.append(part)
+    except TimeoutError:
+        raise InputError(
+            f"{SENDING:g} s were not enough to send it: send a smaller file."
+        ) from None
     return b"".join(parts)

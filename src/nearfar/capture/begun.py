@@ -1,7 +1,6 @@
 """Captures that are under way or were stopped: what is known of their photos."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -57,25 +56,6 @@ def begun_capture(path: AnyPath) -> Begun:
         return Begun(0, None)
     exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
     return Begun(count_photos(folder), exposure if is_positive(exposure) else None)
-
-
-def read_log(folder: Path) -> list[Taken]:
-    """Read what is noted of the photos; what a crash tore off the last line is cut away."""
-    path = folder / LOG
-    lines = path.read_bytes().splitlines(keepends=True)
-    taken: list[Taken] = []
-    whole = 0
-    for line in lines:
-        try:
-            noted = Taken(**json.loads(line))
-        except (ValueError, TypeError):
-            break
-        if not line.endswith(b"\n"):
-            break
-        taken.append(noted)
-        whole += len(line)
-    os.truncate(path, whole)
-    return taken
 
 
 def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:

@@ -1,7 +1,6 @@
 """Writing a capture: every photo is on the disk, and noted, before the next is asked for."""
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ import zarr
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
-from nearfar.capture.begun import LOG, Taken, other_plan, read_log, require_same_rig
+from nearfar.capture.begun import LOG, Taken, other_plan, require_same_rig
 from nearfar.capture.checks import (
     as_photo,
     check_count,
@@ -40,6 +39,7 @@ from nearfar.files import (
     open_store,
     read_selection,
 )
+from nearfar.files.logs import note, read_notes
 from nearfar.files.output import synchronise_entry
 from nearfar.plan.model import Plan
 from nearfar.version import version
@@ -47,8 +47,6 @@ from nearfar.version import version
 
 class CaptureWriter:
     """Writes the photos of a plan into a folder, in order; it may be gone on with by another.
-
-    Use it as a context: leaving it closes the log.
 
     Parameters
     ----------
@@ -105,7 +103,6 @@ class CaptureWriter:
         self._first: NDArray[Any] | None = None
         self._group: zarr.Group | None = None
         self._photos: zarr.Array[Any] | None = None
-        self._log: int | None = None
 
     @classmethod
     def resume(
@@ -135,21 +132,8 @@ class CaptureWriter:
         """
         group = open_store(folder, KIND, FORMAT_VERSION)
         writer = cls(folder, plan, full_scale=full_scale, rig=rig, exposure=exposure)
-        writer._open_log()
-        try:
-            writer._take_up(group)
-        except BaseException:
-            writer.__exit__()
-            raise
+        writer._take_up(group)
         return writer
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_fault: object) -> None:
-        if self._log is not None:
-            os.close(self._log)
-            self._log = None
 
     @property
     def taken(self) -> int:
@@ -218,7 +202,9 @@ class CaptureWriter:
         saturated = float(np.mean(photo >= scale))
         same = bool(np.array_equal(photo, first))
         told = (dict(conditions or {}), list(alarms))
-        self._note(Taken(time.time(), saturated, mean, same, *told))
+        taken = Taken(time.time(), saturated, mean, same, *told)
+        note(self._folder / LOG, taken._asdict())
+        self._taken.append(taken)
         return photo
 
     def finish(self, alarms: Sequence[str] = ()) -> None:
@@ -261,7 +247,7 @@ class CaptureWriter:
     def _take_up(self, group: zarr.Group) -> None:
         """Take over what another writer left."""
         folder, before = self._folder, dict(group.attrs)
-        self._taken = read_log(folder)
+        self._taken = read_notes(folder / LOG, lambda words: Taken(**words))
         # What was being written when it was killed.
         for left in folder.rglob(".*.partial"):
             left.unlink()
@@ -291,19 +277,9 @@ class CaptureWriter:
         rows = max(1, min(len(first), CHUNK_BYTES // max(1, first[0].nbytes)))
         chunk = (1, rows, *first.shape[1:])
         photos = add_array(self._group, "photos", (count, *first.shape), first.dtype, chunk)
-        self._open_log()
-        return photos
-
-    def _open_log(self) -> None:
-        self._log = os.open(self._folder / LOG, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
         synchronise_entry(self._folder)
         synchronise_entry(self._folder.parent)
-
-    def _note(self, taken: Taken) -> None:
-        assert self._log is not None
-        os.write(self._log, (json.dumps(taken._asdict()) + "\n").encode())
-        os.fsync(self._log)
-        self._taken.append(taken)
+        return photos
 
 
 def write_capture(
@@ -357,12 +333,10 @@ def write_capture(
     """
     path = Path(path)
     count = len(plan.patterns)
-    with (
-        new_output(path, force=force) as partial,
-        CaptureWriter(
+    with new_output(path, force=force) as partial:
+        writer = CaptureWriter(
             partial, plan, full_scale=full_scale, rig=rig, exposure=exposure, names=names
-        ) as writer,
-    ):
+        )
         remaining = iter(photos)
         ended = False
         while writer.taken < count and not ended:

@@ -78,10 +78,8 @@ def acquire(
     kept = _Kept(path, len(plan.patterns), resume=resume)
     tell = told or (lambda _alarm: None)
     try:
-        with (
-            resumable_output(path, kept.worth, resume=resume, force=force) as folder,
-            _writer(folder, plan, rig, resume=resume) as writer,
-        ):
+        with resumable_output(path, kept.worth, resume=resume, force=force) as folder:
+            writer = _writer(folder, plan, rig, resume=resume)
             kept.folder = folder
             ended, taken, heard = writer.ended, writer.taken, 0
             look = CaptureAlarms(plan, rig.full_scale)

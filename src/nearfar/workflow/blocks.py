@@ -81,6 +81,21 @@ class Cut(NamedTuple):
         """Return the rows that a block hears of: its own, and those beside it."""
         return slice(max(0, block.start - self.halo), min(self.height, block.stop + self.halo))
 
+    def known_around(
+        self, block: slice, correspondence: Correspondence | None
+    ) -> Correspondence | None:
+        """Return what a block hears of a correspondence, if it is given."""
+        return None if correspondence is None else correspondence.of_rows(self.around(block))
+
+    def report_of(self, block: slice, report: Progress) -> Callable[[float], None]:
+        """Return what reports the share of a block as that of the whole camera."""
+
+        def done(share: float) -> None:
+            rows = block.start + share * (block.stop - block.start)
+            report("reconstructing", rows / self.height)
+
+        return done
+
 
 @dataclass(frozen=True)
 class Job:

@@ -9,11 +9,11 @@ gives with the same memory.
 import hashlib
 import os
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, open_capture
@@ -21,20 +21,20 @@ from nearfar.correspondence import Correspondence
 from nearfar.errors import ClusterError, MissingPackageError
 from nearfar.files import check_output, new_output
 from nearfar.files.writes import abandon
-from nearfar.transport.store import write_provenance, write_rows
+from nearfar.transport.store import write_provenance
 from nearfar.version import version
 from nearfar.workflow.blocks import (
     MEMORY,
     Job,
     Progress,
     cut_rows,
-    of_all,
     prepare,
     reconstruct_block,
     unheard,
     without_light,
 )
 from nearfar.workflow.methods import Method
+from nearfar.workflow.written import Written, write_block
 
 try:
     from dask import config
@@ -52,22 +52,6 @@ PATIENCE = 10
 _AT_WORK = threading.Lock()
 
 
-class Done(NamedTuple):
-    """A block of rows that was reconstructed and written.
-
-    Attributes
-    ----------
-    lit, pixels : int
-        Camera pixels with direct light, and all.
-    provenance : dict
-        How it was made.
-    """
-
-    lit: int
-    pixels: int
-    provenance: Mapping[str, Any]
-
-
 def reconstruct_on(
     scheduler: str,
     capture: Capture,
@@ -79,7 +63,7 @@ def reconstruct_on(
     half: bool = False,
     force: bool = False,
     progress: Progress | None = None,
-) -> Done:
+) -> Written:
     """Reconstruct a capture on the workers of a Dask scheduler.
 
     Parameters
@@ -99,7 +83,7 @@ def reconstruct_on(
 
     Returns
     -------
-    Done
+    Written
         Of the whole camera.
 
     Raises
@@ -124,7 +108,7 @@ def reconstruct_on(
         job = client.submit(_prepared, source, method, memory, given, half, pure=False)
         tasks = []
         for block in cut.blocks():
-            known = correspondence.of_rows(cut.around(block)) if correspondence else None
+            known = cut.known_around(block, correspondence)
             tasks.append(client.submit(_reconstructed, job, block, known, partial, pure=False))
         try:
             done = _gathered(client, tasks, scheduler, report)
@@ -148,26 +132,23 @@ def _prepared(source: Path, method: Method, memory: int, given: bool, half: bool
     return prepare(open_capture(source), method=method, memory=memory, given=given, half=half)
 
 
-def _reconstructed(job: Job, block: slice, known: Correspondence | None, partial: Path) -> Done:
+def _reconstructed(job: Job, block: slice, known: Correspondence | None, partial: Path) -> Written:
     """On a worker: reconstruct a block of rows, and write it."""
     with _AT_WORK:
         part = reconstruct_block(job, block, known)
     if not partial.is_dir():
         raise ClusterError(f"{partial} was given up while this block was worked at.")
-    write_rows(partial, part.transport, block.start, rows=job.cut.rows, height=job.cut.height)
-    lit = part.correspondence.lit
-    return Done(int(lit.sum()), lit.size, part.transport.provenance)
+    return write_block(partial, job.cut, block, part)
 
 
-def _gathered(client: Client, tasks: list[Future[Done]], scheduler: str, report: Progress) -> Done:
+def _gathered(
+    client: Client, tasks: list[Future[Written]], scheduler: str, report: Progress
+) -> Written:
     """Wait for all blocks, and put what they say together."""
-    lit, pixels = 0, 0
-    provenance: Mapping[str, Any] = {}
+    whole = Written()
     try:
         for count, task in enumerate(as_completed(tasks, loop=client.loop), start=1):
-            done = task.result()
-            lit, pixels = lit + done.lit, pixels + done.pixels
-            provenance = of_all(provenance, done.provenance)
+            whole = whole.with_block(task.result())
             report("reconstructing", count / len(tasks))
     except KilledWorker as error:
         raise ClusterError(
@@ -179,7 +160,7 @@ def _gathered(client: Client, tasks: list[Future[Done]], scheduler: str, report:
             f"the scheduler at {scheduler} was lost in the middle of the work: see that it and its "
             f"workers run, and reconstruct again."
         ) from error
-    return Done(lit, pixels, provenance)
+    return whole
 
 
 @contextmanager

@@ -144,14 +144,8 @@ def parts_of(job: Job, correspondence: Correspondence | None, report: Progress) 
     height, lit = capture.camera.height, False
     provenance: Mapping[str, Any] = {}
     for block in job.cut.blocks():
-        known = None
-        if correspondence is not None:
-            known = correspondence.of_rows(job.cut.around(block))
-
-        def done(share: float, block: slice = block) -> None:
-            report("reconstructing", (block.start + share * (block.stop - block.start)) / height)
-
-        part = reconstruct_block(job, block, known, done)
+        known = job.cut.known_around(block, correspondence)
+        part = reconstruct_block(job, block, known, job.cut.report_of(block, report))
         lit = lit or bool(part.correspondence.lit.any())
         if block.stop == height and not lit:
             raise without_light(capture)

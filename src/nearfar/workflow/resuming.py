@@ -1,11 +1,9 @@
 """Reconstructions that are gone on with: a block that is written is not worked at again."""
 
 import hashlib
-import json
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,37 +13,23 @@ from nearfar.correspondence import Correspondence
 from nearfar.devices import Device
 from nearfar.errors import InputError, KeptInterrupt, NearfarError
 from nearfar.files import UNFINISHED, resumable_output
-from nearfar.transport.store import write_provenance, write_rows
+from nearfar.files.logs import note, read_notes
+from nearfar.transport.store import write_provenance
 from nearfar.version import version
 from nearfar.workflow.blocks import (
     MEMORY,
     Job,
     Progress,
-    of_all,
     prepare,
     reconstruct_block,
     unheard,
     without_light,
 )
 from nearfar.workflow.methods import Method
+from nearfar.workflow.written import Written, write_block
 
 # A line for the work as a whole and one for each block that is written; gone in the end.
 LOG = "blocks.jsonl"
-
-
-class Reconstructed(NamedTuple):
-    """What is said of a transport that was written.
-
-    Attributes
-    ----------
-    lit, pixels : int
-        Camera pixels that are lit directly, and all.
-    provenance : mapping
-    """
-
-    lit: int
-    pixels: int
-    provenance: Mapping[str, Any]
 
 
 def reconstruct_into(
@@ -60,7 +44,7 @@ def reconstruct_into(
     resume: bool = False,
     force: bool = False,
     progress: Progress | None = None,
-) -> Reconstructed:
+) -> Written:
     """Reconstruct the transport of a capture into a file, block by block of camera rows.
 
     Until the last block they lie in a folder of the output's name with ``.unfinished`` behind it;
@@ -79,7 +63,8 @@ def reconstruct_into(
 
     Returns
     -------
-    Reconstructed
+    Written
+        Of the whole camera.
 
     Raises
     ------
@@ -130,17 +115,17 @@ def _into(
     *,
     resume: bool,
     force: bool,
-) -> Reconstructed:
+) -> Written:
     def worth(folder: Path, _why: BaseException) -> bool:
         return bool(_blocks(folder))
 
     with resumable_output(output, worth, resume=resume, force=force) as folder:
         job = prepared()
         about = _about(job, correspondence)
-        if _lines(folder):
-            _require_same(folder, about)
+        if before := _lines(folder):
+            _require_same(folder, before[0], about)
         else:
-            _note(folder, about)
+            note(folder / LOG, about)
         done = _work(job, correspondence, folder, report)
         write_provenance(folder, done.provenance)
     return done
@@ -160,47 +145,25 @@ def _kept(output: Path) -> str:
 
 def _work(
     job: Job, correspondence: Correspondence | None, folder: Path, report: Progress
-) -> Reconstructed:
+) -> Written:
     """Reconstruct and write the blocks that are missing."""
-    written = {block["start"]: block for block in _blocks(folder)}
+    written = _blocks(folder)
     # What was being written when it was killed.
     for left in folder.rglob(".*.partial"):
         left.unlink()
-    height, lit, pixels = job.cut.height, 0, 0
-    provenance: Mapping[str, Any] = {}
+    whole = Written()
     for block in job.cut.blocks():
-        noted = written.get(block.start)
-        if noted is None:
-            noted = _block(job, block, correspondence, folder, report)
-        lit, pixels = lit + noted["lit"], pixels + noted["pixels"]
-        provenance = of_all(provenance, noted["provenance"])
-        report("reconstructing", block.stop / height)
-    if not lit:
+        done = written.get(block.start)
+        if done is None:
+            known = job.cut.known_around(block, correspondence)
+            part = reconstruct_block(job, block, known, job.cut.report_of(block, report))
+            done = write_block(folder, job.cut, block, part)
+            note(folder / LOG, {"start": block.start, **done._asdict()})
+        whole = whole.with_block(done)
+        report("reconstructing", block.stop / job.cut.height)
+    if not whole.lit:
         raise without_light(job.capture)
-    return Reconstructed(lit, pixels, provenance)
-
-
-def _block(
-    job: Job, block: slice, correspondence: Correspondence | None, folder: Path, report: Progress
-) -> dict[str, Any]:
-    """Reconstruct a block, write it, and note it."""
-    height = job.cut.height
-    known = correspondence.of_rows(job.cut.around(block)) if correspondence else None
-
-    def done(share: float) -> None:
-        report("reconstructing", (block.start + share * (block.stop - block.start)) / height)
-
-    part = reconstruct_block(job, block, known, done)
-    write_rows(folder, part.transport, block.start, rows=job.cut.rows, height=height)
-    lit = part.correspondence.lit
-    noted = {
-        "start": block.start,
-        "lit": int(lit.sum()),
-        "pixels": int(lit.size),
-        "provenance": dict(part.transport.provenance),
-    }
-    _note(folder, noted)
-    return noted
+    return whole
 
 
 def _about(job: Job, correspondence: Correspondence | None) -> dict[str, Any]:
@@ -224,8 +187,7 @@ def _digest(correspondence: Correspondence | None) -> str:
     return hashlib.sha256(np.ascontiguousarray(correspondence.pixels).tobytes()).hexdigest()
 
 
-def _require_same(folder: Path, about: Mapping[str, Any]) -> None:
-    before = _lines(folder)[0]
+def _require_same(folder: Path, before: Mapping[str, Any], about: Mapping[str, Any]) -> None:
     other = [name for name in about if before.get(name) != about[name]]
     if other:
         raise InputError(
@@ -234,38 +196,13 @@ def _require_same(folder: Path, about: Mapping[str, Any]) -> None:
         )
 
 
-def _note(folder: Path, line: Mapping[str, Any]) -> None:
-    """Add a line to the log, and wait for the disk."""
-    log = os.open(folder / LOG, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-    try:
-        os.write(log, (json.dumps(line) + "\n").encode())
-        os.fsync(log)
-    finally:
-        os.close(log)
+def _blocks(folder: Path) -> dict[int, Written]:
+    """Return what is said of the blocks that are written, by their first row."""
+    return {
+        words["start"]: Written(*(words[name] for name in Written._fields))
+        for words in _lines(folder)[1:]
+    }
 
 
-def _blocks(folder: Path) -> list[dict[str, Any]]:
-    return _lines(folder)[1:]
-
-
-def _lines(folder: Path) -> list[dict[str, Any]]:
-    """Read the log; what a crash tore off its last line is cut away."""
-    path = folder / LOG
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        return []
-    lines: list[dict[str, Any]] = []
-    whole = 0
-    for line in data.splitlines(keepends=True):
-        try:
-            noted = json.loads(line)
-        except ValueError:
-            break
-        if not line.endswith(b"\n") or not isinstance(noted, dict):
-            break
-        lines.append(noted)
-        whole += len(line)
-    if whole < len(data):
-        os.truncate(path, whole)
-    return lines
+def _lines(folder: Path) -> list[Mapping[str, Any]]:
+    return read_notes(folder / LOG, lambda words: words)

@@ -63,6 +63,23 @@ def test_a_row_draws_what_the_pixel_answers(transport):
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["direct", "near", "far"]
 
 
+def test_a_row_has_a_band_of_one_deviation_of_the_mean_of_channels(transport):
+    q = np.rint(transport.correspondence[3, 4]).astype(int)
+    asked = []
+
+    class Errors:
+        def along(self, pixel, line):
+            asked.append((pixel, line))
+            return [np.full((transport.channels, 12), off) for off in (0.1, 0.2, 0.3)]
+
+    ax = transport.plot.row(3, 4, errors=Errors())
+    assert asked == [(3 * 8 + 4, q[0])]
+    for line, band, off in zip(ax.lines, ax.collections, (0.1, 0.2, 0.3), strict=True):
+        top = band.get_paths()[0].vertices[:, 1].max()
+        expected = line.get_ydata().max() + off / np.sqrt(transport.channels)
+        assert top == pytest.approx(expected)
+
+
 @pytest.mark.parametrize("draw", ["row", "transport_row", "spectrum", "column"])
 def test_pixels_that_are_not_there_get_a_sentence(transport, draw):
     for y, x in ((9, 0), (-1, 3), (0, 12)):

@@ -209,10 +209,15 @@ def test_a_camera_pixel_tells_its_row(address, transport):
     assert words["q"] == pytest.approx(transport.correspondence[y, x].tolist())
     assert words["floodlit"]["near"] == pytest.approx(n.mean(axis=0).sum(), abs=1e-5)
     bars = ErrorBars(transport).component_rows(slice(y * 42 + x, y * 42 + x + 1))
+    line = round(float(transport.correspondence[y, x, 0]))
+    assert words["line"] == line
+    along = slice(line * PROJECTOR.width, (line + 1) * PROJECTOR.width)
     # Of the mean of three channels.
     expected = np.sqrt((bars.far[0] ** 2).sum(axis=0)) / 3
-    np.testing.assert_allclose(far_error, expected.reshape(PROJECTOR), rtol=1e-4)
-    assert np.count_nonzero(window_error) <= transport.window**2
+    np.testing.assert_allclose(far_error, expected[along], rtol=1e-4)
+    expected = np.sqrt((bars.direct[0] ** 2 + bars.near[0] ** 2).sum(axis=0)) / 3
+    np.testing.assert_allclose(window_error, expected[along], rtol=1e-4)
+    assert 1 < np.count_nonzero(window_error) <= transport.window
     assert spectrum.max() == 0
     assert np.unravel_index(spectrum.argmax(), PROJECTOR) == (10, 12)
     assert words["k_far"][0] <= words["k_near"][0] <= 0.5
@@ -222,6 +227,7 @@ def test_a_camera_pixel_tells_its_row(address, transport):
 def test_a_camera_pixel_without_direct_light_says_so(address):
     words, (window, *_) = unpack(ask(address, "/row?y=3&x=5"))
     assert words["q"] is None
+    assert words["line"] == PROJECTOR.height // 2
     assert not window.any()
 
 

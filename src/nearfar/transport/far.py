@@ -78,12 +78,17 @@ class RealBasis:
     @cached_property
     def patterns(self) -> NDArray[np.float32]:
         """cos(2 pi k.p) or sin(2 pi k.p), shape (M, P)."""
-        drawn = np.empty((self.count, *self.projector), dtype=np.float32)
+        return self.patterns_on(slice(0, self.projector.height))
+
+    def patterns_on(self, lines: slice) -> NDArray[np.float32]:
+        """Patterns on some rows of the pattern grid, shape (M, lines * Px)."""
         down, across = self._phases
+        down = down[lines]
+        drawn = np.empty((self.count, len(down), len(across)), dtype=np.float32)
         for m, (i, sine) in enumerate(zip(self.index, self.is_sine, strict=True)):
             wave = np.outer(down[:, i], across[:, i])
             drawn[m] = wave.imag if sine else wave.real
-        return drawn.reshape(self.count, self.projector.pixels)
+        return drawn.reshape(self.count, -1)
 
     def drawn_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
         """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""

@@ -23,6 +23,12 @@ def centre(correspondence: Floats, projector: Size) -> NDArray[np.int64]:
     return np.clip(np.rint(q), 0, np.array(projector) - 1).astype(np.int64)
 
 
+def line_through(q: Floats, projector: Size) -> int:
+    """Row of the projector nearest to one q, shape (2,); the middle one without direct light."""
+    lit = bool(np.isfinite(q).all())
+    return int(centre(q, projector)[0, 0]) if lit else projector.height // 2
+
+
 def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans:
     """Tell which window entries lie on the projector, shape (C, W^2)."""
     side = beside(np.arange(window) - window // 2, centres)

@@ -10,6 +10,7 @@ import numpy as np
 from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
+from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.transport.far import RealBasis
 
@@ -42,11 +43,11 @@ class Drawable(Apart, Protocol):
         """Return the picture under one projector pixel."""
 
 
-class _ErrorsOfRows(Protocol):
-    """What tells standard deviations of rows, as `nearfar.ErrorBars` does."""
+class _ErrorsAlong(Protocol):
+    """What tells standard deviations along a row of the projector, as `nearfar.ErrorBars` does."""
 
-    def component_rows(self, pixels: slice) -> Any:
-        """Return those of D, N and F."""
+    def along(self, pixel: int, line: int) -> Any:
+        """Return those of D, N and F, each (channels, Px)."""
 
 
 def colours(picture: Floats) -> Floats:
@@ -109,7 +110,7 @@ class Plots:
         y: int,
         x: int,
         *,
-        errors: _ErrorsOfRows | None = None,
+        errors: _ErrorsAlong | None = None,
         ax: "Axes | None" = None,
     ) -> "Axes":
         """Draw what a camera pixel answers along the projector's row through its q.
@@ -119,21 +120,20 @@ class Plots:
         y, x : int
             Camera pixel.
         errors : ErrorBars, optional
-            Draws a band of one standard deviation.
+            Draws a band of one standard deviation, of channels that err independently.
         ax : Axes, optional
         """
         transport, pixel = self._transport, self._pixel(y, x)
-        q = transport.correspondence[y, x]
         height, width = transport.projector
-        line = int(np.rint(q[0])) if np.isfinite(q[0]) else height // 2
+        line = near.line_through(transport.correspondence[y, x], transport.projector)
         drawn = _axes(ax)
         rows = transport.component_rows(pixel)
-        bars = errors.component_rows(pixel) if errors is not None else None
+        bars = errors.along(pixel.start, line) if errors is not None else None
         for number, (name, values) in enumerate(zip(PARTS, rows, strict=True)):
             level = np.abs(values[0].mean(axis=0).reshape(height, width)[line])
             (drawn_line,) = drawn.semilogy(level, label=name)
             if bars is not None:
-                off = bars[number][0].mean(axis=0).reshape(height, width)[line]
+                off = np.linalg.norm(bars[number], axis=0) / len(bars[number])
                 low = np.maximum(level - off, 1e-12)
                 drawn.fill_between(
                     np.arange(width), low, level + off, alpha=0.25, color=drawn_line.get_color()

@@ -10,12 +10,11 @@ import numpy as np
 from nearfar.arrays import Floats, Size
 from nearfar.estimate.joint import ErrorBars
 from nearfar.illumination.frequencies import grid
+from nearfar.transport import near
 from nearfar.transport.model import Transport
 
 # Below this share of its largest value a row's spectrum is not told apart from nothing.
 LEAST = 1e-7
-# Projector pixels up to which error bars of a row take no more than some hundred megabytes.
-FINEST = 2**16
 
 
 class Row(NamedTuple):
@@ -27,9 +26,9 @@ class Row(NamedTuple):
         q, k_far, k_near and so on, for JSON.
     window, far : ndarray, shape (Py, Px), float32
         D + N, and F.
-    window_error, far_error : ndarray, shape (Py, Px), float32
-        Standard deviations, for errors of channels that are independent; 0 where the transport
-        does not tell, and for projectors of more than `FINEST` pixels.
+    window_error, far_error : ndarray, shape (Px,), float32
+        Standard deviations along the projector's row of q, which `words` names, for errors of
+        channels that are independent; 0 where the transport does not tell.
     spectrum : ndarray, shape (Py, Px), float32
         |t^| over its largest value in dB, DC in the middle.
     """
@@ -55,22 +54,19 @@ def inspect_row(transport: Transport, x: int) -> Row:
     pixel, projector = slice(x, x + 1), transport.projector
     d, n, f = (part[0].mean(axis=0) for part in transport.component_rows(pixel))
     window, far = (part.reshape(projector) for part in (d + n, f))
-    errors = np.zeros((2, *projector), dtype=np.float32)
-    no_errors = ""
-    if transport.belief is None:
-        no_errors = "the joint estimate tells them"
-    elif projector.pixels > FINEST:
-        no_errors = f"the grid has more than {FINEST} pixels"
-    else:
-        d_error, n_error, f_error = ErrorBars(transport).component_rows(pixel)
-        errors[0] = _of_mean(d_error[0] ** 2 + n_error[0] ** 2).reshape(projector)
-        errors[1] = _of_mean(f_error[0] ** 2).reshape(projector)
     q = transport.correspondence[0, x]
+    line = near.line_through(q, projector)
+    errors = np.zeros((2, projector.width), dtype=np.float32)
+    if transport.belief is not None:
+        d_error, n_error, f_error = ErrorBars(transport).along(x, line)
+        errors[0] = _of_mean(d_error**2 + n_error**2)
+        errors[1] = _of_mean(f_error**2)
     quality = transport.quality
     words: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
+        "line": line,
         "window": transport.window,
-        "no_errors": no_errors,
+        "no_errors": "the joint estimate tells them" if transport.belief is None else "",
         "confidence": None if quality is None else float(quality.confidence[0, x]),
         "saturated": None if quality is None else bool(quality.saturated[0, x]),
         "floodlit": {"direct": float(d.sum()), "near": float(n.sum()), "far": float(f.sum())},

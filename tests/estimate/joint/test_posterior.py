@@ -8,7 +8,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate_jointly, posterior
 from nearfar.estimate.joint.nuisance import OFF
 from nearfar.estimate.joint.posterior import ErrorBars
 from nearfar.estimate.matrices import band_of
@@ -164,6 +164,21 @@ def test_entries_are_as_uncertain_as_dense_algebra_says():
         weights[3 : 3 + WINDOW**2] = -1.0 / PROJECTOR.pixels
         expected = _dense(transport, 0, weights)
         assert rows.far[0, 0, place] == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("lit", [True, False])
+def test_entries_are_the_same_line_by_line_and_some_at_a_time(lit, monkeypatch):
+    transport = _transport(np.array([[6, 8], [0, 1]]), lit=lit)
+    bars = ErrorBars(transport)
+    rows = bars.component_rows(slice(0, 2))
+    for pixel in range(2):
+        lines = [bars.along(pixel, line) for line in range(PROJECTOR.height)]
+        for whole, *parts in zip(rows, *lines, strict=True):
+            np.testing.assert_allclose(np.concatenate(parts, axis=1), whole[pixel], rtol=1e-4)
+    for entries in (1, 3 * PROJECTOR.width):
+        monkeypatch.setattr(posterior, "ENTRIES", entries)
+        for whole, again in zip(rows, bars.component_rows(slice(0, 2)), strict=True):
+            np.testing.assert_allclose(again, whole, rtol=1e-4)
 
 
 def test_an_unlit_camera_pixel_has_far_light_alone():

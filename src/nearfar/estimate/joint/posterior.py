@@ -27,6 +27,8 @@ from nearfar.transport.kinds import Kind, power_at
 from nearfar.transport.model import Components, Transport
 
 BLOCK = 2048
+# Entries of a row that are worked at at once.
+ENTRIES = 2**14
 
 
 class _Asked(NamedTuple):
@@ -38,7 +40,8 @@ class _Asked(NamedTuple):
         h of white.
     direct : ndarray, shape (n, 3)
         h of d, and of d times what q is off down and across.
-    near : ndarray, shape (n, W^2)
+    near : ndarray, shape (n, W^2) or (1, W^2)
+        One for all of them where they are of one camera pixel.
     far : ndarray, shape (n, R)
         Re-centred.
     unseen : ndarray, shape (kinds,) or (kinds, n)
@@ -144,30 +147,54 @@ class ErrorBars:
         """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
 
         N and F are the model's: n in the window, f at the frequencies of the far band that the
-        transport holds. A millisecond or two for each thousand projector pixels and camera pixel.
+        transport holds. A millisecond or less for each thousand projector pixels and camera pixel.
         """
         chosen = range(*pixels.indices(self._transport.camera.pixels))
         shape = (0, self._transport.channels, self._transport.projector.pixels)
-        rows = [self._rows_of(c) for c in chosen]
+        rows = [self._on(c, slice(0, self._transport.projector.height)) for c in chosen]
         if not rows:
             return Components(*(np.zeros(shape, dtype=np.float32) for _ in Components._fields))
         return Components(*(np.stack(part) for part in zip(*rows, strict=True)))
 
-    def _rows_of(self, c: int) -> Components:
-        """Of one camera pixel, each (channels, P)."""
+    def along(self, pixel: int, line: int) -> Components:
+        """Return those of one camera pixel along one row of the projector.
+
+        Parameters
+        ----------
+        pixel : int
+            Of the camera, row by row.
+        line : int
+            Row of the projector.
+
+        Returns
+        -------
+        Components
+            Each (channels, Px); as `component_rows`.
+        """
+        return self._on(pixel, slice(line, line + 1))
+
+    def _on(self, c: int, lines: slice) -> Components:
+        """Of one camera pixel on some rows of the projector, each (channels, lines * Px)."""
         transport, one = self._transport, slice(c, c + 1)
+        width = transport.projector.width
+        first, last = lines.start * width, lines.stop * width
         inside = near.inside(self._centres[one], transport.window, transport.projector)[0]
-        d = np.zeros((transport.channels, transport.projector.pixels), dtype=np.float32)
-        n = np.zeros_like(d)
+        d = np.zeros((transport.channels, last - first), dtype=np.float32)
+        n, f = np.zeros_like(d), np.empty_like(d)
         if transport.lit.ravel()[c]:
             deviation = np.sqrt(self._variance(one, self._of_direct(1)))[0]
-            np.add.at(d.T, self._where.pixels[c], self._where.weights[c][:, None] * deviation)
-            entries = np.flatnonzero(inside)
-            places = near.places_on(self._centres[one], transport.window, transport.projector)
-            asked = self._of_entries(entries)
-            n[:, places[0, entries]] = np.sqrt(self._variance(one, asked)).T
-        f = np.sqrt(self._variance(one, self._of_far(one, inside))).T
-        return Components(d, n, f.astype(np.float32))
+            corners, weights = self._where.pixels[c], self._where.weights[c]
+            here = (corners >= first) & (corners < last)
+            np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
+            places = near.places_on(self._centres[one], transport.window, transport.projector)[0]
+            entries = np.flatnonzero(inside & (places >= first) & (places < last))
+            variance = self._variance(one, self._of_entries(entries))
+            n[:, places[entries] - first] = np.sqrt(variance).T
+        for some in blocks(lines.stop - lines.start, max(1, ENTRIES // width)):
+            shown = slice(lines.start + some.start, lines.start + some.stop)
+            variance = self._variance(one, self._of_far(one, inside, shown))
+            f[:, some.start * width : some.stop * width] = np.sqrt(variance).T
+        return Components(d, n, f)
 
     def _of_direct(self, number: int) -> _Asked:
         """Ask for d."""
@@ -189,16 +216,18 @@ class ErrorBars:
             np.zeros(len(self._belief.kinds)),
         )
 
-    def _of_far(self, one: slice, inside: Booleans) -> _Asked:
-        """Ask for every entry of a row of F of one camera pixel."""
+    def _of_far(self, one: slice, inside: Booleans, lines: slice) -> _Asked:
+        """Ask for what a row of F of one camera pixel holds on some rows of the projector."""
         band, total = self._band, self._transport.projector.pixels
         lit = float(self._transport.lit.ravel()[one][0])
-        patterns = (band.basis.patterns.T * band.basis.weights * self._held).astype(np.float32)
-        centre = np.broadcast_to(self._centres[one], (total, 2))
+        drawn = band.basis.patterns_on(lines).T
+        patterns = (drawn * band.basis.weights * self._held).astype(np.float32)
+        number = len(patterns)
+        centre = np.broadcast_to(self._centres[one], (number, 2))
         return _Asked(
-            np.full(total, 1.0 / total),
-            np.broadcast_to([-lit / total, 0.0, 0.0], (total, 3)),
-            np.broadcast_to(-lit / total * inside.astype(np.float32), (total, len(inside))),
+            np.full(number, 1.0 / total),
+            np.broadcast_to([-lit / total, 0.0, 0.0], (number, 3)),
+            -lit / total * inside[None].astype(np.float32),
             band.recentre(patterns[:, None], centre)[:, 0],
             np.zeros(len(self._belief.kinds)),
         )
@@ -270,23 +299,15 @@ class ErrorBars:
     def _variance(self, block: slice, asked: _Asked) -> Floats:
         """Posterior variance of numbers asked of a block, or many of one camera pixel."""
         known = self._known(block)
-        number = len(asked.mean)
-        found = np.empty((number, self._transport.channels))
-        each = number == len(known.kind)
+        if len(known.kind) == 1:
+            (place,) = known.kind
+            of_kind = asked._replace(unseen=asked.unseen[place])
+            return _of_kind(self._prior(int(place)), known, of_kind)
+        found = np.empty((len(asked.mean), self._transport.channels))
         for place in np.unique(known.kind):
-            chosen = np.flatnonzero(known.kind == place)
-            rows = chosen if each else np.arange(number)
-            found[rows] = _of_kind(
-                self._prior(int(place)),
-                known.only(chosen),
-                _Asked(
-                    asked.mean[rows],
-                    asked.direct[rows],
-                    asked.near[rows],
-                    asked.far[rows],
-                    asked.unseen[place],
-                ),
-            )
+            rows = np.flatnonzero(known.kind == place)
+            of_kind = _Asked._make((*(part[rows] for part in asked[:-1]), asked.unseen[place]))
+            found[rows] = _of_kind(self._prior(int(place)), known.only(rows), of_kind)
         return found
 
     def _prior(self, place: int) -> Prior:

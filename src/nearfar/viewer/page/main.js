@@ -188,9 +188,8 @@ function drawRow() {
   drawLog(get('row-window'), around.values, around.shape, scale);
   drawLog(get('row-far'), far.data, projector, scale);
   drawSpectrum(get('row-spectrum'), spectrum.data, projector, words, scale);
-  const from = Math.round(centre[0]) * width;
-  const line = (values, errors, colour) =>
-    ({ values: values.data.slice(from, from + width), errors: errors.data.slice(from, from + width), colour });
+  const from = words.line * width;
+  const line = (values, errors, colour) => ({ values: values.data.slice(from, from + width), errors: errors.data, colour });
   drawProfile(get('row-profile'), [line(far, farError, '--far'), line(near, nearError, '--near')],
     'orange: direct and near-range, green: far-range; projector column 0 to ' + (width - 1));
 }

@@ -73,14 +73,13 @@ def test_what_is_installed_runs_by_itself(built, kind, tmp_path):
     assert int(run("-c", page)) > 5000
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_shells_complete_commands_and_options(shell):
-    words = "nearfar re"
+def _completed(shell, words):
+    """What a shell is told may follow words."""
     environment = {
         **os.environ,
         "_NEARFAR_COMPLETE": f"complete_{shell}",
         "COMP_WORDS": words,
-        "COMP_CWORD": "1",
+        "COMP_CWORD": str(words.count(" ")),
         "_TYPER_COMPLETE_ARGS": words,
         "_TYPER_COMPLETE_FISH_ACTION": "get-args",
     }
@@ -92,6 +91,19 @@ def test_shells_complete_commands_and_options(shell):
         text=True,
         check=False,
     )
+    return done.stdout
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_commands_and_scenes(shell):
+    told = _completed(shell, "nearfar re")
     for name in ("reconstruct", "relight", "render"):
-        assert name in done.stdout
-    assert "acquire" not in done.stdout
+        assert name in told
+    assert "acquire" not in told
+    for command in ("compare", "render", "acquire plan.json capture.zarr --rig", "separate --rig"):
+        told = _completed(shell, f"nearfar {command} cor")
+        assert "cornell-aside" in told
+        assert "corner" in told
+        assert "wedge" not in told
+    # Whatever else it may be is a file, which shells know better.
+    assert "cornell" not in _completed(shell, "nearfar compare my")

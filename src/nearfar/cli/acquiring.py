@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
-from nearfar.cli.options import Force, PlanFile, Quiet, Where, keep_input
+from nearfar.cli.options import Force, PlanFile, Quiet, Where, keep_input, scene_names
 from nearfar.cli.reconstructing import Seen
 from nearfar.cli.reshooting import photo_numbers, take_again
 from nearfar.cli.saying import say, warn
@@ -44,6 +44,7 @@ def acquire(
             help="Scene (cornell, cornell-aside, wedge, corner, alcove, shelf), Mitsuba 3 scene "
             "(.xml), stored transport (.npy, .npz, Zarr), or RIG.toml.",
             metavar="RIG",
+            autocompletion=scene_names,
         ),
     ],
     until: Annotated[

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from nearfar.cli.options import AsJson, Force, Quiet, ScenesCamera, ScenesProjector
+from nearfar.cli.options import AsJson, Force, Quiet, ScenesCamera, ScenesProjector, scene_names
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -16,6 +16,7 @@ def compare(
         str,
         typer.Argument(
             metavar="SCENE",
+            autocompletion=scene_names,
             help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a transport that "
             "render wrote.",
         ),

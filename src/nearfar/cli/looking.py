@@ -17,6 +17,7 @@ from nearfar.cli.options import (
     TransportPath,
     keep_for_page,
     keep_input,
+    scene_names,
 )
 from nearfar.cli.saying import say, warn
 from nearfar.progress import Report, progress_bar
@@ -105,6 +106,7 @@ def render(
         str,
         typer.Argument(
             metavar="SCENE",
+            autocompletion=scene_names,
             help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a Mitsuba 3 scene "
             "(.xml).",
         ),

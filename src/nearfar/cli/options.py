@@ -27,6 +27,13 @@ def size(text: str | Size) -> Size:
         raise typer.BadParameter(str(error)) from None
 
 
+def scene_names(begun: str) -> list[str]:
+    """Names of built-in scenes that begin so, for shells to complete; of none they try files."""
+    from nearfar.scenes import NAMES
+
+    return [name for name in NAMES if name.startswith(begun)]
+
+
 def keep_input(output: Path, *inputs: Path) -> None:
     """Refuse an output that is an input of the same command, for --force to replace.
 

@@ -9,7 +9,7 @@ import typer
 
 from nearfar.arrays import Size
 from nearfar.cli import separation_steps as steps
-from nearfar.cli.options import AsJson, Force, Quiet, keep_input, size
+from nearfar.cli.options import AsJson, Force, Quiet, keep_input, scene_names, size
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -33,6 +33,7 @@ def separate(
             help="Shoot on this rig: a scene (cornell, cornell-aside, wedge, corner, alcove, "
             "shelf), stored transport (.npy, .npz, Zarr), or RIG.toml.",
             metavar="RIG",
+            autocompletion=scene_names,
         ),
     ] = None,
     photos: Annotated[

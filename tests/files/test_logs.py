@@ -1,8 +1,9 @@
 """Logs: lines that are whole, whatever a crash tore off."""
 
 import os
+import subprocess
+import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
@@ -62,8 +63,23 @@ def test_a_note_waits_for_the_disk(log, monkeypatch):
     assert waited == [log.stat().st_size]
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
-def test_a_disk_that_is_full_is_not_passed_over(tmp_path):
-    (tmp_path / "log.jsonl").symlink_to("/dev/full")
-    with pytest.raises(OSError, match="No space left"):
-        note(tmp_path / "log.jsonl", vars(NOTES[0]))
+# Ends the log's file in the middle of a line, as a disk does that fills up.
+FILLING = """
+import resource, sys
+from pathlib import Path
+from nearfar.files.logs import note
+log = Path(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (log.stat().st_size + 7,) * 2)
+note(log, {"number": 9, "name": "more than there is room for"})
+"""
+
+
+def test_a_disk_that_fills_up_within_a_line_is_not_passed_over(log):
+    done = subprocess.run(
+        [sys.executable, "-c", FILLING, str(log)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "File too large" in done.stderr
+    assert read_notes(log, as_noted) == NOTES
+    note(log, vars(NOTES[0]))
+    assert read_notes(log, as_noted) == [*NOTES, NOTES[0]]

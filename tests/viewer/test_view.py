@@ -422,26 +422,51 @@ def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
     relit(address, lights["spot"])
 
 
-def test_hundreds_of_connections_that_say_nothing_or_do_not_end_keep_nobody_out(
-    serve_it, lights, monkeypatch
-):
-    monkeypatch.setattr(view, "SENDING", 1.0)
-    address = serve_it()
+def _opened(stack, address, said):
     place = ("127.0.0.1", int(address.rsplit(":", 1)[1]))
+    opened = stack.enter_context(create_connection(place, timeout=30))
+    opened.sendall(said.encode())
+    return opened
+
+
+def test_hundreds_of_connections_that_say_nothing_or_do_not_end_keep_nobody_out(serve_it, lights):
+    address = serve_it()
     head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n"
     with socket_of(address) as first:
-        for said in ("", "GET / HTTP/1.1\r\nHost:", head + "\r\n{"):
+        for said in ("", "GET / HTTP/1.1\r\nHost:", head, head + "\r\n{"):
             with ExitStack() as stack:
                 for _ in range(600):
-                    opened = stack.enter_context(create_connection(place, timeout=30))
-                    opened.sendall(said.encode())
-                if said.endswith("{"):
-                    # Those that were let in are answered, that it took too long.
-                    time.sleep(view.SENDING + 1)
+                    _opened(stack, address, said)
+                # Until those that are too many are given up.
+                time.sleep(1)
                 relit(address, lights["spot"])
                 assert ask(address, "/main.js")
                 first.send(message(lights["random"]))
                 first.recv(timeout=30)
+
+
+def test_what_does_not_arrive_in_time_gets_a_sentence(serve_it, monkeypatch):
+    monkeypatch.setattr(view, "SENDING", 0.3)
+    address = serve_it()
+    head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n\r\n"
+    with ExitStack() as stack:
+        slow = _opened(stack, address, head + "{")
+        answer = slow.recv(65536)
+        while chunk := slow.recv(65536):
+            answer += chunk
+    assert b" 400 " in answer
+    assert b"did not arrive within 0.3 s" in answer
+
+
+def test_a_page_that_goes_while_it_sends_is_no_fault(serve_it, capfd):
+    address = serve_it()
+    head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n\r\n"
+    with ExitStack() as stack:
+        _opened(stack, address, head + "{")
+        time.sleep(0.3)
+    assert ask(address, "/main.js")
+    time.sleep(0.3)
+    assert not "".join(capfd.readouterr())
 
 
 @pytest.mark.parametrize(

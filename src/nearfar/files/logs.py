@@ -29,7 +29,8 @@ def read_notes(log: Path, understood: Callable[[Mapping[str, Any]], T]) -> list[
     ----------
     log : Path
     understood : callable
-        Makes of a line's words what is returned; where it raises TypeError the log ends.
+        Makes of a line's words what is returned; where it raises ValueError or TypeError the
+        log ends.
 
     Returns
     -------

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from nearfar.arrays import Floats, Integers
 from nearfar.illumination.frequencies import Frequency
 from nearfar.transport.kinds import Kind
@@ -41,3 +43,13 @@ class Belief:
     offset_noise: Floats
     light_noise: Floats
     share_of_white: Floats
+
+
+def deviation_of_mean(deviations: Floats) -> Floats:
+    """Return the deviation of a mean over channels that err independently, of theirs.
+
+    Parameters
+    ----------
+    deviations : ndarray, shape (channels, ...)
+    """
+    return np.asarray(np.linalg.norm(deviations, axis=0) / len(deviations))

@@ -88,7 +88,7 @@ class RealBasis:
         for m, (i, sine) in enumerate(zip(self.index, self.is_sine, strict=True)):
             wave = np.outer(down[:, i], across[:, i])
             drawn[m] = wave.imag if sine else wave.real
-        return drawn.reshape(self.count, -1)
+        return drawn.reshape(self.count, len(down) * len(across))
 
     def drawn_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
         """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""

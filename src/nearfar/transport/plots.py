@@ -12,6 +12,7 @@ from nearfar.errors import InputError
 from nearfar.files import to_srgb
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
+from nearfar.transport.belief import deviation_of_mean
 from nearfar.transport.far import RealBasis
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ class Plots:
             level = np.abs(values[0].mean(axis=0).reshape(height, width)[line])
             (drawn_line,) = drawn.semilogy(level, label=name)
             if bars is not None:
-                off = np.linalg.norm(bars[number], axis=0) / len(bars[number])
+                off = deviation_of_mean(bars[number])
                 low = np.maximum(level - off, 1e-12)
                 drawn.fill_between(
                     np.arange(width), low, level + off, alpha=0.25, color=drawn_line.get_color()

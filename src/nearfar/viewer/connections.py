@@ -7,30 +7,38 @@ from nearfar.packages import needed
 with needed(extra="viewer", what="a page in the browser"):
     from uvicorn.protocols.http.h11_impl import H11Protocol
 
-# Connections that wait for a request at once, of the six or so that a browser opens.
+# Connections that are waited for at once, of the six or so that a browser opens.
 WAITING = 64
+# Seconds in which what was sent with a connection is read.
+READING = 0.1
 
 
 class Connection(H11Protocol):
-    """A connection that is closed when `WAITING` newer ones wait for a request, as it does.
+    """A connection that is given up when `WAITING` newer ones are waited for, as it is.
 
-    Whoever opens many and says nothing, or never ends what it says, keeps nobody out.
+    Whoever opens many and says nothing, never ends what it says, or does not read what it is
+    answered keeps nobody out.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection; the one that has waited longest goes, if there are too many."""
+        """Take a connection, and soon give up those that are too many."""
         super().connection_made(transport)
         self._waits_since = self.loop.time()
-        waiting = [one for one in self.connections if isinstance(one, Connection) and one._waits]
-        if len(waiting) > WAITING:
-            min(waiting, key=lambda one: one._waits_since).transport.close()
+        # What it asks may lie there already: it is read before this is called.
+        self.loop.call_later(READING, self._make_room)
 
     def on_response_complete(self) -> None:
-        """Wait for the next request."""
+        """Wait for the answer to be read, and for the next request."""
         self._waits_since = self.loop.time()
         super().on_response_complete()
 
     @property
     def _waits(self) -> bool:
-        asked = self.cycle is not None and not self.cycle.response_complete
-        return not asked and not self.transport.is_closing()
+        asked = self.cycle is not None and not self.cycle.more_body
+        return not asked or self.cycle.response_complete or self.flow.write_paused
+
+    def _make_room(self) -> None:
+        waiting = [one for one in self.connections if isinstance(one, Connection) and one._waits]
+        waiting.sort(key=lambda one: one._waits_since)
+        for one in waiting[:-WAITING]:
+            one.transport.abort()

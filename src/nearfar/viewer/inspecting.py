@@ -11,6 +11,7 @@ from nearfar.arrays import Floats, Size
 from nearfar.estimate.joint import ErrorBars
 from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
+from nearfar.transport.belief import deviation_of_mean
 from nearfar.transport.model import Transport
 
 # Below this share of its largest value a row's spectrum is not told apart from nothing.
@@ -59,8 +60,8 @@ def inspect_row(transport: Transport, x: int) -> Row:
     errors = np.zeros((2, projector.width), dtype=np.float32)
     if transport.belief is not None:
         d_error, n_error, f_error = ErrorBars(transport).along(x, line)
-        errors[0] = _of_mean(d_error**2 + n_error**2)
-        errors[1] = _of_mean(f_error**2)
+        errors[0] = deviation_of_mean(np.hypot(d_error, n_error))
+        errors[1] = deviation_of_mean(f_error)
     quality = transport.quality
     words: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
@@ -73,11 +74,6 @@ def inspect_row(transport: Transport, x: int) -> Row:
         **_bands(transport),
     }
     return Row(words, window, far, errors[0], errors[1], _spectrum(window + far))
-
-
-def _of_mean(variances: Floats) -> Floats:
-    """Return the deviation of a mean over channels of these variances, (channels, P)."""
-    return np.asarray(np.sqrt(variances.sum(axis=0)) / len(variances))
 
 
 def _spectrum(row: Floats) -> Floats:
@@ -96,10 +92,10 @@ def _bands(transport: Transport) -> dict[str, Any]:
         measured = [(float(k.fy), float(k.fx)) for k in grid(side, side)]
     beyond = [k for k in measured if abs(k[0]) > far[0] or abs(k[1]) > far[1]]
     # The checkerboard is there for direct light; along a side of one pixel there is no frequency.
-    near = [k for k in beyond if min(map(abs, k)) < 0.5] or [(float(far[0]), float(far[1]))]
+    of_near = [k for k in beyond if min(map(abs, k)) < 0.5] or [(float(far[0]), float(far[1]))]
     there = np.array(transport.projector) > 1
     return {
         "k_far": far.tolist(),
-        "k_near": (np.abs(near).max(axis=0) * there).tolist(),
+        "k_near": (np.abs(of_near).max(axis=0) * there).tolist(),
         "measured": [list(k) for k in measured],
     }

@@ -32,6 +32,7 @@ from nearfar.viewer.viewed import ViewedTransport
 with needed(extra="viewer", what="a page in the browser"):
     from fastapi import FastAPI, Request, WebSocket
     from fastapi.responses import JSONResponse, Response
+    from starlette.requests import ClientDisconnect
     from starlette.websockets import WebSocketDisconnect
 
 # Seconds in which what a page sends is here.
@@ -242,7 +243,7 @@ async def _body(request: Request, most: int) -> bytes:
                     raise InputError(f"more than {most} bytes were sent: send a smaller file.")
                 parts.append(part)
     except TimeoutError:
-        raise InputError(
-            f"{SENDING:g} s were not enough to send it: send a smaller file."
-        ) from None
+        raise InputError(f"it did not arrive within {SENDING:g} s: send it again.") from None
+    except ClientDisconnect:
+        raise InputError("the page went before it had sent all: send it again.") from None
     return b"".join(parts)

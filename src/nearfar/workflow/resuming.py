@@ -198,11 +198,14 @@ def _require_same(folder: Path, before: Mapping[str, Any], about: Mapping[str, A
 
 def _blocks(folder: Path) -> dict[int, Written]:
     """Return what is said of the blocks that are written, by their first row."""
+    fields = Written._fields
     return {
-        words["start"]: Written(*(words[name] for name in Written._fields))
-        for words in _lines(folder)[1:]
+        words["start"]: Written(*(words[name] for name in fields))
+        for words in _lines(folder)
+        if words.keys() >= {"start", *fields}
     }
 
 
 def _lines(folder: Path) -> list[Mapping[str, Any]]:
+    """Read the log: what blocks have in common, and then the blocks."""
     return read_notes(folder / LOG, lambda words: words)

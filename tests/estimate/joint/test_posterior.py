@@ -181,6 +181,13 @@ def test_entries_are_the_same_line_by_line_and_some_at_a_time(lit, monkeypatch):
             np.testing.assert_allclose(again, whole, rtol=1e-4)
 
 
+@pytest.mark.parametrize(("pixel", "line"), [(2, 0), (-1, 0), (0, PROJECTOR.height), (0, -1)])
+def test_what_is_not_there_has_no_error_bars(pixel, line):
+    bars = ErrorBars(_transport(np.array([[6, 8], [0, 1]])))
+    with pytest.raises(InputError, match="choose one that it has"):
+        bars.along(pixel, line)
+
+
 def test_an_unlit_camera_pixel_has_far_light_alone():
     centres = np.array([[6, 8], [0, 0]])
     bars = ErrorBars(_transport(centres, lit=False))

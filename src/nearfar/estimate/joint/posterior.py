@@ -17,7 +17,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.pixels import EXACT, answers_of_direct
 from nearfar.estimate.joint.prior import Prior, build_prior
-from nearfar.estimate.matrices import Band, band_of
+from nearfar.estimate.matrices import Band, band_of, corner_weights
 from nearfar.illumination.frequencies import DC
 from nearfar.transport import near
 from nearfar.transport.belief import Belief
@@ -147,7 +147,7 @@ class ErrorBars:
         """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
 
         N and F are the model's: n in the window, f at the frequencies of the far band that the
-        transport holds. A millisecond or less for each thousand projector pixels and camera pixel.
+        transport holds. Some milliseconds for each thousand projector pixels and camera pixel.
         """
         chosen = range(*pixels.indices(self._transport.camera.pixels))
         shape = (0, self._transport.channels, self._transport.projector.pixels)
@@ -170,7 +170,21 @@ class ErrorBars:
         -------
         Components
             Each (channels, Px); as `component_rows`.
+
+        Raises
+        ------
+        InputError
+            If there is no such pixel, or no such row.
         """
+        camera, projector = self._transport.camera, self._transport.projector
+        if not 0 <= pixel < camera.pixels:
+            raise InputError(
+                f"the camera of {camera} has no pixel {pixel}: choose one that it has."
+            )
+        if not 0 <= line < projector.height:
+            raise InputError(
+                f"the projector of {projector} has no row {line}: choose one that it has."
+            )
         return self._on(pixel, slice(line, line + 1))
 
     def _on(self, c: int, lines: slice) -> Components:
@@ -281,13 +295,13 @@ class ErrorBars:
         white = belief.white.reshape(-1, channels)[block]
         centres = self._centres[block]
         q = transport.correspondence.reshape(-1, 2)[block]
-        direct = answers_of_direct(q, band.basis.patterns, transport.projector)
-        both = np.concatenate([np.ones_like(direct[:, :1]), direct], axis=1)
+        direct = corner_weights(q, centres) @ band.on_corners.T
+        ones = band.recentre(np.ones_like(direct[:, :1]), centres)
         offset_noise = belief.offset_noise.reshape(-1, channels)[block]
         share = belief.share_of_white.reshape(-1, channels)[block]
         light_noise = belief.light_noise.reshape(-1, channels)[block]
         return _Of(
-            band.recentre(both, centres).transpose(0, 2, 1),
+            np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
             nuisance.precision_of(white, offset_noise),
             np.maximum(transport.noise.reshape(-1, channels)[block], EXACT * white),
             belief.strength.ravel()[block, None] * white,

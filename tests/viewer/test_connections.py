@@ -1,0 +1,86 @@
+"""Connections to a server of pages: nobody who asks is kept out, whatever others do."""
+
+import socket
+import time
+import urllib.request
+from contextlib import ExitStack
+
+import pytest
+
+from nearfar.viewer.connections import WAITING
+from nearfar.viewer.serving import Place, serve
+
+# More than the system keeps for who does not read.
+LONG = 300_000
+MANY = 600
+
+
+async def _answer(scope, receive, send):
+    body = bytes(LONG) if scope["path"] == "/long" else b"here"
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": body})
+
+
+@pytest.fixture
+def address():
+    with serve(_answer, Place("127.0.0.1", 0)) as address:
+        yield address
+
+
+def _asking(address, path, **settings):
+    """A connection that has asked and not read."""
+    place = ("127.0.0.1", int(address.rsplit(":", 1)[1]))
+    opened = socket.socket()
+    for name, value in settings.items():
+        opened.setsockopt(socket.SOL_SOCKET, getattr(socket, name), value)
+    opened.settimeout(30)
+    opened.connect(place)
+    opened.sendall(f"GET {path} HTTP/1.1\r\nHost: {address[7:]}\r\n\r\n".encode())
+    return opened
+
+
+def _is_answered(address):
+    with urllib.request.urlopen(address, timeout=30) as answer:
+        return answer.read() == b"here"
+
+
+def test_all_who_ask_at_once_are_answered(address):
+    with ExitStack() as stack:
+        asking = [stack.enter_context(_asking(address, "/")) for _ in range(4 * WAITING)]
+        for one in asking:
+            assert b" 200 " in one.recv(4096)
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_those_who_do_not_read_their_answers_keep_nobody_out(address, times):
+    with ExitStack() as stack:
+        for _ in range(MANY):
+            one = stack.enter_context(_asking(address, "/long", SO_RCVBUF=2048))
+            for _ in range(times - 1):
+                one.sendall(f"GET /long HTTP/1.1\r\nHost: {address[7:]}\r\n\r\n".encode())
+        time.sleep(1)
+        assert _is_answered(address)
+        # Longer than connections are kept that ask nothing more.
+        time.sleep(6)
+        assert _is_answered(address)
+
+
+def test_the_newest_of_those_that_wait_are_kept(address):
+    with ExitStack() as stack:
+        asking = [stack.enter_context(_asking(address, "/")) for _ in range(2 * WAITING)]
+        time.sleep(0.5)
+        for one in asking:
+            assert b" 200 " in one.recv(4096)
+        stack.enter_context(_asking(address, "/"))
+        time.sleep(0.5)
+        gone = []
+        for one in asking:
+            one.setblocking(False)
+            try:
+                gone.append(one.recv(4096) == b"")
+            except BlockingIOError:
+                gone.append(False)
+            except ConnectionResetError:
+                gone.append(True)
+        assert sum(gone) == len(asking) + 1 - WAITING
+        assert gone == sorted(gone, reverse=True)

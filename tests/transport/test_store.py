@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nearfar.arrays import Size, blocks
+from nearfar.arrays import Size, blocks, middles
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -98,7 +98,10 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
 def test_blocks_are_thinned_as_the_whole_camera(generator, step, rows):
     whole = _believed(_transport(generator))
     parts = [of_rows(whole, block) for block in blocks(whole.camera.height, rows)]
-    found, known = stacked(list(thinned_blocks(parts, step))), thinned(whole, step)
+    found, known = (
+        stacked(list(thinned_blocks(parts, whole.camera.height, step))),
+        thinned(whole, step),
+    )
     for name in FACTORS:
         np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
     np.testing.assert_array_equal(found.quality.saturated, known.quality.saturated)
@@ -116,15 +119,25 @@ def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):
         load_transport(path)
 
 
-@pytest.mark.parametrize(("step", "first"), [(1, 0), (2, 0), (3, 2), (20, 0)])
-def test_a_thinned_transport_relights_the_pixels_it_keeps(generator, step, first):
+@pytest.mark.parametrize("step", [1, 2, 3, 4, 20])
+def test_a_thinned_transport_relights_the_middle_of_each_cell(generator, step):
     whole = _believed(_transport(generator))
     light = generator.random(PROJECTOR)
-    thin = thinned(whole, step, first)
-    np.testing.assert_allclose(thin @ light, (whole @ light)[first::step, ::step], rtol=1e-5)
-    chosen = (slice(first, None, step), slice(None, None, step))
+    thin = thinned(whole, step)
+    chosen = np.ix_(*(middles(side, step) for side in whole.camera))
+    assert thin.camera == tuple(-(-side // step) for side in whole.camera)
+    np.testing.assert_allclose(thin @ light, (whole @ light)[chosen], rtol=1e-5)
     np.testing.assert_array_equal(thin.quality.saturated, whole.quality.saturated[chosen])
     np.testing.assert_array_equal(thin.belief.white, whole.belief.white[chosen])
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 30])
+def test_middles_are_where_cells_are(length):
+    found = middles(11, length)
+    for cell, middle in zip(blocks(11, length), found, strict=True):
+        # As far from the first as from the last, but for the half pixel of even cells.
+        assert 0 <= (cell.stop - 1 - middle) - (middle - cell.start) <= 1
+    assert len(middles(0, length)) == 0
 
 
 def test_a_damaged_belief_gets_a_sentence(tmp_path, generator):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from nearfar.arrays import Integers, middles
 from nearfar.transport.model import Transport
 
 # What each camera pixel has its own of.
@@ -21,17 +22,34 @@ def of_rows(transport: Transport, rows: slice) -> Transport:
     return _chosen(transport, lambda values: values[rows])
 
 
-def thinned(transport: Transport, step: int, first: int = 0) -> Transport:
-    """Return the transport of every `step`-th row, from `first`, and column, as a copy."""
-    return _chosen(transport, lambda values: values[first::step, ::step].copy())
+def thinned(transport: Transport, step: int) -> Transport:
+    """Return the transport of the middle of each cell of `step` rows and columns, as a copy."""
+    height, width = transport.camera
+    return of_pixels(transport, middles(height, step), middles(width, step))
 
 
-def thinned_blocks(blocks: Iterable[Transport], step: int) -> Iterator[Transport]:
-    """Thin blocks of camera rows out as the whole camera would be; some may be left empty."""
-    first = 0
+def thinned_blocks(blocks: Iterable[Transport], height: int, step: int) -> Iterator[Transport]:
+    """Thin blocks of a camera's rows out as the whole camera would be; some may be left empty.
+
+    Parameters
+    ----------
+    blocks : iterable of Transport
+        In order.
+    height : int
+        Rows of the whole camera.
+    step : int
+    """
+    rows, first = middles(height, step), 0
     for part in blocks:
-        yield thinned(part, step, -first % step)
-        first += part.camera.height
+        stop = first + part.camera.height
+        mine = rows[(rows >= first) & (rows < stop)] - first
+        yield of_pixels(part, mine, middles(part.camera.width, step))
+        first = stop
+
+
+def of_pixels(transport: Transport, rows: Integers, columns: Integers) -> Transport:
+    """Return the transport of the camera pixels in some rows and columns, as a copy."""
+    return _chosen(transport, lambda values: values[np.ix_(rows, columns)])
 
 
 def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:

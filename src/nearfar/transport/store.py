@@ -228,8 +228,8 @@ class StoredTransport:
         return read_selection(self._arrays["black"], (slice(None),))
 
     def thinned(self, step: int) -> Transport:
-        """Read every `step`-th row and column of the camera, no more of it at once than a block."""
-        return stacked(list(thinned_blocks(self.blocks(), step)))
+        """Read the middle of each cell of `step` rows and columns, block by block of the camera."""
+        return stacked(list(thinned_blocks(self.blocks(), self.camera.height, step)))
 
 
 def open_transport(path: AnyPath) -> StoredTransport:

@@ -108,12 +108,10 @@ def read_photo_file(viewed: ViewedTransport, data: bytes, name: str) -> bytes:
         photo /= np.float32(full_scale_of(pixels.dtype))
         is_linear = pixels.dtype != np.uint8
     if is_linear:
-        step = viewed.shown_step
-        black = viewed.stored.black()[::step, ::step]
-        photo = _coloured(photo)[::step, ::step] - viewed.in_colours(black)
+        photo = _coloured(photo) - viewed.in_colours(viewed.stored.black())
     else:
-        photo = _coloured(from_srgb(photo))[:: viewed.shown_step, :: viewed.shown_step]
-    scale, shown = in_half(photo)
+        photo = _coloured(from_srgb(photo))
+    scale, shown = in_half(viewed.thinned_out(photo))
     return pack({"scale": scale}, shown)
 
 

@@ -8,17 +8,17 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.arrays import AnyPath, Floats, Size, middles
 from nearfar.errors import InputError, NearfarError
 from nearfar.files import luminance
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
-from nearfar.transport.rows import FACTORS, stacked, thinned, thinned_blocks
+from nearfar.transport.rows import FACTORS, of_pixels, stacked, thinned_blocks
 from nearfar.transport.store import StoredTransport, open_transport
 from nearfar.viewer.messages import Light
 
@@ -95,8 +95,9 @@ class ViewedTransport:
         quick: list[Transport] = []
         if self._held is None:
             # Of what is not held only the rows that are gone through are read.
-            for row in range(0, camera.height, self.step):
-                quick.append(thinned(self.row_of_camera(row), self.step))
+            alone, columns = middles(1, 1), middles(camera.width, self.step)
+            for row in middles(camera.height, self.step):
+                quick.append(of_pixels(self.row_of_camera(int(row)), alone, columns))
                 told(row / camera.height)
         else:
             first = 0
@@ -104,7 +105,7 @@ class ViewedTransport:
                 self._held.append(part)
                 first += part.camera.height
                 told(first / camera.height)
-            quick = list(thinned_blocks(self._held, self.step))
+            quick = list(thinned_blocks(self._held, camera.height, self.step))
         self.quick = _joined(quick)
 
     @property
@@ -131,7 +132,7 @@ class ViewedTransport:
         found = []
         shown = self.blocks()
         if self.shown_step > 1:
-            shown = thinned_blocks(shown, self.shown_step)
+            shown = thinned_blocks(shown, self.stored.camera.height, self.shown_step)
         for part in shown:
             if part.camera.height:
                 found.append(self._parts(part, light))
@@ -148,6 +149,11 @@ class ViewedTransport:
     def row_of_camera(self, y: int) -> Transport:
         """Return the transport of one row of the camera."""
         return self.stored.rows(slice(y, y + 1))
+
+    def thinned_out(self, picture: NDArray[Any]) -> NDArray[Any]:
+        """Return what of a picture of the camera's size is shown at rest."""
+        step = self.shown_step
+        return picture[np.ix_(*(middles(side, step) for side in self.stored.camera))]
 
     def blocks(self) -> Iterator[Transport]:
         """Go through blocks of camera rows; GivenUpError after `give_up`."""

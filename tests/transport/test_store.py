@@ -21,7 +21,7 @@ from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import TRUSTED, of_rows, stacked, thinned, thinned_blocks
+from nearfar.transport.rows import TRUSTED, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.store import (
     BELIEVED,
     FACTORS,
@@ -93,15 +93,18 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
         assert values.dtype == getattr(transport.quality, name).dtype
 
 
+def _middle(whole, step):
+    """Rows and columns of the middle of each cell."""
+    return [middles(side, step) for side in whole.camera]
+
+
 @pytest.mark.parametrize("step", [1, 2, 3, 4, 20])
 @pytest.mark.parametrize("rows", [1, 2, 4, 5, 9])
 def test_blocks_are_thinned_as_the_whole_camera(generator, step, rows):
     whole = _believed(_transport(generator))
     parts = [of_rows(whole, block) for block in blocks(whole.camera.height, rows)]
-    found, known = (
-        stacked(list(thinned_blocks(parts, whole.camera.height, step))),
-        thinned(whole, step),
-    )
+    found = stacked(list(thinned_blocks(parts, whole.camera.height, step)))
+    known = of_pixels(whole, *_middle(whole, step))
     for name in FACTORS:
         np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
     np.testing.assert_array_equal(found.quality.saturated, known.quality.saturated)
@@ -123,8 +126,8 @@ def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):
 def test_a_thinned_transport_relights_the_middle_of_each_cell(generator, step):
     whole = _believed(_transport(generator))
     light = generator.random(PROJECTOR)
-    thin = thinned(whole, step)
-    chosen = np.ix_(*(middles(side, step) for side in whole.camera))
+    thin = of_pixels(whole, *_middle(whole, step))
+    chosen = np.ix_(*_middle(whole, step))
     assert thin.camera == tuple(-(-side // step) for side in whole.camera)
     np.testing.assert_allclose(thin @ light, (whole @ light)[chosen], rtol=1e-5)
     np.testing.assert_array_equal(thin.quality.saturated, whole.quality.saturated[chosen])

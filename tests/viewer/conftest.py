@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,3 +88,18 @@ def serve_it(stored: Path) -> Iterator[Callable[..., str]]:
             return stack.enter_context(served_view(ViewedTransport(stored, memory=memory), place))
 
         yield serve
+
+
+@pytest.fixture
+def lights() -> dict[str, np.ndarray[Any, Any]]:
+    """Return lights of the pattern grid's size."""
+    generator = np.random.default_rng(0)
+    spot = np.zeros(PROJECTOR)
+    spot[4:9, 6:12] = 1
+    return {
+        "white": np.ones(PROJECTOR),
+        "black": np.zeros(PROJECTOR),
+        "spot": spot,
+        "random": generator.random(PROJECTOR),
+        "coloured": generator.random((*PROJECTOR, 3)),
+    }

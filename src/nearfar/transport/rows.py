@@ -22,12 +22,6 @@ def of_rows(transport: Transport, rows: slice) -> Transport:
     return _chosen(transport, lambda values: values[rows])
 
 
-def thinned(transport: Transport, step: int) -> Transport:
-    """Return the transport of the middle of each cell of `step` rows and columns, as a copy."""
-    height, width = transport.camera
-    return of_pixels(transport, middles(height, step), middles(width, step))
-
-
 def thinned_blocks(blocks: Iterable[Transport], height: int, step: int) -> Iterator[Transport]:
     """Thin blocks of a camera's rows out as the whole camera would be; some may be left empty.
 

@@ -1,4 +1,4 @@
-"""Connections that have asked for nothing: they give way to those that may."""
+"""Connections that are waited for, for a request, its rest or a reader: the oldest give way."""
 
 import asyncio
 

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
+from nearfar.arrays import Size
+
+PROJECTOR, CAMERA = Size(20, 24), Size(30, 42)
 TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2"}
 
 

@@ -1,14 +1,17 @@
 """A transport with error bars, and its page, served."""
 
+import json
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
 
 from nearfar.arrays import Size
 from nearfar.plan import choose_plan
@@ -22,9 +25,11 @@ from nearfar.viewer.view import run_view
 from nearfar.viewer.viewed import ViewedTransport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruct import reconstruct
+from tests.rigs.displays import need
+from tests.viewer.asking import CAMERA, PROJECTOR
+from tests.viewer.browsing import settled
 from tests.worlds import model_transport
 
-PROJECTOR, CAMERA = Size(20, 24), Size(30, 42)
 ANYWHERE = Place("127.0.0.1", 0)
 
 
@@ -103,3 +108,38 @@ def lights() -> dict[str, np.ndarray[Any, Any]]:
         "random": generator.random(PROJECTOR),
         "coloured": generator.random((*PROJECTOR, 3)),
     }
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Debian's Chromium."""
+    need("chromium")
+    with sync_playwright() as playwright:
+        running = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
+        )
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
+    """Open the viewer's page; whatever its console says is a failure."""
+    said: list[str] = []
+    contexts = []
+
+    def open_it(address: str, state: Any = None, **options: Any) -> Page:
+        context = browser.new_context(viewport={"width": 1300, "height": 900}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        # Of a file that was refused the browser takes note in words of its own.
+        page.on("console", lambda line: "status of 400" in line.text or said.append(line.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(address + "/" + ("#" + quote(json.dumps(state)) if state else ""))
+        settled(page)
+        return page
+
+    yield open_it
+    for context in contexts:
+        context.close()
+    assert said == []

@@ -16,8 +16,8 @@ import websockets.exceptions
 from nearfar.viewer import view, viewed
 from nearfar.viewer.serving import Place
 from nearfar.viewer.viewed import ViewedTransport
-from tests.viewer.asking import ask, message, refused, relit, socket_of
-from tests.viewer.conftest import PROJECTOR, served_view
+from tests.viewer.asking import PROJECTOR, ask, message, refused, relit, socket_of
+from tests.viewer.conftest import served_view
 
 
 @pytest.mark.parametrize(

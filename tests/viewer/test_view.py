@@ -32,8 +32,18 @@ from nearfar.viewer.serving import Place, serve
 from nearfar.viewer.viewed import ViewedTransport
 from tests.absent import said_without
 from tests.cli.conftest import run_nearfar
-from tests.viewer.asking import ask, message, picture, refused, relit, socket_of, unpack
-from tests.viewer.conftest import CAMERA, PROJECTOR, served_view
+from tests.viewer.asking import (
+    CAMERA,
+    PROJECTOR,
+    ask,
+    message,
+    picture,
+    refused,
+    relit,
+    socket_of,
+    unpack,
+)
+from tests.viewer.conftest import served_view
 from tests.worlds import model_transport
 
 # Pictures

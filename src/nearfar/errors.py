@@ -42,6 +42,10 @@ class MissingPackageError(NearfarError, ImportError):
     """A package that an optional part needs and that is not installed."""
 
 
+class ExtensionError(NearfarError, ImportError):
+    """Something that another package adds to nearfar and that cannot be loaded or used."""
+
+
 class DeviceError(NearfarError, OSError):
     """A projector or a camera that is not there, does not answer, or cannot do what was asked."""
 

@@ -25,7 +25,7 @@ from nearfar.correspondence import correspond_by_stripes
 from nearfar.estimate.fit import fit_model
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -44,7 +44,7 @@ CASES = {
 CLEAN = SimulatedCamera(shot_noise=False, read_noise=0.0, full_well=1e9, bits=16)
 
 
-def shoot(plan: Plan, scene: ExactTransport, camera: SimulatedCamera) -> HeldPhotos:
+def shoot(plan: Plan, scene: ExactTransport, camera: SimulatedCamera) -> PhotosInMemory:
     """Take the photos of a plan."""
     rig = SimulatedRig(scene, scene.name, SimulatedProjector(), camera, 1.0, 0)
     return hold(plan, rig)
@@ -59,8 +59,8 @@ def scores(truth: Mapping[str, Floats], found: Transport, lights: Mapping[str, F
     return f"{pictures:6.2f} {values['white']:7.2f} {values['random']:7.2f}"
 
 
-def answers_of(transport: Transport, measurements: Measurements) -> NDArray[np.float32]:
-    """Return the true answers of a transport to the measured patterns."""
+def responses_of(transport: Transport, measurements: Measurements) -> NDArray[np.float32]:
+    """Return the true responses of a transport to the measured patterns."""
     patterns = measurements.basis.patterns + measurements.shown_error
     pixels = transport.camera.pixels
     parts = [transport.rows(slice(c, c + 512)) @ patterns.T for c in range(0, pixels, 512)]
@@ -92,9 +92,9 @@ def run(name: str) -> None:
     print(f"  ceiling     {scores(truth, fitted, lights)}")
 
     clean = measure(shoot(plan, scene, CLEAN))
-    laid = answers_of(fitted, measurements) + measurements.answers - clean.answers
+    laid = responses_of(fitted, measurements) + measurements.responses - clean.responses
     noise_alone = estimate(
-        replace(measurements, answers=laid), scene.correspondence, window, far, plan.dropped
+        replace(measurements, responses=laid), scene.correspondence, window, far, plan.dropped
     )
     obeying = {light: fitted @ values for light, values in lights.items()}
     print(f"  floor       {scores(obeying, noise_alone, lights)}", flush=True)

@@ -55,7 +55,7 @@ def main() -> None:
     choice = best_share(measurements, truth)
     blind = held_out_share(measurements)
     print(f"{len(patterns)} patterns, {measurements.photos} photos")
-    for judge, tried in (("SNR of T", choice), ("SNR of held-out answers", blind)):
+    for judge, tried in (("SNR of T", choice), ("SNR of held-out responses", blind)):
         print(f"    share   {judge}, plain and refitted")
         for row in zip(tried.shares, tried.plain, tried.refitted, strict=True):
             print("{:9.6f}   {:6.2f} {:6.2f}".format(*row))

@@ -20,7 +20,7 @@ from nearfar.correspondence import correspond_by_phase, correspond_by_stripes
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
@@ -39,13 +39,13 @@ CASES = {
 SHARES = (1, 4, 8, 16)
 
 
-def as_the_paper(plan: Plan, photos: HeldPhotos) -> Transport:
+def as_the_paper(plan: Plan, photos: PhotosInMemory) -> Transport:
     """Estimate with stripes and the paper's estimator."""
     pixels = correspond_by_stripes(photos).pixels
     return estimate(measure(photos), pixels, plan.window, plan.far, plan.dropped)
 
 
-def jointly(plan: Plan, photos: HeldPhotos) -> Transport:
+def jointly(plan: Plan, photos: PhotosInMemory) -> Transport:
     """Estimate with phase and the joint estimator."""
     measurements = measure(photos)
     pixels = correspond_by_phase(measurements).pixels

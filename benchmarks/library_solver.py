@@ -31,9 +31,9 @@ def main() -> None:
     windows = generator.uniform(0, 0.05, (TOGETHER, len(offsets))).astype(np.float32)
     windows *= generator.random(windows.shape) < 0.1
     noisy = generator.normal(0, NOISE, (TOGETHER, len(patterns))).astype(np.float32)
-    answers = windows @ patterns.T + noisy
+    responses = windows @ patterns.T + noisy
     started = time.perf_counter()
-    for row in answers[:ALONE]:
+    for row in responses[:ALONE]:
         ARDRegression(fit_intercept=False).fit(patterns, row)
     alone = (time.perf_counter() - started) / ALONE
 
@@ -44,7 +44,7 @@ def main() -> None:
     entry_noise = np.full(BLOCK, NOISE * np.sqrt(2) / WINDOW, dtype=np.float32)
     inside = np.ones((BLOCK, len(offsets)), dtype=bool)
     for first in range(0, TOGETHER, BLOCK):
-        n0 = answers[first : first + BLOCK] @ inverse
+        n0 = responses[first : first + BLOCK] @ inverse
         _, z = solve(n0, unseen, inside, np.float32(0.75) * entry_noise)
         solve(n0, unseen, inside, least_risk(n0 + z @ unseen.T, inside, entry_noise), z)
     together = (time.perf_counter() - started) / TOGETHER

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import Plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -52,7 +52,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.fixture
-def shoot() -> Callable[..., HeldPhotos]:
+def shoot() -> Callable[..., PhotosInMemory]:
     """Photograph a plan on a world in memory."""
 
     def photograph(
@@ -61,7 +61,7 @@ def shoot() -> Callable[..., HeldPhotos]:
         camera: SimulatedCamera = QUIET,
         projector: SimulatedProjector | None = None,
         seed: int = 0,
-    ) -> HeldPhotos:
+    ) -> PhotosInMemory:
         optics = projector or SimulatedProjector()
         rig = SimulatedRig(world, "test", optics, camera, 1.0, seed)
         return hold(plan, rig)

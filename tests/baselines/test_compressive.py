@@ -67,7 +67,7 @@ def test_theory_is_the_transport_times_the_patterns():
     patterns = bernoulli_patterns(PROJECTOR, 50, seed=0)
     measurements = answer_in_theory(world, patterns)
     expected = world.far @ patterns.reshape(50, -1).T.astype(np.float32)
-    np.testing.assert_allclose(measurements.answers, np.moveaxis(expected, 0, 1), rtol=1e-5)
+    np.testing.assert_allclose(measurements.responses, np.moveaxis(expected, 0, 1), rtol=1e-5)
     assert measurements.photos == 50
 
 
@@ -79,7 +79,7 @@ def test_photos_give_the_same_under_ambient_light_and_black_levels():
     measurements = measure_by_rig(SimulatedRig(world, "test", optics, camera, 1.0, 0), patterns)
     theory = answer_in_theory(world, patterns)
     assert measurements.photos == 71
-    assert np.abs(measurements.answers - theory.answers).max() < 2e-5
+    assert np.abs(measurements.responses - theory.responses).max() < 2e-5
 
 
 def test_sparse_rows_are_recovered_from_few_patterns():
@@ -114,14 +114,14 @@ def test_noise_says_how_far_to_go():
     patterns = bernoulli_patterns(PROJECTOR, 80, seed=0)
     clean = answer_in_theory(world, patterns)
     deviation = 1e-3
-    error = np.random.default_rng(5).normal(0, deviation, clean.answers.shape)
+    error = np.random.default_rng(5).normal(0, deviation, clean.responses.shape)
     noisy = CompressiveMeasurements(
-        CAMERA, patterns, (clean.answers + error).astype(np.float32), len(patterns)
+        CAMERA, patterns, (clean.responses + error).astype(np.float32), len(patterns)
     )
     found = reconstruct_to_noise(noisy, deviation, refitted=False)
     lights = patterns.reshape(len(patterns), -1).T.astype(np.float32)
-    answers = np.moveaxis(found.far @ lights, 0, 1)
-    left = np.sqrt(((answers - noisy.answers) ** 2).sum(axis=2) / (len(patterns) - 1))
+    responses = np.moveaxis(found.far @ lights, 0, 1)
+    left = np.sqrt(((responses - noisy.responses) ** 2).sum(axis=2) / (len(patterns) - 1))
     # Below the noise, and above what the next lambda but one would leave.
     assert (left <= 1.001 * deviation).all()
     assert (left > 0.3 * deviation).all()
@@ -129,9 +129,9 @@ def test_noise_says_how_far_to_go():
         found.far, reconstruct_to_noise(noisy, np.full(left.shape, deviation), refitted=False).far
     )
     without = reconstruct_to_noise(noisy, deviation / 5, refitted=False)
-    assert np.linalg.norm(without.far @ lights - np.moveaxis(noisy.answers, 1, 0)) < np.linalg.norm(
-        found.far @ lights - np.moveaxis(noisy.answers, 1, 0)
-    )
+    assert np.linalg.norm(
+        without.far @ lights - np.moveaxis(noisy.responses, 1, 0)
+    ) < np.linalg.norm(found.far @ lights - np.moveaxis(noisy.responses, 1, 0))
     assert _decibels(world.far, found.far) > _decibels(world.far, without.far)
 
 
@@ -154,7 +154,7 @@ def test_the_best_share_is_the_best():
 def test_exposure_scales_the_truth():
     world = _dense_world()
     theory = answer_in_theory(world, bernoulli_patterns(PROJECTOR, 60, seed=0))
-    longer = CompressiveMeasurements(CAMERA, theory.patterns, 2 * theory.answers, 60)
+    longer = CompressiveMeasurements(CAMERA, theory.patterns, 2 * theory.responses, 60)
     one = best_share(theory, world, rows=10, shares=[0.01])
     two = best_share(longer, world, rows=10, shares=[0.01], exposure=2.0)
     assert two.plain == pytest.approx(one.plain, abs=0.05)
@@ -186,9 +186,9 @@ def test_faults_are_told_in_a_sentence():
     with pytest.raises(InputError, match=r"0 random patterns .*: ask for at least 1\.$"):
         bernoulli_patterns(PROJECTOR, 0, seed=0)
     with pytest.raises(InputError, match=r"all patterns are black, .*: draw others\.$"):
-        CompressiveMeasurements(CAMERA, 0 * patterns > 0, measurements.answers, 20)
-    with pytest.raises(InputError, match=r"answers of shape .* do not fit .*: give"):
-        CompressiveMeasurements(CAMERA, patterns[1:], measurements.answers, 20)
+        CompressiveMeasurements(CAMERA, 0 * patterns > 0, measurements.responses, 20)
+    with pytest.raises(InputError, match=r"responses of shape .* do not fit .*: give"):
+        CompressiveMeasurements(CAMERA, patterns[1:], measurements.responses, 20)
     for share in (0.0, -1.0, 1.5, float("nan")):
         with pytest.raises(InputError, match=r"gives no lambda: choose one above 0 and up to 1\.$"):
             reconstruct_compressive(measurements, share)

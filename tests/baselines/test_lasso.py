@@ -24,21 +24,21 @@ def _problem(count=90, seed=0):
     rows = rows.reshape(ROWS, -1).astype(np.float32)
     patterns = bernoulli_patterns(PROJECTOR, count, seed)
     sensing = sense(patterns)
-    answers, along = sensing.project(rows @ patterns.reshape(count, -1).T.astype(np.float32))
-    return rows, patterns, sensing, answers, along
+    responses, along = sensing.project(rows @ patterns.reshape(count, -1).T.astype(np.float32))
+    return rows, patterns, sensing, responses, along
 
 
-def _objective(sensing, answers, coefficients, strength):
+def _objective(sensing, responses, coefficients, strength):
     coefficients = coefficients.astype(np.float64)
-    residual = answers - coefficients @ sensing.columns
+    residual = responses - coefficients @ sensing.columns
     return 0.5 * (residual**2).sum(axis=1) + strength * np.abs(coefficients).sum(axis=1)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.03, 0.003])
 def test_it_finds_a_librarys_minimum(share):
-    _, patterns, sensing, answers, _ = _problem()
-    strength = share * highest_strength(start(sensing.columns, answers))
-    found = solve(sensing.columns, answers, strength, tolerance=1e-5)
+    _, patterns, sensing, responses, _ = _problem()
+    strength = share * highest_strength(start(sensing.columns, responses))
+    found = solve(sensing.columns, responses, strength, tolerance=1e-5)
     oracle = np.zeros_like(found)
     for i in range(ROWS):
         # scikit-learn divides the squares by their number.
@@ -48,62 +48,62 @@ def test_it_finds_a_librarys_minimum(share):
             tol=1e-6,
             max_iter=200_000,
         )
-        lasso.fit(sensing.columns[:-1].T.astype(np.float64), answers[i].astype(np.float64))
+        lasso.fit(sensing.columns[:-1].T.astype(np.float64), responses[i].astype(np.float64))
         oracle[i, :-1] = lasso.coef_
-    ours = _objective(sensing, answers, found, strength)
-    theirs = _objective(sensing, answers, oracle, strength)
+    ours = _objective(sensing, responses, found, strength)
+    theirs = _objective(sensing, responses, oracle, strength)
     np.testing.assert_allclose(ours, theirs, rtol=1e-4)
     size = np.linalg.norm(oracle, axis=1)
     assert (np.linalg.norm(found - oracle, axis=1) < 0.01 * size).all()
 
 
 def test_every_tolerance_is_kept():
-    _, _, sensing, answers, _ = _problem()
-    strength = 0.01 * highest_strength(start(sensing.columns, answers))
+    _, _, sensing, responses, _ = _problem()
+    strength = 0.01 * highest_strength(start(sensing.columns, responses))
     best = _objective(
-        sensing, answers, solve(sensing.columns, answers, strength, tolerance=1e-5), strength
+        sensing, responses, solve(sensing.columns, responses, strength, tolerance=1e-5), strength
     )
     for tolerance in (1e-1, 1e-2, 1e-3, 1e-4):
-        found = solve(sensing.columns, answers, strength, tolerance)
-        assert (_objective(sensing, answers, found, strength) <= best * (1 + tolerance)).all()
+        found = solve(sensing.columns, responses, strength, tolerance)
+        assert (_objective(sensing, responses, found, strength) <= best * (1 + tolerance)).all()
 
 
 def test_a_row_does_not_depend_on_its_company():
-    _, _, sensing, answers, _ = _problem()
-    strength = 0.02 * highest_strength(start(sensing.columns, answers))
-    together = solve(sensing.columns, answers, strength, tolerance=1e-5)
+    _, _, sensing, responses, _ = _problem()
+    strength = 0.02 * highest_strength(start(sensing.columns, responses))
+    together = solve(sensing.columns, responses, strength, tolerance=1e-5)
     for i in range(ROWS):
-        alone = solve(sensing.columns, answers[i : i + 1], strength[i : i + 1], tolerance=1e-5)
+        alone = solve(sensing.columns, responses[i : i + 1], strength[i : i + 1], tolerance=1e-5)
         assert np.linalg.norm(alone - together[i]) < 2e-3 * np.linalg.norm(together[i])
 
 
 def test_above_the_highest_strength_nothing_is_left():
-    _, _, sensing, answers, _ = _problem()
-    highest = highest_strength(start(sensing.columns, answers))
-    assert not solve(sensing.columns, answers, 1.001 * highest).any()
-    assert solve(sensing.columns, answers, 0.9 * highest).any(axis=1).all()
+    _, _, sensing, responses, _ = _problem()
+    highest = highest_strength(start(sensing.columns, responses))
+    assert not solve(sensing.columns, responses, 1.001 * highest).any()
+    assert solve(sensing.columns, responses, 0.9 * highest).any(axis=1).all()
 
 
 def test_refitting_is_least_squares_on_the_support():
-    _, _, sensing, answers, _ = _problem()
-    strength = 0.1 * highest_strength(start(sensing.columns, answers))
-    found = solve(sensing.columns, answers, strength)
+    _, _, sensing, responses, _ = _problem()
+    strength = 0.1 * highest_strength(start(sensing.columns, responses))
+    found = solve(sensing.columns, responses, strength)
     counts = np.count_nonzero(found, axis=1)
     most = int(np.sort(counts)[ROWS // 2])
-    fitted = refit(sensing.columns, answers, found, most)
+    fitted = refit(sensing.columns, responses, found, most)
     assert (counts > most).any()
     for i in range(ROWS):
         expected = found[i].copy()
         if counts[i] <= most:
             kept = np.flatnonzero(found[i])
-            expected[kept] = np.linalg.lstsq(sensing.columns[kept].T, answers[i], rcond=None)[0]
+            expected[kept] = np.linalg.lstsq(sensing.columns[kept].T, responses[i], rcond=None)[0]
         np.testing.assert_allclose(fitted[i], expected, atol=2e-5)
 
 
 def test_the_mean_is_not_penalised():
-    rows, patterns, sensing, answers, along = _problem()
-    strength = 0.05 * highest_strength(start(sensing.columns, answers))
-    found = sensing.pictures(solve(sensing.columns, answers, strength, tolerance=1e-5), along)
+    rows, patterns, sensing, responses, along = _problem()
+    strength = 0.05 * highest_strength(start(sensing.columns, responses))
+    found = sensing.pictures(solve(sensing.columns, responses, strength, tolerance=1e-5), along)
     # Of the whole problem, its column of the means included: no overlap is left with the mean's
     # column, lambda with a wavelet in use, and no more with any other.
     lights = patterns.reshape(len(patterns), -1).astype(np.float64)

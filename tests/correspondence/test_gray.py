@@ -14,7 +14,7 @@ from nearfar.correspondence import (
 )
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import GrayCode, paper_plan, parse_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -161,7 +161,7 @@ def _photos_of_bits(projector, bits, share):
     # Of surfaces dark and bright.
     photos *= np.linspace(0.2, 1.0, pixels, dtype=np.float32)[:, None]
     photos += np.random.default_rng(0).normal(0, 1e-4, photos.shape).astype(np.float32)
-    return HeldPhotos(plan, photos, 1.0)
+    return PhotosInMemory(plan, photos, 1.0)
 
 
 def _bits_of(places, count):

@@ -42,17 +42,19 @@ def _world(camera=PROJECTOR, projector=PROJECTOR, near=0.2, **options):
     return world.with_gains(near=near)
 
 
-def _answers(world, frequencies, noise=0.0, seed=0):
+def _responses(world, frequencies, noise=0.0, seed=0):
     """Answer chosen frequencies, with normal noise."""
     basis = real_basis(representatives([DC, *frequencies]), world.projector)
     pixels, channels = world.camera.pixels, world.channels
-    answers = world.rows(slice(0, pixels)).astype(np.float64) @ basis.patterns.T.astype(np.float64)
-    answers += noise * np.random.default_rng(seed).normal(size=answers.shape)
+    responses = world.rows(slice(0, pixels)).astype(np.float64) @ basis.patterns.T.astype(
+        np.float64
+    )
+    responses += noise * np.random.default_rng(seed).normal(size=responses.shape)
     level = np.full((pixels, channels), noise, dtype=np.float32)
     return Measurements(
         camera=world.camera,
         basis=basis,
-        answers=answers.astype(np.float32),
+        responses=responses.astype(np.float32),
         noise=level,
         black=np.zeros_like(level),
         shown_error=np.zeros_like(basis.patterns),
@@ -89,7 +91,7 @@ def test_the_papers_frequencies_find_whole_pixels(size, window, far):
     found = correspond_by_phase(ideal_measurements(alone, window, far, Size(1, 1)))
     assert found.lit.all()
     np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.01)
-    # Far-range light answers frequencies off the DFT grid as well.
+    # Far-range light responses frequencies off the DFT grid as well.
     lit_by_all = world.with_gains(near=0)
     found = correspond_by_phase(ideal_measurements(lit_by_all, window, far, Size(1, 1)))
     np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.3)
@@ -105,10 +107,10 @@ def test_near_and_far_light_pull_q_by_little():
 
 def test_a_finer_camera_falls_between_pixels():
     world = _world(Size(61, 77), fractional=True)
-    found = correspond_by_phase(_answers(world.with_gains(near=0), FEW))
+    found = correspond_by_phase(_responses(world.with_gains(near=0), FEW))
     assert found.lit.all()
     np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.05)
-    found = correspond_by_phase(_answers(world, FEW, noise=0.003))
+    found = correspond_by_phase(_responses(world, FEW, noise=0.003))
     off = np.abs(found.pixels - world.correspondence)
     assert found.lit.all()
     assert np.percentile(off, 95) < 0.2
@@ -118,13 +120,13 @@ def test_a_finer_camera_falls_between_pixels():
 def test_a_coarse_camera_pixel_gets_the_centroid():
     fine = _world(Size(24, 30), near=0.0)
     basis = real_basis(representatives([DC, *FEW]), PROJECTOR)
-    measured = _answers(fine, FEW)
+    measured = _responses(fine, FEW)
     camera = Size(12, 15)
-    together = measured.answers.reshape(12, 2, 15, 2, 1, -1)
+    together = measured.responses.reshape(12, 2, 15, 2, 1, -1)
     coarse = Measurements(
         camera=camera,
         basis=basis,
-        answers=together.mean(axis=(1, 3)).reshape(camera.pixels, 1, -1),
+        responses=together.mean(axis=(1, 3)).reshape(camera.pixels, 1, -1),
         noise=np.zeros((camera.pixels, 1), dtype=np.float32),
         black=np.zeros((camera.pixels, 1), dtype=np.float32),
         shown_error=measured.shown_error,
@@ -156,7 +158,7 @@ def test_a_channel_without_light_does_no_harm():
         near=world.near * dark[:, None, None],
         far=world.far * dark[:, None],
     )
-    found = correspond_by_phase(_answers(world, FEW, noise=0.002))
+    found = correspond_by_phase(_responses(world, FEW, noise=0.002))
     assert found.lit.all()
     assert np.mean(np.abs(found.pixels - world.correspondence) < 0.5) > 0.999
 
@@ -164,7 +166,7 @@ def test_a_channel_without_light_does_no_harm():
 def test_many_times_as_much_global_light_does_not_fool_it():
     world = _world(near=0.0)
     world = replace(world, direct=0.04 + 0 * world.direct)
-    found = correspond_by_phase(_answers(world, FEW))
+    found = correspond_by_phase(_responses(world, FEW))
     assert found.lit.all()
     np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.1)
 
@@ -173,8 +175,8 @@ def test_the_stronger_of_two_surfaces_wins():
     one = replace(_world(near=0.0), far=0 * _world().far)
     moved = np.roll(one.correspondence, (9, 11), axis=(0, 1))
     other = replace(one, correspondence=moved, direct=0.5 * one.direct)
-    first, second = _answers(one, FEW), _answers(other, FEW)
-    found = correspond_by_phase(replace(first, answers=first.answers + second.answers))
+    first, second = _responses(one, FEW), _responses(other, FEW)
+    found = correspond_by_phase(replace(first, responses=first.responses + second.responses))
     np.testing.assert_allclose(found.pixels, one.correspondence, atol=0.5)
 
 
@@ -183,7 +185,7 @@ def test_camera_pixels_without_direct_light_are_marked(noise):
     shade = np.zeros(PROJECTOR, dtype=bool)
     shade[5:9, 7:20] = True
     world = _with_shade(_world(channels=3), shade)
-    found = correspond_by_phase(_answers(world, FEW, noise))
+    found = correspond_by_phase(_responses(world, FEW, noise))
     np.testing.assert_array_equal(found.lit, ~shade)
     assert np.all(np.isnan(found.pixels[shade]))
     assert found.confidence[~shade].min() >= 0.5
@@ -202,7 +204,7 @@ def test_near_range_light_that_is_concentrated_is_no_direct_light():
     near = np.where(shade[..., None, None, None], 0.1 * blob / blob.sum(), world.near)
     q = world.correspondence.copy()
     world = replace(world, direct=np.where(shade[..., None], 0, world.direct), near=near)
-    found = correspond_by_phase(_answers(replace(world, correspondence=q), FEW, noise=0.003))
+    found = correspond_by_phase(_responses(replace(world, correspondence=q), FEW, noise=0.003))
     np.testing.assert_array_equal(found.lit, ~shade)
 
 
@@ -214,7 +216,7 @@ def test_light_at_the_border_does_not_wrap_to_the_other_side():
     q[:, 0], q[:, -1] = [11.5, 0.0], [6.4, 29.0]
     world = replace(world, correspondence=q)
     for noise in (0.0, 0.01):
-        found = correspond_by_phase(_answers(world, FEW, noise))
+        found = correspond_by_phase(_responses(world, FEW, noise))
         assert found.lit.all()
         np.testing.assert_allclose(found.pixels, q, atol=0.05 if noise == 0 else 0.5)
         assert np.nanmin(found.pixels) >= 0
@@ -235,7 +237,7 @@ def test_saturated_photos_still_correspond(shoot):
 def test_black_photos_show_no_direct_light(noise):
     world = _world()
     black = replace(world, direct=0 * world.direct, near=0 * world.near, far=0 * world.far)
-    found = correspond_by_phase(_answers(black, FEW, noise))
+    found = correspond_by_phase(_responses(black, FEW, noise))
     assert not found.lit.any()
     assert np.all(np.isnan(found.pixels))
     assert np.all(np.isfinite(found.confidence))
@@ -243,21 +245,21 @@ def test_black_photos_show_no_direct_light(noise):
 
 
 def test_rounding_in_a_black_pixel_is_no_light():
-    measured = _answers(_world(), FEW)
-    answers = measured.answers.copy()
-    answers[37] = 1e-9 * np.random.default_rng(0).uniform(-1, 1, size=answers[37].shape)
-    answers[37, :, measured.places([DC])[0]] = 1e-9
-    found = correspond_by_phase(replace(measured, answers=answers))
+    measured = _responses(_world(), FEW)
+    responses = measured.responses.copy()
+    responses[37] = 1e-9 * np.random.default_rng(0).uniform(-1, 1, size=responses[37].shape)
+    responses[37, :, measured.places([DC])[0]] = 1e-9
+    found = correspond_by_phase(replace(measured, responses=responses))
     assert np.flatnonzero(~found.lit).tolist() == [37]
 
 
 @pytest.mark.parametrize("scale", [1e-3, 300.0])
 def test_the_exposure_does_not_matter(scale):
-    measured = _answers(_world(), FEW, noise=0.003)
+    measured = _responses(_world(), FEW, noise=0.003)
     found = correspond_by_phase(measured)
     scaled = replace(
         measured,
-        answers=(scale * measured.answers).astype(np.float32),
+        responses=(scale * measured.responses).astype(np.float32),
         noise=(scale * measured.noise).astype(np.float32),
     )
     again = correspond_by_phase(scaled)
@@ -267,7 +269,7 @@ def test_the_exposure_does_not_matter(scale):
 
 
 def test_a_block_of_camera_pixels_corresponds_on_its_own():
-    measured = _answers(_world(), FEW, noise=0.003)
+    measured = _responses(_world(), FEW, noise=0.003)
     whole = correspond_by_phase(measured)
     part = correspond_by_phase(measured.of_pixels(Size(6, 30), slice(90, 270)))
     assert part.pixels.dtype == np.float32
@@ -289,7 +291,7 @@ def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
     for beyond, seen in ((x, True), (30 - x, False)):
         q = np.stack([y, np.where(x > 15, beyond, x)], axis=-1).astype(np.float32)
         shown = replace(world, correspondence=q, direct=direct)
-        found = correspond_by_phase(_answers(shown, FEW, noise=0.003))
+        found = correspond_by_phase(_responses(shown, FEW, noise=0.003))
         assert found.lit[:, :12].all()
         assert np.mean(found.lit[:, 15:-1] == seen) > 0.95
 
@@ -299,7 +301,7 @@ def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
     [
         [],
         [CHECKERBOARD],
-        # Light one window away answers alike.
+        # Light one window away gives the same responses.
         [CHECKERBOARD, *near_frequencies(5, Size(1, 1))],
         # Neighbours answer all but alike.
         far_frequencies(Size(3, 3), Size(64, 64)),
@@ -316,14 +318,14 @@ def test_frequencies_that_settle_nothing_are_refused(frequencies):
     size = Size(64, 64)
     world = model_transport(size, Size(2, 2), window=3, far=Size(1, 1))
     with pytest.raises(InputError, match=r"pattern grid of 64x64 alike .*: plan with .*\.$"):
-        correspond_by_phase(_answers(world, frequencies))
+        correspond_by_phase(_responses(world, frequencies))
 
 
-def test_answers_without_white_are_refused():
-    measured = _answers(_world(Size(2, 2)), FEW)
+def test_responses_without_white_are_refused():
+    measured = _responses(_world(Size(2, 2)), FEW)
     kept = measured.places([k for k in measured.basis.frequencies if k != DC])
     basis = real_basis([k for k in measured.basis.frequencies if k != DC], PROJECTOR)
-    without = replace(measured, basis=basis, answers=measured.answers[..., kept])
+    without = replace(measured, basis=basis, responses=measured.responses[..., kept])
     with pytest.raises(InputError, match=r"no answer to white.*: .*\.$"):
         correspond_by_phase(without)
 

@@ -31,26 +31,26 @@ def basis():
     return found
 
 
-def test_scores_are_sums_over_answers(basis):
-    answers = np.random.default_rng(0).normal(size=(20, basis.count)).astype(np.float32)
-    expected = (answers @ basis.patterns).reshape(20, *PROJECTOR)
-    np.testing.assert_allclose(_scores(answers, _waves(basis)), expected, atol=1e-4)
+def test_scores_are_sums_over_responses(basis):
+    responses = np.random.default_rng(0).normal(size=(20, basis.count)).astype(np.float32)
+    expected = (responses @ basis.patterns).reshape(20, *PROJECTOR)
+    np.testing.assert_allclose(_scores(responses, _waves(basis)), expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.5, 5.0])
-def test_no_place_explains_the_answers_better(basis, noise):
+def test_no_place_explains_the_responses_better(basis, noise):
     generator = np.random.default_rng(1)
     # Light at whole pixels, between two and among four, and noise up to where there is none.
     places = generator.integers(0, 2 * (np.array(PROJECTOR) - 1) + 1, size=(200, 2)) / 2
-    answers = _patterns_at(basis, places) + noise * generator.normal(size=(200, basis.count))
+    responses = _patterns_at(basis, places) + noise * generator.normal(size=(200, basis.count))
     weights = generator.uniform(0.2, 2.0, size=(200, len(basis.frequencies)))
     weighed = _Weighed(
-        (answers * weights[:, basis.index]).astype(np.float32), weights.astype(np.float32)
+        (responses * weights[:, basis.index]).astype(np.float32), weights.astype(np.float32)
     )
     every = np.stack(np.meshgrid(*(np.arange(2 * s - 1) / 2 for s in PROJECTOR), indexing="ij"), -1)
     every = every.reshape(-1, 2)
     patterns = _patterns_at(basis, every)
-    deviations = (weighed.answers @ patterns.T) / np.sqrt(weights @ _shared(basis, every).T)
+    deviations = (weighed.responses @ patterns.T) / np.sqrt(weights @ _shared(basis, every).T)
     found = _search(basis, _waves(basis), weighed)
     index = (2 * found @ np.array([2 * PROJECTOR.width - 1, 1])).astype(int)
     best = deviations.max(axis=1)

@@ -157,7 +157,7 @@ def test_the_square_transport_averages_the_camera_pixels_of_a_projector_pixel(sh
     for y, x in ((0, 0), (4, 7), (9, 11)):
         mine = (q == (y, x)).all(axis=1)
         np.testing.assert_allclose(
-            measurements.answers[y * 12 + x], whole.answers[mine].mean(axis=0), atol=1e-5
+            measurements.responses[y * 12 + x], whole.responses[mine].mean(axis=0), atol=1e-5
         )
     assert measurements.camera == small
     np.testing.assert_array_equal(pixels[3, 5], (3, 5))

@@ -49,16 +49,18 @@ def test_the_estimate_is_numpys(shoot, by, offset, between, device):
         q = np.clip(q + np.random.default_rng(0).uniform(-0.4, 0.4, q.shape), 0, 23)
         q[3:5, 8:20] = np.nan
         q = q.astype(np.float32)
-    # What rounding the answers in single precision changes is all that another library may.
+    # What rounding the responses in single precision changes is all that another library may.
     generator = np.random.default_rng(1)
-    rounded = measurements.answers * (1 + 2e-7 * generator.normal(size=measurements.answers.shape))
-    again = replace(measurements, answers=rounded.astype(np.float32))
+    rounded = measurements.responses * (
+        1 + 2e-7 * generator.normal(size=measurements.responses.shape)
+    )
+    again = replace(measurements, responses=rounded.astype(np.float32))
     ours, shaken, theirs = (
         by(told, q, plan, where)
         for told, where in ((measurements, "cpu"), (again, "cpu"), (measurements, device))
     )
-    if ours.belief is not None:
-        assert np.mean(ours.belief.kind == theirs.belief.kind) > 0.99
+    if ours.posterior is not None:
+        assert np.mean(ours.posterior.kind == theirs.posterior.kind) > 0.99
     for name in ("direct", "near", "far", "correspondence"):
         one, jolted, other = (np.nan_to_num(getattr(each, name)) for each in (ours, shaken, theirs))
         assert type(other) is np.ndarray

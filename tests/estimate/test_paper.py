@@ -53,7 +53,7 @@ def test_the_leak_matters_where_the_window_does_not_divide_the_projector():
 
 
 def test_low_frequency_relighting_is_what_was_measured():
-    # The far step ends the estimate: whatever n does, T answers the far frequencies as the
+    # The far step ends the estimate: whatever n does, T responses the far frequencies as the
     # photos did, a world beyond the model's included.
     projector, window, far = Size(24, 30), 7, Size(3, 5)
     dropped = default_dropped(window, far, projector)
@@ -62,14 +62,14 @@ def test_low_frequency_relighting_is_what_was_measured():
     generator = np.random.default_rng(2)
     shaken = replace(
         measurements,
-        answers=measurements.answers
-        + generator.normal(0, 0.01, measurements.answers.shape).astype(np.float32),
+        responses=measurements.responses
+        + generator.normal(0, 0.01, measurements.responses.shape).astype(np.float32),
         noise=np.full_like(measurements.noise, 0.01),
     )
     found = estimate(shaken, world.correspondence, window, far, dropped)
     places = shaken.places(found.far_basis.frequencies)
-    answers = found.dense() @ found.far_basis.patterns.T
-    np.testing.assert_allclose(answers, shaken.answers[..., places], atol=2e-5)
+    responses = found.dense() @ found.far_basis.patterns.T
+    np.testing.assert_allclose(responses, shaken.responses[..., places], atol=2e-5)
 
 
 def test_noise_is_honoured():
@@ -79,12 +79,14 @@ def test_noise_is_honoured():
     world = model_transport(projector, Size(12, 12), window=window, far=far, entries=3)
     measurements = ideal_measurements(world, window, far, dropped)
     noise = 0.01
-    shaken = measurements.answers + np.random.default_rng(0).normal(
-        0, noise, measurements.answers.shape
+    shaken = measurements.responses + np.random.default_rng(0).normal(
+        0, noise, measurements.responses.shape
     ).astype(np.float32)
     errors = []
     for known in (0.0, noise):
-        told = replace(measurements, answers=shaken, noise=np.full_like(measurements.noise, known))
+        told = replace(
+            measurements, responses=shaken, noise=np.full_like(measurements.noise, known)
+        )
         found = estimate(told, world.correspondence, window, far, dropped)
         errors.append(np.linalg.norm(found.near - world.near))
     assert errors[1] < 0.75 * errors[0]
@@ -103,7 +105,7 @@ def test_unlit_camera_pixels_keep_f_alone():
     assert np.all(np.isfinite(found.far))
     place = measurements.places(found.far_basis.frequencies)
     np.testing.assert_allclose(
-        found.far[2, 3], measurements.answers.reshape(6, 6, 1, -1)[2, 3][:, place], atol=1e-6
+        found.far[2, 3], measurements.responses.reshape(6, 6, 1, -1)[2, 3][:, place], atol=1e-6
     )
 
 
@@ -172,11 +174,11 @@ def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropp
     rows = _bouncing(projector)
     frame = model_transport(projector, projector, window=window, far=far)
     measurements = ideal_measurements(frame, window, far, dropped)
-    answers = rows @ measurements.basis.patterns.T
-    answers += np.random.default_rng(0).normal(0, noise, answers.shape)
+    responses = rows @ measurements.basis.patterns.T
+    responses += np.random.default_rng(0).normal(0, noise, responses.shape)
     told = replace(
         measurements,
-        answers=answers.astype(np.float32),
+        responses=responses.astype(np.float32),
         noise=np.full_like(measurements.noise, noise),
     )
     light = natural_picture(projector, 1).ravel()
@@ -199,7 +201,7 @@ def test_direct_light_fades_where_nothing_tells_it():
     world = model_transport(projector, Size(37, 37), window=5, far=far, fractional=True, entries=0)
     world = replace(world, near=np.zeros_like(world.near))
     measurements = ideal_measurements(world, 1, far, Size(1, 1))
-    noise = np.random.default_rng(0).normal(0, 0.01, measurements.answers.shape)
-    told = replace(measurements, answers=(measurements.answers + noise).astype(np.float32))
+    noise = np.random.default_rng(0).normal(0, 0.01, measurements.responses.shape)
+    told = replace(measurements, responses=(measurements.responses + noise).astype(np.float32))
     found = estimate(told, world.correspondence, 1, far, Size(1, 1))
     assert np.abs(found.direct).max() < 0.6

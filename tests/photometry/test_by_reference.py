@@ -1,4 +1,4 @@
-"""Photos against white and black: the same answers as by pairs, and errors that are known."""
+"""Photos against white and black: the same responses as by pairs, and errors that are known."""
 
 from dataclasses import replace
 
@@ -10,10 +10,10 @@ from nearfar.correspondence import Correspondence, onto_projector
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.frequencies import CHECKERBOARD, DC
 from nearfar.photometry.by_inverse import measure_pairs
+from nearfar.photometry.drift_removal import remove_drift
 from nearfar.photometry.measure import measure, measured_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.noise import fit_noise, mean_of_few
-from nearfar.photometry.steady import steady
 from nearfar.plan import paper_plan, with_references
 from nearfar.plan.model import Sinusoid
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -54,7 +54,7 @@ def test_by_reference_and_by_pairs_agree(small_world, shoot, plan, black):
     here, there = (m.places(pairs.basis.frequencies) for m in (found, pairs))
     # 16 bits: twice a rounding of the photo, and those of white and black, half a level each.
     level = 1 / 65535
-    error = np.abs(found.answers[..., here] - pairs.answers[..., there])
+    error = np.abs(found.responses[..., here] - pairs.responses[..., there])
     assert error.max() <= 3.2 * level
     np.testing.assert_allclose(found.black, pairs.black, atol=level)
     np.testing.assert_array_equal(found.shown_error[here], pairs.shown_error[there])
@@ -68,7 +68,7 @@ def test_an_inverse_among_them_counts_with_its_sign(small_world, shoot):
     found, other = (measure(shoot(p, small_world)) for p in (plan, PLAN))
     place = found.places([CHECKERBOARD]), other.places([CHECKERBOARD])
     np.testing.assert_allclose(
-        found.answers[..., place[0]], other.answers[..., place[1]], atol=5e-5
+        found.responses[..., place[0]], other.responses[..., place[1]], atol=5e-5
     )
 
 
@@ -77,14 +77,14 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
     plan = _repeated(plan, _is_checkerboard, 4)
     clean = measure(shoot(plan, wide_world))
     found = [measure(shoot(plan, wide_world, NOISY, seed=seed)) for seed in range(24)]
-    errors = np.stack([m.answers - clean.answers for m in found])
+    errors = np.stack([m.responses - clean.responses for m in found])
 
     def told(name):
         return np.sqrt(np.mean([getattr(m, name) ** 2 for m in found]))
 
     light = clean.places([DC])[0]
     sinusoids = np.setdiff1d(np.arange(clean.basis.count), [light])
-    # The references' own error is that of all answers of a pixel; each has its own besides.
+    # The references' own error is that of all responses of a pixel; each has its own besides.
     own = told("noise") ** 2 / clean.repeats[sinusoids]
     shared = told("white_noise") ** 2 + told("black_noise") ** 2
     scatter = np.sqrt(np.mean(errors[..., sinusoids] ** 2, axis=(0, 1, 2)))
@@ -94,7 +94,7 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
     between = np.mean(errors[..., sinusoids], axis=-1)
     expected = np.sqrt(shared + np.mean(own) / len(sinusoids))
     assert between.std() == pytest.approx(expected, rel=0.1)
-    # As many answers as the plan shows, white for DC.
+    # As many responses as the plan shows, white for DC.
     assert clean.repeats[clean.places([CHECKERBOARD])] == [4]
     assert clean.repeats[light] == sum(
         isinstance(p, Sinusoid) and p.frequency == DC and not p.inverse for p in plan.patterns
@@ -106,7 +106,7 @@ def test_noise_follows_each_pixels_brightness(wide_world, shoot):
     found = [measure(shoot(PLAN, bright, NOISY, seed=seed)) for seed in range(20)]
     light = found[0].places([DC])[0]
     rest = np.setdiff1d(np.arange(found[0].basis.count), [light])
-    scatter = np.std([m.answers[..., rest] for m in found], axis=0)
+    scatter = np.std([m.responses[..., rest] for m in found], axis=0)
     each = np.sqrt(np.mean(scatter**2, axis=-1))
     told = np.mean([m.noise for m in found], axis=0)
     shared = np.mean([m.white_noise**2 + m.black_noise**2 for m in found], axis=0)
@@ -127,7 +127,7 @@ def test_two_whites_and_two_blacks_tell_the_noise(bits, shoot):
     others = tuple(p for p in PLAN.patterns if not (isinstance(p, Sinusoid) and p.frequency == DC))
     plan = PLAN.model_copy(update={"patterns": with_references(others, 2, 2)})
     camera = SimulatedCamera(bits=bits)
-    (model,) = steady(shoot(plan, world, camera)).noise
+    (model,) = remove_drift(shoot(plan, world, camera)).noise
     level = np.array([0.2, 0.4, 0.6])
     # Rounding is noise too.
     truth = (level - 0.02) / camera.full_well + (camera.read_noise / camera.full_well) ** 2
@@ -143,11 +143,11 @@ def test_without_noise_that_of_rounding_is_left(small_world, shoot):
 
 def test_moving_pixels_do_not_decide_the_noise(wide_world, shoot):
     photos = shoot(PLAN, wide_world, NOISY)
-    still = steady(photos).noise
+    still = remove_drift(photos).noise
     moved = photos.photos.copy()
     generator = np.random.default_rng(1)
     moved[:, :2] = generator.integers(500, 9000, size=moved[:, :2].shape)
-    for one, other in zip(still, steady(replace(photos, photos=moved)).noise, strict=True):
+    for one, other in zip(still, remove_drift(replace(photos, photos=moved)).noise, strict=True):
         level = np.array([0.1, 0.5])
         np.testing.assert_allclose(other.variance(level), one.variance(level), rtol=0.15)
 
@@ -164,10 +164,10 @@ def test_variances_of_few_photos_are_not_taken_for_less():
 
 @pytest.mark.parametrize("plan", [PLAN, STRIPES])
 def test_rows_are_measured_on_their_own(small_world, shoot, plan):
-    photos = steady(shoot(plan, small_world, NOISY))
+    photos = remove_drift(shoot(plan, small_world, NOISY))
     whole, part = measure(photos), measure(photos, slice(2, 5))
     assert part.camera == Size(3, 9)
-    for name in ("answers", "noise", "black", "white_noise", "black_noise", "light_noise"):
+    for name in ("responses", "noise", "black", "white_noise", "black_noise", "light_noise"):
         mine = getattr(whole, name)[2 * 9 : 5 * 9]
         np.testing.assert_allclose(getattr(part, name), mine, atol=1e-7)
     cut = whole.of_pixels(Size(3, 9), slice(2 * 9, 5 * 9))
@@ -198,7 +198,7 @@ def test_measurements_by_pairs_have_no_reference_noise(wide_world, shoot):
 
 def test_the_noise_of_light_by_pairs_is_what_it_is(wide_world, shoot):
     found = [measure(shoot(PAIRS, wide_world, NOISY, seed=seed)) for seed in range(20)]
-    light = np.stack([m.answers[..., m.places([DC])[0]] for m in found])
+    light = np.stack([m.responses[..., m.places([DC])[0]] for m in found])
     told = np.sqrt(np.mean([m.light_noise**2 for m in found]))
     # Sums are never dark, so the noise of black is an extrapolation of theirs.
     assert np.sqrt(light.var(axis=0, ddof=1).mean()) == pytest.approx(told, rel=0.2)
@@ -207,7 +207,7 @@ def test_the_noise_of_light_by_pairs_is_what_it_is(wide_world, shoot):
 def test_what_is_left_out_of_measurements_is_a_single_measurement(small_world, shoot):
     found = measure(shoot(PAIRS, small_world, NOISY))
     plain = Measurements(
-        found.camera, found.basis, found.answers, found.noise, found.black, found.shown_error
+        found.camera, found.basis, found.responses, found.noise, found.black, found.shown_error
     )
     np.testing.assert_array_equal(plain.repeats, np.ones(found.basis.count))
     assert np.all(plain.white_noise == 0)

@@ -11,9 +11,9 @@ from nearfar.estimate.paper import estimate
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.pictures import natural_picture
 from nearfar.photometry.drift import find_references, follow_drift
+from nearfar.photometry.drift_removal import remove_drift
 from nearfar.photometry.measure import measure
 from nearfar.photometry.robust import robust_fit
-from nearfar.photometry.steady import steady
 from nearfar.plan import Sinusoid, paper_plan, with_references
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.drift import SimulatedDrift
@@ -89,8 +89,8 @@ def test_without_noise_nothing_of_the_drift_is_left(world, shoot, lamp, ambient)
     plain = measure(_drifting(shoot, world, STEADY, STEADY, QUIET))
     photos = _drifting(shoot, world, lamp, ambient, QUIET)
     found = measure(photos)
-    raw = measure(replace_drift(steady(photos)))
-    error, left = (np.abs(_rescaled(m, plain) - plain.answers).max() for m in (found, raw))
+    raw = measure(replace_drift(remove_drift(photos)))
+    error, left = (np.abs(_rescaled(m, plain) - plain.responses).max() for m in (found, raw))
     # Straight runs are taken out to the last level; swings, to what bends between references.
     assert error < (1.5e-3 if lamp.swing else 8e-5)
     assert left > 10 * error
@@ -104,10 +104,10 @@ def replace_drift(photos):
 
 
 def _rescaled(found, plain):
-    """Answers per unit of white: what lamp counts as 1 is a matter of definition."""
+    """Responses per unit of white: what lamp counts as 1 is a matter of definition."""
     light = found.places([DC])[0]
-    gain = plain.answers[..., light].sum(axis=0) / found.answers[..., light].sum(axis=0)
-    return found.answers * gain[:, None]
+    gain = plain.responses[..., light].sum(axis=0) / found.responses[..., light].sum(axis=0)
+    return found.responses * gain[:, None]
 
 
 def _relighting(photos, world):
@@ -130,7 +130,7 @@ def test_drift_costs_next_to_nothing(world, shoot):
         still = _relighting(_drifting(shoot, world, STEADY, STEADY, seed=seed), world)
         photos = _drifting(shoot, world, LAMP, AMBIENT, seed=seed)
         lost.append(still - _relighting(photos, world))
-        lost_raw.append(still - _relighting(replace_drift(steady(photos)), world))
+        lost_raw.append(still - _relighting(replace_drift(remove_drift(photos)), world))
     assert np.mean(lost) < 0.5
     assert np.mean(lost_raw) > 5
 
@@ -141,10 +141,10 @@ def test_ambient_light_has_a_picture_of_its_own(world, shoot):
     window = 2000 * (1 + np.sin(x / 4) * np.cos(y / 5))[..., None]
     share = np.linspace(0, 2, PHOTOS)[:, None, None, None]
     lit = np.rint(photos.photos + share * window).astype(np.uint16)
-    plain = measure(photos).answers
-    found = measure(replace(photos, photos=lit)).answers
+    plain = measure(photos).responses
+    found = measure(replace(photos, photos=lit)).responses
     assert np.abs(found - plain).max() < 1e-4
-    raw = measure(replace_drift(steady(replace(photos, photos=lit)))).answers
+    raw = measure(replace_drift(remove_drift(replace(photos, photos=lit)))).responses
     assert np.abs(raw - plain).max() > 0.01
 
 
@@ -195,7 +195,7 @@ def test_a_channel_without_light_is_taken_as_steady(world, shoot):
     drift = follow_drift(replace(photos, photos=dark))
     assert np.all(drift.lamp[:, 1] == 1.0)
     assert drift.lamp_range == pytest.approx(0.1, abs=0.01)
-    assert np.all(np.isfinite(measure(replace(photos, photos=dark)).answers))
+    assert np.all(np.isfinite(measure(replace(photos, photos=dark)).responses))
 
 
 def test_a_lamp_that_failed_is_told(world, shoot):

@@ -20,8 +20,8 @@ PLAN = paper_plan(Size(16, 20), 5, Size(3, 3))
 NOISY = SimulatedCamera()
 
 
-def _answers(world, basis):
-    """True answers to what 8 bits show, (C, channels, R)."""
+def _responses(world, basis):
+    """True responses to what 8 bits show, (C, channels, R)."""
     pairs = find_pairs(PLAN)
     shown = np.stack([PLAN.draw(pair.photo).ravel() / 127.5 - 1 for pair in pairs])
     return world.dense() @ shown.T, pairs
@@ -35,13 +35,13 @@ def _places(measurements, pairs):
     return [order.index((pair.frequency, pair.sine)) for pair in pairs]
 
 
-def test_answers_are_in_photo_units(small_world, shoot):
+def test_responses_are_in_photo_units(small_world, shoot):
     measurements = measure(shoot(PLAN, small_world))
-    truth, pairs = _answers(small_world, measurements.basis)
+    truth, pairs = _responses(small_world, measurements.basis)
     dc = [pair.frequency == DC for pair in pairs]
     # The DC answer stands for white less black.
     truth[..., dc] = (small_world @ np.ones(PLAN.projector)).reshape(-1, 2, 1)
-    found = measurements.answers[..., _places(measurements, pairs)]
+    found = measurements.responses[..., _places(measurements, pairs)]
     # 16 bits: two roundings of 1/65535 each.
     np.testing.assert_allclose(found, truth, atol=2.5e-5)
 
@@ -51,7 +51,7 @@ def test_what_eight_bits_got_wrong_is_known(small_world, shoot):
     ideal = small_world.dense() @ (measurements.basis.patterns + measurements.shown_error).T
     place = measurements.places([DC])
     keep = np.setdiff1d(np.arange(measurements.basis.count), place)
-    np.testing.assert_allclose(measurements.answers[..., keep], ideal[..., keep], atol=2.5e-5)
+    np.testing.assert_allclose(measurements.responses[..., keep], ideal[..., keep], atol=2.5e-5)
     assert 0.001 < np.abs(measurements.shown_error).max() <= 1 / 255 + 1e-6
 
 
@@ -65,22 +65,22 @@ def test_what_eight_bits_got_wrong_is_known(small_world, shoot):
 def test_ambient_light_and_black_level_fall_out(small_world, shoot, camera):
     plain = measure(shoot(PLAN, small_world))
     other = measure(shoot(PLAN, small_world, camera))
-    np.testing.assert_allclose(other.answers, plain.answers, atol=5e-5)
+    np.testing.assert_allclose(other.responses, plain.responses, atol=5e-5)
     np.testing.assert_allclose(other.black, camera.ambient + camera.black_level, atol=5e-5)
 
 
 def test_the_projectors_black_falls_out(small_world, shoot):
     plain = measure(shoot(PLAN, small_world))
     other = measure(shoot(PLAN, small_world, projector=SimulatedProjector(black_level=0.05)))
-    np.testing.assert_allclose(other.answers, plain.answers, atol=5e-5)
+    np.testing.assert_allclose(other.responses, plain.responses, atol=5e-5)
 
 
 def test_the_noise_is_what_it_is(small_world, shoot):
-    # Over many seeds, answers scatter by the noise that each capture alone tells.
+    # Over many seeds, responses scatter by the noise that each capture alone tells.
     found = [measure(shoot(PLAN, small_world, NOISY, seed=seed)) for seed in range(40)]
     place = found[0].places([DC])
     keep = np.setdiff1d(np.arange(found[0].basis.count), place)
-    scatter = np.std([m.answers[..., keep] for m in found], axis=0)
+    scatter = np.std([m.responses[..., keep] for m in found], axis=0)
     told = np.mean([m.noise for m in found], axis=0)
     ratio = np.sqrt(np.mean(scatter**2, axis=-1)) / told
     assert np.median(ratio) == pytest.approx(1.0, abs=0.05)
@@ -90,7 +90,7 @@ def test_the_noise_is_what_it_is(small_world, shoot):
 def test_pair_sums_make_differences_better(small_world, shoot):
     # Under direct light alone, half of a difference's variance shows in the sum: 0.71 is left.
     small_world = small_world.with_gains(near=0, far=0)
-    clean = measure(shoot(PLAN, small_world)).answers
+    clean = measure(shoot(PLAN, small_world)).responses
     plain, better = [], []
     for seed in range(6):
         photos = shoot(PLAN, small_world, NOISY, seed=seed)
@@ -103,7 +103,7 @@ def test_pair_sums_make_differences_better(small_world, shoot):
         kept = [i for i, p in enumerate(pairs) if p.frequency != DC]
         truth = clean[..., place][..., kept]
         plain.append(difference[..., kept] - truth)
-        better.append(measurements.answers[..., place][..., kept] - truth)
+        better.append(measurements.responses[..., place][..., kept] - truth)
     assert np.std(better) < 0.8 * np.std(plain)
     assert abs(np.mean(better)) < 0.1 * np.std(better)
 
@@ -113,7 +113,7 @@ def test_white_is_better_than_one_photo_of_it(small_world, shoot):
     errors = []
     for seed in range(6):
         measurements = measure(shoot(PLAN, small_world, NOISY, seed=seed))
-        errors.append(measurements.answers[..., measurements.places([DC])[0]] - truth)
+        errors.append(measurements.responses[..., measurements.places([DC])[0]] - truth)
     one_photo = np.sqrt((truth.mean() + 0.02) / NOISY.full_well)
     assert np.std(errors) < 0.5 * one_photo
 
@@ -128,8 +128,8 @@ def test_a_flickering_lamp_falls_out(small_world, shoot):
     )
     found = measure(flickering)
     keep = np.setdiff1d(np.arange(found.basis.count), found.places([DC]))
-    error = np.abs(found.answers - steady.answers)[..., keep]
-    # A 1 % lamp on answers of up to 0.4: thousandths without the sums, next to none with them.
+    error = np.abs(found.responses - steady.responses)[..., keep]
+    # A 1 % lamp on responses of up to 0.4: thousandths without the sums, next to none with them.
     assert np.sqrt(np.mean(error**2)) < 4e-4
 
 
@@ -137,7 +137,7 @@ def test_rows_are_measured_on_their_own(small_world, shoot):
     photos = shoot(PLAN, small_world)
     whole, part = measure(photos), measure(photos, slice(2, 5))
     assert part.camera == Size(3, 9)
-    np.testing.assert_allclose(part.answers, whole.answers[2 * 9 : 5 * 9], atol=1e-6)
+    np.testing.assert_allclose(part.responses, whole.responses[2 * 9 : 5 * 9], atol=1e-6)
 
 
 def test_dark_rows_are_measured_as_dark(small_world, shoot):
@@ -145,7 +145,7 @@ def test_dark_rows_are_measured_as_dark(small_world, shoot):
     shown = photos.photos.copy()
     shown[:, 3:6] = 0
     dark = measure(replace(photos, photos=shown), slice(3, 6))
-    assert np.all(dark.answers == 0)
+    assert np.all(dark.responses == 0)
     assert np.all(dark.black == 0)
     assert np.all(np.isfinite(dark.noise))
 
@@ -158,17 +158,17 @@ def test_a_projector_that_is_not_linear_is_told_by_its_sums(small_world, shoot, 
     assert bent.excess_of_sums < -least
     # White was photographed: it is not spoiled by sums that do not hold.
     truth = (small_world @ np.ones(PLAN.projector)).reshape(-1, 2)
-    white = bent.answers[..., bent.places([DC])[0]]
+    white = bent.responses[..., bent.places([DC])[0]]
     assert np.abs(white - truth).mean() < 0.01 * truth.mean()
 
 
-def test_dim_answers_do_not_shrink(small_world, shoot):
+def test_dim_responses_do_not_shrink(small_world, shoot):
     # Few electrons: what a noisy rho would take away on average is given back.
     dim = SimulatedCamera(full_well=300, read_noise=0, bits=16, ambient=0, black_level=0.02)
-    clean = measure(shoot(PLAN, small_world)).answers
+    clean = measure(shoot(PLAN, small_world)).responses
     ratios = []
     for seed in range(30):
-        found = measure(shoot(PLAN, small_world, dim, seed=seed)).answers
+        found = measure(shoot(PLAN, small_world, dim, seed=seed)).responses
         ratios.append(np.vdot(found, clean) / np.vdot(clean, clean))
     assert np.mean(ratios) == pytest.approx(1.0, abs=4e-3)
 
@@ -186,7 +186,7 @@ def test_what_was_shot_twice_counts_as_the_mean(shoot):
     for place in range(1, measurements.basis.count):
         mine = [pair for pair, at in zip(pairs, order, strict=True) if at == place]
         mean = np.mean([taken[pair.photo] - taken[pair.inverse] for pair in mine], axis=0)
-        found = measurements.answers[..., place]
+        found = measurements.responses[..., place]
         # What the sums' noise takes out of it is less than the noise.
         assert measurements.repeats[place] == len(mine)
         np.testing.assert_allclose(found, mean, atol=6 * measurements.noise.max())

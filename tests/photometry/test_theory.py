@@ -12,20 +12,20 @@ from nearfar.plan import paper_plan
 from tests.worlds import model_transport
 
 
-def test_the_answers_are_those_of_the_complex_patterns():
+def test_the_responses_are_those_of_the_complex_patterns():
     world = model_transport(Size(12, 20), Size(3, 4), window=5, far=Size(3, 4), channels=2)
     plan = paper_plan(
         world.projector, 5, Size(3, 4), dropped=Size(1, 1), offset="none", correspondence="none"
     )
     measured = measure_in_theory(plan, world)
     rows = world.dense().astype(np.float64)
-    answers = measured.answers.astype(np.float64)
+    responses = measured.responses.astype(np.float64)
     for i, frequency in enumerate(measured.basis.frequencies):
         expected = rows @ exponential(frequency, world.projector).ravel()
         here = measured.basis.index == i
-        cosine = answers[..., here & ~measured.basis.is_sine][..., 0]
+        cosine = responses[..., here & ~measured.basis.is_sine][..., 0]
         np.testing.assert_allclose(cosine, expected.real, atol=1e-6)
-        sine = answers[..., here & measured.basis.is_sine]
+        sine = responses[..., here & measured.basis.is_sine]
         shown = sine[..., 0] if sine.shape[-1] else np.zeros_like(cosine)
         np.testing.assert_allclose(-shown, expected.imag, atol=1e-6)
     shot = {pattern.frequency for pattern in plan.patterns}

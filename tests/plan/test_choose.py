@@ -11,10 +11,10 @@ from nearfar.illumination.frequencies import CHECKERBOARD, DC
 from nearfar.plan import choose_plan, parse_plan
 from nearfar.plan.choose import LEAST_PHOTOS, candidates, choose_frequencies, default_window
 from nearfar.plan.typical import TYPICAL, noise_of, typical_of
-from nearfar.transport.belief import Belief
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, STRENGTHS, Kind
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import Posterior
 
 
 @pytest.mark.parametrize("photos", [LEAST_PHOTOS, 61, 150])
@@ -105,7 +105,7 @@ def _quick_look(kind, strength, noise=0.01, shape=(6, 8, 3)):
         far_basis=basis,
         black=dark,
         noise=noise * white,
-        belief=Belief(
+        posterior=Posterior(
             kinds=(LIT[0], kind),
             frequencies=(),
             repeats=np.zeros(0, np.float32),
@@ -140,7 +140,7 @@ def test_the_plan_follows_what_was_looked_at():
 
 
 def test_a_look_without_kinds_is_refused():
-    look = replace(_quick_look(LIT[0], 0.01), belief=None)
+    look = replace(_quick_look(LIT[0], 0.01), posterior=None)
     for ask in (typical_of, noise_of):
         with pytest.raises(InputError, match="--method joint"):
             ask(look)

@@ -54,7 +54,7 @@ def test_every_drawing_takes_axes_and_returns_them(transport):
     assert plot.components(np.ones(transport.projector), ax=three) == three
 
 
-def test_a_row_draws_what_the_pixel_answers(transport):
+def test_a_row_draws_what_the_pixel_responses(transport):
     ax = transport.plot.row(3, 4)
     q = np.rint(transport.correspondence[3, 4]).astype(int)
     direct = ax.lines[0].get_ydata()

@@ -15,11 +15,11 @@ from nearfar.errors import (
     NearfarError,
     UnreadableFileError,
 )
-from nearfar.transport.belief import Belief
 from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import TRUSTED, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.store import (
@@ -55,7 +55,7 @@ def test_a_transport_comes_back(tmp_path, generator):
 
 
 def _believed(transport: Transport) -> Transport:
-    """Add a belief to a transport."""
+    """Add a posterior to a transport."""
     generator = np.random.default_rng(2)
     shape = transport.direct.shape
     values = {
@@ -63,7 +63,7 @@ def _believed(transport: Transport) -> Transport:
         for name in ("white", "offset_noise", "light_noise", "share_of_white")
     }
     frequencies = transport.far_basis.frequencies[1:]
-    belief = Belief(
+    posterior = Posterior(
         kinds=LIT[:3],
         frequencies=frequencies,
         repeats=np.arange(real_basis(frequencies, PROJECTOR).count, dtype=np.float32),
@@ -74,19 +74,19 @@ def _believed(transport: Transport) -> Transport:
     quality = Quality(
         generator.random(shape[:2]).astype(np.float32), generator.random(shape[:2]) < 0.1
     )
-    return replace(transport, belief=belief, quality=quality)
+    return replace(transport, posterior=posterior, quality=quality)
 
 
 def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
     transport = _believed(_transport(generator))
     save_transport(tmp_path / "t.zarr", transport)
-    loaded = load_transport(tmp_path / "t.zarr").belief
-    assert loaded.kinds == transport.belief.kinds
-    assert loaded.frequencies == transport.belief.frequencies
+    loaded = load_transport(tmp_path / "t.zarr").posterior
+    assert loaded.kinds == transport.posterior.kinds
+    assert loaded.frequencies == transport.posterior.frequencies
     for name in ("repeats", *BELIEVED):
         values = getattr(loaded, name)
-        np.testing.assert_array_equal(values, getattr(transport.belief, name))
-        assert values.dtype == getattr(transport.belief, name).dtype
+        np.testing.assert_array_equal(values, getattr(transport.posterior, name))
+        assert values.dtype == getattr(transport.posterior, name).dtype
     for name in TRUSTED:
         values = getattr(load_transport(tmp_path / "t.zarr").quality, name)
         np.testing.assert_array_equal(values, getattr(transport.quality, name))
@@ -131,7 +131,7 @@ def test_a_thinned_transport_relights_the_middle_of_each_cell(generator, step):
     assert thin.camera == tuple(-(-side // step) for side in whole.camera)
     np.testing.assert_allclose(thin @ light, (whole @ light)[chosen], rtol=1e-5)
     np.testing.assert_array_equal(thin.quality.saturated, whole.quality.saturated[chosen])
-    np.testing.assert_array_equal(thin.belief.white, whole.belief.white[chosen])
+    np.testing.assert_array_equal(thin.posterior.white, whole.posterior.white[chosen])
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 30])
@@ -143,20 +143,20 @@ def test_middles_are_where_cells_are(length):
     assert len(middles(0, length)) == 0
 
 
-def test_a_damaged_belief_gets_a_sentence(tmp_path, generator):
+def test_a_damaged_posterior_gets_a_sentence(tmp_path, generator):
     path = tmp_path / "t.zarr"
     save_transport(path, _believed(_transport(generator)))
-    belief = json.loads((path / "zarr.json").read_text())["attributes"]["belief"]
+    posterior = json.loads((path / "zarr.json").read_text())["attributes"]["belief"]
     for change, message in (
-        ({"kinds": belief["kinds"][:1]}, "error bars"),
+        ({"kinds": posterior["kinds"][:1]}, "error bars"),
         ({"repeats": [1.0]}, "error bars"),
         ({"frequencies": 3}, "does not describe a transport"),
         ({"kinds": [[1.0, 2.0]]}, "does not describe a transport"),
     ):
-        _change_attributes(path, belief={**belief, **change})
+        _change_attributes(path, belief={**posterior, **change})
         with pytest.raises(UnreadableFileError, match=message):
             load_transport(path)
-    _change_attributes(path, belief=belief)
+    _change_attributes(path, belief=posterior)
     chunk = next(p for p in (path / "belief_white").iterdir() if p.name != "zarr.json")
     chunk.unlink()
     with pytest.raises(UnreadableFileError, match=r"t\.zarr"):
@@ -174,8 +174,8 @@ def test_rows_are_read_in_blocks(tmp_path, generator, size):
     for name in FACTORS:
         np.testing.assert_array_equal(getattr(whole, name), getattr(transport, name))
     for name in BELIEVED:
-        got = getattr(whole.belief, name)
-        np.testing.assert_array_equal(got, getattr(transport.belief, name))
+        got = getattr(whole.posterior, name)
+        np.testing.assert_array_equal(got, getattr(transport.posterior, name))
     for name in TRUSTED:
         got = getattr(whole.quality, name)
         np.testing.assert_array_equal(got, getattr(transport.quality, name))

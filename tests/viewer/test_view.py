@@ -196,7 +196,7 @@ def test_every_map_is_there(address, transport):
 
 
 def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
-    save_transport(tmp_path / "t.zarr", replace(transport, belief=None, quality=None))
+    save_transport(tmp_path / "t.zarr", replace(transport, posterior=None, quality=None))
     with served_view(ViewedTransport(tmp_path / "t.zarr")) as address:
         about = json.loads(ask(address, "/scene"))
         names = [one["name"] for one in about["maps"]]

@@ -3,7 +3,7 @@
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.photometry.steady import steady
+from nearfar.photometry.drift_removal import remove_drift
 from nearfar.plan import choose_plan
 from nearfar.workflow.blocks import LIBRARIES, SLACK, rows_at_once
 from nearfar.workflow.methods import ESTIMATORS
@@ -20,7 +20,7 @@ def held(shoot):
 
 def test_room_is_left_for_references_of_the_whole_camera(held):
     # A block of rows is worked at beside what is known of every row.
-    drift = steady(held).drift
+    drift = remove_drift(held).drift
     kept = sum(values.nbytes for values in (drift.black, drift.light, drift.unsaturated))
     shared, pixel = ESTIMATORS["joint"].bytes_of(held.plan, 3)
     row = SLACK * pixel * CAMERA.width

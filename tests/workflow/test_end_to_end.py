@@ -54,7 +54,7 @@ def test_a_clean_capture_of_a_model_world_relights_it(tmp_path, world):
     transport, correspondence = reconstruct(capture)
     assert correspondence.lit.all()
     light = nearfar.natural_picture(PROJECTOR, 1, colour=True)
-    # Photos of 16 bits: a rounding of 1/65535 in each, on answers of a few tenths.
+    # Photos of 16 bits: a rounding of 1/65535 in each, on responses of a few tenths.
     assert snr(world @ light, transport @ light) > 55
     np.testing.assert_allclose(transport.black, 0.03, atol=1e-4)
 
@@ -106,8 +106,8 @@ def test_a_dark_margin_is_no_fault(tmp_path, world):
     # What counts as dark does so beside the whole camera, not beside the dark rows alone.
     parts, _ = reconstruct(capture, method="joint", memory=memory_for(5, PLAN, PROJECTOR, "joint"))
     whole, _ = reconstruct(capture, method="joint")
-    np.testing.assert_array_equal(parts.belief.white[:12], whole.belief.white[:12])
-    assert whole.belief.white[:12].min() > 0
+    np.testing.assert_array_equal(parts.posterior.white[:12], whole.posterior.white[:12])
+    assert whole.posterior.white[:12].min() > 0
 
 
 def test_correspondence_can_be_given(tmp_path, world):
@@ -208,7 +208,7 @@ def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
         parts, found = reconstruction.reconstruct(capture, known, memory=memory)
         np.testing.assert_array_equal(found.lit, q.lit)
         # Matrix products round by blocks, and a camera pixel between two kinds may take the other.
-        same = parts.belief.kind == whole.belief.kind
+        same = parts.posterior.kind == whole.posterior.kind
         assert same.mean() > 0.99
         for name in ("correspondence", "direct", "near", "far", "noise", "black"):
             one, other = getattr(parts, name), getattr(whole, name)
@@ -226,7 +226,9 @@ def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
     for name in (*FACTORS, "provenance"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(whole, name))
     for name in BELIEVED:
-        np.testing.assert_array_equal(getattr(stored.belief, name), getattr(whole.belief, name))
+        np.testing.assert_array_equal(
+            getattr(stored.posterior, name), getattr(whole.posterior, name)
+        )
 
 
 def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):

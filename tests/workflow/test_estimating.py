@@ -82,8 +82,8 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, tmp_path, pl
 def test_kinds_are_those_that_were_chosen_on_the_way(rig, tmp_path):
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
     chosen = estimate._choice.kinds[0]
-    np.testing.assert_array_equal(part.transport.belief.kind.ravel(), chosen.kind)
-    np.testing.assert_array_equal(part.transport.belief.strength.ravel(), chosen.strength)
+    np.testing.assert_array_equal(part.transport.posterior.kind.ravel(), chosen.kind)
+    np.testing.assert_array_equal(part.transport.posterior.strength.ravel(), chosen.strength)
 
 
 def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, monkeypatch):
@@ -99,8 +99,8 @@ def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, mon
     part, estimate, capture = _follow(plan, rig, tmp_path / "c.zarr")
     assert estimate.chosen_by > 0
     expected, _ = reconstruct(capture)
-    kind = part.transport.belief.kind
-    assert kind[dark] == expected.belief.kind[dark]
+    kind = part.transport.posterior.kind
+    assert kind[dark] == expected.posterior.kind[dark]
     assert kind[dark] > kind[:3].max()
     np.testing.assert_array_equal(part.transport.near[dark], 0)
 

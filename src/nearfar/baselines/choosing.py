@@ -86,7 +86,7 @@ def best_share(
     InputError
         If the truth is of other sizes, or there is no share to try.
     """
-    sizes = (measurements.projector, measurements.camera, measurements.answers.shape[1])
+    sizes = (measurements.projector, measurements.camera, measurements.responses.shape[1])
     if sizes != (truth.projector, truth.camera, truth.channels):
         raise InputError(
             f"the truth is of a projector {truth.projector}, a camera {truth.camera} and "
@@ -170,14 +170,14 @@ def _try(
         raise InputError(f"shares of {list(shares)} give no lambda: try some above 0 and up to 1.")
     shares = sorted(shares, reverse=True)
     sensing = sense(measurements.patterns[kept])
-    answers, along = sensing.project(measurements.rows[chosen][:, kept])
-    rows = start(sensing.columns, answers)
+    responses, along = sensing.project(measurements.rows[chosen][:, kept])
+    rows = start(sensing.columns, responses)
     highest = highest_strength(rows)
     plain: list[float] = []
     refitted: list[float] = []
     for share in shares:
-        settle(sensing.columns, answers, rows, share * highest, np.arange(len(chosen)))
-        found = (rows.coefficients, refit_few(sensing, answers, rows.coefficients))
+        settle(sensing.columns, responses, rows, share * highest, np.arange(len(chosen)))
+        found = (rows.coefficients, refit_few(sensing, responses, rows.coefficients))
         for scores, coefficients in zip((plain, refitted), found, strict=True):
             pictures = sensing.pictures(coefficients, along)
             scores.append(judge(pictures.reshape(len(chosen), -1)))

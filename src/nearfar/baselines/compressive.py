@@ -93,10 +93,10 @@ def reconstruct_compressive(
     if not 0.0 < share <= 1.0:
         raise InputError(f"a share of {share} gives no lambda: choose one above 0 and up to 1.")
 
-    def solver(sensing: Sensing, answers: Floats, _: slice) -> Floats:
-        strength = share * highest_strength(start(sensing.columns, answers))
-        found = solve(sensing.columns, answers, strength)
-        return refit_few(sensing, answers, found) if refitted else found
+    def solver(sensing: Sensing, responses: Floats, _: slice) -> Floats:
+        strength = share * highest_strength(start(sensing.columns, responses))
+        found = solve(sensing.columns, responses, strength)
+        return refit_few(sensing, responses, found) if refitted else found
 
     return _reconstruct(measurements, solver, progress)
 
@@ -128,7 +128,7 @@ def reconstruct_to_noise(
     InputError
         If the noise is negative or of another shape.
     """
-    shape = measurements.answers.shape[:2]
+    shape = measurements.responses.shape[:2]
     if np.shape(noise) not in ((), shape) or not np.min(noise) >= 0:
         raise InputError(
             f"the noise is no number or array of shape {shape} of at least 0: give the standard "
@@ -137,24 +137,24 @@ def reconstruct_to_noise(
     deviation = np.broadcast_to(np.asarray(noise, dtype=np.float64), shape).ravel()
     freedom = len(measurements.patterns) - 1
 
-    def solver(sensing: Sensing, answers: Floats, block: slice) -> Floats:
+    def solver(sensing: Sensing, responses: Floats, block: slice) -> Floats:
         allowed = freedom * (deviation[block] / sensing.scale) ** 2
-        rows = start(sensing.columns, answers)
+        rows = start(sensing.columns, responses)
         highest = highest_strength(rows)
-        waiting: Integers = np.arange(len(answers))
+        waiting: Integers = np.arange(len(responses))
         for share in SHARES:
-            settle(sensing.columns, answers, rows, share * highest, waiting)
+            settle(sensing.columns, responses, rows, share * highest, waiting)
             energy = np.einsum("ik,ik->i", rows.residual[waiting], rows.residual[waiting])
             waiting = waiting[energy > allowed[waiting]]
-        return refit_few(sensing, answers, rows.coefficients) if refitted else rows.coefficients
+        return refit_few(sensing, responses, rows.coefficients) if refitted else rows.coefficients
 
     return _reconstruct(measurements, solver, progress)
 
 
-def refit_few(sensing: Sensing, answers: Floats, coefficients: Floats) -> Floats:
+def refit_few(sensing: Sensing, responses: Floats, coefficients: Floats) -> Floats:
     """Refit the rows that keep few coefficients: see `PATTERNS_PER_COEFFICIENT`."""
-    most = answers.shape[1] // PATTERNS_PER_COEFFICIENT
-    return refit(sensing.columns, answers, coefficients, most)
+    most = responses.shape[1] // PATTERNS_PER_COEFFICIENT
+    return refit(sensing.columns, responses, coefficients, most)
 
 
 def _reconstruct(
@@ -162,13 +162,13 @@ def _reconstruct(
 ) -> ExactTransport:
     """Solve rows in blocks, on all cores."""
     sensing = sense(measurements.patterns)
-    rows, channels = measurements.rows, measurements.answers.shape[1]
+    rows, channels = measurements.rows, measurements.responses.shape[1]
     projector, camera = measurements.projector, measurements.camera
     far = np.empty((channels, camera.pixels, projector.pixels), dtype=np.float32)
 
     def one(block: slice) -> int:
-        answers, along = sensing.project(rows[block])
-        pictures = sensing.pictures(solver(sensing, answers, block), along)
+        responses, along = sensing.project(rows[block])
+        pictures = sensing.pictures(solver(sensing, responses, block), along)
         pixel, channel = np.divmod(np.arange(block.start, block.stop), channels)
         far[channel, pixel] = pictures.reshape(len(pictures), -1)
         return len(pictures)

@@ -5,10 +5,10 @@ fall out. Equation (3), t(p) = 1/P sum_k b_k l_k*(p), is an inverse DFT.
 
 Patterns of 8 bits stray from sinusoids by up to 1/255, which by equation (3) alone leaves an error
 of about 0.3 % of a row, 50 dB. What is shown is known, so each refinement takes what the estimate
-would have answered to it from the answers, and the inverse DFT of the rest corrects the estimate;
+would have answered to it from the responses, and the inverse DFT of the rest corrects the estimate;
 one brings the error to about 100 dB, for one product with a P x P matrix.
 
-Index convention: r runs over the P real answers, cosine before sine for each of +-k; i over rows.
+Index convention: r runs over the P real responses, cosine before sine for each of +-k; i over rows.
 """
 
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class FullDFT:
 
     @property
     def photos(self) -> int:
-        """Two for each of P real answers."""
+        """Two for each of P real responses."""
         return 2 * self.projector.pixels
 
     @cached_property
@@ -74,26 +74,26 @@ class FullDFT:
 
     def decode(self, photos: Floats) -> Floats:
         """Transform pair differences, and refine: (2 P, I) to (I, P)."""
-        answers = (photos[0::2] - photos[1::2]).T.astype(np.float64)
-        rows = self._transform(answers)
+        responses = (photos[0::2] - photos[1::2]).T.astype(np.float64)
+        rows = self._transform(responses)
         for _ in range(self.refinements):
-            rows += self._transform(answers - self._answers_of(rows))
+            rows += self._transform(responses - self._responses_of(rows))
         return rows
 
-    def _transform(self, answers: Floats) -> Floats:
-        """Equation (3): real answers (I, P) to rows (I, P)."""
-        spectrum = np.zeros((len(answers), *self.projector), dtype=np.complex128)
+    def _transform(self, responses: Floats) -> Floats:
+        """Equation (3): real responses (I, P) to rows (I, P)."""
+        spectrum = np.zeros((len(responses), *self.projector), dtype=np.complex128)
         y, x = self._numbers[self.basis.index].T
         sines = self.basis.is_sine
-        spectrum[:, y[~sines], x[~sines]] = answers[:, ~sines]
-        spectrum[:, y[sines], x[sines]] -= 1j * answers[:, sines]
-        # A real row answers -k by the conjugate of its answer to k.
+        spectrum[:, y[~sines], x[~sines]] = responses[:, ~sines]
+        spectrum[:, y[sines], x[sines]] -= 1j * responses[:, sines]
+        # A real row responds to -k by the conjugate of its response to k.
         down, across = self._numbers.T
         spectrum[:, -down, -across] = spectrum[:, down, across].conj()
-        return np.asarray(fft.ifft2(spectrum).real.reshape(answers.shape))
+        return np.asarray(fft.ifft2(spectrum).real.reshape(responses.shape))
 
-    def _answers_of(self, rows: Floats) -> Floats:
-        """Answers of rows to what is shown: 2 l / 255 - 1."""
+    def _responses_of(self, rows: Floats) -> Floats:
+        """Responses of rows to what is shown: 2 l / 255 - 1."""
         height, width = self.projector
         period = int(np.lcm(height, width))
         y, x = np.divmod(np.arange(height * width), width)
@@ -104,11 +104,11 @@ class FullDFT:
             True: quantise(0.5 + 0.5 * np.sin(angle)) * (2.0 / 255.0) - 1.0,
         }
         numbers = self._numbers[self.basis.index]
-        answers = np.empty_like(rows)
+        responses = np.empty_like(rows)
         for is_sine, shown in period_of.items():
             mine = np.flatnonzero(self.basis.is_sine == is_sine)
             for block in blocks(len(mine), DRAWN):
                 ky, kx = numbers[mine[block]].T[..., None]
                 steps = (ky * y * (period // height) + kx * x * (period // width)) % period
-                answers[:, mine[block]] = rows @ shown[steps].T
-        return answers
+                responses[:, mine[block]] = rows @ shown[steps].T
+        return responses

@@ -65,9 +65,9 @@ class Hadamard:
 
     def decode(self, photos: Floats) -> Floats:
         """Correlate with 2 s - 1: (q + 1, I) to (I, P)."""
-        answers = np.ascontiguousarray((photos[1:] - photos[0]).T, dtype=np.float64)
+        responses = np.ascontiguousarray((photos[1:] - photos[0]).T, dtype=np.float64)
         signs = fft.rfft(2.0 * self.sequence - 1.0)
-        rows = fft.irfft(signs * np.conj(fft.rfft(answers)), n=self.order)
+        rows = fft.irfft(signs * np.conj(fft.rfft(responses)), n=self.order)
         return np.asarray(rows[:, : self.projector.pixels] * (2.0 / (self.order + 1)))
 
 

@@ -8,7 +8,7 @@ Only a few coefficients differ from 0, so a row works on few columns at a time: 
 those whose overlap with the residual exceeds lambda, which are looked for among all columns, for
 a block of rows in one matrix product. A row whose duality gap over all columns is small leaves.
 
-Index convention: i runs over rows, n over the N columns of the problem, k over the K answers.
+Index convention: i runs over rows, n over the N columns of the problem, k over the K responses.
 """
 
 from collections.abc import Iterator
@@ -55,18 +55,18 @@ class Rows(NamedTuple):
     overlap: Floats
 
 
-def start(columns: Floats, answers: Floats) -> Rows:
+def start(columns: Floats, responses: Floats) -> Rows:
     """Return rows of zeros.
 
     Parameters
     ----------
     columns : ndarray, shape (N + 1, K), float32
         A, and a last row of zeros.
-    answers : ndarray, shape (I, K), float32
+    responses : ndarray, shape (I, K), float32
         b.
     """
-    nothing = np.zeros((len(answers), len(columns)), dtype=np.float32)
-    residual = answers.astype(np.float32, copy=True)
+    nothing = np.zeros((len(responses), len(columns)), dtype=np.float32)
+    residual = responses.astype(np.float32, copy=True)
     return Rows(nothing, residual, residual @ columns.T)
 
 
@@ -76,16 +76,16 @@ def highest_strength(rows: Rows) -> Floats:
 
 
 def solve(
-    columns: Floats, answers: Floats, strength: Floats, tolerance: float = TOLERANCE
+    columns: Floats, responses: Floats, strength: Floats, tolerance: float = TOLERANCE
 ) -> Floats:
     """Minimise for one lambda per row, by way of larger ones.
 
     Parameters
     ----------
-    columns, answers
+    columns, responses
         As `start`.
     strength : ndarray, shape (I,)
-        lambda; 0 only where the answers are 0.
+        lambda; 0 only where the responses are 0.
     tolerance : float
         Duality gap at which a row leaves, as a share of its objective.
 
@@ -94,24 +94,24 @@ def solve(
     ndarray, shape (I, N + 1), float32
         x, and a 0.
     """
-    rows = start(columns, answers)
-    everything = np.arange(len(answers))
+    rows = start(columns, responses)
+    everything = np.arange(len(responses))
     before = STEP * highest_strength(rows)
     while (before > strength).any():
-        settle(columns, answers, rows, np.maximum(before, strength), everything, ROUGH)
+        settle(columns, responses, rows, np.maximum(before, strength), everything, ROUGH)
         before = STEP * before
-    settle(columns, answers, rows, strength, everything, tolerance)
+    settle(columns, responses, rows, strength, everything, tolerance)
     return rows.coefficients
 
 
-def refit(columns: Floats, answers: Floats, coefficients: Floats, most: int) -> Floats:
+def refit(columns: Floats, responses: Floats, coefficients: Floats, most: int) -> Floats:
     """Fit the coefficients that are not 0 by least squares, where there are at most `most`.
 
     The l1 norm pulls every coefficient towards 0; this takes the pull back.
 
     Parameters
     ----------
-    columns, answers
+    columns, responses
         As `start`.
     coefficients : ndarray, shape (I, N + 1)
 
@@ -131,7 +131,7 @@ def refit(columns: Floats, answers: Floats, coefficients: Floats, most: int) -> 
         # Squares as small as this against a column's own cannot be told from rounding.
         matrix[:, diagonal, diagonal] *= 1.0 + 1e-9
         matrix[:, diagonal, diagonal] += places == len(columns) - 1
-        right = chosen @ answers[group].astype(np.float64)[..., None]
+        right = chosen @ responses[group].astype(np.float64)[..., None]
         values = np.linalg.solve(matrix, right)[..., 0].astype(np.float32)
         fitted = np.zeros((len(group), len(columns)), dtype=np.float32)
         np.put_along_axis(fitted, places, values, axis=1)
@@ -141,7 +141,7 @@ def refit(columns: Floats, answers: Floats, coefficients: Floats, most: int) -> 
 
 def settle(
     columns: Floats,
-    answers: Floats,
+    responses: Floats,
     rows: Rows,
     strength: Floats,
     chosen: Integers,
@@ -151,7 +151,7 @@ def settle(
 
     Parameters
     ----------
-    columns, answers
+    columns, responses
         As `start`.
     rows : Rows
         Where to start; best at the minimum of a lambda a few times as large.
@@ -174,7 +174,7 @@ def settle(
             return
         wanted = np.maximum(INNER * tolerance, SHARE_OF_GAP * gap)
         _one_round(columns, rows, active, strength, wanted)
-        residual = answers[active] - rows.coefficients[active] @ columns
+        residual = responses[active] - rows.coefficients[active] @ columns
         rows.residual[active] = residual
         rows.overlap[active] = residual @ columns.T
 
@@ -210,7 +210,7 @@ def _one_round(
         rows.coefficients[i] = fresh
 
 
-def _groups(sizes: Integers, answers: int) -> Iterator[Integers]:
+def _groups(sizes: Integers, responses: int) -> Iterator[Integers]:
     """Cut rows into groups of like sizes whose matrices fit in `NUMBERS`; size 0 is left out."""
     order = np.argsort(sizes, kind="stable")
     order = order[sizes[order] > 0]
@@ -219,7 +219,7 @@ def _groups(sizes: Integers, answers: int) -> Iterator[Integers]:
             : np.searchsorted(sizes[order], ALIKE * max(sizes[order[0]], FEWEST), "right")
         ]
         largest = int(sizes[alike[-1]])
-        for block in blocks(len(alike), max(1, NUMBERS // (largest * (2 * largest + answers)))):
+        for block in blocks(len(alike), max(1, NUMBERS // (largest * (2 * largest + responses)))):
             yield alike[block]
         order = order[len(alike) :]
 

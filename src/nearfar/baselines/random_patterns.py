@@ -1,4 +1,4 @@
-"""Random patterns, and what every camera pixel answers to them: b = T l.
+"""Random patterns, and the response of every camera pixel to them: b = T l.
 
 Index convention: k runs over K patterns.
 """
@@ -43,13 +43,13 @@ def bernoulli_patterns(projector: Size, count: int, seed: int) -> Booleans:
 
 @dataclass(frozen=True)
 class CompressiveMeasurements:
-    """What every camera pixel answers to random patterns.
+    """Responses of every camera pixel to random patterns.
 
     Attributes
     ----------
     camera : Size
     patterns : ndarray of bool, shape (K, Py, Px)
-    answers : ndarray, shape (C, channels, K), float32
+    responses : ndarray, shape (C, channels, K), float32
         b in photo units, black subtracted.
     photos : int
         Exposures that were needed: K, and 1 for black where a rig was used.
@@ -59,18 +59,18 @@ class CompressiveMeasurements:
 
     camera: Size
     patterns: Booleans
-    answers: Floats
+    responses: Floats
     photos: int
     name: str = "compressive light transport"
 
     def __post_init__(self) -> None:
-        if self.answers.ndim != 3 or (self.answers.shape[0], self.answers.shape[2]) != (
+        if self.responses.ndim != 3 or (self.responses.shape[0], self.responses.shape[2]) != (
             self.camera.pixels,
             len(self.patterns),
         ):
             raise InputError(
-                f"answers of shape {self.answers.shape} do not fit a camera of {self.camera} and "
-                f"{len(self.patterns)} patterns: give (camera pixels, channels, patterns)."
+                f"responses of shape {self.responses.shape} do not fit a camera of {self.camera} "
+                f"and {len(self.patterns)} patterns: give (camera pixels, channels, patterns)."
             )
         if not self.patterns.any():
             raise InputError("all patterns are black, which measures nothing: draw others.")
@@ -82,8 +82,8 @@ class CompressiveMeasurements:
 
     @property
     def rows(self) -> Floats:
-        """Answers as rows, shape (C * channels, K)."""
-        return self.answers.reshape(-1, len(self.patterns))
+        """Responses as rows, shape (C * channels, K)."""
+        return self.responses.reshape(-1, len(self.patterns))
 
 
 def answer_in_theory(truth: ExactTransport, patterns: Booleans) -> CompressiveMeasurements:
@@ -99,12 +99,12 @@ def answer_in_theory(truth: ExactTransport, patterns: Booleans) -> CompressiveMe
     InputError
         If the patterns are not of the projector's size.
     """
-    answers = np.empty((len(patterns), truth.camera.pixels, truth.channels), dtype=np.float32)
+    responses = np.empty((len(patterns), truth.camera.pixels, truth.channels), dtype=np.float32)
     for block in blocks(len(patterns), LIGHTS):
         pictures = truth.pictures(patterns[block].astype(np.float32))
-        answers[block] = pictures.reshape(-1, *answers.shape[1:])
+        responses[block] = pictures.reshape(-1, *responses.shape[1:])
     return CompressiveMeasurements(
-        truth.camera, patterns, np.moveaxis(answers, 0, 2).copy(), len(patterns), truth.name
+        truth.camera, patterns, np.moveaxis(responses, 0, 2).copy(), len(patterns), truth.name
     )
 
 
@@ -132,9 +132,9 @@ def measure_by_rig(rig: Rig, patterns: Booleans) -> CompressiveMeasurements:
     photos = rig.shoot(shown)
     black = next(photos).astype(np.float32)
     camera = Size(*black.shape[:2])
-    answers = np.empty((len(patterns), camera.pixels, black.shape[2]), dtype=np.float32)
+    responses = np.empty((len(patterns), camera.pixels, black.shape[2]), dtype=np.float32)
     for k, photo in enumerate(photos):
-        answers[k] = (photo - black).reshape(answers.shape[1:]) / np.float32(rig.full_scale)
+        responses[k] = (photo - black).reshape(responses.shape[1:]) / np.float32(rig.full_scale)
     return CompressiveMeasurements(
-        camera, patterns, np.moveaxis(answers, 0, 2).copy(), len(patterns) + 1
+        camera, patterns, np.moveaxis(responses, 0, 2).copy(), len(patterns) + 1
     )

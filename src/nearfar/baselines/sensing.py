@@ -27,7 +27,7 @@ class Sensing:
     gain : float
         Length of the scaling function's column, scaled.
     scale : float
-        What answers are divided by.
+        What responses are divided by.
     """
 
     projector: Size
@@ -38,7 +38,7 @@ class Sensing:
     scale: float
 
     def project(self, rows: Floats) -> tuple[Floats, Floats]:
-        """Split rows of answers (I, K) into what wavelets explain, and the part along the means."""
+        """Split responses (I, K) into what wavelets explain, and the part along the means."""
         along = (rows @ self.mean) / self.scale
         return (rows / self.scale - along[:, None] * self.mean).astype(np.float32), along
 

@@ -1,6 +1,6 @@
 """Whether a set of frequencies settles where direct light comes from.
 
-Light from one place answers like light from another, D away, but for
+Light from one place responses like light from another, D away, but for
 lost(D) = sum_k w_k (1 - cos 2 pi k.D), the depth below its peak of the score that one place
 throws on the others (its point spread), the weights w being those of the search. Direct light of
 share a of white is taken for light from D away with the probability that a normal deviate exceeds

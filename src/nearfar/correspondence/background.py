@@ -1,4 +1,4 @@
-"""What else than direct light answers a frequency: the power of far- and near-range light.
+"""What else than direct light responses a frequency: the power of far- and near-range light.
 
 All amplitudes are shares of a camera pixel's white, so that they hold for any exposure.
 """
@@ -20,14 +20,14 @@ class Background:
     near : float
         Highest entry of near-range light, a Gaussian of `NEAR_WIDTH`.
     floor : float
-        What answers at any frequency: entries of t that stand out by themselves.
+        What responds at any frequency: entries of t that stand out by themselves.
     """
 
     near: float
     floor: float
 
     def power(self, basis: RealBasis) -> Floats:
-        """Return the mean square of the answers to each frequency, shape (K,)."""
+        """Return the mean square of the responses to each frequency, shape (K,)."""
         cycles = basis.cycles
         around = np.hypot(*(cycles * basis.projector).T)
         far = FAR * np.exp(-around / FAR_DECAY)

@@ -4,7 +4,7 @@ Each bit is read by its sign: a photo against that of the inverse, so that neith
 ambient light matter. Neighbouring rows differ in one bit (Gray 1953), so a camera pixel that sees
 two of them is unsure of that bit alone, and how unsure it is tells its share of each.
 
-Far-range light hardly answers fine bits, which is how camera pixels without direct light are
+Far-range light hardly responses fine bits, which is how camera pixels without direct light are
 seen. Where it outshines direct light it turns coarse bits; stripes and phase do better there.
 
 Index convention: arrays are (C,) or (B, C); c runs over camera pixels, b over the bits of one axis,

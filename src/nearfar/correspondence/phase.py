@@ -1,9 +1,9 @@
 """Correspondence from the photos of transport themselves, without photos of its own.
 
-Direct light is a peak of a row t: its answers to all frequencies agree on one place, where they
-add up. Far-range light answers low frequencies alone, and near-range light mostly those. So each
+Direct light is a peak of a row t: its responses to all frequencies agree on one place, where they
+add up. Far-range light responses low frequencies alone, and near-range light mostly those. So each
 answer is divided by the power of what else is in it (noise, far- and near-range light), and the
-answers are laid on every place of the pattern grid: a whitened matched filter. Two weightings are
+responses are laid on every place of the pattern grid: a whitened matched filter. Two weightings are
 used. A weak background finds the place, for every answer helps to tell one place from another; a
 strong one then measures the footprint, the 5 x 5 entries of t around it, and tells direct light
 from near-range light that is concentrated, as in a crease.
@@ -11,7 +11,7 @@ from near-range light that is concentrated, as in a crease.
 Sums over places, first along rows and then down, replace an inverse FFT, so that frequencies may
 lie off the DFT grid.
 
-Index convention: c runs over camera pixels, r over real answers, k over frequencies, g over
+Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
 frequencies of one fy, o and i over the offsets of a footprint.
 """
 
@@ -45,7 +45,7 @@ SWEEPS = 15
 # direct light is believed more readily next to the first.
 RIDGE = 1.0
 # Direct light is seen where it stands above the background by this factor, root mean square over
-# the answers. Between the 98th percentile of unlit and the 0.05th of lit camera pixels of a
+# the responses. Between the 98th percentile of unlit and the 0.05th of lit camera pixels of a
 # Cornell box seen from aside, by plans of 79 to 340 photos (benchmarks/correspondence.py).
 SEEN = 2.25
 # By how much more where q turns round, which light by way of another surface does: so much leaves
@@ -54,18 +54,18 @@ TURNED = 1.35
 
 
 class _Weighed(NamedTuple):
-    """Answers over white, channels summed by their weights.
+    """Responses over white, channels summed by their weights.
 
-    `answers` (C, R) is sum of weight times answer, `weights` (C, K) the sum of weights, one for
+    `responses` (C, R) is sum of weight times answer, `weights` (C, K) the sum of weights, one for
     the cosine and the sine of a frequency.
     """
 
-    answers: Floats
+    responses: Floats
     weights: Floats
 
 
 def correspond_by_phase(measurements: Measurements) -> Correspondence:
-    """Find q(c) from the answers to the sinusoids.
+    """Find q(c) from the responses to the sinusoids.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     basis = _without_dc(measurements)
     require_settled(basis)
     camera = measurements.camera
-    white = measurements.answers[..., measurements.places([DC])[0]]
+    white = measurements.responses[..., measurements.places([DC])[0]]
     brightest = measurements.brightest or float(white.max(initial=0.0))
     pixels = np.empty((camera.pixels, 2), dtype=np.float32)
     excess = np.empty(camera.pixels, dtype=np.float32)
@@ -96,10 +96,10 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
 
     def work(block: slice) -> None:
         part = measurements.of_pixels(Size(1, block.stop - block.start), block)
-        answers, variance = _relative(part, BLACK * brightest)
-        found = _search(basis, waves, _weigh(basis, answers, variance, SEARCH))
-        pixels[block], _ = _footprints(basis, _weigh(basis, answers, variance, SHARP), found)
-        _, excess[block] = _footprints(basis, _weigh(basis, answers, variance, STRONG), found)
+        responses, variance = _relative(part, BLACK * brightest)
+        found = _search(basis, waves, _weigh(basis, responses, variance, SEARCH))
+        pixels[block], _ = _footprints(basis, _weigh(basis, responses, variance, SHARP), found)
+        _, excess[block] = _footprints(basis, _weigh(basis, responses, variance, STRONG), found)
 
     side_by_side(work, blocks(camera.pixels, BLOCK))
     pixels[excess <= SEEN] = np.nan
@@ -128,23 +128,25 @@ def _without_dc(measurements: Measurements) -> RealBasis:
 
 
 def _relative(measurements: Measurements, black: float) -> tuple[Floats, Floats]:
-    """Answers over each pixel's own white, (C, channels, R), and their variances; DC left out."""
+    """Responses over each pixel's own white, (C, channels, R), and their variances; DC left out."""
     places = measurements.places([k for k in measurements.basis.frequencies if k != DC])
-    white = measurements.answers[..., measurements.places([DC])[0]]
+    white = measurements.responses[..., measurements.places([DC])[0]]
     scale = np.maximum(white, black)
     inverse = np.divide(1.0, scale, where=scale > 0, out=np.zeros_like(scale))[..., None]
-    shape = measurements.answers.shape
+    shape = measurements.responses.shape
     variance = np.broadcast_to(answer_variance(measurements), shape)[..., places] * inverse**2
-    return measurements.answers[..., places] * inverse, variance
+    return measurements.responses[..., places] * inverse, variance
 
 
-def _weigh(basis: RealBasis, answers: Floats, variance: Floats, background: Background) -> _Weighed:
+def _weigh(
+    basis: RealBasis, responses: Floats, variance: Floats, background: Background
+) -> _Weighed:
     cosine = np.flatnonzero(~basis.is_sine)
     count = np.bincount(basis.index, minlength=len(basis.frequencies))
     # A cosine and its sine get one weight, so that no place is favoured.
     of_pair = np.add.reduceat(variance, cosine, axis=-1) / count if len(cosine) else variance
     weights = 1.0 / (of_pair + background.power(basis))
-    summed = np.einsum("cir,cir->cr", answers, weights[..., basis.index])
+    summed = np.einsum("cir,cir->cr", responses, weights[..., basis.index])
     return _Weighed(summed.astype(np.float32), weights.sum(axis=1).astype(np.float32))
 
 
@@ -154,9 +156,9 @@ class _Group(NamedTuple):
     Attributes
     ----------
     cosines, sines : ndarray of int
-        Their answers; what is its own negative has no sine.
+        Their responses; what is its own negative has no sine.
     along : ndarray, shape (len(cosines) + len(sines), 2 Px), float32
-        From these answers to real and imaginary parts of their sum along a row.
+        From these responses to real and imaginary parts of their sum along a row.
     """
 
     cosines: NDArray[np.int64]
@@ -165,7 +167,7 @@ class _Group(NamedTuple):
 
 
 class _Waves(NamedTuple):
-    """Scores of all places from answers.
+    """Scores of all places from responses.
 
     Attributes
     ----------
@@ -197,24 +199,24 @@ def _waves(basis: RealBasis) -> _Waves:
     return _Waves(tuple(groups), down.astype(np.float32))
 
 
-def _scores(answers: Floats, waves: _Waves) -> Floats:
-    """Scores of all places, (n, Py, Px), of answers (n, R)."""
+def _scores(responses: Floats, waves: _Waves) -> Floats:
+    """Scores of all places, (n, Py, Px), of responses (n, R)."""
     width = waves.groups[0].along.shape[1] // 2
-    sums = np.empty((len(answers), len(waves.groups), 2, width), dtype=np.float32)
+    sums = np.empty((len(responses), len(waves.groups), 2, width), dtype=np.float32)
     for g, group in enumerate(waves.groups):
         chosen = np.concatenate([group.cosines, group.sines])
-        sums[:, g] = (answers[:, chosen] @ group.along).reshape(-1, 2, width)
-    return np.asarray(np.matmul(waves.down, sums.reshape(len(answers), -1, width)))
+        sums[:, g] = (responses[:, chosen] @ group.along).reshape(-1, 2, width)
+    return np.asarray(np.matmul(waves.down, sums.reshape(len(responses), -1, width)))
 
 
 def _search(basis: RealBasis, waves: _Waves, weighed: _Weighed) -> NDArray[np.float64]:
-    """Find the place, to half a pixel, at which direct light explains the answers best: (C, 2).
+    """Find the place, to half a pixel, at which direct light explains the responses best: (C, 2).
 
     Light at half a pixel is shared by the pixels around it, which adds half of both scores.
     """
-    best = np.empty((len(weighed.answers), 2))
-    for block in blocks(len(weighed.answers), max(1, HELD // basis.projector.pixels)):
-        score = _scores(weighed.answers[block], waves)
+    best = np.empty((len(weighed.responses), 2))
+    for block in blocks(len(weighed.responses), max(1, HELD // basis.projector.pixels)):
+        score = _scores(weighed.responses[block], waves)
         best[block] = _highest(basis, score, weighed.weights[block])
     return best
 
@@ -263,7 +265,7 @@ def _footprints(
     -------
     centroid : ndarray, shape (C, 2)
     excess : ndarray, shape (C,)
-        What the footprint explains, in units of the background, root mean square over answers.
+        What the footprint explains, in units of the background, root mean square over responses.
     """
     limit = np.array(basis.projector) - 1
     offsets = _square(REACH)
@@ -276,7 +278,7 @@ def _footprints(
     ridge = np.where(np.abs(offsets).max(axis=1) > 1, RIDGE, 0.0).astype(np.float32)
     places = offsets[:, None] + centre
     inside: Booleans = np.all((places >= 0) & (places <= limit), axis=-1)
-    turned = basis.recentre(weighed.answers[:, None], centre)[:, 0]
+    turned = basis.recentre(weighed.responses[:, None], centre)[:, 0]
     scores = np.ascontiguousarray((turned @ basis.drawn_at(offsets)).T)
     gram = (overlap.T @ weighed.weights.T)[number]
     entries, left = _nonnegative(scores, gram, inside, ridge)

@@ -49,7 +49,7 @@ def onto_projector(
     measurements = replace(
         parts[0],
         camera=projector,
-        answers=mean([part.answers for part in parts]),
+        responses=mean([part.responses for part in parts]),
         noise=noise("noise"),
         black=mean([part.black for part in parts]),
         white_noise=noise("white_noise"),

@@ -69,8 +69,8 @@ def fit_model(
         seen: Floats = band.recentre(f[block] * far_basis.weights, centres[block]) @ band.on_window
         n[block] = (within - seen) * inside[:, None]
         # The paper's own far step: what D and N leave at the far frequencies is f's.
-        answers = band.uncentre(n[block] @ band.on_window.T, centres[block])
-        f[block] = rows @ far_basis.patterns.T - answers
+        responses = band.uncentre(n[block] @ band.on_window.T, centres[block])
+        f[block] = rows @ far_basis.patterns.T - responses
     shape = (*truth.camera, channels)
     return Transport(
         projector=truth.projector,

@@ -32,7 +32,7 @@ class Band:
     ----------
     basis : RealBasis
     places : ndarray, shape (R,)
-        Where its answers stand among the measurements.
+        Where its responses stand among the measurements.
     on_window : ndarray, shape (R, W^2), float32
     on_corners : ndarray, shape (R, 9), float32
         Over `CORNERS`.
@@ -47,13 +47,13 @@ class Band:
         """Put the patterns onto a device."""
         return replace(self, on_window=move(self.on_window), on_corners=move(self.on_corners))
 
-    def recentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
-        """Turn answers (n, channels, R) about each pixel's centre (n, 2)."""
-        return self.basis.recentre(answers, centres)
+    def recentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
+        """Turn responses (n, channels, R) about each pixel's centre (n, 2)."""
+        return self.basis.recentre(responses, centres)
 
-    def uncentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
+    def uncentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
         """Inverse of `recentre`."""
-        return self.basis.uncentre(answers, centres)
+        return self.basis.uncentre(responses, centres)
 
 
 def corner_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats:
@@ -94,7 +94,7 @@ def _band(measurements: Measurements, frequencies: Sequence[Frequency], window: 
 
 
 def band_of(basis: RealBasis, window_offsets: NDArray[np.int64]) -> Band:
-    """Return a basis with its patterns about q; its answers stand in its own order."""
+    """Return a basis with its patterns about q; its responses stand in its own order."""
     return Band(
         basis, np.arange(basis.count), basis.drawn_at(window_offsets), basis.drawn_at(CORNERS)
     )
@@ -109,11 +109,11 @@ class Matrices:
     window : int
     checkerboard, near, far : Band
     near_inverse : ndarray, shape (R_near, W^2), float32
-        From near answers to the part of a window that they see.
+        From near responses to the part of a window that they see.
     unseen : ndarray, shape (W^2, m), float32
         Orthonormal directions that no near photo sees: the dropped frequencies.
     near_leak : ndarray, shape (M, R_near), float32
-        Answers of each far coefficient to the near patterns; 0 where W divides P.
+        Responses of each far coefficient to the near patterns; 0 where W divides P.
     checkerboard_leak : ndarray, shape (M, 1), float32
         The same for the checkerboard; 0 where P is even.
     """
@@ -162,6 +162,6 @@ def build_matrices(measurements: Measurements, window: int, far: Size, dropped: 
 
 
 def _leak(far: RealBasis, shown: RealBasis) -> Floats:
-    """Answers of each far coefficient to the patterns of another basis, (M, R), float32."""
+    """Responses of each far coefficient to the patterns of another basis, (M, R), float32."""
     overlap = far.patterns.astype(np.float64) @ shown.patterns.T.astype(np.float64)
     return np.asarray((far.weights[:, None] * overlap).astype(np.float32))

@@ -1,10 +1,10 @@
 """The paper's estimation: direct, then near-range, then far-range (sections 4.1 to 4.3).
 
-All camera pixels go through the same few matrix products: answers re-centred on q meet one
-matrix for every pixel. What the far estimate answers at near frequencies off the DFT grid is
+All camera pixels go through the same few matrix products: responses re-centred on q meet one
+matrix for every pixel. What the far estimate contributes to near responses off the DFT grid is
 taken out of them, and near and far are estimated again.
 
-Index convention: arrays are (n, channels, ...) with n camera pixels; r runs over real answers,
+Index convention: arrays are (n, channels, ...) with n camera pixels; r runs over real responses,
 w over window entries, m over far coefficients.
 """
 
@@ -104,7 +104,7 @@ def estimate(
     where = footprint(correspondence, measurements.projector)
     centres = near.centre(correspondence, measurements.projector)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
-    number, channels = measurements.answers.shape[:2]
+    number, channels = measurements.responses.shape[:2]
     direct = np.empty((number, channels), dtype=np.float32)
     windows = np.empty((number, channels, window**2), dtype=np.float32)
     low = np.empty((number, channels, matrices.far.basis.count), dtype=np.float32)
@@ -150,10 +150,10 @@ class _Pixels(NamedTuple):
     corners: Floats  # weights of the direct light over CORNERS, (n, 9)
     noise: Floats
     light: Floats  # largest answer, (n,)
-    checkerboard: Floats  # answers, re-centred
-    near: Floats  # answers, re-centred
-    far: Floats  # answers, as measured
-    near_of_direct: Floats  # answers of unit direct light, 8 bits included
+    checkerboard: Floats  # responses, re-centred
+    near: Floats  # responses, re-centred
+    far: Floats  # responses, as measured
+    near_of_direct: Floats  # responses of unit direct light, 8 bits included
     far_of_direct: Floats
 
     def only(self, pixels: Booleans) -> "_Pixels":
@@ -223,7 +223,7 @@ def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
 
 
 class _Leaks(NamedTuple):
-    """What f answers where the model has it silent: off the DFT grid."""
+    """What f adds to responses where the model has it silent: off the DFT grid."""
 
     checkerboard: Floats
     near: Floats
@@ -243,10 +243,10 @@ def _leaks(far: Floats, pixels: _Pixels, matrices: Matrices) -> _Leaks:
 
 def _round(pixels: _Pixels, start: Floats | None, leaks: _Leaks, matrices: Matrices) -> _Estimate:
     """Sections 4.1, 4.2 and 4.3 once."""
-    near_answers = pixels.near - leaks.near
-    direct = _direct(pixels.checkerboard - leaks.checkerboard, near_answers, pixels, matrices)
-    near_answers -= direct[..., None] * pixels.near_of_direct
-    windows, unseen = _near(near_answers, pixels, matrices, start)
+    near_responses = pixels.near - leaks.near
+    direct = _direct(pixels.checkerboard - leaks.checkerboard, near_responses, pixels, matrices)
+    near_responses -= direct[..., None] * pixels.near_of_direct
+    windows, unseen = _near(near_responses, pixels, matrices, start)
     far = pixels.far - direct[..., None] * pixels.far_of_direct
     far -= matrices.far.uncentre(product(windows, matrices.far.on_window.T), pixels.centres)
     return _Estimate(direct, windows, far, unseen)
@@ -280,10 +280,10 @@ def _pixels(
     where = Footprint(where.pixels[block], where.weights[block])
     centres = centres[block]
     corners = _corner_weights(where, centres, projector.width)
-    answers = measurements.answers[block]
+    responses = measurements.responses[block]
 
     def shown_error(error: Floats) -> Floats:
-        """Answers (n, 1, R) of unit direct light to what 8 bits got wrong."""
+        """Responses (n, 1, R) of unit direct light to what 8 bits got wrong."""
         return look_up_each(error, where.pixels, where.weights)[:, None]
 
     def of_direct(band: Band) -> Floats:
@@ -297,31 +297,31 @@ def _pixels(
         inside=near.inside(centres, matrices.window, projector),
         corners=corners,
         noise=measurements.noise[block],
-        light=np.abs(answers).max(axis=(1, 2)),
-        checkerboard=checkerboard.recentre(answers[..., checkerboard.places], centres),
-        near=near_band.recentre(answers[..., near_band.places], centres),
-        far=answers[..., far_band.places],
+        light=np.abs(responses).max(axis=(1, 2)),
+        checkerboard=checkerboard.recentre(responses[..., checkerboard.places], centres),
+        near=near_band.recentre(responses[..., near_band.places], centres),
+        far=responses[..., far_band.places],
         near_of_direct=of_direct(near_band) + near_error,
         far_of_direct=far_band.uncentre(of_direct(far_band), centres) + shown_error(errors.far),
     )
 
 
 def _direct(
-    checkerboard: Floats, near_answers: Floats, pixels: _Pixels, matrices: Matrices
+    checkerboard: Floats, near_responses: Floats, pixels: _Pixels, matrices: Matrices
 ) -> Floats:
     """Return d, shape (n, channels): section 4.1, and more where q falls between pixels.
 
     There the checkerboard's answer fades, d (1 - 2a)(1 - 2b) for an offset (a, b), so the
     highest near frequencies are weighed in as far as it does.
     """
-    xp = namespace(near_answers)
+    xp = namespace(near_responses)
     answer = pixels.corners @ matrices.checkerboard.on_corners.T
     frequencies = np.abs(matrices.near.basis.cycles).max(axis=1, initial=0.0)
-    high = beside(np.flatnonzero(frequencies[matrices.near.basis.index] > HIGH), near_answers)
+    high = beside(np.flatnonzero(frequencies[matrices.near.basis.index] > HIGH), near_responses)
     high_answer = pixels.corners @ matrices.near.on_corners[high].T
     faded = 1.0 - answer[:, 0] ** 2
     energy = answer[:, 0] ** 2 + faded * xp.sum(high_answer**2, axis=1)
-    of_high = (near_answers[..., high] @ high_answer[..., None])[..., 0]
+    of_high = (near_responses[..., high] @ high_answer[..., None])[..., 0]
     total = checkerboard[..., 0] * answer + faded[:, None] * of_high
     d = total / xp.clip(energy, min=FAINT)[:, None] * pixels.lit[:, None]
     found: Floats = xp.astype(d, xp.float32)
@@ -329,13 +329,13 @@ def _direct(
 
 
 def _near(
-    answers: Floats, pixels: _Pixels, matrices: Matrices, start: Floats | None
+    responses: Floats, pixels: _Pixels, matrices: Matrices, start: Floats | None
 ) -> tuple[Floats, Floats]:
     """Equation (10): windows n, shape (n, channels, W^2), and the unseen part z."""
-    number, channels = answers.shape[:2]
-    xp, rows = namespace(answers), number * channels
-    n0 = product(answers, matrices.near_inverse).reshape((rows, matrices.window**2))
-    # A window entry is a mean of W^2 answers, cosine and sine of each pair.
+    number, channels = responses.shape[:2]
+    xp, rows = namespace(responses), number * channels
+    n0 = product(responses, matrices.near_inverse).reshape((rows, matrices.window**2))
+    # A window entry is a mean of W^2 responses, cosine and sine of each pair.
     entry_noise = pixels.noise.reshape((rows,)) * (math.sqrt(2.0) / matrices.window)
     inside = xp.repeat(pixels.inside, channels, axis=0)
     if start is None:

@@ -2,8 +2,8 @@
 
 A frequency is a pair (fy, fx). Patterns live on whole pixels, so frequencies that differ by a
 whole number of cycles per pixel are one and the same; each is kept in [-1/2, 1/2). A real
-transport answers -k by the complex conjugate of its answer to k, so +-k share their photos and
-stand under one representative.
+transport responds to -k by the complex conjugate of its response to k, so +-k share their
+photos and stand under one representative.
 """
 
 from collections.abc import Iterable

@@ -36,7 +36,7 @@ from nearfar.transport.far import RealBasis
 
 # Pairs that sum to more or less than white + black by this share of white are not linear.
 NOT_LINEAR = 0.005
-# Camera pixels whose answers are laid side by side at once: few enough to lie near the processor.
+# Camera pixels whose responses are laid side by side at once: few enough to lie near the processor.
 TURNED = 256
 
 
@@ -78,7 +78,7 @@ def find_pairs(plan: Plan) -> list[Pair]:
     return sorted(pairs, key=lambda pair: pair.photo)
 
 
-def answers_of_pairs(plan: Plan) -> tuple[RealBasis, Integers, Floats]:
+def responses_of_pairs(plan: Plan) -> tuple[RealBasis, Integers, Floats]:
     """Return the basis that a plan's pairs answer, each pair's place in it, and repeats (R,)."""
     pairs = find_pairs(plan)
     if all(pair.frequency != DC for pair in pairs):
@@ -117,7 +117,7 @@ def measure_pairs(
     """
     plan = photos.plan
     camera = size_of_rows(photos, rows)
-    pairs, (basis, places, repeats) = find_pairs(plan), answers_of_pairs(plan)
+    pairs, (basis, places, repeats) = find_pairs(plan), responses_of_pairs(plan)
     shape = (camera.pixels, photos.channels)
     differences = np.empty((len(pairs), *shape), dtype=np.float32)
     strays = np.empty((len(pairs), *shape), dtype=np.float32)
@@ -158,12 +158,12 @@ def measure_pairs(
         ]
     )
     left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
-    answers = _means(differences, places, repeats)
-    answers[..., basis.places([DC])[0]] = levels.light
+    responses = _means(differences, places, repeats)
+    responses[..., basis.places([DC])[0]] = levels.light
     return Measurements(
         camera=camera,
         basis=basis,
-        answers=answers,
+        responses=responses,
         noise=np.sqrt(pair_variance * left).astype(np.float32),
         black=levels.black.astype(np.float32),
         shown_error=shown_error(basis),
@@ -178,11 +178,11 @@ def _means(differences: Floats, places: Integers, repeats: Floats) -> Floats:
     order = np.argsort(places, kind="stable")
     first = np.flatnonzero(np.diff(places[order], prepend=-1))
     shape = differences.shape[1:]
-    answers = np.empty((*shape, len(repeats)), dtype=np.float32)
+    responses = np.empty((*shape, len(repeats)), dtype=np.float32)
     for block in blocks(shape[0], TURNED):
         sums = np.add.reduceat(differences[:, block][order], first, axis=0)
-        answers[block] = np.moveaxis(sums, 0, -1) / repeats
-    return answers
+        responses[block] = np.moveaxis(sums, 0, -1) / repeats
+    return responses
 
 
 def _excess_of_sums(pair_mean: Floats, white: Floats, black: Floats) -> float:

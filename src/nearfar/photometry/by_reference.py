@@ -6,7 +6,7 @@ black go into every answer of a camera pixel, so these are shown often, and how 
 is told apart from the noise. Lamp and ambient light are followed by the same photos.
 
 Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
-real answers.
+real responses.
 """
 
 from collections.abc import Callable
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.drift import find_references
+from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import (
     Reference,
@@ -29,12 +30,11 @@ from nearfar.photometry.photos import (
     stripe_references,
     two_levels,
 )
-from nearfar.photometry.steady import SteadyPhotos
 from nearfar.plan import Plan
 from nearfar.transport.far import RealBasis
 
 
-def answers_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, int]], Floats]:
+def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, int]], Floats]:
     """Tell what the photos of a plan by reference answer.
 
     Returns
@@ -60,13 +60,13 @@ def answers_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, in
 
 
 def measure_by_reference(
-    photos: SteadyPhotos, rows: slice, progress: Callable[[int], None] | None = None
+    photos: PhotosWithoutDrift, rows: slice, progress: Callable[[int], None] | None = None
 ) -> Measurements:
     """Turn photos against white and black into measurements.
 
     Parameters
     ----------
-    photos : SteadyPhotos
+    photos : PhotosWithoutDrift
     rows : slice
         Rows of the camera to measure.
     progress : callable, optional
@@ -83,7 +83,7 @@ def measure_by_reference(
         If a cosine was shown without its sine.
     """
     camera = size_of_rows(photos, rows)
-    basis, terms, repeats = answers_by_reference(photos.plan)
+    basis, terms, repeats = responses_by_reference(photos.plan)
     whites, blacks = find_references(photos.plan)
     white = mean_photo(photos, whites.tolist(), rows)
     black = mean_photo(photos, blacks.tolist(), rows)
@@ -95,15 +95,15 @@ def measure_by_reference(
         ]
     )
     both = (2 * levels.black + levels.light).astype(np.float32)
-    answers = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
+    responses = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
     for numbers, read in in_batches(photos, sorted(terms), rows):
         for number, photo in zip(numbers, read, strict=True):
             r, sign = terms[number]
-            answers[..., r] += sign * (2 * photo - both)
+            responses[..., r] += sign * (2 * photo - both)
         if progress is not None:
             progress(numbers[-1] + 1)
-    answers /= repeats
-    answers[..., basis.places([DC])[0]] = levels.light
+    responses /= repeats
+    responses[..., basis.places([DC])[0]] = levels.light
 
     def deviation(variance: Floats) -> NDArray[np.float32]:
         return np.sqrt(variance).astype(np.float32)
@@ -111,7 +111,7 @@ def measure_by_reference(
     return Measurements(
         camera=camera,
         basis=basis,
-        answers=answers,
+        responses=responses,
         noise=2 * deviation(photos.variance(levels.black + levels.light / 2)),
         black=levels.black.astype(np.float32),
         shown_error=shown_error(basis),

@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import Frequency
-from nearfar.photometry.by_inverse import answers_of_pairs, find_pairs, measure_pairs
-from nearfar.photometry.by_reference import answers_by_reference, measure_by_reference
+from nearfar.photometry.by_inverse import find_pairs, measure_pairs, responses_of_pairs
+from nearfar.photometry.by_reference import measure_by_reference, responses_by_reference
 from nearfar.photometry.drift import find_references
+from nearfar.photometry.drift_removal import PhotosWithoutDrift, remove_drift
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos, find_shown
-from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
 from nearfar.transport.far import RealBasis
 
@@ -48,9 +48,9 @@ def answered(plan: Plan) -> tuple[RealBasis, Floats]:
     """
     plan.require_real("measure")
     if plan.offset == "reference":
-        basis, _, repeats = answers_by_reference(plan)
+        basis, _, repeats = responses_by_reference(plan)
     else:
-        basis, _, repeats = answers_of_pairs(plan)
+        basis, _, repeats = responses_of_pairs(plan)
     return basis, repeats
 
 
@@ -84,6 +84,6 @@ def measure(
     photos.plan.require_real("measure")
     rows = slice(0, photos.camera.height) if rows is None else rows
     if photos.plan.offset == "reference":
-        followed = photos if isinstance(photos, SteadyPhotos) else steady(photos)
+        followed = photos if isinstance(photos, PhotosWithoutDrift) else remove_drift(photos)
         return measure_by_reference(followed, rows, progress)
     return measure_pairs(photos, rows, progress)

@@ -18,9 +18,9 @@ def _left_out() -> Floats:
 
 @dataclass(frozen=True)
 class Measurements:
-    """Answers of every camera pixel to cosines and sines without offset.
+    """Responses of every camera pixel to cosines and sines without offset.
 
-    Index convention: c runs over camera pixels row by row, r over the real answers of `basis`;
+    Index convention: c runs over camera pixels row by row, r over the real responses of `basis`;
     b_k(c) = (answer to cos) - j (answer to sin).
 
     Attributes
@@ -28,7 +28,7 @@ class Measurements:
     camera : Size
     basis : RealBasis
         The frequencies that were measured, one of each +-k, and the pattern grid.
-    answers : ndarray, shape (C, channels, R), float32
+    responses : ndarray, shape (C, channels, R), float32
     noise : ndarray, shape (C, channels), float32
         Standard deviation of one real answer from one measurement: a pair, or one photo against
         references; 0 where there is none.
@@ -42,7 +42,7 @@ class Measurements:
     repeats : ndarray, shape (R,), float32
         How often each answer was measured; answer r has noise / sqrt(repeats[r]). Ones by default.
     white_noise, black_noise : ndarray, shape (C, channels), float32
-        Standard deviations of the white and the black that all sinusoids' answers were taken
+        Standard deviations of the white and the black that all sinusoids' responses were taken
         against: errors e_w and e_k of theirs add -(e_w + e_k) to every one of them. 0, the
         default, where each was taken against its own inverse.
     light_noise : ndarray, shape (C, channels), float32
@@ -53,7 +53,7 @@ class Measurements:
 
     camera: Size
     basis: RealBasis
-    answers: Floats
+    responses: Floats
     noise: Floats
     black: Floats
     shown_error: Floats
@@ -83,10 +83,10 @@ class Measurements:
     @property
     def channels(self) -> int:
         """Number of camera channels."""
-        return int(self.answers.shape[1])
+        return int(self.responses.shape[1])
 
     def places(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
-        """Places of the answers to `frequencies` along the last axis, cosine before sine."""
+        """Places of the responses to `frequencies` along the last axis, cosine before sine."""
         return self.basis.places(frequencies)
 
     def of_pixels(self, camera: Size, pixels: slice) -> "Measurements":
@@ -94,7 +94,7 @@ class Measurements:
         return replace(
             self,
             camera=camera,
-            answers=self.answers[pixels],
+            responses=self.responses[pixels],
             noise=self.noise[pixels],
             black=self.black[pixels],
             white_noise=self.white_noise[pixels],
@@ -117,7 +117,7 @@ def join(parts: Sequence[Measurements]) -> Measurements:
         first,
         camera=Size(height, first.camera.width),
         excess_of_sums=max((part.excess_of_sums for part in parts), key=abs),
-        answers=joined("answers"),
+        responses=joined("responses"),
         noise=joined("noise"),
         black=joined("black"),
         white_noise=joined("white_noise"),

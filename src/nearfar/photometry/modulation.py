@@ -1,10 +1,8 @@
 """How much sinusoids move a camera pixel, which a linear response bounds.
 
-Transport is never negative, so no camera pixel answers a sinusoid with more than it answers white:
-modulation, the answer's amplitude over half of what white adds to black, is 1 at most. Above it the
-response is not linear, or black is clipped.
-
-Index convention: steps are (n, ...), one photo for each phase; what follows is a photo's own shape.
+Transport is never negative, so no camera pixel responds to a sinusoid by more than to white. Its
+modulation, the response's amplitude over half of what white adds to black, is 1 at most. Above it
+the camera or the projector is not linear, or black is clipped.
 """
 
 from collections.abc import Sequence

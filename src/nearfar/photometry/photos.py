@@ -1,7 +1,7 @@
-"""What measuring reads, and what its shapes share: batches, the answers' places, two levels.
+"""What measuring reads, and what its shapes share: batches, the responses' places, two levels.
 
 Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
-real answers.
+real responses.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -83,7 +83,7 @@ def find_shown(plan: Plan) -> dict[Answer, list[tuple[int, int]]]:
     return found
 
 
-def basis_of(answers: Sequence[Answer], projector: Size) -> tuple[RealBasis, dict[Answer, int]]:
+def basis_of(responses: Sequence[Answer], projector: Size) -> tuple[RealBasis, dict[Answer, int]]:
     """Return the basis of what was answered, and the place of each answer in it.
 
     Raises
@@ -91,8 +91,8 @@ def basis_of(answers: Sequence[Answer], projector: Size) -> tuple[RealBasis, dic
     InputError
         If a cosine was shown without its sine, or a sine without its cosine.
     """
-    known = set(answers)
-    basis = real_basis(list(dict.fromkeys(frequency for frequency, _ in answers)), projector)
+    known = set(responses)
+    basis = real_basis(list(dict.fromkeys(frequency for frequency, _ in responses)), projector)
     place = {
         (basis.frequencies[i], bool(sine)): r
         for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True))

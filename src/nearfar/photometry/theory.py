@@ -1,7 +1,7 @@
-"""Measurements without photos: the answers of a known transport, as the paper's theory has them.
+"""Measurements without photos: the responses of a known transport, as the paper's theory has them.
 
 One complex pattern exp(-j 2 pi k.p) for each frequency, no offset, no noise, no 8 bits; a real
-transport answers -k by the conjugate of its answer to k.
+transport responds to -k by the conjugate of its response to k.
 """
 
 from typing import Protocol
@@ -80,14 +80,14 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
     # Sums over thousands of pixels: in float64, so that exact recovery stays exact.
     patterns = np.ascontiguousarray(basis.patterns.T, dtype=np.float64)
     pixels, channels = transport.camera.pixels, transport.channels
-    answers = np.empty((pixels, channels, basis.count), dtype=np.float32)
+    responses = np.empty((pixels, channels, basis.count), dtype=np.float32)
     for block in blocks(pixels, BLOCK):
-        answers[block] = transport.rows(block).astype(np.float64) @ patterns
+        responses[block] = transport.rows(block).astype(np.float64) @ patterns
     nothing = np.zeros((pixels, channels), dtype=np.float32)
     return Measurements(
         camera=transport.camera,
         basis=basis,
-        answers=answers,
+        responses=responses,
         noise=nothing,
         black=nothing,
         shown_error=np.zeros((basis.count, plan.projector.pixels), dtype=np.float32),

@@ -195,7 +195,7 @@ def _on_grid(part: Fraction, side: int) -> Fraction:
 
 
 class _Beliefs:
-    """What is known of the answers of each typical camera pixel while a plan grows."""
+    """What is known of the responses of each typical camera pixel while a plan grows."""
 
     def __init__(
         self, frequencies: list[Frequency], projector: Size, window: int, typical: Typical

@@ -10,8 +10,8 @@ from nearfar.transport.kinds import STRENGTHS, Kind
 
 if TYPE_CHECKING:
     # A plan needs none of what a transport computes with.
-    from nearfar.transport.belief import Belief
     from nearfar.transport.model import Transport
+    from nearfar.transport.posterior import Posterior
 
 # Strengths of a kind in a scene that was looked at are put together in so many octaves.
 OCTAVES = 2
@@ -96,16 +96,16 @@ def typical_of(transport: "Transport") -> Typical:
     InputError
         If the transport was not estimated jointly.
     """
-    belief = _believed(transport)
-    power = np.mean(belief.white.astype(np.float64) ** 2, axis=-1).ravel()
-    octave = np.rint(np.log2(belief.strength.ravel() / STRENGTHS[0])).astype(np.int64)
-    group = belief.kind.ravel().astype(np.int64) * len(STRENGTHS) + octave // OCTAVES
+    posterior = _believed(transport)
+    power = np.mean(posterior.white.astype(np.float64) ** 2, axis=-1).ravel()
+    octave = np.rint(np.log2(posterior.strength.ravel() / STRENGTHS[0])).astype(np.int64)
+    group = posterior.kind.ravel().astype(np.int64) * len(STRENGTHS) + octave // OCTAVES
     found, member = np.unique(group, return_inverse=True)
     shares = np.bincount(member, power)
-    squared = np.bincount(member, power * belief.strength.ravel().astype(np.float64) ** 2)
+    squared = np.bincount(member, power * posterior.strength.ravel().astype(np.float64) ** 2)
     kept = np.flatnonzero(shares >= LEAST_SHARE * shares.sum())
     kinds = tuple(
-        (belief.kinds[found[i] // len(STRENGTHS)], float(np.sqrt(squared[i] / shares[i])))
+        (posterior.kinds[found[i] // len(STRENGTHS)], float(np.sqrt(squared[i] / shares[i])))
         for i in kept
     )
     return Typical(kinds, (shares[kept] / shares[kept].sum())[None], np.ones(1))
@@ -113,15 +113,15 @@ def typical_of(transport: "Transport") -> Typical:
 
 def noise_of(transport: "Transport") -> float:
     """Return the noise of an answer in a joint estimate, as a share of white, over all pixels."""
-    belief = _believed(transport)
+    posterior = _believed(transport)
     noise = transport.noise.astype(np.float64)
-    return float(np.sqrt(np.mean(noise**2) / np.mean(belief.white.astype(np.float64) ** 2)))
+    return float(np.sqrt(np.mean(noise**2) / np.mean(posterior.white.astype(np.float64) ** 2)))
 
 
-def _believed(transport: "Transport") -> "Belief":
-    if transport.belief is None:
+def _believed(transport: "Transport") -> "Posterior":
+    if transport.posterior is None:
         raise InputError(
             "this transport tells no kinds of camera pixel: reconstruct the quick look by --method "
             "joint."
         )
-    return transport.belief
+    return transport.posterior

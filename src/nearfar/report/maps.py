@@ -59,7 +59,7 @@ def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
         found["confidence"] = lambda: Map(
             TITLES["confidence"], "", 0, 1, quality.confidence.astype(np.float32)
         )
-    if transport.belief is not None:
+    if transport.posterior is not None:
         found["error"] = lambda: _ratio(TITLES["error"], _floodlit(transport), _error(transport))
         found["direct-error"] = lambda: _ratio(
             TITLES["direct-error"], transport.direct, ErrorBars(transport).direct()

@@ -17,7 +17,7 @@ def as_channels_see(light: Floats, channels: int, provenance: Mapping[str, Any])
     """Turn a colour light into one for each channel of the camera.
 
     Patterns are white, so a channel's transport is that of white light. Of red, green and blue
-    alone it answers the shares that the calibration found, taken to be the same all over the
+    alone it responds with the shares that the calibration found, taken to be the same all over the
     scene. Without a calibration red goes to the first channel and so on, and a camera of one
     channel sees luminance.
 

@@ -1,4 +1,4 @@
-"""Direct transport: each camera pixel answers the 2 x 2 projector pixels around q.
+"""Direct transport: each camera pixel responds to the 2 x 2 projector pixels around q.
 
 A fractional q is the centroid of the direct light, so bilinear weights around it are exact
 wherever a camera pixel's direct light stays within two projector pixels on each axis.
@@ -64,16 +64,16 @@ def look_up(light: Floats, where: Footprint) -> Floats:
     return np.asarray(np.einsum("...ck,ck->...c", light[..., where.pixels], where.weights))
 
 
-def look_up_each(answers: Floats, pixels: Integers, weights: Floats) -> Floats:
-    """Read the answers (P, R) of every projector pixel at footprints, both (n, 4): (n, R).
+def look_up_each(responses: Floats, pixels: Integers, weights: Floats) -> Floats:
+    """Read the responses (P, R) of every projector pixel at footprints, both (n, 4): (n, R).
 
     What a camera pixel asks for lies side by side; corners that nobody weighs are not read.
     """
-    found: Floats = answers[pixels[:, 0]] * weights[:, :1]
-    xp = namespace(answers)
+    found: Floats = responses[pixels[:, 0]] * weights[:, :1]
+    xp = namespace(responses)
     for corner in range(1, 4):
         if bool(xp.any(weights[:, corner] != 0)):
-            found += answers[pixels[:, corner]] * weights[:, corner, None]
+            found += responses[pixels[:, corner]] * weights[:, corner, None]
     return found
 
 

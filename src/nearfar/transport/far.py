@@ -1,7 +1,7 @@
 """Far-range transport: a few low frequencies, in real arithmetic.
 
 A row of F is f(p) = (1/P) sum_k b_k exp(j 2 pi k.p). Its coefficients are kept as the real
-answers to cosines and sines, b_k = (answer to cos) - j (answer to sin), one for a frequency
+responses to cosines and sines, b_k = (answer to cos) - j (answer to sin), one for a frequency
 that is its own negative and two for a pair +-k, which share them.
 
 Index convention: m runs over the real coefficients, cosine before sine for each k.
@@ -96,25 +96,25 @@ class RealBasis:
         drawn = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))
         return drawn.astype(np.float32)
 
-    def recentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
-        """Turn answers (n, channels, M) about each camera pixel's centre (n, 2)."""
-        return self._turn(answers, centres, +1)
+    def recentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
+        """Turn responses (n, channels, M) about each camera pixel's centre (n, 2)."""
+        return self._turn(responses, centres, +1)
 
-    def uncentre(self, answers: Floats, centres: NDArray[np.int64]) -> Floats:
+    def uncentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
         """Inverse of `recentre`."""
-        return self._turn(answers, centres, -1)
+        return self._turn(responses, centres, -1)
 
-    def _turn(self, answers: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
-        xp = namespace(answers)
-        down, across = (beside(phase, answers) for phase in self._single_phases)
+    def _turn(self, responses: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
+        xp = namespace(responses)
+        down, across = (beside(phase, responses) for phase in self._single_phases)
         turn = down[centres[:, 0]] * across[centres[:, 1]]
         real, imaginary = xp.real(turn)[:, None], xp.imag(turn)[:, None]
         cosine = np.flatnonzero(~self.is_sine)
         # Frequencies that are their own negative answer no sine: their phase is 1 or -1.
         own = np.diff(np.append(cosine, self.count)) == 1
-        turned: Floats = xp.empty_like(answers)
-        single, alone = beside(cosine[own], answers), beside(np.flatnonzero(own), answers)
-        turned[..., single] = answers[..., single] * real[..., alone]
+        turned: Floats = xp.empty_like(responses)
+        single, alone = beside(cosine[own], responses), beside(np.flatnonzero(own), responses)
+        turned[..., single] = responses[..., single] * real[..., alone]
         first = np.flatnonzero(~own)
         if not len(first):
             return turned
@@ -123,7 +123,7 @@ class RealBasis:
             start, stop = cosine[run[0]], cosine[run[-1]] + 2
             c = real[..., run[0] : run[-1] + 1]
             s = sign * imaginary[..., run[0] : run[-1] + 1]
-            even, odd = answers[..., start:stop:2], answers[..., start + 1 : stop : 2]
+            even, odd = responses[..., start:stop:2], responses[..., start + 1 : stop : 2]
             turned[..., start:stop:2] = even * c + odd * s
             turned[..., start + 1 : stop : 2] = odd * c - even * s
         return turned

@@ -14,10 +14,10 @@ from nearfar.errors import InputError
 from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
-from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
+from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 
 # Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
@@ -53,7 +53,7 @@ class Transport:
     near : ndarray, shape (Cy, Cx, channels, W, W), float32
         n over the window around the rounded q; 0 beyond the projector's border.
     far : ndarray, shape (Cy, Cx, channels, M), float32
-        Answers of F to the cosines and sines of `far_basis`.
+        Responses of F to the cosines and sines of `far_basis`.
     far_basis : RealBasis
     black : ndarray, shape (Cy, Cx, channels), float32
         The photo under black: ambient light and black level.
@@ -61,7 +61,7 @@ class Transport:
         Standard deviation of one real measurement (a cosine's or sine's answer).
     provenance : mapping
         Plan, estimator, exposure and version: whatever JSON holds.
-    belief : Belief, optional
+    posterior : Posterior, optional
         What error bars follow from, where the estimate can tell them.
     quality : Quality, optional
         How far each camera pixel is to be trusted, where photos told.
@@ -76,7 +76,7 @@ class Transport:
     black: Floats
     noise: Floats
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    belief: Belief | None = None
+    posterior: Posterior | None = None
     quality: Quality | None = None
 
     @property
@@ -133,7 +133,7 @@ class Transport:
             ("camera", f"{self.camera}, {self.channels} channels"),
             ("window W, far coefficients", f"{self.window}, {self.far_basis.count}"),
             ("directly lit", f"{self.lit.mean():.1%} of the camera"),
-            ("error bars", "yes" if self.belief is not None else "no"),
+            ("error bars", "yes" if self.posterior is not None else "no"),
             ("method", str(self.provenance.get("method", "unknown"))),
         ]
         return card("transport", rows, images)
@@ -193,7 +193,7 @@ class Transport:
         """Return the transport with its components scaled, without error bars."""
         return replace(
             self,
-            belief=None,
+            posterior=None,
             direct=self.direct * np.float32(direct),
             near=self.near * np.float32(near),
             far=self.far * np.float32(far),
@@ -313,7 +313,7 @@ class Transport:
 
         one = replace(
             self,
-            belief=None,
+            posterior=None,
             **{
                 name: getattr(self, name)[:, :, channel : channel + 1]
                 for name in ("direct", "near", "far", "black", "noise")

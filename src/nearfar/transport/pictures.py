@@ -62,7 +62,7 @@ def near_pictures(
 
 
 def far_pictures(far: Floats, basis: RealBasis, lights: Floats) -> Floats:
-    """Pictures of f, shape (C, channels, M), the answers to a basis."""
+    """Pictures of f, shape (C, channels, M), the responses to a basis."""
     overlaps = basis.analyse(lights).astype(np.result_type(lights, far), copy=False)
     if lights.shape[1] == 1:
         flat = far.reshape(-1, basis.count) @ overlaps[:, 0].T

@@ -12,8 +12,8 @@ from nearfar.errors import InputError
 from nearfar.files import to_srgb
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
-from nearfar.transport.belief import deviation_of_mean
 from nearfar.transport.far import RealBasis
+from nearfar.transport.posterior import deviation_of_mean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -114,7 +114,7 @@ class Plots:
         errors: _ErrorsAlong | None = None,
         ax: "Axes | None" = None,
     ) -> "Axes":
-        """Draw what a camera pixel answers along the projector's row through its q.
+        """Draw how a camera pixel responds along the projector's row through its q.
 
         Parameters
         ----------

@@ -14,7 +14,7 @@ FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
 BELIEVED = ("kind", "strength", "white", "offset_noise", "light_noise", "share_of_white")
 TRUSTED = ("confidence", "saturated")
 # Parts that a transport may lack, and what each camera pixel has of them.
-OPTIONAL = {"belief": BELIEVED, "quality": TRUSTED}
+OPTIONAL = {"posterior": BELIEVED, "quality": TRUSTED}
 
 
 def of_rows(transport: Transport, rows: slice) -> Transport:

@@ -20,10 +20,10 @@ from nearfar.files import (
     read_selection,
 )
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
-from nearfar.transport.belief import Belief
 from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED, stacked, thinned_blocks
 
@@ -36,7 +36,9 @@ CHUNK_BYTES = 8 * 2**20
 READ_BYTES = 2**28
 
 # Parts that may be lacking: a mapping of their own in the attributes, and arrays PART_NAME.
-BELIEF, QUALITY = "belief", "quality"
+# Names in the file of what a transport may lack; the posterior's is the format's of old.
+POSTERIOR, QUALITY = "belief", "quality"
+STORED_AS = {"posterior": POSTERIOR, "quality": QUALITY}
 
 
 def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) -> None:
@@ -101,7 +103,7 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
     for optional, names in OPTIONAL.items():
         owner = getattr(part, optional)
         if owner is not None:
-            values |= {f"{optional}_{name}": getattr(owner, name) for name in names}
+            values |= {f"{STORED_AS[optional]}_{name}": getattr(owner, name) for name in names}
     group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
     for name, one in values.items():
         # A single block has its chunks to itself, whatever their rows.
@@ -127,19 +129,19 @@ def _attributes(transport: Transport) -> dict[str, Any]:
         "projector": list(transport.projector),
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
     }
-    if transport.belief is not None:
-        attributes[BELIEF] = _described(transport.belief)
+    if transport.posterior is not None:
+        attributes[POSTERIOR] = _described(transport.posterior)
     if transport.quality is not None:
         attributes[QUALITY] = {}
     return attributes
 
 
-def _described(belief: Belief) -> dict[str, Any]:
-    """Lay what all camera pixels share of a belief out for JSON."""
+def _described(posterior: Posterior) -> dict[str, Any]:
+    """Lay what all camera pixels share of a posterior out for JSON."""
     return {
-        "kinds": [list(kind) for kind in belief.kinds],
-        "frequencies": [frequency_to_text(k) for k in belief.frequencies],
-        "repeats": [float(count) for count in belief.repeats],
+        "kinds": [list(kind) for kind in posterior.kinds],
+        "frequencies": [frequency_to_text(k) for k in posterior.frequencies],
+        "repeats": [float(count) for count in posterior.repeats],
     }
 
 
@@ -180,7 +182,7 @@ class StoredTransport:
     provenance: Mapping[str, Any]
     channels: int
     _arrays: Mapping[str, Any]
-    _belief: Mapping[str, Any] | None
+    _posterior: Mapping[str, Any] | None
 
     def rows(self, rows: slice = slice(None)) -> Transport:
         """Read some rows of the camera.
@@ -191,18 +193,22 @@ class StoredTransport:
             If what belongs to them is damaged.
         """
         read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
-        believed: dict[str, Any] = {name: read.pop(f"{BELIEF}_{name}", None) for name in BELIEVED}
-        belief = Belief(**self._belief, **believed) if self._belief is not None else None
+        believed: dict[str, Any] = {
+            name: read.pop(f"{POSTERIOR}_{name}", None) for name in BELIEVED
+        }
+        posterior = (
+            Posterior(**self._posterior, **believed) if self._posterior is not None else None
+        )
         trusted: dict[str, Any] = {
             name: read.pop(f"{QUALITY}_{name}") for name in TRUSTED if f"{QUALITY}_{name}" in read
         }
-        if belief is not None and int(belief.kind.max(initial=0)) >= len(belief.kinds):
+        if posterior is not None and int(posterior.kind.max(initial=0)) >= len(posterior.kinds):
             raise _misfit(self.path)
         return Transport(
             projector=self.projector,
             far_basis=self.far_basis,
             provenance=self.provenance,
-            belief=belief,
+            posterior=posterior,
             quality=Quality(**trusted) if trusted else None,
             **read,
         )
@@ -243,13 +249,13 @@ def open_transport(path: AnyPath) -> StoredTransport:
     path = Path(path)
     group = open_store(path, KIND, FORMAT_VERSION)
     arrays = {name: open_array(group, name) for name in FACTORS}
-    belief = None
+    posterior = None
     try:
         height, width = (int(side) for side in listed(group.attrs["projector"]))
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
-        if BELIEF in group.attrs:
-            belief = _shared_belief(_mapped(group.attrs[BELIEF]))
+        if POSTERIOR in group.attrs:
+            posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
     except (KeyError, TypeError, ValueError) as error:
         raise UnreadableFileError(
             f"{path} is damaged: its zarr.json does not describe a transport ({error}); "
@@ -271,9 +277,11 @@ def open_transport(path: AnyPath) -> StoredTransport:
                 f"{path} is damaged: its {name} has shape {arrays[name].shape}, not {shape}; "
                 f"reconstruct it again."
             )
-    if belief is not None:
-        arrays |= {f"{BELIEF}_{name}": open_array(group, f"{BELIEF}_{name}") for name in BELIEVED}
-        if not _belief_fits(belief, arrays, basis.projector, each):
+    if posterior is not None:
+        arrays |= {
+            f"{POSTERIOR}_{name}": open_array(group, f"{POSTERIOR}_{name}") for name in BELIEVED
+        }
+        if not _posterior_fits(posterior, arrays, basis.projector, each):
             raise _misfit(path)
     if QUALITY in group.attrs:
         told = {f"{QUALITY}_{name}": open_array(group, f"{QUALITY}_{name}") for name in TRUSTED}
@@ -285,12 +293,12 @@ def open_transport(path: AnyPath) -> StoredTransport:
                 f"reconstruct it again."
             )
     return StoredTransport(
-        path, basis.projector, Size(*each[:2]), basis, provenance, each[2], arrays, belief
+        path, basis.projector, Size(*each[:2]), basis, provenance, each[2], arrays, posterior
     )
 
 
-def _shared_belief(described: dict[str, Any]) -> dict[str, Any]:
-    """Read what all camera pixels share of a belief."""
+def _shared_posterior(described: dict[str, Any]) -> dict[str, Any]:
+    """Read what all camera pixels share of a posterior."""
     return {
         "kinds": tuple(Kind(*(float(value) for value in kind)) for kind in described["kinds"]),
         "frequencies": tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
@@ -298,17 +306,17 @@ def _shared_belief(described: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _belief_fits(
-    belief: Mapping[str, Any],
+def _posterior_fits(
+    posterior: Mapping[str, Any],
     arrays: Mapping[str, Any],
     projector: Size,
     each: tuple[int, ...],
 ) -> bool:
-    count = real_basis(belief["frequencies"], projector).count
-    kind, strength = (arrays[f"{BELIEF}_{name}"] for name in BELIEVED[:2])
+    count = real_basis(posterior["frequencies"], projector).count
+    kind, strength = (arrays[f"{POSTERIOR}_{name}"] for name in BELIEVED[:2])
     flat = (kind.shape, strength.shape) == (each[:2], each[:2])
-    full = all(arrays[f"{BELIEF}_{name}"].shape == each for name in BELIEVED[2:])
-    return flat and full and kind.dtype == np.uint8 and belief["repeats"].shape == (count,)
+    full = all(arrays[f"{POSTERIOR}_{name}"].shape == each for name in BELIEVED[2:])
+    return flat and full and kind.dtype == np.uint8 and posterior["repeats"].shape == (count,)
 
 
 def _misfit(path: Path) -> UnreadableFileError:

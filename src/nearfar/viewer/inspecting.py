@@ -11,8 +11,8 @@ from nearfar.arrays import Floats, Size
 from nearfar.estimate.joint import ErrorBars
 from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
-from nearfar.transport.belief import deviation_of_mean
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import deviation_of_mean
 
 # Below this share of its largest value a row's spectrum is not told apart from nothing.
 LEAST = 1e-7
@@ -58,7 +58,7 @@ def inspect_row(transport: Transport, x: int) -> Row:
     q = transport.correspondence[0, x]
     line = near.line_through(q, projector)
     errors = np.zeros((2, projector.width), dtype=np.float32)
-    if transport.belief is not None:
+    if transport.posterior is not None:
         d_error, n_error, f_error = ErrorBars(transport).along(x, line)
         errors[0] = deviation_of_mean(np.hypot(d_error, n_error))
         errors[1] = deviation_of_mean(f_error)
@@ -67,7 +67,7 @@ def inspect_row(transport: Transport, x: int) -> Row:
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
         "line": line,
         "window": transport.window,
-        "no_errors": "the joint estimate tells them" if transport.belief is None else "",
+        "no_errors": "the joint estimate tells them" if transport.posterior is None else "",
         "confidence": None if quality is None else float(quality.confidence[0, x]),
         "saturated": None if quality is None else bool(quality.saturated[0, x]),
         "floodlit": {"direct": float(d.sum()), "near": float(n.sum()), "far": float(f.sum())},
@@ -85,8 +85,8 @@ def _spectrum(row: Floats) -> Floats:
 def _bands(transport: Transport) -> dict[str, Any]:
     """Tell where far- and near-range light was measured, in cycles per projector pixel."""
     far = np.abs(transport.far_basis.cycles).max(axis=0, initial=0.0)
-    if transport.belief is not None:
-        measured = [(float(k.fy), float(k.fx)) for k in transport.belief.frequencies]
+    if transport.posterior is not None:
+        measured = [(float(k.fy), float(k.fx)) for k in transport.posterior.frequencies]
     else:
         side = Size(transport.window, transport.window)
         measured = [(float(k.fy), float(k.fx)) for k in grid(side, side)]

@@ -13,7 +13,7 @@ from nearfar.capture.begun import LOG, count_photos, require_same_rig
 from nearfar.capture.replacing import replace_photos
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.files import resumable_output
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import Plan
 from nearfar.rigs.base import Photo, Rig
 from nearfar.workflow.alarms import CaptureAlarms
@@ -213,7 +213,7 @@ def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWrite
     return begin(folder, plan, full_scale=rig.full_scale, rig=about, exposure=about.get("exposure"))
 
 
-def hold(plan: Plan, rig: Rig) -> HeldPhotos:
+def hold(plan: Plan, rig: Rig) -> PhotosInMemory:
     """Shoot a plan and hold its photos in memory: for simulations.
 
     Raises
@@ -222,7 +222,7 @@ def hold(plan: Plan, rig: Rig) -> HeldPhotos:
         As `acquire`.
     """
     _require(plan, rig)
-    return HeldPhotos(plan, np.stack(list(_photos(plan, rig))), rig.full_scale)
+    return PhotosInMemory(plan, np.stack(list(_photos(plan, rig))), rig.full_scale)
 
 
 def _require(plan: Plan, rig: Rig) -> None:

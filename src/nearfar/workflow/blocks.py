@@ -24,10 +24,10 @@ from nearfar.correspondence import (
 from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
 from nearfar.photometry.drift import find_references
+from nearfar.photometry.drift_removal import PhotosWithoutDrift, remove_drift
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos
-from nearfar.photometry.steady import SteadyPhotos, steady
 from nearfar.plan import Plan
 from nearfar.transport.half import in_half, rounding_over_noise
 from nearfar.transport.model import Transport
@@ -289,7 +289,7 @@ def without_drift(photos: Photos, report: Progress) -> Photos:
         return photos
     whites, blacks = find_references(photos.plan)
     total = 2 * (len(whites) + len(blacks))
-    return steady(photos, lambda done: report("references", done / total))
+    return remove_drift(photos, lambda done: report("references", done / total))
 
 
 def brightest_white(photos: Photos) -> float:
@@ -333,7 +333,7 @@ def provenance_of(
 ) -> dict[str, Any]:
     """Tell what a transport was made of."""
     plan = capture.plan
-    drift = photos.drift if isinstance(photos, SteadyPhotos) else None
+    drift = photos.drift if isinstance(photos, PhotosWithoutDrift) else None
     return {
         "nearfar": version(),
         "method": method,

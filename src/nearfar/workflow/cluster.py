@@ -45,7 +45,7 @@ except ImportError as error:
         f"pip install 'nearfar[dask]'."
     ) from error
 
-# Seconds in which a scheduler answers, and has a worker.
+# Seconds in which a scheduler responses, and has a worker.
 PATIENCE = 10
 
 # One block at a time in a process, however many threads it has: that is what memory is for.

@@ -28,7 +28,7 @@ from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
 from nearfar.estimate.joint import Choices, choose_kinds
 from nearfar.estimate.joint.problem import build_model
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import answered, measure
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import ends
@@ -99,7 +99,7 @@ class RunningEstimate:
     ) -> None:
         require_device(device)
         ESTIMATORS["joint"].require(plan)
-        self.held: HeldPhotos | None = None
+        self.held: PhotosInMemory | None = None
         self._plan, self._full_scale = plan, full_scale
         self._memory, self._device = memory, device
         self._ends = ends(plan)
@@ -175,7 +175,7 @@ class RunningEstimate:
                 capture, memory=memory, device=self._device, progress=report
             )
             return
-        photos = HeldPhotos(
+        photos = PhotosInMemory(
             capture.plan, self.held.photos[: len(capture.plan.patterns)], self._full_scale
         )
         job = prepare(
@@ -199,11 +199,11 @@ class RunningEstimate:
         enough = self._share[self._choice.photos] >= ENOUGH * self._share[self._taken]
         return self._choice.photos if enough else 0
 
-    def _room_for(self, photo: NDArray[Any]) -> HeldPhotos | None:
+    def _room_for(self, photo: NDArray[Any]) -> PhotosInMemory | None:
         """Make room for all photos, if they fit beside the estimate of the whole camera."""
         count = len(self._plan.patterns)
         shape = (count, *photo.shape)
-        room = HeldPhotos(self._plan, np.broadcast_to(photo[:1, :1], shape), self._full_scale)
+        room = PhotosInMemory(self._plan, np.broadcast_to(photo[:1, :1], shape), self._full_scale)
         # One more set of kinds, for the photos there are while they are chosen.
         shared, _ = ESTIMATORS["joint"].bytes_of(self._plan, photo.shape[-1])
         rest = self._memory - count * photo.nbytes - shared
@@ -215,7 +215,7 @@ class RunningEstimate:
             return None
         if not fits:
             return None
-        return HeldPhotos(self._plan, np.empty(shape, photo.dtype), self._full_scale)
+        return PhotosInMemory(self._plan, np.empty(shape, photo.dtype), self._full_scale)
 
     def _is_time(self, taken: int) -> bool:
         """Tell whether to choose kinds now, rather than later or never."""
@@ -248,7 +248,7 @@ class RunningEstimate:
         begun = time.monotonic()
         assert self.held is not None
         plan = self._plan.first(taken)
-        some = HeldPhotos(plan, self.held.photos[:taken], self._full_scale)
+        some = PhotosInMemory(plan, self.held.photos[:taken], self._full_scale)
         photos = without_drift(some, unheard)
         measurements = measure(photos, progress=self._heed)
         if has_correspondence_photos(plan):

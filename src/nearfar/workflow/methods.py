@@ -71,17 +71,19 @@ def jointly(
 
 def _bytes_of_paper(plan: Plan, channels: int) -> tuple[int, int]:
     photos, entries = len(plan.patterns), plan.window**2
-    # Differences and sums of the pairs, answers, windows.
+    # Differences and sums of the pairs, responses, windows.
     return 4 * entries**2, 4 * channels * (2 * photos + 2 * entries)
 
 
 def _bytes_of_joint(plan: Plan, channels: int) -> tuple[int, int]:
-    answers = 2 * len(measured_frequencies(plan))
+    responses = 2 * len(measured_frequencies(plan))
     entries = plan.window**2
     kinds = len(LIT) + len(UNLIT)
-    prior = 4 * (2 * answers**2 + 2 * answers * entries + len(RATIOS) * entries + 2 * entries**2)
-    # Answers, re-ordered; what a turn begins with, what neighbours expect, what it finds, the sum.
-    rows = 4 * channels * (2 * answers + 4 * (answers + entries))
+    prior = 4 * (
+        2 * responses**2 + 2 * responses * entries + len(RATIOS) * entries + 2 * entries**2
+    )
+    # Responses, re-ordered; what a turn begins with, what neighbours expect, what it finds, sum.
+    rows = 4 * channels * (2 * responses + 4 * (responses + entries))
     # Inverse pairs are held while they are measured.
     pairs = 4 * channels * len(plan.patterns) if plan.offset == "inverse" else 0
     return kinds * prior, rows + entries + pairs

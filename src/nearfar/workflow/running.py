@@ -19,10 +19,10 @@ from nearfar.arrays import Floats, Integers, blocks
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
 from nearfar.estimate.joint import ErrorBars, estimate_jointly
-from nearfar.photometry.held import HeldPhotos
+from nearfar.photometry.drift_removal import remove_drift
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
-from nearfar.photometry.steady import steady
 from nearfar.plan import Plan
 from nearfar.plan.checks import check_photos, ends
 from nearfar.transport.model import Transport
@@ -126,8 +126,8 @@ class RunningCheck:
         return missing <= 0
 
     def _look(self, taken: int) -> Standing:
-        held = HeldPhotos(self._plan.first(taken), np.stack(self._photos), self._full_scale)
-        photos = steady(held)
+        held = PhotosInMemory(self._plan.first(taken), np.stack(self._photos), self._full_scale)
+        photos = remove_drift(held)
         measurements = measure(photos)
         try:
             pixels = correspond_by_phase(measurements).pixels
@@ -179,14 +179,14 @@ def _in_common(photos: Floats) -> float:
 
 def _without_noise(found: Transport) -> Transport:
     """Return what the estimate would believe if its photos had no noise."""
-    belief = found.belief
-    assert belief is not None
+    posterior = found.posterior
+    assert posterior is not None
     return replace(
         found,
         noise=QUIET * found.noise,
-        belief=replace(
-            belief,
-            offset_noise=QUIET * belief.offset_noise,
-            light_noise=QUIET * belief.light_noise,
+        posterior=replace(
+            posterior,
+            offset_noise=QUIET * posterior.offset_noise,
+            light_noise=QUIET * posterior.light_noise,
         ),
     )

@@ -36,14 +36,14 @@ def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=Non
     generator = np.random.default_rng(seed)
     basis = real_basis([DC, *frequencies], PROJECTOR)
     count, channels = rows.shape[:2]
-    answers = rows @ basis.patterns.T.astype(np.float64)
-    answers = answers + noise * generator.normal(size=answers.shape)
-    answers[..., 1:] += offset * generator.normal(size=(count, channels, 1))
+    responses = rows @ basis.patterns.T.astype(np.float64)
+    responses = responses + noise * generator.normal(size=responses.shape)
+    responses[..., 1:] += offset * generator.normal(size=(count, channels, 1))
     level = np.full((count, channels), noise, dtype=np.float32)
     return Measurements(
         camera=camera or Size(1, count),
         basis=basis,
-        answers=answers.astype(np.float32),
+        responses=responses.astype(np.float32),
         noise=level,
         black=np.zeros_like(level),
         shown_error=np.zeros((basis.count, PROJECTOR.pixels), dtype=np.float32),
@@ -70,7 +70,7 @@ def drawn_rows(count, centres, strength, seed=0):
 def pixels_of(measurements, centres, band):
     count = len(centres)
     whole = Whole(
-        answers=measurements.answers[..., band.places],
+        responses=measurements.responses[..., band.places],
         correspondence=centres.astype(float),
         centres=centres,
         lit=np.ones(count, dtype=bool),
@@ -115,7 +115,7 @@ def dense(measurements, pixels, band, strength, kind=KIND):
             + shared @ np.diag(1 / known) @ shared.T
             + noise**2 * np.eye(len(power))
         )
-        y = pixels.answers[c, 0].astype(np.float64)
+        y = pixels.responses[c, 0].astype(np.float64)
         x = np.linalg.solve(covariance, y)
         _, logarithm = np.linalg.slogdet(covariance)
         near_mean = s * (window @ cut.T @ x) * pixels.inside[c]

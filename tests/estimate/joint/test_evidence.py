@@ -65,7 +65,7 @@ def test_a_camera_pixel_chooses_the_kind_that_it_was_drawn_from():
     assert np.median(strength * white) == pytest.approx(0.02, rel=0.5)
 
 
-def test_few_answers_narrow_the_kinds_down_and_all_choose(monkeypatch):
+def test_few_responses_narrow_the_kinds_down_and_all_choose(monkeypatch):
     generator = np.random.default_rng(3)
     centres = np.stack([generator.integers(4, 12, 100), generator.integers(4, 16, 100)], axis=1)
     frequencies = chosen_frequencies()
@@ -74,7 +74,7 @@ def test_few_answers_narrow_the_kinds_down_and_all_choose(monkeypatch):
     priors = tuple(build_prior(kind, band, repeats) for kind in LIT)
     unscreened = screened(priors, band, repeats)
     assert unscreened.screens is priors
-    monkeypatch.setattr("nearfar.estimate.joint.evidence.ANSWERS", 24)
+    monkeypatch.setattr("nearfar.estimate.joint.evidence.RESPONSES", 24)
     narrowed = screened(priors, band, repeats)
     assert len(narrowed.chosen) == pytest.approx(24, abs=1)
     worse = []
@@ -83,17 +83,17 @@ def test_few_answers_narrow_the_kinds_down_and_all_choose(monkeypatch):
         pixels = pixels_of(measured(rows, frequencies, noise=1e-3), centres, band)
         _, _, most = best_kind(pixels, unscreened)
         kind, _, found = best_kind(pixels, narrowed)
-        # What is told of the kind that was chosen is told by all answers.
+        # What is told of the kind that was chosen is told by all responses.
         values = np.stack([evidence(tell(pixels), prior).max(axis=1) for prior in priors])
         # Sums of squares are float32, and how they round depends on which pixels stand beside.
         told = tell(pixels)
-        squares = np.bincount(told.pixel, np.sum(told.answers.astype(np.float64) ** 2, axis=1))
+        squares = np.bincount(told.pixel, np.sum(told.responses.astype(np.float64) ** 2, axis=1))
         rounding = np.finfo(np.float32).eps / 4 * squares
         assert np.median(rounding) < 0.3
         chosen = values[kind, np.arange(100)]
         assert (np.abs(found - chosen) <= 1e-4 * np.abs(chosen) + rounding).all()
         worse.append(most - found)
-    # Odds of 20 against the kind that few answers left: hardly ever, of the 300.
+    # Odds of 20 against the kind that few responses left: hardly ever, of the 300.
     assert np.mean(np.concatenate(worse) > 3.0) < 0.03
 
 
@@ -107,13 +107,13 @@ def test_narrow_projectors_and_windows_are_reconstructed(projector, window):
     frequencies = list(choose_frequencies(projector, 40, window).frequencies)
     basis = real_basis([DC, *frequencies], projector)
     rows = world.dense().astype(np.float64)
-    answers = rows @ basis.patterns.T.astype(np.float64)
+    responses = rows @ basis.patterns.T.astype(np.float64)
     noise = np.full(rows.shape[:2], 1e-4, dtype=np.float32)
-    answers += 1e-4 * np.random.default_rng(0).normal(size=answers.shape)
+    responses += 1e-4 * np.random.default_rng(0).normal(size=responses.shape)
     measurements = Measurements(
         camera=world.camera,
         basis=basis,
-        answers=answers.astype(np.float32),
+        responses=responses.astype(np.float32),
         noise=noise,
         black=np.zeros_like(noise),
         shown_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),

@@ -99,7 +99,7 @@ def test_cut_windows_of_every_kind_are_those_of_dense_algebra(kind, uneven):
         covariance = squared * (cut @ window @ cut.T + np.diag(power))
         covariance += float(pixels.noise[c, 0]) ** 2 * spread
         covariance += np.outer(direct, direct) / precision(pixels)[c, 0, 0]
-        x = np.linalg.solve(covariance, pixels.answers[c, 0].astype(np.float64))
+        x = np.linalg.solve(covariance, pixels.responses[c, 0].astype(np.float64))
         for got, exact in (
             (found.near[c, 0], squared * (window @ cut.T @ x) * pixels.inside[c]),
             (found.far[c, 0], squared * power * x),
@@ -125,7 +125,7 @@ def test_whole_and_cut_agree_where_nothing_is_cut():
         np.testing.assert_allclose(a, b, atol=2e-3 * np.abs(b).max(), err_msg=name)
 
 
-def test_a_world_of_the_model_is_relit_by_few_answers():
+def test_a_world_of_the_model_is_relit_by_few_responses():
     world = model_transport(
         PROJECTOR, Size(16, 20), window=WINDOW, far=Size(3, 3), channels=2, entries=0, seed=2
     )
@@ -155,9 +155,9 @@ def test_what_eight_bits_make_of_direct_light_is_no_other_light():
     error[0] = 0
     misdrawn = replace(
         measurements,
-        answers=(measurements.answers + world.direct.reshape(-1, 1, 1) * error.T[:, None]).astype(
-            np.float32
-        ),
+        responses=(
+            measurements.responses + world.direct.reshape(-1, 1, 1) * error.T[:, None]
+        ).astype(np.float32),
     )
 
     def stray(told):
@@ -225,14 +225,14 @@ def test_the_offset_of_the_references_is_taken_out():
     assert errors[0] < 0.3 * errors[1]
 
 
-def test_answers_without_white_are_refused():
+def test_responses_without_white_are_refused():
     rows, _ = drawn_rows(1, np.array([[8, 10]]), 0.01)
     measurements = measured(rows, chosen_frequencies())
     basis = real_basis(chosen_frequencies(), PROJECTOR)
     lacking = replace(
         measurements,
         basis=basis,
-        answers=measurements.answers[..., 1:],
+        responses=measurements.responses[..., 1:],
         shown_error=measurements.shown_error[1:],
         repeats=measurements.repeats[1:],
     )

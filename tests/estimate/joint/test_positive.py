@@ -82,4 +82,4 @@ def test_an_estimate_has_no_negative_transport_in_its_windows(noise):
     assert entries[light].min() > -1e-5 * rows.max()
     # White is what the photos say.
     white = found @ np.ones(PROJECTOR)
-    np.testing.assert_allclose(white.ravel(), measurements.answers[:, 0, 0], atol=1e-4)
+    np.testing.assert_allclose(white.ravel(), measurements.responses[:, 0, 0], atol=1e-4)

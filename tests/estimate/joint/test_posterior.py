@@ -22,10 +22,10 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
-from nearfar.transport.belief import Belief
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, far_power, near_covariance, power_at
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import Posterior
 from nearfar.workflow.acquire import hold
 
 PROJECTOR = Size(12, 16)
@@ -53,7 +53,7 @@ def _transport(centres, lit=True):
         far_basis=basis,
         black=np.zeros(shape, np.float32),
         noise=np.full(shape, NOISE, np.float32),
-        belief=Belief(
+        posterior=Posterior(
             kinds=(Kind(0.0, 1.0, 1.0), KIND),
             frequencies=measured,
             repeats=np.random.default_rng(0).integers(1, 4, count).astype(np.float32),
@@ -70,34 +70,34 @@ def _transport(centres, lit=True):
 def _dense(transport, c, ask):
     """Posterior deviation of ask(o, white's own, d, n, f) by plain linear algebra.
 
-    `ask` holds weights of each; f is its answers to the measured patterns.
+    `ask` holds weights of each; f is its responses to the measured patterns.
     """
-    belief = transport.belief
-    basis = real_basis(belief.frequencies, PROJECTOR)
+    posterior = transport.posterior
+    basis = real_basis(posterior.frequencies, PROJECTOR)
     centre = transport.correspondence[0, c].astype(int)
     band = band_of(basis, near.offsets(WINDOW) + centre)
     s = STRENGTH * WHITE
     ones = np.ones((basis.count, 1))
     direct = basis.patterns[:, [centre[0] * PROJECTOR.width + centre[1]]]
-    answers = np.concatenate(
+    responses = np.concatenate(
         [ones, 0 * ones, direct, band.on_window, np.eye(basis.count)], axis=1
     ).astype(np.float64)
-    prior = np.zeros((answers.shape[1], answers.shape[1]))
+    prior = np.zeros((responses.shape[1], responses.shape[1]))
     prior[0, 0] = OFFSET**2
     prior[1, 1] = LIGHT**2 - (SHARE * OFFSET) ** 2
     prior[2, 2] = (4 * WHITE) ** 2
     end = 3 + WINDOW**2
     prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
     prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
-    noise = np.diag(NOISE**2 / belief.repeats.astype(np.float64))
-    gain = prior @ answers.T @ np.linalg.inv(answers @ prior @ answers.T + noise)
-    posterior = prior - gain @ answers @ prior
+    noise = np.diag(NOISE**2 / posterior.repeats.astype(np.float64))
+    gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
+    posterior = prior - gain @ responses @ prior
     return np.sqrt(ask @ posterior @ ask)
 
 
 def _weights(transport, c, light, *, far_only_held=True):
-    """Weights of o, white's own error, d, n and f's answers in the picture under a light."""
-    basis = real_basis(transport.belief.frequencies, PROJECTOR)
+    """Weights of o, white's own error, d, n and f's responses in the picture under a light."""
+    basis = real_basis(transport.posterior.frequencies, PROJECTOR)
     held = np.array([basis.frequencies[i] in transport.far_basis.frequencies for i in basis.index])
     mean = light.mean()
     centre = transport.correspondence[:, c].astype(int)
@@ -215,7 +215,7 @@ def test_gains_scale_the_error_of_their_component():
 
 def test_colour_lights_go_channel_by_channel():
     transport = _transport(np.array([[6, 8], [5, 7]]))
-    belief = transport.belief
+    posterior = transport.posterior
 
     def doubled(values):
         return np.concatenate([values, 2 * values], axis=2)
@@ -223,10 +223,10 @@ def test_colour_lights_go_channel_by_channel():
     both = replace(
         transport,
         **{n: doubled(getattr(transport, n)) for n in ("direct", "near", "far", "black", "noise")},
-        belief=replace(
-            belief,
-            **{n: doubled(getattr(belief, n)) for n in ("white", "offset_noise", "light_noise")},
-            share_of_white=np.repeat(belief.share_of_white, 2, axis=2),
+        posterior=replace(
+            posterior,
+            **{n: doubled(getattr(posterior, n)) for n in ("white", "offset_noise", "light_noise")},
+            share_of_white=np.repeat(posterior.share_of_white, 2, axis=2),
         ),
     )
     lights = np.random.default_rng(1).random((*PROJECTOR, 2))
@@ -240,22 +240,22 @@ def test_colour_lights_go_channel_by_channel():
 def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     part = 0.4
     transport = _transport(np.array([[6.0, 8.0 + part]]))
-    belief = transport.belief
-    basis = real_basis(belief.frequencies, PROJECTOR)
+    posterior = transport.posterior
+    basis = real_basis(posterior.frequencies, PROJECTOR)
     at = 6 * PROJECTOR.width + 8
     one, other = basis.patterns[:, at], basis.patterns[:, at + 1]
     band = band_of(basis, near.offsets(WINDOW) + np.array([6, 8]))
     own = np.stack([np.ones(basis.count), (1 - part) * one + part * other, other - one], axis=1)
-    answers = np.concatenate([own, band.on_window, np.eye(basis.count)], axis=1).astype(float)
+    responses = np.concatenate([own, band.on_window, np.eye(basis.count)], axis=1).astype(float)
     end = 3 + WINDOW**2
     s = STRENGTH * WHITE
-    prior = np.zeros((answers.shape[1], answers.shape[1]))
+    prior = np.zeros((responses.shape[1], responses.shape[1]))
     prior[:3, :3] = np.diag([OFFSET**2, (4 * WHITE) ** 2, (OFF * WHITE) ** 2])
     prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
     prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
-    noise = np.diag(NOISE**2 / belief.repeats.astype(np.float64))
-    gain = prior @ answers.T @ np.linalg.inv(answers @ prior @ answers.T + noise)
-    posterior = prior - gain @ answers @ prior
+    noise = np.diag(NOISE**2 / posterior.repeats.astype(np.float64))
+    gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
+    posterior = prior - gain @ responses @ prior
     light = np.zeros(PROJECTOR)
     light[:, 9:] = 1.0
     weights = _weights(transport, 0, light)
@@ -272,11 +272,11 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     assert found == pytest.approx(np.sqrt(variance), rel=2e-3)
 
 
-def test_a_transport_without_belief_says_so():
-    transport = replace(_transport(np.array([[6, 8]])), belief=None)
+def test_a_transport_without_posterior_says_so():
+    transport = replace(_transport(np.array([[6, 8]])), posterior=None)
     with pytest.raises(InputError, match="--method joint"):
         ErrorBars(transport)
-    assert _transport(np.array([[6, 8]])).with_gains(near=2.0).belief is None
+    assert _transport(np.array([[6, 8]])).with_gains(near=2.0).posterior is None
 
 
 def _within(error, deviation):

@@ -52,7 +52,7 @@ def test_slices_and_their_singular_values_are_those_of_the_scene(measured_once):
     rank = np.sum(values > data.numbers["rank_above"] * values[0])
     assert data.numbers["ranks"]["T"] == rank
     assert data.numbers["ranks"]["D"] == BOX.projector.width
-    # A row summed down the projector answers as the whole row does at ky = 0.
+    # A row summed down the projector responses as the whole row does at ky = 0.
     c = int(data.arrays["columns"][0])
     whole = np.fft.fft2(rows[c].reshape(BOX.projector))[0]
     np.testing.assert_allclose(np.fft.fft(data.arrays["T/along"][0]), whole, atol=1e-5)

@@ -16,10 +16,10 @@ from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.belief import Belief
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, UNLIT
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import Posterior
 
 # Camera pixels at once.
 BLOCK = 2048
@@ -36,7 +36,7 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
     xp = namespace(rows.near)
     white, share, places = (
         beside(values, rows.near)
-        for values in (measurements.answers[..., dc_place(measurements)], share_of_white, kept)
+        for values in (measurements.responses[..., dc_place(measurements)], share_of_white, kept)
     )
     direct = xp.clip(rows.shared[..., 1], min=0.0) * whole.lit[:, None]
     rest = white - share * rows.shared[..., 0] - direct - xp.sum(rows.near, axis=-1)
@@ -58,7 +58,7 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
         far_basis=basis,
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
-        belief=Belief(
+        posterior=Posterior(
             kinds=(*LIT, *UNLIT),
             frequencies=band.basis.frequencies,
             repeats=fetch(problem.model.repeats),

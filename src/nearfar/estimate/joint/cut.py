@@ -9,7 +9,7 @@ over the entries inside, ratio = (s / sigma)^2 and B the patterns over the windo
 whose windows are cut alike, of one kind and of ratios that are close, share one factor of Lambda;
 strengths are tried in steps of 2, so a ratio rounded to the nearest power of 2 is as good.
 
-Index convention: arrays are (n, channels, ...); r runs over real answers, w over window entries
+Index convention: arrays are (n, channels, ...); r runs over real responses, w over window entries
 inside, g over y and the numbers of `nuisance`; m over pairs of a camera pixel and a channel.
 """
 
@@ -37,12 +37,12 @@ def rounded(ratio: Floats) -> Floats:
 
 def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
     """Estimate camera pixels of one kind; see `solve_whole`."""
-    xp = namespace(pixels.answers)
-    number, channels, count = pixels.answers.shape
+    xp = namespace(pixels.responses)
+    number, channels, count = pixels.responses.shape
     # m, how often each answer was measured: the squares of a row add up to it.
     repeats = xp.sum(xp.astype(prior.directions, xp.float64) ** 2, axis=1)
     power, deviation = (
-        beside(values, pixels.answers) for values in (prior.power, prior.factors.deviation)
+        beside(values, pixels.responses) for values in (prior.power, prior.factors.deviation)
     )
     columns = nuisance.columns(pixels, band)
     known = nuisance.precision(pixels)
@@ -50,7 +50,7 @@ def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
     rectangles = _rectangles(fetch(pixels.inside))
 
     def empty(*shape: int, dtype: Any = None) -> Any:
-        return xp.empty(shape, dtype=dtype or xp.float32, device=device(pixels.answers))
+        return xp.empty(shape, dtype=dtype or xp.float32, device=device(pixels.responses))
 
     shared = empty(*known.shape, dtype=xp.float64)
     near = empty(number, channels, len(deviation))
@@ -60,7 +60,7 @@ def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
         weight = 1.0 / (float(value) * power + 1.0 / repeats)
         of, channel = np.nonzero(rounded_to == value)
         c, i = beside(of, known), beside(channel, known)
-        y = xp.astype(xp.concat([pixels.answers[c, i, None], columns[c]], axis=1), xp.float64)
+        y = xp.astype(xp.concat([pixels.responses[c, i, None], columns[c]], axis=1), xp.float64)
         weighed = y * weight
         told = product(weighed, spread)
         solved = _solved(told, rectangles, of, prior, float(value), weight, band)

@@ -1,7 +1,7 @@
 """Direct light of a second surface, where a camera pixel looks past a depth edge.
 
 The model has direct light around one q. What a camera pixel sees of another surface is a second
-spike, most often within the window. It is looked for where the answers, less what is explained,
+spike, most often within the window. It is looked for where the responses, less what is explained,
 agree with light at a single window entry: adding it must raise the evidence by far more than the
 choice among all entries could by chance. Where a neighbour's own q lies on another surface, light
 around that place is likely, and less evidence will do.

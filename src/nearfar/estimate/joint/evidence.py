@@ -5,8 +5,8 @@ constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with o an
 v_i depends on s and sigma through their ratio alone, so every camera pixel shares one table over
 ratios, and the sums over i are matrix products.
 
-A few answers narrow the kinds down, and all answers choose among those that are left: to choose by
-a few alone cost 1.7 dB on the wedge, and by all throughout takes three times as long.
+A few responses narrow the kinds down, and all responses choose among those that are left: to
+choose by a few alone cost 1.7 dB on the wedge, and by all throughout takes three times as long.
 
 Channels are not put together first: of their mean, the shelf's coloured books lose 1.2 dB under a
 random light.
@@ -29,8 +29,8 @@ from nearfar.transport.kinds import STRENGTHS
 
 # Steps of the table in (s / sigma)^2, between two strengths: they are 2 apart.
 STEPS = 4
-# Answers by which kinds are told apart first, and kinds that are then told by all answers.
-ANSWERS = 100
+# Responses by which kinds are told apart first, and kinds that are then told by all responses.
+RESPONSES = 100
 KINDS = 3
 
 
@@ -41,9 +41,9 @@ class Kinds(NamedTuple):
     ----------
     priors : tuple of Prior
     screens : tuple of Spectrum
-        The same kinds as a few answers see them; the priors, where there are but a few.
+        The same kinds as a few responses see them; the priors, where there are but a few.
     chosen : ndarray of int
-        Those answers.
+        Those responses.
     """
 
     priors: tuple[Prior, ...]
@@ -61,11 +61,11 @@ class Kinds(NamedTuple):
 
 
 def screened(priors: tuple[Prior, ...], band: Band, repeats: Floats) -> Kinds:
-    """Choose answers that tell kinds apart: evenly among the frequencies, in their order."""
+    """Choose responses that tell kinds apart: evenly among the frequencies, in their order."""
     frequencies = len(band.basis.frequencies)
-    if band.basis.count <= 2 * ANSWERS:
+    if band.basis.count <= 2 * RESPONSES:
         return Kinds(priors, priors, np.arange(band.basis.count))
-    kept = np.linspace(0, frequencies - 1, ANSWERS // 2).round().astype(np.int64)
+    kept = np.linspace(0, frequencies - 1, RESPONSES // 2).round().astype(np.int64)
     chosen = np.flatnonzero(np.isin(band.basis.index, kept))
     screens = tuple(prior.told_by(chosen, band, repeats) for prior in priors)
     return Kinds(priors, screens, chosen)
@@ -90,8 +90,8 @@ def best_kind(pixels: Pixels, kinds: Kinds) -> tuple[Integers, Floats, Floats]:
     """
     xp = namespace(pixels.white)
     told = tell(pixels)
-    chosen = beside(kinds.chosen, told.answers)
-    some = told._replace(answers=told.answers[:, chosen], of_offset=told.of_offset[:, chosen])
+    chosen = beside(kinds.chosen, told.responses)
+    some = told._replace(responses=told.responses[:, chosen], of_offset=told.of_offset[:, chosen])
     found = [evidence(some, screen) for screen in kinds.screens]
     values = xp.stack([xp.max(each, axis=1) for each in found])
     steps = xp.stack([xp.argmax(each, axis=1) for each in found])
@@ -110,13 +110,13 @@ def best_kind(pixels: Pixels, kinds: Kinds) -> tuple[Integers, Floats, Floats]:
 
 
 class Told(NamedTuple):
-    """What the answers of camera pixels tell, a row for each channel of each.
+    """What the responses of camera pixels tell, a row for each channel of each.
 
     Rows with the same table stand side by side.
 
     Attributes
     ----------
-    answers : ndarray, shape (m, R)
+    responses : ndarray, shape (m, R)
         In units of their noise.
     ratio, offset_ratio : ndarray, shape (m, 1)
         White, and the deviation of the references' error, over that noise.
@@ -127,10 +127,10 @@ class Told(NamedTuple):
     corners : ndarray, shape (n, 9)
         Unit direct light around q.
     of_offset : ndarray, shape (n or 0, R)
-        Answers of a unit error of the references; none where they cannot err.
+        Responses of a unit error of the references; none where they cannot err.
     """
 
-    answers: Floats
+    responses: Floats
     ratio: Floats
     offset_ratio: Floats
     level: Integers
@@ -146,7 +146,7 @@ class Told(NamedTuple):
         pixel = place[self.pixel]
         (rows,) = xp.nonzero(pixel >= 0)
         return Told(
-            self.answers[rows],
+            self.responses[rows],
             self.ratio[rows],
             self.offset_ratio[rows],
             self.level[rows],
@@ -157,15 +157,15 @@ class Told(NamedTuple):
 
 
 def tell(pixels: Pixels) -> Told:
-    """Lay out what the answers of camera pixels tell."""
+    """Lay out what the responses of camera pixels tell."""
     xp = namespace(pixels.white)
     noise = pixels.noise.reshape((-1, 1))
     ratio = pixels.white.reshape((-1, 1)) / noise
     level = xp.round(STEPS * xp.log2(xp.astype(ratio[:, 0], xp.float64) * STRENGTHS[0]))
     order = xp.argsort(level, stable=True)
-    flat = pixels.answers.reshape((len(order), -1))
+    flat = pixels.responses.reshape((len(order), -1))
     return Told(
-        answers=flat[order] / noise[order],
+        responses=flat[order] / noise[order],
         ratio=ratio[order],
         offset_ratio=(pixels.offset_noise.reshape((-1, 1)) / noise)[order],
         level=xp.astype(level[order], xp.int64),
@@ -177,7 +177,7 @@ def tell(pixels: Pixels) -> Told:
 
 def evidence(told: Told, spectrum: Spectrum) -> Floats:
     """Return the log evidence of one kind at every strength, of all channels, (n, strengths)."""
-    y = told.answers @ spectrum.directions
+    y = told.responses @ spectrum.directions
     u = told.corners @ spectrum.of_corners
     v = told.of_offset @ spectrum.directions
     xp, level = namespace(y), fetch(told.level)

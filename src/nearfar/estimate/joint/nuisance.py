@@ -1,14 +1,14 @@
-"""What answers besides n and f: o, d, shifts of q, and direct light of other surfaces.
+"""What responses besides n and f: o, d, shifts of q, and direct light of other surfaces.
 
 o is the error that the references add to every answer; d is direct light at q, and with it go how
 far q is off down and across, times d; d2 ... are spikes of direct light at single window entries.
-Their answers are combinations of a few vectors that all camera pixels share, but for o's. Where
+Their responses are combinations of a few vectors that all camera pixels share, but for o's. Where
 no camera pixel of a block can tell one of them, it is left out.
 
 Their precision is known beforehand: the references' noise, that direct light is about as bright as
 white at most, and that q was found well.
 
-Index convention: arrays are (n, channels, ...); g and h run over the numbers, r over answers.
+Index convention: arrays are (n, channels, ...); g and h run over the numbers, r over responses.
 """
 
 from array_api_compat import device
@@ -31,7 +31,7 @@ LEAST = 1e-12
 
 
 def columns(pixels: Pixels, band: Band) -> Floats:
-    """Return answers a_g of unit o, d, shifts, d2 ..., those that are there: (n, G, R)."""
+    """Return responses a_g of unit o, d, shifts, d2 ..., those that are there: (n, G, R)."""
     return _side_by_side(
         [
             pixels.of_offset,

@@ -1,6 +1,6 @@
 """What the estimate of a block of camera pixels needs, re-centred on q.
 
-Index convention: arrays are (n, channels, ...), n camera pixels; r runs over real answers.
+Index convention: arrays are (n, channels, ...), n camera pixels; r runs over real responses.
 """
 
 from typing import NamedTuple
@@ -33,14 +33,14 @@ class Pixels(NamedTuple):
     lit : ndarray of bool, shape (n,)
     inside : ndarray of bool, shape (n, W^2)
         Window entries on the projector.
-    answers : ndarray, shape (n, channels, R)
+    responses : ndarray, shape (n, channels, R)
         Of all frequencies but DC.
     corners : ndarray, shape (n, 1 or 3, 9)
         Unit direct light over `nearfar.estimate.matrices.CORNERS`, and what moving it by a
         projector pixel down, or across, adds, which is left out where all q are whole; 0 at unlit
         camera pixels.
     of_offset : ndarray, shape (n, 0 or 1, R)
-        What an error of the references adds to the answers; left out where they cannot err.
+        What an error of the references adds to the responses; left out where they cannot err.
     spikes : ndarray of int, shape (n, E)
         Window entries at which direct light of other surfaces is believed.
     noise : ndarray, shape (n, channels)
@@ -56,7 +56,7 @@ class Pixels(NamedTuple):
     centres: NDArray[np.int64]
     lit: Booleans
     inside: Booleans
-    answers: Floats
+    responses: Floats
     corners: Floats
     of_offset: Floats
     spikes: NDArray[np.int64]
@@ -77,19 +77,19 @@ def dc_place(measurements: Measurements) -> int:
 
 def scale_of(measurements: Measurements) -> Floats:
     """Light under white, the scale of all transport, (C, channels); never nothing."""
-    white = measurements.answers[..., dc_place(measurements)]
+    white = measurements.responses[..., dc_place(measurements)]
     brightest = measurements.brightest or float(np.abs(white).max(initial=0.0))
     least = max(DARKEST * brightest, float(np.finfo(np.float32).tiny))
     return np.asarray(np.maximum(white, np.float32(least)))
 
 
 def offset_noise(measurements: Measurements) -> Floats:
-    """Return the deviation of what the references' error adds to answers, (C, channels)."""
+    """Return the deviation of what the references' error adds to responses, (C, channels)."""
     return np.hypot(measurements.white_noise, measurements.black_noise)
 
 
-def answers_of_direct(correspondence: Floats, lights: Floats, projector: Size) -> Floats:
-    """Answers of unit direct light to lights, and what moving it by a projector pixel adds.
+def responses_of_direct(correspondence: Floats, lights: Floats, projector: Size) -> Floats:
+    """Responses of unit direct light to lights, and what moving it by a projector pixel adds.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def answers_of_direct(correspondence: Floats, lights: Floats, projector: Size) -
     Returns
     -------
     ndarray, shape (n, 3, R), float32
-        Answers, and their change down and across; 0 along an axis on which q is whole, where
+        Responses, and their change down and across; 0 along an axis on which q is whole, where
         direct light is all one projector pixel's.
     """
 
@@ -122,7 +122,7 @@ class Whole(NamedTuple):
 
     Attributes
     ----------
-    answers : ndarray, shape (C, channels, R)
+    responses : ndarray, shape (C, channels, R)
         Of all frequencies but DC, in the order of the band.
     correspondence : ndarray, shape (C, 2)
         q.
@@ -134,7 +134,7 @@ class Whole(NamedTuple):
         As in `Pixels`.
     """
 
-    answers: Floats
+    responses: Floats
     correspondence: Floats
     centres: NDArray[np.int64]
     lit: Booleans
@@ -161,21 +161,21 @@ def gather(
         The measured frequencies without DC.
     projector : Size
     shown : ndarray, shape (n, channels, R), optional
-        What is known of the answers already, as measured: it is taken out of them.
+        What is known of the responses already, as measured: it is taken out of them.
     """
     some = Whole._make(values[chosen] for values in whole)
-    answers = some.answers if shown is None else some.answers - shown
+    responses = some.responses if shown is None else some.responses - shown
     corners = corner_weights(some.correspondence, some.centres)
-    xp = namespace(some.answers)
+    xp = namespace(some.responses)
     if not bool(xp.any(corners[:, 1:] != 0)):
         corners = corners[:, :1]
     shape = (len(some.lit), int(bool(xp.any(some.offset_noise > 0))), band.basis.count)
-    ones = xp.ones(shape, dtype=xp.float32, device=device(some.answers))
+    ones = xp.ones(shape, dtype=xp.float32, device=device(some.responses))
     return Pixels(
         centres=some.centres,
         lit=some.lit,
         inside=near.inside(some.centres, round(some.likely.shape[1] ** 0.5), projector),
-        answers=band.recentre(answers, some.centres),
+        responses=band.recentre(responses, some.centres),
         corners=corners,
         of_offset=band.recentre(ones, some.centres),
         spikes=some.centres[:, :0],

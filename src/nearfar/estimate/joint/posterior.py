@@ -5,7 +5,7 @@ leave of white. Given the kind, o, d and q, the posterior is a Gaussian in the k
 o, d and q add what is not known of them.
 
 Index convention: arrays are (n, channels, ...), n camera pixels or numbers asked of one of them; r
-runs over real answers, w over window entries, i over eigenvectors, g over o and d.
+runs over real responses, w over window entries, i over eigenvectors, g over o and d.
 """
 
 from typing import NamedTuple
@@ -15,16 +15,16 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.errors import InputError
 from nearfar.estimate.joint import nuisance
-from nearfar.estimate.joint.pixels import EXACT, answers_of_direct
+from nearfar.estimate.joint.pixels import EXACT, responses_of_direct
 from nearfar.estimate.joint.prior import Prior, build_prior
 from nearfar.estimate.matrices import Band, band_of, corner_weights
 from nearfar.illumination.frequencies import DC
 from nearfar.transport import near
-from nearfar.transport.belief import Belief
 from nearfar.transport.direct import footprint
 from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, power_at
 from nearfar.transport.model import Components, Transport
+from nearfar.transport.posterior import Posterior
 
 BLOCK = 2048
 # Entries of a row that are worked at at once.
@@ -89,13 +89,13 @@ class ErrorBars:
     """
 
     def __init__(self, transport: Transport) -> None:
-        if transport.belief is None:
+        if transport.posterior is None:
             raise InputError(
                 "this transport holds no error bars: reconstruct the capture with --method joint."
             )
         self._transport = transport
-        self._belief: Belief = transport.belief
-        basis = real_basis(self._belief.frequencies, transport.projector)
+        self._posterior: Posterior = transport.posterior
+        basis = real_basis(self._posterior.frequencies, transport.projector)
         self._band: Band = band_of(basis, near.offsets(transport.window))
         self._priors: dict[int, Prior] = {}
         self._where = footprint(transport.correspondence, transport.projector)
@@ -217,7 +217,7 @@ class ErrorBars:
             np.broadcast_to([1.0, 0.0, 0.0], (number, 3)),
             np.zeros((number, self._transport.window**2), dtype=np.float32),
             np.zeros((number, self._band.basis.count), dtype=np.float32),
-            np.zeros(len(self._belief.kinds)),
+            np.zeros(len(self._posterior.kinds)),
         )
 
     def _of_entries(self, entries: Integers) -> _Asked:
@@ -227,7 +227,7 @@ class ErrorBars:
             np.zeros((len(entries), 3)),
             np.eye(self._transport.window**2, dtype=np.float32)[entries],
             np.zeros((len(entries), self._band.basis.count), dtype=np.float32),
-            np.zeros(len(self._belief.kinds)),
+            np.zeros(len(self._posterior.kinds)),
         )
 
     def _of_far(self, one: slice, inside: Booleans, lines: slice) -> _Asked:
@@ -243,7 +243,7 @@ class ErrorBars:
             np.broadcast_to([-lit / total, 0.0, 0.0], (number, 3)),
             -lit / total * inside[None].astype(np.float32),
             band.recentre(patterns[:, None], centre)[:, 0],
-            np.zeros(len(self._belief.kinds)),
+            np.zeros(len(self._posterior.kinds)),
         )
 
     def _of_light(
@@ -260,7 +260,7 @@ class ErrorBars:
         overlap = (gain_far * band.basis.analyse(light) * self._held).astype(np.float32)
         turned = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
         lit = transport.lit.ravel()[block]
-        direct = gain_direct * answers_of_direct(q, light[None], projector)[..., 0]
+        direct = gain_direct * responses_of_direct(q, light[None], projector)[..., 0]
         direct[:, 0] -= mean * lit
         return _Asked(
             np.full(len(centres), mean),
@@ -285,29 +285,29 @@ class ErrorBars:
             power[-y % projector.height, -x % projector.width] = 0.0
         cycles = [np.fft.fftfreq(side) * side for side in projector]
         radius = np.hypot(cycles[0][:, None], cycles[1])
-        total = [np.sum(power_at(radius, kind) * power) for kind in self._belief.kinds]
+        total = [np.sum(power_at(radius, kind) * power) for kind in self._posterior.kinds]
         return np.array(total) / projector.pixels**2
 
     def _known(self, block: slice) -> _Of:
         """Gather camera pixels."""
-        transport, belief, band = self._transport, self._belief, self._band
+        transport, posterior, band = self._transport, self._posterior, self._band
         channels = transport.channels
-        white = belief.white.reshape(-1, channels)[block]
+        white = posterior.white.reshape(-1, channels)[block]
         centres = self._centres[block]
         q = transport.correspondence.reshape(-1, 2)[block]
         direct = corner_weights(q, centres) @ band.on_corners.T
         ones = band.recentre(np.ones_like(direct[:, :1]), centres)
-        offset_noise = belief.offset_noise.reshape(-1, channels)[block]
-        share = belief.share_of_white.reshape(-1, channels)[block]
-        light_noise = belief.light_noise.reshape(-1, channels)[block]
+        offset_noise = posterior.offset_noise.reshape(-1, channels)[block]
+        share = posterior.share_of_white.reshape(-1, channels)[block]
+        light_noise = posterior.light_noise.reshape(-1, channels)[block]
         return _Of(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
             nuisance.precision_of(white, offset_noise),
             np.maximum(transport.noise.reshape(-1, channels)[block], EXACT * white),
-            belief.strength.ravel()[block, None] * white,
+            posterior.strength.ravel()[block, None] * white,
             np.maximum(light_noise**2 - (share * offset_noise) ** 2, 0.0),
             share,
-            belief.kind.ravel()[block].astype(np.int64),
+            posterior.kind.ravel()[block].astype(np.int64),
         )
 
     def _variance(self, block: slice, asked: _Asked) -> Floats:
@@ -326,8 +326,8 @@ class ErrorBars:
 
     def _prior(self, place: int) -> Prior:
         if place not in self._priors:
-            kind: Kind = self._belief.kinds[place]
-            self._priors[place] = build_prior(kind, self._band, self._belief.repeats)
+            kind: Kind = self._posterior.kinds[place]
+            self._priors[place] = build_prior(kind, self._band, self._posterior.repeats)
         return self._priors[place]
 
 
@@ -345,7 +345,7 @@ def _of_kind(prior: Prior, known: _Of, asked: _Asked) -> Floats:
     turned = np.matmul(known.columns.transpose(0, 2, 1), prior.directions)[:, None]
     weighed = turned * weight[:, :, None]
     normal = np.matmul(weighed, turned.transpose(0, 1, 3, 2))
-    # o tells of white, d and q of direct light; all of what the answers say of n and f.
+    # o tells of white, d and q of direct light; all of what the responses say of n and f.
     shape = within.shape
     own = np.stack(
         [

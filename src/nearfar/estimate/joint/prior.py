@@ -1,11 +1,11 @@
 """A kind's expectation as the measured frequencies see it, the same for every camera pixel.
 
-With n about q of covariance C and f stationary over the pattern grid, of power S, the answers to
+With n about q of covariance C and f stationary over the pattern grid, of power S, the responses to
 the measured cosines and sines, re-centred on q, have the covariance K = B C B^T + diag(S), B the
 patterns over the window. Measured m times over, in units of one measurement's noise, its
 eigenvectors are those of sqrt(m) K sqrt(m), whatever the strength of the light and the noise.
 
-Index convention: r runs over real answers, w over window entries, i over eigenvectors,
+Index convention: r runs over real responses, w over window entries, i over eigenvectors,
 t over tabulated ratios.
 """
 
@@ -31,16 +31,16 @@ RATIOS = 2.0 ** np.arange(-16.0, 41.0, 0.5)
 
 @dataclass(frozen=True)
 class Spectrum:
-    """What tells how probable answers are under a kind.
+    """What tells how probable responses are under a kind.
 
     Attributes
     ----------
     levels : ndarray, shape (R,), float32
         Eigenvalues of sqrt(m) K sqrt(m), falling.
     directions : ndarray, shape (R, R), float32
-        Its eigenvectors, times sqrt(m): from re-centred answers to their coordinates.
+        Its eigenvectors, times sqrt(m): from re-centred responses to their coordinates.
     of_corners : ndarray, shape (9, R), float32
-        Coordinates of the answers of unit light at the entries around q.
+        Coordinates of the responses of unit light at the entries around q.
     """
 
     levels: Floats
@@ -66,9 +66,9 @@ class Prior(Spectrum):
     to_near : ndarray, shape (R, W^2), float32
         From weights of the eigenvectors to window entries.
     to_far : ndarray, shape (R, R), float32
-        From weights of the eigenvectors to re-centred answers of f.
+        From weights of the eigenvectors to re-centred responses of f.
     of_window : ndarray, shape (W^2, R), float32
-        Coordinates of the answers of unit light at each window entry.
+        Coordinates of the responses of unit light at each window entry.
     ratios : ndarray, shape (T,)
         (s / sigma)^2, for which is tabulated:
     curvatures : ndarray, shape (T, W^2), float32
@@ -97,7 +97,7 @@ class Prior(Spectrum):
         return (*super()._met, "to_near", "to_far", "of_window", "curvatures")
 
     def told_by(self, chosen: Integers, band: Band, repeats: Floats) -> Spectrum:
-        """Return the spectrum of some answers alone."""
+        """Return the spectrum of some responses alone."""
         patterns = band.on_window[chosen].astype(np.float64)
         matrix = patterns @ self.covariance @ patterns.T + np.diag(self.power[chosen])
         levels, directions = _decomposed(matrix, repeats[chosen])

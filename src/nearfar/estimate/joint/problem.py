@@ -1,6 +1,6 @@
-"""What all turns of the joint estimate share: the answers in order, q, and the kinds.
+"""What all turns of the joint estimate share: the responses in order, q, and the kinds.
 
-Index convention: arrays are (C, channels, ...); r runs over real answers, w over window entries.
+Index convention: arrays are (C, channels, ...); r runs over real responses, w over window entries.
 """
 
 from functools import lru_cache
@@ -149,7 +149,7 @@ def lay_out(
     )
     white = scale_of(measurements)
     whole = Whole(
-        answers=measurements.answers[..., model.band.places],
+        responses=measurements.responses[..., model.band.places],
         correspondence=correspondence.reshape(-1, 2),
         centres=near.centre(correspondence, measurements.projector),
         lit=lit,

@@ -1,9 +1,9 @@
 """The posterior mean of d, n and f for camera pixels of one kind whose windows are whole.
 
-Inside the projector the covariance of the answers is diagonal in the kind's eigenvectors, and the
+Inside the projector the covariance of the responses is diagonal in the kind's eigenvectors, and the
 mean is a product there and one back. Where the border cuts the window, see `cut`.
 
-Index convention: arrays are (n, channels, ...); r runs over real answers, i over eigenvectors, w
+Index convention: arrays are (n, channels, ...); r runs over real responses, i over eigenvectors, w
 over window entries, g over the numbers of `nuisance`.
 """
 
@@ -22,11 +22,11 @@ class Found(NamedTuple):
     Attributes
     ----------
     shared : ndarray, shape (n, channels, 4 + E)
-        o, what the references' error adds to the answers; d; by how much q is off down and
+        o, what the references' error adds to the responses; d; by how much q is off down and
         across, times d; and d2 ... of other surfaces.
     near : ndarray, shape (n, channels, W^2)
     far : ndarray, shape (n, channels, R)
-        Answers of f, re-centred.
+        Responses of f, re-centred.
     near_noise : ndarray, shape (n, channels)
         Mean variance of a window entry that the photos' noise causes.
     pull : ndarray, shape (n, channels, W^2)
@@ -72,11 +72,11 @@ def solve_whole(pixels: Pixels, prior: Prior, ratio: Floats, _band: Band) -> Fou
     ratio : ndarray, shape (n, channels)
         (s / sigma)^2.
     """
-    xp = namespace(pixels.answers)
+    xp = namespace(pixels.responses)
     noise = xp.astype(pixels.noise[..., None], xp.float32) ** 2
     strong = xp.astype(ratio[..., None], xp.float32) * noise
     weight = 1.0 / (strong * prior.levels + noise)
-    y = product(pixels.answers, prior.directions)
+    y = product(pixels.responses, prior.directions)
     turned = nuisance.turned(pixels, prior)
     across = xp.permute_dims(turned, (0, 2, 1))
     normal, right = [], []

@@ -3,7 +3,7 @@
 The first is taken alone; later ones start from what the neighbours expect of each camera pixel and
 estimate what differs.
 
-Index convention: arrays are (C, channels, ...); r runs over real answers, w over window entries.
+Index convention: arrays are (C, channels, ...); r runs over real responses, w over window entries.
 """
 
 from collections.abc import Callable, Iterator
@@ -66,7 +66,7 @@ def take_turn(
     """
     whole, model = problem.whole, problem.model
     band, projector = model.band, problem.measurements.projector
-    xp, number = namespace(whole.answers), len(whole.answers)
+    xp, number = namespace(whole.responses), len(whole.responses)
     rows = _empty_rows(problem, before)
     choice = rows.choices[-1]
     known = None
@@ -75,14 +75,14 @@ def take_turn(
     cut = whole.lit & ~xp.all(near.inside(whole.centres, problem.window, projector), axis=1)
 
     def shown(chosen: slice | NDArray[np.int64]) -> Floats | None:
-        """Answers that are expected, and what 8 bits made of direct light."""
+        """Responses that are expected, and what 8 bits made of direct light."""
         if known is None:
             return None
-        answers = product(known.expected.near[chosen], band.on_window.T)
-        answers = band.uncentre(answers, whole.centres[chosen])
-        answers += known.expected.far[chosen]
-        answers += known.before.shared[chosen, :, 1, None] * known.misdrawn(chosen)[:, None]
-        return answers
+        responses = product(known.expected.near[chosen], band.on_window.T)
+        responses = band.uncentre(responses, whole.centres[chosen])
+        responses += known.expected.far[chosen]
+        responses += known.before.shared[chosen, :, 1, None] * known.misdrawn(chosen)[:, None]
+        return responses
 
     def put(chosen: NDArray[np.int64], pixels: Pixels, found: Found) -> None:
         rows.shared[chosen] = found.shared[..., :KEPT]
@@ -118,7 +118,7 @@ def take_turn(
 
     def estimate_cut(part: NDArray[np.int64]) -> None:
         """Estimate camera pixels of one kind whose windows the border cuts."""
-        chosen = beside(part, whole.answers)
+        chosen = beside(part, whole.responses)
         pixels = gather(whole, chosen, band, projector, shown(chosen))
         prior = model.lit.priors[int(choice.kind[chosen[0]])]
         ratio = rounded(ratio_of(pixels, choice.strength[chosen]))
@@ -133,11 +133,11 @@ def take_turn(
 
 def _empty_rows(problem: Problem, before: Rows | None) -> Rows:
     """Make room for what a turn finds, behind the choices of the turns before."""
-    answers = problem.whole.answers
-    xp, (number, channels, count) = namespace(answers), answers.shape
+    responses = problem.whole.responses
+    xp, (number, channels, count) = namespace(responses), responses.shape
 
     def zeros(*shape: int, dtype: Any = xp.float32) -> Any:
-        return xp.zeros(shape, dtype=dtype, device=device(answers))
+        return xp.zeros(shape, dtype=dtype, device=device(responses))
 
     return Rows(
         zeros(number, channels, KEPT),
@@ -175,12 +175,12 @@ def _cut_alike(whole: Whole, kind: Integers, cut: Booleans) -> Iterator[NDArray[
 
 
 def _misdrawn(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
-    """Return what tells the answers (n, R) of unit direct light to what 8 bits got wrong."""
+    """Return what tells the responses (n, R) of unit direct light to what 8 bits got wrong."""
     # A row for each projector pixel, so that what a camera pixel asks for lies side by side.
     shown_error = problem.measurements.shown_error[problem.model.band.places]
     where = footprint(fetch(problem.whole.correspondence), problem.measurements.projector)
     error, places, shares = (
-        beside(np.ascontiguousarray(values), problem.whole.answers)
+        beside(np.ascontiguousarray(values), problem.whole.responses)
         for values in (shown_error.T, where.pixels, where.weights)
     )
 

@@ -93,7 +93,7 @@ def _rival(data: Data) -> str:
     return (
         f"{found['patterns']} patterns each, without noise; errors are shown brighter. This method "
         f"is given q, as the paper has it from stripes, and its complex patterns hold "
-        f"{found['answers_of_this_method']} real answers. Compressive light transport (CLT): "
+        f"{found['answers_of_this_method']} real responses. Compressive light transport (CLT): "
         f"Bernoulli patterns, rows sparse in the Haar basis, each reconstructed on its own, "
         f"{'refitted by least squares' if found['refitted'] else 'without refitting'}, with the "
         f"lambda that is best against the truth: {found['share']:.1e} of each row's "

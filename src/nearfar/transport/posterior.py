@@ -10,7 +10,7 @@ from nearfar.transport.kinds import Kind
 
 
 @dataclass(frozen=True)
-class Belief:
+class Posterior:
     """Kinds, strengths and noise that a joint estimate ended with.
 
     Attributes

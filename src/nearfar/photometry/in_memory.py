@@ -12,7 +12,7 @@ from nearfar.plan import Plan
 
 
 @dataclass(frozen=True)
-class HeldPhotos:
+class PhotosInMemory:
     """Photos in memory, read as from a capture.
 
     Attributes

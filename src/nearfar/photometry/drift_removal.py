@@ -21,7 +21,7 @@ LEVELS = 2**18
 
 
 @dataclass(frozen=True)
-class SteadyPhotos:
+class PhotosWithoutDrift:
     """Photos by reference without the drift of lamp and ambient light; read as any others.
 
     Attributes
@@ -62,7 +62,9 @@ class SteadyPhotos:
         return np.stack(told, axis=1)
 
 
-def steady(photos: Photos, progress: Callable[[int], None] | None = None) -> SteadyPhotos:
+def remove_drift(
+    photos: Photos, progress: Callable[[int], None] | None = None
+) -> PhotosWithoutDrift:
     """Follow lamp, ambient light and noise through a capture, the whole camera at once.
 
     Parameters
@@ -74,7 +76,7 @@ def steady(photos: Photos, progress: Callable[[int], None] | None = None) -> Ste
 
     Returns
     -------
-    SteadyPhotos
+    PhotosWithoutDrift
         To be measured in blocks of rows as one pleases.
 
     Raises
@@ -83,11 +85,11 @@ def steady(photos: Photos, progress: Callable[[int], None] | None = None) -> Ste
         If the plan has fewer than two whites or two blacks, or the lamp failed.
     """
     drift = follow_drift(photos, progress)
-    found = SteadyPhotos(photos, drift)
-    return SteadyPhotos(photos, drift, _noise_of_repeats(found))
+    found = PhotosWithoutDrift(photos, drift)
+    return PhotosWithoutDrift(photos, drift, _noise_of_repeats(found))
 
 
-def _noise_of_repeats(photos: SteadyPhotos) -> tuple[NoiseModel, ...]:
+def _noise_of_repeats(photos: PhotosWithoutDrift) -> tuple[NoiseModel, ...]:
     """Fit shot and read noise to the scatter of every pattern that was shown more than once."""
     shown: dict[tuple[Answer, bool], list[int]] = {}
     for answer, signed in find_shown(photos.plan).items():

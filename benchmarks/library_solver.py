@@ -13,8 +13,8 @@ from sklearn.linear_model import ARDRegression
 from nearfar import Size
 from nearfar.estimate.sparse import least_risk, solve
 from nearfar.illumination.frequencies import near_frequencies, representatives
+from nearfar.illumination.real_basis import real_basis
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
 
 WINDOW, NOISE = 19, 0.003
 ALONE, TOGETHER = 20, 128 * 128 * 3
@@ -27,7 +27,7 @@ def main() -> None:
     generator = np.random.default_rng(0)
     offsets = near.offsets(WINDOW)
     frequencies = representatives(near_frequencies(WINDOW, Size(1, 1)))
-    patterns = real_basis(frequencies, Size(128, 128)).drawn_at(offsets)
+    patterns = real_basis(frequencies, Size(128, 128)).patterns_at(offsets)
     windows = generator.uniform(0, 0.05, (TOGETHER, len(offsets))).astype(np.float32)
     windows *= generator.random(windows.shape) < 0.1
     noisy = generator.normal(0, NOISE, (TOGETHER, len(patterns))).astype(np.float32)

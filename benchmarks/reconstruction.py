@@ -18,10 +18,10 @@ import numpy as np
 
 from nearfar import Size, Transport, acquire, open_capture, paper_plan, reconstruct
 from nearfar.illumination.frequencies import far_frequencies, representatives
+from nearfar.illumination.real_basis import real_basis
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.transport.far import real_basis
 
 PROJECTOR = Size(128, 128)
 WINDOW, FAR = 19, Size(13, 13)

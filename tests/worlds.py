@@ -4,11 +4,11 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
+from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.theory import measure_in_theory
 from nearfar.plan import paper_plan
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
 from nearfar.transport.model import Transport
 
 

@@ -17,11 +17,11 @@ from nearfar.illumination.frequencies import (
     near_frequencies,
     representatives,
 )
+from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
-from nearfar.transport.far import real_basis
 from tests.worlds import ideal_measurements, model_transport
 
 PROJECTOR = Size(24, 30)

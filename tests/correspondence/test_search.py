@@ -13,7 +13,7 @@ from nearfar.illumination.frequencies import (
     near_frequencies,
     representatives,
 )
-from nearfar.transport.far import real_basis
+from nearfar.illumination.real_basis import real_basis
 
 PROJECTOR = Size(10, 13)
 # Its own negative: a cosine without a sine.

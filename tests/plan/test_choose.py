@@ -8,10 +8,10 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.frequencies import CHECKERBOARD, DC
+from nearfar.illumination.real_basis import real_basis
 from nearfar.plan import choose_plan, parse_plan
 from nearfar.plan.choose import LEAST_PHOTOS, candidates, choose_frequencies, default_window
 from nearfar.plan.typical import TYPICAL, noise_of, typical_of
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, STRENGTHS, Kind
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior

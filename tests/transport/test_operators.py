@@ -16,9 +16,9 @@ from nearfar.illumination.frequencies import (
     representatives,
     wrap,
 )
+from nearfar.illumination.real_basis import real_basis
 from nearfar.transport import direct, near
 from nearfar.transport.exact import ExactTransport
-from nearfar.transport.far import real_basis
 from nearfar.transport.model import Transport
 from tests.worlds import ideal_measurements, model_transport
 

@@ -15,8 +15,8 @@ from nearfar.errors import (
     NearfarError,
     UnreadableFileError,
 )
+from nearfar.illumination.real_basis import real_basis
 from nearfar.transport.exact_store import load_exact, save_exact
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior

@@ -22,7 +22,7 @@ from scipy import fft
 from nearfar.arrays import Floats, Integers, Size, blocks
 from nearfar.illumination.frequencies import grid, representatives
 from nearfar.illumination.patterns import cosine, invert, quantise, sine
-from nearfar.transport.far import RealBasis, real_basis
+from nearfar.illumination.real_basis import RealBasis, real_basis
 
 # Patterns drawn at once while refining.
 DRAWN = 32

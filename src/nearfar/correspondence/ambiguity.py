@@ -13,7 +13,7 @@ from scipy.special import ndtr
 
 from nearfar.correspondence.background import SEARCH
 from nearfar.errors import InputError
-from nearfar.transport.far import RealBasis
+from nearfar.illumination.real_basis import RealBasis
 
 # Noise of an answer, and direct light, as shares of the white of a camera pixel.
 NOISE = 0.02

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.transport.far import RealBasis
+from nearfar.illumination.real_basis import RealBasis
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,9 @@ from nearfar.correspondence.orientation import turned_round
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
-from nearfar.transport.far import RealBasis
 
 # Values of the score that are held at once.
 HELD = 2**22
@@ -279,7 +279,7 @@ def _footprints(
     places = offsets[:, None] + centre
     inside: Booleans = np.all((places >= 0) & (places <= limit), axis=-1)
     turned = basis.recentre(weighed.responses[:, None], centre)[:, 0]
-    scores = np.ascontiguousarray((turned @ basis.drawn_at(offsets)).T)
+    scores = np.ascontiguousarray((turned @ basis.patterns_at(offsets)).T)
     gram = (overlap.T @ weighed.weights.T)[number]
     entries, left = _nonnegative(scores, gram, inside, ridge)
     total = entries.sum(axis=0)

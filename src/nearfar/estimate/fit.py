@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, blocks
 from nearfar.estimate.matrices import Band, band_of
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import direct, near
 from nearfar.transport.exact import ExactTransport
-from nearfar.transport.far import RealBasis
 from nearfar.transport.model import Transport
 
 # Inside the window n takes whatever f leaves, so f is fitted to what lies outside; this weight

@@ -16,9 +16,9 @@ from nearfar.illumination.frequencies import (
     near_frequencies,
     representatives,
 )
+from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.far import RealBasis, real_basis
 
 # Window offsets that the direct light's 2 x 2 footprint can touch.
 CORNERS = np.array([(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1)])
@@ -96,7 +96,7 @@ def _band(measurements: Measurements, frequencies: Sequence[Frequency], window: 
 def band_of(basis: RealBasis, window_offsets: NDArray[np.int64]) -> Band:
     """Return a basis with its patterns about q; its responses stand in its own order."""
     return Band(
-        basis, np.arange(basis.count), basis.drawn_at(window_offsets), basis.drawn_at(CORNERS)
+        basis, np.arange(basis.count), basis.patterns_at(window_offsets), basis.patterns_at(CORNERS)
     )
 
 
@@ -147,7 +147,7 @@ def build_matrices(measurements: Measurements, window: int, far: Size, dropped: 
     lowest = real_basis(
         representatives(grid(dropped, Size(window, window))), measurements.projector
     )
-    unseen = lowest.drawn_at(near.offsets(window)).T.astype(np.float64)
+    unseen = lowest.patterns_at(near.offsets(window)).T.astype(np.float64)
     energy = np.sum(near_band.on_window.astype(np.float64) ** 2, axis=1)
     return Matrices(
         window,

@@ -18,6 +18,7 @@ import numpy as np
 from nearfar.arrays import Floats, Integers, blocks
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import ahead
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.noise import NoiseModel, fit_noise
@@ -32,7 +33,6 @@ from nearfar.photometry.photos import (
     two_levels,
 )
 from nearfar.plan import Plan, Sinusoid
-from nearfar.transport.far import RealBasis
 
 # Pairs that sum to more or less than white + black by this share of white are not linear.
 NOT_LINEAR = 0.005

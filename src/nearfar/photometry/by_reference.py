@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.photometry.measurements import Measurements
@@ -31,7 +32,6 @@ from nearfar.photometry.photos import (
     two_levels,
 )
 from nearfar.plan import Plan
-from nearfar.transport.far import RealBasis
 
 
 def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, int]], Floats]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import Frequency
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.photometry.by_inverse import find_pairs, measure_pairs, responses_of_pairs
 from nearfar.photometry.by_reference import measure_by_reference, responses_by_reference
 from nearfar.photometry.drift import find_references
@@ -11,7 +12,6 @@ from nearfar.photometry.drift_removal import PhotosWithoutDrift, remove_drift
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos, find_shown
 from nearfar.plan import Plan
-from nearfar.transport.far import RealBasis
 
 
 def measured_frequencies(plan: Plan) -> set[Frequency]:

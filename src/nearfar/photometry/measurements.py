@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size
 from nearfar.illumination.frequencies import Frequency
-from nearfar.transport.far import RealBasis
+from nearfar.illumination.real_basis import RealBasis
 
 
 def _left_out() -> Floats:

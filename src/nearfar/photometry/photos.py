@@ -14,9 +14,9 @@ from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import Frequency
+from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.parallel import ahead
 from nearfar.plan import Plan, Sinusoid, Stripe
-from nearfar.transport.far import RealBasis, real_basis
 
 # Photos read at once.
 BATCH = 16

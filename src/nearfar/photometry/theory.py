@@ -11,10 +11,10 @@ import numpy as np
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.frequencies import representatives
+from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
 from nearfar.plan.model import Exponential
-from nearfar.transport.far import real_basis
 
 # Camera pixels at once.
 BLOCK = 512

@@ -28,12 +28,12 @@ from nearfar.illumination.frequencies import (
     representatives,
     wrap,
 )
+from nearfar.illumination.real_basis import real_basis
 from nearfar.plan.model import Plan, Purpose
 from nearfar.plan.paper import LARGEST, sinusoids
 from nearfar.plan.references import FEWEST, with_references
 from nearfar.plan.typical import TYPICAL, Typical
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import far_power, near_covariance
 
 # Standard deviation of an answer to a sinusoid, as a share of white: 30 000 electrons at full

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import near
-from nearfar.transport.far import RealBasis
 
 # Neighbouring window entries answer alike over about this many projector pixels.
 CORRELATION = 1.0

@@ -11,10 +11,10 @@ from scipy.sparse.linalg import LinearOperator
 
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.errors import InputError
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
-from nearfar.transport.far import RealBasis
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior

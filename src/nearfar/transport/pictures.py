@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size, blocks
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import side_by_side
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.direct import Footprint
-from nearfar.transport.far import RealBasis
 
 # Camera pixels at once: their windows stay near the processor while lights change.
 BLOCK = 1024

@@ -10,9 +10,9 @@ import numpy as np
 from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
-from nearfar.transport.far import RealBasis
 from nearfar.transport.posterior import deviation_of_mean
 
 if TYPE_CHECKING:

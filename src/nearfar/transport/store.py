@@ -20,7 +20,7 @@ from nearfar.files import (
     read_selection,
 )
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
-from nearfar.transport.far import RealBasis, real_basis
+from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.transport.kinds import Kind
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior

@@ -9,10 +9,10 @@ from nearfar.estimate.joint.pixels import Whole, gather, offset_noise, scale_of
 from nearfar.estimate.joint.solve import Found, ratio_of, solve_whole
 from nearfar.estimate.matrices import Band, band_of
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose import choose_frequencies
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, far_power, near_covariance
 
 PROJECTOR = Size(16, 20)

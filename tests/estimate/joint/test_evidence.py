@@ -10,9 +10,9 @@ from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.evidence import best_kind, evidence, screened, tell
 from nearfar.estimate.joint.prior import build_prior
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose import choose_frequencies
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, STRENGTHS, Kind
 from tests.estimate.joint.draws import (
     KIND,

@@ -14,7 +14,7 @@ from nearfar.estimate.joint.nuisance import columns, precision
 from nearfar.estimate.joint.prior import build_prior
 from nearfar.estimate.joint.solve import Found, solve_whole
 from nearfar.illumination.patterns import exponential
-from nearfar.transport.far import real_basis
+from nearfar.illumination.real_basis import real_basis
 from nearfar.transport.kinds import Kind, far_power, near_covariance
 from tests.estimate.joint.draws import (
     FAR,

@@ -14,6 +14,7 @@ from nearfar.estimate.joint.posterior import ErrorBars
 from nearfar.estimate.matrices import band_of
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.pictures import standard_lights
+from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.plan.choose import choose_frequencies
@@ -22,7 +23,6 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, far_power, near_covariance, power_at
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior

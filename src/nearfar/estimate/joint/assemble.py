@@ -13,10 +13,10 @@ from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.problem import Problem, Rows
 from nearfar.estimate.matrices import Band, band_of
 from nearfar.illumination.frequencies import DC, far_frequencies
+from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import LIT, UNLIT
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior

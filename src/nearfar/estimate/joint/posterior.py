@@ -19,9 +19,9 @@ from nearfar.estimate.joint.pixels import EXACT, responses_of_direct
 from nearfar.estimate.joint.prior import Prior, build_prior
 from nearfar.estimate.matrices import Band, band_of, corner_weights
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.real_basis import real_basis
 from nearfar.transport import near
 from nearfar.transport.direct import footprint
-from nearfar.transport.far import real_basis
 from nearfar.transport.kinds import Kind, power_at
 from nearfar.transport.model import Components, Transport
 from nearfar.transport.posterior import Posterior

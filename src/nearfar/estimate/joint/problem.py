@@ -22,9 +22,9 @@ from nearfar.estimate.joint.pixels import (
 from nearfar.estimate.joint.prior import build_prior
 from nearfar.estimate.matrices import Band, band_of
 from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.far import RealBasis, real_basis
 from nearfar.transport.kinds import LIT, UNLIT, Kind
 
 # Direct light this close to a whole projector pixel is taken to be all that pixel's: noise moves q

@@ -1,8 +1,9 @@
-"""Far-range transport: a few low frequencies, in real arithmetic.
+"""Responses to frequencies in real arithmetic: cosines and sines on the pattern grid.
 
-A row of F is f(p) = (1/P) sum_k b_k exp(j 2 pi k.p). Its coefficients are kept as the real
-responses to cosines and sines, b_k = (answer to cos) - j (answer to sin), one for a frequency
-that is its own negative and two for a pair +-k, which share them.
+A camera pixel's response to exp(-j 2 pi k.p) is b_k = (response to cos) - j (response to sin). It
+is kept as those two real numbers, or as the first alone where k is its own negative; k and -k
+share them. They are also the coefficients of a row of F,
+f(p) = (1/P) sum_k b_k exp(j 2 pi k.p).
 
 Index convention: m runs over the real coefficients, cosine before sine for each k.
 """
@@ -47,7 +48,7 @@ class RealBasis:
 
     @cached_property
     def is_sine(self) -> NDArray[np.bool_]:
-        """Which coefficients answer a sine, shape (M,)."""
+        """Whether each coefficient belongs to a sine, shape (M,)."""
         return np.array(
             [sine for k in self.frequencies for sine in (False, True)[: self._parts(k)]],
             dtype=bool,
@@ -71,7 +72,7 @@ class RealBasis:
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:
-        """1/P, or 2/P for a pair +-k: what the inverse DFT gives each coefficient, (M,)."""
+        """Weight of each coefficient in the inverse DFT: 1/P, or 2/P for a pair +-k, shape (M,)."""
         parts = np.array([self._parts(k) for k in self.frequencies], dtype=np.float64)
         return np.asarray(parts[self.index] / self.projector.pixels)
 
@@ -90,43 +91,50 @@ class RealBasis:
             drawn[m] = wave.imag if sine else wave.real
         return drawn.reshape(self.count, len(down) * len(across))
 
-    def drawn_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
+    def patterns_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
         """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""
         angle = 2 * np.pi * (self.cycles @ offsets.T)[self.index]
-        drawn = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))
-        return drawn.astype(np.float32)
+        patterns = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))
+        return patterns.astype(np.float32)
 
     def recentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
-        """Turn responses (n, channels, M) about each camera pixel's centre (n, 2)."""
-        return self._turn(responses, centres, +1)
+        """Shift the phases of responses so that offsets count from each camera pixel's centre.
+
+        Parameters
+        ----------
+        responses : ndarray, shape (n, channels, M)
+        centres : ndarray of int, shape (n, 2)
+            Projector pixels (y, x).
+        """
+        return self._shift_phases(responses, centres, +1)
 
     def uncentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
         """Inverse of `recentre`."""
-        return self._turn(responses, centres, -1)
+        return self._shift_phases(responses, centres, -1)
 
-    def _turn(self, responses: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
+    def _shift_phases(self, responses: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
         xp = namespace(responses)
-        down, across = (beside(phase, responses) for phase in self._single_phases)
-        turn = down[centres[:, 0]] * across[centres[:, 1]]
-        real, imaginary = xp.real(turn)[:, None], xp.imag(turn)[:, None]
+        down, across = (beside(phases, responses) for phases in self._single_phases)
+        phase = down[centres[:, 0]] * across[centres[:, 1]]
+        real, imaginary = xp.real(phase)[:, None], xp.imag(phase)[:, None]
         cosine = np.flatnonzero(~self.is_sine)
-        # Frequencies that are their own negative answer no sine: their phase is 1 or -1.
+        # A frequency that is its own negative has no sine: its phase is 1 or -1.
         own = np.diff(np.append(cosine, self.count)) == 1
-        turned: Floats = xp.empty_like(responses)
+        shifted: Floats = xp.empty_like(responses)
         single, alone = beside(cosine[own], responses), beside(np.flatnonzero(own), responses)
-        turned[..., single] = responses[..., single] * real[..., alone]
+        shifted[..., single] = responses[..., single] * real[..., alone]
         first = np.flatnonzero(~own)
         if not len(first):
-            return turned
-        # Views where the pairs stand side by side, as they do but for the few above.
+            return shifted
+        # Runs of pairs side by side, so that slices are views and nothing is copied.
         for run in np.split(first, np.flatnonzero(np.diff(first) != 1) + 1):
             start, stop = cosine[run[0]], cosine[run[-1]] + 2
             c = real[..., run[0] : run[-1] + 1]
             s = sign * imaginary[..., run[0] : run[-1] + 1]
             even, odd = responses[..., start:stop:2], responses[..., start + 1 : stop : 2]
-            turned[..., start:stop:2] = even * c + odd * s
-            turned[..., start + 1 : stop : 2] = odd * c - even * s
-        return turned
+            shifted[..., start:stop:2] = even * c + odd * s
+            shifted[..., start + 1 : stop : 2] = odd * c - even * s
+        return shifted
 
     @cached_property
     def _phases(self) -> tuple[Complexes, Complexes]:
@@ -156,5 +164,5 @@ class RealBasis:
 
 
 def real_basis(frequencies: Sequence[Frequency], projector: Size) -> RealBasis:
-    """Return the cosines and sines of frequencies of which each stands for +-k."""
+    """Return the basis of cosines and sines of frequencies, each of which stands for +-k."""
     return RealBasis(tuple(frequencies), projector)

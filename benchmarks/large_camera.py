@@ -71,7 +71,7 @@ def run(camera: Size, folder: Path, method: str) -> None:
         np.save(folder / "q.npy", q.astype(np.float32))
         given = ["--method", "paper", "--correspondence", str(folder / "q.npy")]
     capture = folder / "capture.zarr"
-    write_capture(capture, plan, photos_of(plan, camera))
+    write_capture(plan, capture, photos_of(plan, camera))
     command = [sys.executable, "-c", COMMAND, "reconstruct", str(capture), str(folder / "t.zarr")]
     started = time.perf_counter()
     said = subprocess.run([*command, *given], check=True, capture_output=True, text=True)

@@ -75,7 +75,7 @@ def main() -> None:
     """Print the table."""
     folder = tempfile.TemporaryDirectory()
     path = Path(folder.name) / "transport.zarr"
-    save_transport(path, random_transport(Size(*PROJECTOR), WINDOW, FAR))
+    save_transport(random_transport(Size(*PROJECTOR), WINDOW, FAR), path)
     told, ended = threading.Event(), threading.Event()
     addresses: list[str] = []
 

@@ -53,8 +53,8 @@ def main() -> None:
         plan, scale = source.plan, source.full_scale
         with RunningEstimate(plan, scale, memory=MEMORY) as estimate:
             capture = write_capture(
-                Path(folder, "again.zarr"),
                 plan,
+                Path(folder, "again.zarr"),
                 one_by_one(source, seconds),
                 full_scale=scale,
                 enough=estimate,

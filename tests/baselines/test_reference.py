@@ -144,7 +144,7 @@ def test_transport_goes_to_a_file_and_into_a_store(tmp_path):
     out = np.memmap(tmp_path / "far.bin", dtype=np.float32, mode="w+", shape=shape)
     found = acquire_reference(Hadamard(size), _rig(world), out=out)
     assert found.far is out
-    save_exact(tmp_path / "found.zarr", found)
+    save_exact(found, tmp_path / "found.zarr")
     back = load_exact(tmp_path / "found.zarr")
     assert np.array_equal(back.far, out)
     assert back.name == "Hadamard"

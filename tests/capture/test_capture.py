@@ -46,8 +46,8 @@ def test_what_is_written_is_read(tmp_path: Path, dtype: str, channels: int | Non
     told: list[int] = []
     before = time.time()
     written = write_capture(
-        tmp_path / "a.zarr",
         PLAN,
+        tmp_path / "a.zarr",
         iter(photos),
         rig={"camera": "simulated"},
         exposure=0.02,
@@ -79,7 +79,7 @@ def test_what_is_written_is_read(tmp_path: Path, dtype: str, channels: int | Non
 
 def test_full_scale_and_saturation(tmp_path: Path) -> None:
     photos = [np.minimum(p, 16383) for p in photos_of(PLAN)]
-    capture = write_capture(tmp_path / "a.zarr", PLAN, photos, full_scale=16383)
+    capture = write_capture(PLAN, tmp_path / "a.zarr", photos, full_scale=16383)
     share = [np.mean(p >= 16383) for p in photos]
     np.testing.assert_array_equal(capture.saturated, share)
     assert capture.saturated_share == pytest.approx(np.mean(share))
@@ -116,9 +116,9 @@ BAD: dict[str, tuple[Any, str]] = {
 @pytest.mark.parametrize("name", BAD)
 def test_photos_that_do_not_fit_are_refused(tmp_path: Path, name: str) -> None:
     photos, words = BAD[name]
-    old = write_capture(tmp_path / "a.zarr", PLAN, photos_of(PLAN))
+    old = write_capture(PLAN, tmp_path / "a.zarr", photos_of(PLAN))
     with pytest.raises(InputError, match=words):
-        write_capture(tmp_path / "a.zarr", PLAN, photos, force=True)
+        write_capture(PLAN, tmp_path / "a.zarr", photos, force=True)
     assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
     np.testing.assert_array_equal(open_capture(tmp_path / "a.zarr").times, old.times)
 
@@ -131,17 +131,17 @@ def test_a_capture_without_white_that_is_all_the_same_is_refused(tmp_path: Path)
     for value, words in ((0, f"all {len(stripes)} photos are black"), (7, "are the same")):
         with pytest.raises(InputError, match=words):
             write_capture(
-                tmp_path / "a.zarr", plan, [np.full((5, 6), value, np.uint8)] * len(stripes)
+                plan, tmp_path / "a.zarr", [np.full((5, 6), value, np.uint8)] * len(stripes)
             )
     assert list(tmp_path.iterdir()) == []
 
 
 def test_values_above_full_scale_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"photo 0 .*above the full scale of 16383"):
-        write_capture(tmp_path / "a.zarr", PLAN, photos_of(PLAN), full_scale=16383)
+        write_capture(PLAN, tmp_path / "a.zarr", photos_of(PLAN), full_scale=16383)
     for bad in (0, -1, float("nan"), float("inf")):
         with pytest.raises(InputError, match="full scale"):
-            write_capture(tmp_path / "a.zarr", PLAN, photos_of(PLAN), full_scale=bad)
+            write_capture(PLAN, tmp_path / "a.zarr", photos_of(PLAN), full_scale=bad)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -153,12 +153,12 @@ def never() -> Iterator[NDArray[Any]]:
 def test_what_can_be_refused_is_refused_before_any_photo(tmp_path: Path) -> None:
     theory = paper_plan(Size(4, 5), 1, Size(1, 1), offset="none")
     with pytest.raises(PlanError, match="complex"):
-        write_capture(tmp_path / "a.zarr", theory, never())
+        write_capture(theory, tmp_path / "a.zarr", never())
     with pytest.raises(MissingFileError):
-        write_capture(tmp_path / "no" / "a.zarr", PLAN, never())
+        write_capture(PLAN, tmp_path / "no" / "a.zarr", never())
     (tmp_path / "a.zarr").write_text("old")
     with pytest.raises(ExistingOutputError):
-        write_capture(tmp_path / "a.zarr", PLAN, never())
+        write_capture(PLAN, tmp_path / "a.zarr", never())
 
 
 def test_a_photo_is_on_the_disk_before_the_next_is_asked_for(tmp_path: Path) -> None:
@@ -168,7 +168,7 @@ def test_a_photo_is_on_the_disk_before_the_next_is_asked_for(tmp_path: Path) -> 
             assert found == {f"c.{j}.0.0.0" for j in range(i)}
             yield photo
 
-    write_capture(tmp_path / "a.zarr", PLAN, watched())
+    write_capture(PLAN, tmp_path / "a.zarr", watched())
 
 
 def test_a_fault_of_the_camera_leaves_nothing(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_a_fault_of_the_camera_leaves_nothing(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_capture(tmp_path / "a.zarr", PLAN, failing())
+        write_capture(PLAN, tmp_path / "a.zarr", failing())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -192,12 +192,12 @@ def photos():
     yield np.full((5, 6), 9, np.uint8)
     print("writing", flush=True)
     time.sleep(60)
-write_capture(Path(sys.argv[1]), paper_plan(Size(4, 5), 1, Size(1, 1)), photos(), force=True)
+write_capture(paper_plan(Size(4, 5), 1, Size(1, 1)), Path(sys.argv[1]), photos(), force=True)
 """
 
 
 def test_a_killed_capture_leaves_the_old(tmp_path: Path) -> None:
-    write_capture(tmp_path / "a.zarr", PLAN, photos_of(PLAN))
+    write_capture(PLAN, tmp_path / "a.zarr", photos_of(PLAN))
     command = [sys.executable, "-c", KILLED, str(tmp_path / "a.zarr")]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as running:
         assert running.stdout is not None
@@ -236,7 +236,7 @@ def change_attributes(path: Path, **changes: Any) -> None:
 def test_a_capture_that_does_not_fit_gets_a_sentence(
     tmp_path: Path, changes: dict[str, Any], words: str
 ) -> None:
-    write_capture(tmp_path / "a.zarr", PLAN, photos_of(PLAN))
+    write_capture(PLAN, tmp_path / "a.zarr", photos_of(PLAN))
     change_attributes(tmp_path / "a.zarr", **changes)
     with pytest.raises(UnreadableFileError, match=words):
         open_capture(tmp_path / "a.zarr")
@@ -244,7 +244,7 @@ def test_a_capture_that_does_not_fit_gets_a_sentence(
 
 def test_a_damaged_photo_gets_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "a.zarr"
-    capture = write_capture(path, PLAN, photos_of(PLAN))
+    capture = write_capture(PLAN, path, photos_of(PLAN))
     chunk = path / "photos" / "c.4.0.0.0"
     data = bytearray(chunk.read_bytes())
     data[len(data) // 2] ^= 1
@@ -268,7 +268,7 @@ def test_rows_of_large_photos_are_read_without_the_rest(tmp_path: Path, monkeypa
     assert height % 3
     monkeypatch.setattr(writing, "CHUNK_BYTES", 3 * row + 1)
     path = tmp_path / "a.zarr"
-    capture = write_capture(path, PLAN, photos)
+    capture = write_capture(PLAN, path, photos)
     assert (path / "photos" / "c.0.1.0.0").exists()
     np.testing.assert_array_equal(
         capture.read(slice(None)) * capture.full_scale, np.stack([np.atleast_3d(p) for p in photos])

@@ -108,7 +108,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Job:
     d, n, f = (np.moveaxis(part, 1, 0) for part in world.component_rows(slice(None)))
     thin = [tuple(sparse.csr_array(channel) for channel in part) for part in (d, n)]
     exact = ExactTransport(world.projector, world.camera, *thin, np.ascontiguousarray(f))
-    save_exact(job.apart, exact)
+    save_exact(exact, job.apart)
     np.save(job.light, np.random.default_rng(1).uniform(size=(16, 20)).astype(np.float32))
     check_done(run_nearfar(*PLAN, "-o", job.plan))
     check_done(run_nearfar("export", job.plan, job.patterns))

@@ -118,9 +118,9 @@ def _stored(tmp_path, scale=1.0):
         direct=scale, near=scale, far=scale
     )
     peak = float((world @ np.ones(SIZE)).max())
-    save_transport(tmp_path / "measured.zarr", world)
+    save_transport(world, tmp_path / "measured.zarr")
     exact = _exact_of(world)
-    save_exact(tmp_path / "exact.zarr", exact)
+    save_exact(exact, tmp_path / "exact.zarr")
     np.save(tmp_path / "dense.npy", exact.rows(slice(None))[:, 0])
     return world, peak
 

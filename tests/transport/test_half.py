@@ -47,7 +47,7 @@ def test_rounding_is_told_beside_the_noise(transport):
 
 
 def test_it_is_stored_as_it_is(tmp_path, transport):
-    save_transport(tmp_path / "half.zarr", in_half(transport))
+    save_transport(in_half(transport), tmp_path / "half.zarr")
     loaded = load_transport(tmp_path / "half.zarr")
     for name in ("near", "far"):
         assert getattr(loaded, name).dtype == np.float16

@@ -40,13 +40,13 @@ def generator():
 @pytest.fixture
 def stored(tmp_path, generator) -> Path:
     path = tmp_path / "t.zarr"
-    save_transport(path, _transport(generator))
+    save_transport(_transport(generator), path)
     return path
 
 
 def test_a_transport_comes_back(tmp_path, generator):
     transport = _transport(generator)
-    save_transport(tmp_path / "t.zarr", transport)
+    save_transport(transport, tmp_path / "t.zarr")
     loaded = load_transport(tmp_path / "t.zarr")
     for name in FACTORS:
         np.testing.assert_array_equal(getattr(loaded, name), getattr(transport, name))
@@ -79,7 +79,7 @@ def _believed(transport: Transport) -> Transport:
 
 def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
     transport = _believed(_transport(generator))
-    save_transport(tmp_path / "t.zarr", transport)
+    save_transport(transport, tmp_path / "t.zarr")
     loaded = load_transport(tmp_path / "t.zarr").posterior
     assert loaded.kinds == transport.posterior.kinds
     assert loaded.frequencies == transport.posterior.frequencies
@@ -112,7 +112,7 @@ def test_blocks_are_thinned_as_the_whole_camera(generator, step, rows):
 
 def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):
     path = tmp_path / "t.zarr"
-    save_transport(path, _believed(_transport(generator)))
+    save_transport(_believed(_transport(generator)), path)
     about = path / "quality_saturated" / "zarr.json"
     about.write_text(about.read_text().replace('"bool"', '"uint8"'))
     with pytest.raises(UnreadableFileError, match="how far to trust it does not fit"):
@@ -145,7 +145,7 @@ def test_middles_are_where_cells_are(length):
 
 def test_a_damaged_posterior_gets_a_sentence(tmp_path, generator):
     path = tmp_path / "t.zarr"
-    save_transport(path, _believed(_transport(generator)))
+    save_transport(_believed(_transport(generator)), path)
     posterior = json.loads((path / "zarr.json").read_text())["attributes"]["belief"]
     for change, message in (
         ({"kinds": posterior["kinds"][:1]}, "error bars"),
@@ -166,7 +166,7 @@ def test_a_damaged_posterior_gets_a_sentence(tmp_path, generator):
 @pytest.mark.parametrize("size", [1, 6000, 2**28])
 def test_rows_are_read_in_blocks(tmp_path, generator, size):
     transport = _believed(_transport(generator))
-    save_transport(tmp_path / "t.zarr", transport)
+    save_transport(transport, tmp_path / "t.zarr")
     stored = open_transport(tmp_path / "t.zarr")
     parts = list(stored.blocks(size))
     assert len(parts) == {1: 9, 6000: 5, 2**28: 1}[size]
@@ -185,9 +185,9 @@ def test_rows_are_read_in_blocks(tmp_path, generator, size):
 def test_nothing_is_overwritten_without_force(stored, generator):
     before = load_transport(stored)
     with pytest.raises(ExistingOutputError, match="--force"):
-        save_transport(stored, _transport(generator))
+        save_transport(_transport(generator), stored)
     np.testing.assert_array_equal(load_transport(stored).near, before.near)
-    save_transport(stored, before.with_gains(near=2.0), force=True)
+    save_transport(before.with_gains(near=2.0), stored, force=True)
     np.testing.assert_allclose(load_transport(stored).near, 2 * before.near)
 
 
@@ -241,7 +241,7 @@ def test_what_is_not_there_or_something_else_gets_a_sentence(tmp_path):
 
 def test_an_exact_transport_comes_back(tmp_path, generator):
     exact = _exact(generator, channels=2)
-    save_exact(tmp_path / "e.zarr", exact)
+    save_exact(exact, tmp_path / "e.zarr")
     loaded = load_exact(tmp_path / "e.zarr")
     assert (loaded.projector, loaded.camera, loaded.name) == (PROJECTOR, CAMERA, exact.name)
     np.testing.assert_array_equal(loaded.far, exact.far)
@@ -336,7 +336,7 @@ def test_sizes_that_are_none_get_a_sentence(tmp_path, sizes):
 
 
 def test_a_channel_that_is_missing_is_missed(tmp_path, generator):
-    save_exact(tmp_path / "e.zarr", _exact(generator, channels=2))
+    save_exact(_exact(generator, channels=2), tmp_path / "e.zarr")
     (tmp_path / "e.zarr" / "far-1" / "zarr.json").unlink()
     with pytest.raises(UnreadableFileError, match=r"e\.zarr"):
         load_exact(tmp_path / "e.zarr")

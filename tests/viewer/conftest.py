@@ -48,7 +48,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     direct, near = transport.direct.copy(), transport.near.copy()
     direct[3, 5] = near[3, 5] = 0
     path = folder / "a scene.zarr"
-    save_transport(path, replace(transport, correspondence=q, direct=direct, near=near))
+    save_transport(replace(transport, correspondence=q, direct=direct, near=near), path)
     return path
 
 

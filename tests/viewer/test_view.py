@@ -196,7 +196,7 @@ def test_every_map_is_there(address, transport):
 
 
 def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
-    save_transport(tmp_path / "t.zarr", replace(transport, posterior=None, quality=None))
+    save_transport(replace(transport, posterior=None, quality=None), tmp_path / "t.zarr")
     with served_view(ViewedTransport(tmp_path / "t.zarr")) as address:
         about = json.loads(ask(address, "/scene"))
         names = [one["name"] for one in about["maps"]]
@@ -415,7 +415,7 @@ def test_the_highest_near_frequency_is_that_of_the_papers_plan(window, k_near):
 
 def test_a_projector_of_one_row_is_shown(tmp_path):
     world = model_transport(Size(1, 24), Size(3, 5), window=3, far=Size(1, 3), entries=0)
-    save_transport(tmp_path / "row.zarr", replace(world, near=np.zeros_like(world.near)))
+    save_transport(replace(world, near=np.zeros_like(world.near)), tmp_path / "row.zarr")
     with served_view(ViewedTransport(tmp_path / "row.zarr")) as address:
         words, _ = unpack(ask(address, "/map/row"))
         assert words["low"] < words["high"]
@@ -428,7 +428,7 @@ def test_a_projector_of_one_row_is_shown(tmp_path):
 def test_a_camera_of_one_or_four_channels_is_shown(tmp_path):
     for channels, colours in ((1, 1), (2, 1), (4, 3)):
         world = model_transport(Size(8, 9), Size(5, 7), window=3, far=Size(3, 3), channels=channels)
-        save_transport(tmp_path / f"{channels}.zarr", world)
+        save_transport(world, tmp_path / f"{channels}.zarr")
         with served_view(ViewedTransport(tmp_path / f"{channels}.zarr")) as address:
             light = np.random.default_rng(0).random((8, 9))
             _, parts = relit(address, light)

@@ -157,8 +157,8 @@ def import_photos(
         photo, and nothing is left behind.
     """
     capture = write_capture(
-        path,
         plan,
+        path,
         _read(photos),
         full_scale=full_scale_of_file(photos[0]) if full_scale is None and photos else full_scale,
         rig={"description": "imported photos", **(rig or {})},

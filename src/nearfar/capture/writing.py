@@ -28,6 +28,7 @@ from nearfar.capture.store import (
     open_capture,
     white_and_black,
 )
+from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
     add_array,
@@ -282,9 +283,10 @@ class CaptureWriter:
         return photos
 
 
+@path_after_content
 def write_capture(
-    path: AnyPath,
     plan: Plan,
+    path: AnyPath,
     photos: Iterable[NDArray[Any]],
     *,
     full_scale: float | None = None,
@@ -299,9 +301,9 @@ def write_capture(
 
     Parameters
     ----------
+    plan : Plan
     path : str or Path
         Folder to make, ending in ``.zarr`` by custom.
-    plan : Plan
     photos : iterable of arrays
         Raw photos in the order of the plan, all uint8, uint16 or float32 and of one shape,
         (Cy, Cx) or (Cy, Cx, channels).

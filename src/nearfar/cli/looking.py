@@ -151,7 +151,7 @@ def render(
             from nearfar.scenes.cache import cached_scene
 
             transport = cached_scene(scene, projector, camera, progress=report)
-        save_exact(output, transport, force=force)
+        save_exact(transport, output, force=force)
     say(
         f"transport of {scene}, projector {transport.projector}, camera {transport.camera}, "
         f"written to {output}",

@@ -146,7 +146,7 @@ def reconstruct(
                 progress=told,
             )
             seen.add(transport, found)
-            save_transport(output, transport, force=force)
+            save_transport(transport, output, force=force)
         else:
             made = reconstruct_into(
                 output,

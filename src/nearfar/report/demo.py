@@ -83,7 +83,7 @@ def run_demo(
             )
         with timed("reconstruction"):
             transport, correspondence = reconstruct(capture, method="paper", progress=report)
-        save_transport(partial / TRANSPORT, transport)
+        save_transport(transport, partial / TRANSPORT)
         with timed("evaluation"):
             judgement = judge_by_truth(transport, truth, progress=report)
             rows = row_snr(transport, truth)

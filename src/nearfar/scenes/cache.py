@@ -56,7 +56,7 @@ def cached_scene(
     transport = build(name, projector, camera, progress=progress)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        save_exact(path, transport, force=True)
+        save_exact(transport, path, force=True)
     except (NearfarError, OSError):
         # A full or read-only cache must not cost the scene that was just computed.
         pass

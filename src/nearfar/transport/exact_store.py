@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import (
     add_array,
@@ -27,8 +28,17 @@ FORMAT_VERSION = 1
 MOST_CHANNELS = 4
 
 
-def save_exact(path: AnyPath, transport: ExactTransport, *, force: bool = False) -> None:
-    """Write an exact transport, components apart, as a Zarr group.
+@path_after_content
+def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False) -> None:
+    """Write an exact transport, its components apart, as a Zarr group.
+
+    Parameters
+    ----------
+    transport : ExactTransport
+    path : str or Path
+        Folder to make, ending in ``.zarr`` by custom.
+    force : bool
+        Replace a transport that is there.
 
     Raises
     ------

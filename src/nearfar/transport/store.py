@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import AnyPath, Floats, Size, blocks
+from nearfar.deprecation import path_after_content
 from nearfar.errors import UnreadableFileError
 from nearfar.files import (
     add_array,
@@ -41,8 +42,17 @@ POSTERIOR, QUALITY = "belief", "quality"
 STORED_AS = {"posterior": POSTERIOR, "quality": QUALITY}
 
 
-def save_transport(path: AnyPath, transport: Transport, *, force: bool = False) -> None:
+@path_after_content
+def save_transport(transport: Transport, path: AnyPath, *, force: bool = False) -> None:
     """Write a transport as a Zarr group, whole or not at all.
+
+    Parameters
+    ----------
+    transport : Transport
+    path : str or Path
+        Folder to make, ending in ``.zarr`` by custom.
+    force : bool
+        Replace a transport that is there.
 
     Raises
     ------

@@ -1,0 +1,29 @@
+"""Old ways to call public functions keep working, and warn."""
+
+import numpy as np
+import pytest
+
+import nearfar
+from nearfar.arrays import Size
+from tests.worlds import model_transport
+
+SIZE = Size(6, 6)
+
+
+def test_a_path_that_comes_first_is_still_taken(tmp_path):
+    transport = model_transport(SIZE, SIZE, window=3, far=Size(1, 1))
+    exact = nearfar.ExactTransport(SIZE, SIZE, (), (), np.ones((1, 36, 36), np.float32))
+    plan = nearfar.paper_plan(SIZE, 1, Size(1, 1), correspondence="none")
+    photos = [plan.draw(i) for i in range(len(plan.patterns))]
+    calls = {
+        "save_transport": (transport,),
+        "save_exact": (exact,),
+        "write_capture": (plan, photos),
+    }
+    for name, (what, *more) in calls.items():
+        function, path = getattr(nearfar, name), tmp_path / f"{name}.zarr"
+        with pytest.warns(DeprecationWarning, match=f"{name} with the path as its first") as seen:
+            function(path, what, *more)
+        assert seen[0].filename == __file__
+        function(what, str(path), *more, force=True)
+    assert nearfar.load_transport(tmp_path / "save_transport.zarr").camera == SIZE

@@ -14,7 +14,7 @@ from nearfar.errors import DeviceError, InputError, LostPhotoError
 from nearfar.files import encode_png
 from nearfar.rigs.cameras.folder import FolderCamera
 from nearfar.rigs.cameras.gphoto import seconds_of
-from nearfar.rigs.cameras.settings import find_cameras
+from nearfar.rigs.cameras.registry import find_cameras
 from nearfar.rigs.cameras.webcam import OpencvCamera
 from tests.absent import said_without
 from tests.files.test_raw import dng

@@ -23,7 +23,7 @@ def devices(quiet: Quiet = False) -> None:
     Example: nearfar devices
     """
     from nearfar.errors import DeviceError, MissingPackageError
-    from nearfar.rigs.cameras.settings import find_cameras
+    from nearfar.rigs.cameras.registry import find_cameras
     from nearfar.rigs.screens import find_monitors
 
     say("monitors:", quiet=quiet)
@@ -56,7 +56,7 @@ def init(
     """
     from nearfar.errors import DeviceError, MissingPackageError
     from nearfar.files import check_output, new_output
-    from nearfar.rigs.cameras.settings import find_cameras
+    from nearfar.rigs.cameras.registry import find_cameras
     from nearfar.rigs.initial import draft_rig
     from nearfar.rigs.screens import Monitor, find_monitors
 

@@ -3,40 +3,9 @@
 import json
 from collections.abc import Sequence
 
-from nearfar.rigs.cameras.base import FoundCamera
+from nearfar.rigs.cameras.driver import FoundCamera
+from nearfar.rigs.cameras.registry import CAMERAS
 from nearfar.rigs.screens import Monitor
-
-# What a driver's own table may hold, commented out.
-OWN = {
-    "aravis": """\
-# Rows x columns to read, from the middle of the sensor.
-# region = "1080x1440"
-# Of those that are not packed, the one of most bits is chosen.
-# pixel_format = "Mono12"
-# "software", "free" (the camera runs by itself), or the line of a hardware trigger such as "Line1".
-# trigger = "software"
-# GenICam features to set first.
-# features = { Gain = 0.0 }
-""",
-    "gphoto2": """\
-# Settings by gphoto2's names; 'gphoto2 --list-config' lists them.
-# settings = { iso = "100", "f-number" = "f/8" }
-""",
-    "opencv": """\
-# Rows x columns of the picture.
-# size = "1080x1920"
-# Frames that the camera's queue holds.
-# skip = 4
-# OpenCV's properties without CAP_PROP_.
-# properties = { GAMMA = 100.0, WB_TEMPERATURE = 5000.0 }
-""",
-    "folder": """\
-# Run for each photo; {} is the folder. Without it, release the camera by hand.
-# command = "gphoto2 --capture-image-and-download --filename {}/%n.%C"
-# Seconds to wait for a photo.
-# patience = 30.0
-""",
-}
 
 ADVICE = """\
 # Exposure in seconds, rounded to whole refreshes of the projector; "auto" takes white's photo.
@@ -101,16 +70,16 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
             f'# {_one_line(c.name)}: driver = "{c.driver}", device = {_quoted(c.device)}'
             for c in others
         ]
-        own = OWN[first.driver]
+        general, own = ADVICE + BRACKET, CAMERAS[first.driver].settings
     else:
         lines += [
             "# No camera is found. Any camera that drops its photos into a folder will do:",
             'driver = "folder"',
             'path = "photos"',
         ]
-        own = OWN["folder"]
-    bracket = BRACKET if cameras and cameras[0].driver != "folder" else ""
-    return "\n".join(lines) + "\n" + ADVICE + bracket + own
+        # Nobody but the camera's owner sets the exposure then, so there is no bracket.
+        general, own = ADVICE, CAMERAS["folder"].settings
+    return "\n".join(lines) + "\n" + general + own
 
 
 def _quoted(text: str) -> str:

@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.rigs.calibration import calibration_folder, read_calibration
 from nearfar.rigs.cameras.base import Camera
-from nearfar.rigs.cameras.settings import AnyCamera
+from nearfar.rigs.cameras.registry import AnyCameraTable
 from nearfar.rigs.real import Begun, RealRig, Told
 from nearfar.rigs.screens import Window
 
@@ -47,7 +47,7 @@ class RealTable(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     projector: ScreenTable = ScreenTable()
-    camera: AnyCamera
+    camera: AnyCameraTable
 
 
 @contextmanager

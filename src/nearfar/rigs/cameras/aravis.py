@@ -1,21 +1,31 @@
 """GigE Vision and USB3 Vision cameras, by the Aravis library."""
 
 import ctypes
-import re
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError, LostPhotoError
 from nearfar.files.mosaic import bin_mosaic
 from nearfar.rigs.cameras.aravis_library import Aravis, aravis
-from nearfar.rigs.cameras.base import Camera, FoundCamera, Frame
+from nearfar.rigs.cameras.base import Camera, Frame
+from nearfar.rigs.cameras.driver import (
+    CameraDriver,
+    CameraTable,
+    FoundCamera,
+    PositiveLevel,
+    SizeText,
+    optional_size,
+)
+from nearfar.rigs.cameras.pixel_formats import parse_pixel_format
 
-DRIVER = "aravis"
+NAME = "aravis"
 CONTINUOUS = 0
 WHOLE = 0  # ARV_BUFFER_STATUS_SUCCESS
 STATUSES = {
@@ -35,9 +45,16 @@ KINDS: dict[type, list[str]] = {
     float: ["float", "integer"],
     str: ["string"],
 }
-# Formats whose values are not packed across bytes.
-FORMATS = re.compile(r"(Mono|Bayer(?P<cell>RG|GR|GB|BG))(?P<bits>8|10|12|14|16)$")
-CELLS = {"RG": "RGGB", "GR": "GRBG", "GB": "GBRG", "BG": "BGGR"}
+SETTINGS = """\
+# Rows x columns to read, from the middle of the sensor.
+# region = "1080x1440"
+# Of those that are not packed, the one of most bits is chosen.
+# pixel_format = "Mono12"
+# "software", "free" (the camera runs by itself), or the line of a hardware trigger such as "Line1".
+# trigger = "software"
+# GenICam features to set first.
+# features = { Gain = 0.0 }
+"""
 
 
 def find() -> list[FoundCamera]:
@@ -56,7 +73,7 @@ def find() -> list[FoundCamera]:
             library.plain(f"arv_get_device_{what}", index) for what in ("id", "vendor", "model")
         )
         device, vendor, model = ((text or b"").decode(errors="replace") for text in told)
-        found.append(FoundCamera(DRIVER, device, f"{vendor} {model}"))
+        found.append(FoundCamera(NAME, device, f"{vendor} {model}"))
     return found
 
 
@@ -139,7 +156,7 @@ class AravisCamera(Camera):
         """Tell what a capture remembers of the camera."""
         return {
             **super().describe(),
-            "driver": DRIVER,
+            "driver": NAME,
             "pixel_format": self._format,
             "region": list(self._region),
             "trigger": self._trigger,
@@ -248,10 +265,9 @@ class AravisCamera(Camera):
             self._set_feature(name, value)
         self._format = self._chosen_format(pixel_format)
         self._call("arv_camera_set_pixel_format_from_string", self._camera, self._format.encode())
-        match = FORMATS.match(self._format)
-        assert match is not None
-        self._bits = int(match["bits"])
-        self._cell = CELLS[match["cell"]] if match["cell"] else None
+        chosen = parse_pixel_format(self._format)
+        assert chosen is not None
+        self._bits, self._cell = chosen
         self._region = self._set_region(region)
         self._call("arv_camera_set_acquisition_mode", self._camera, CONTINUOUS)
         if self._trigger == "free":
@@ -268,7 +284,7 @@ class AravisCamera(Camera):
 
     def _chosen_format(self, wanted: str | None) -> str:
         formats = self._library.pixel_formats(self._camera)
-        usable = [name for name in formats if FORMATS.match(name)]
+        usable = [name for name in formats if parse_pixel_format(name)]
         if wanted is not None and wanted not in usable:
             raise InputError(
                 f"{self.name} has no pixel format {wanted!r} that can be read: choose one of "
@@ -280,13 +296,13 @@ class AravisCamera(Camera):
                 f"({', '.join(formats)}): none of them can be read."
             )
 
-        def worth(name: str) -> tuple[bool, int]:
-            match = FORMATS.match(name)
-            assert match is not None
-            # Of a colour camera Mono is made by a formula of its own.
-            return match["cell"] is not None, int(match["bits"])
+        def preference(name: str) -> tuple[bool, int]:
+            parsed = parse_pixel_format(name)
+            assert parsed is not None
+            # A colour camera computes Mono by a formula of its own, so raw colours come first.
+            return parsed.cell is not None, parsed.bits
 
-        return wanted or max(usable, key=worth)
+        return wanted or max(usable, key=preference)
 
     def _set_region(self, wanted: Size | None) -> Size:
         sides = [ctypes.c_int(), ctypes.c_int()]
@@ -337,3 +353,29 @@ class AravisCamera(Camera):
                 f"{self.name} does not do as told ({error}): check its cable, and that no other "
                 f"program uses it."
             ) from None
+
+
+class AravisTable(CameraTable):
+    """[camera] of a GigE Vision or USB3 Vision camera; the settings are those of `AravisCamera`."""
+
+    region: SizeText | None = None
+    pixel_format: str | None = None
+    trigger: str = "software"
+    features: dict[str, bool | int | float | str] = Field(default_factory=dict)
+    full_scale: PositiveLevel | None = None
+
+    def open(self, folder: Path) -> Camera:
+        """Open the camera; raises as `CameraTable.open`."""
+        return AravisCamera(
+            self.device,
+            region=optional_size(self.region),
+            pixel_format=self.pixel_format,
+            trigger=self.trigger,
+            features=self.features,
+            full_scale=self.full_scale,
+            frames=self.average,
+            bracket=self.bracket,
+        )
+
+
+DRIVER = CameraDriver(AravisTable, find, SETTINGS)

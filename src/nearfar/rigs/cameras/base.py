@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import chain
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +30,6 @@ TRIES = 4
 CLOSE = 0.05
 
 Frame = NDArray[np.uint8] | NDArray[np.uint16]
-
-
-class FoundCamera(NamedTuple):
-    """A camera that a driver found: what to write as ``device`` in a RIG.toml, and what it is."""
-
-    driver: str
-    device: str
-    name: str
 
 
 class Camera(ABC):

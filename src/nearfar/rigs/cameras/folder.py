@@ -7,12 +7,21 @@ import time
 from pathlib import Path
 from typing import Any
 
+from pydantic import field_validator
+
 from nearfar.errors import DeviceError, InputError, LostPhotoError, UnreadableFileError
 from nearfar.files.images import PICTURE_ENDINGS, RAW_ENDINGS
 from nearfar.files.photos import decode_camera_file
 from nearfar.rigs.cameras.base import Camera, Frame
+from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, PositiveLevel, Seconds
 
-DRIVER = "folder"
+NAME = "folder"
+SETTINGS = """\
+# Run for each photo; {} is the folder. Without it, release the camera by hand.
+# command = "gphoto2 --capture-image-and-download --filename {}/%n.%C"
+# Seconds to wait for a photo.
+# patience = 30.0
+"""
 ENDINGS = (*PICTURE_ENDINGS, *RAW_ENDINGS, ".jpg", ".jpeg")
 # Seconds between looks; network folders tell nobody what comes.
 LOOK = 0.05
@@ -76,7 +85,7 @@ class FolderCamera(Camera):
 
     def describe(self) -> dict[str, Any]:
         """Tell what a capture remembers of the camera."""
-        return {**super().describe(), "driver": DRIVER, "command": self._command}
+        return {**super().describe(), "driver": NAME, "command": self._command}
 
     def take(self) -> Frame:
         """Have a photo taken and wait for its file.
@@ -172,3 +181,32 @@ def _size(path: Path) -> int:
         return path.stat().st_size
     except OSError:
         return -1
+
+
+class FolderTable(CameraTable):
+    """[camera] of a watched folder; the settings are those of `FolderCamera`."""
+
+    path: str
+    command: str | None = None
+    patience: Seconds = 30.0
+    full_scale: PositiveLevel | None = None
+
+    @field_validator("bracket")
+    @classmethod
+    def _single(cls, bracket: tuple[float, ...]) -> tuple[float, ...]:
+        if len(bracket) > 1:
+            raise ValueError("whoever drops photos into a folder sets the exposure: remove it")
+        return bracket
+
+    def open(self, folder: Path) -> Camera:
+        """Open the camera; raises as `CameraTable.open`."""
+        return FolderCamera(
+            folder / self.path,
+            command=self.command,
+            patience=self.patience,
+            full_scale=self.full_scale,
+            frames=self.average,
+        )
+
+
+DRIVER = CameraDriver(FolderTable, settings=SETTINGS)

@@ -6,14 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from nearfar.errors import DeviceError, InputError, LostPhotoError, MissingFileError
 from nearfar.files.mosaic import bin_mosaic
 from nearfar.packages import needed
-from nearfar.rigs.cameras.aravis import CELLS, FORMATS
 from nearfar.rigs.cameras.base import Camera, Frame
+from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, PositiveLevel
+from nearfar.rigs.cameras.pixel_formats import parse_pixel_format
 
-DRIVER = "harvesters"
+NAME = "harvesters"
 PATIENCE = 2.0
 MICROSECONDS = 1e6
 
@@ -92,7 +94,7 @@ class HarvestersCamera(Camera):
         """Tell what a capture remembers of the camera."""
         return {
             **super().describe(),
-            "driver": DRIVER,
+            "driver": NAME,
             "pixel_format": self._format,
             "features": self._features,
         }
@@ -142,14 +144,13 @@ class HarvestersCamera(Camera):
             if node is not None:
                 node.value = value
         self._format = str(self._nodes.PixelFormat.value)
-        match = FORMATS.match(self._format)
-        if match is None:
+        chosen = parse_pixel_format(self._format)
+        if chosen is None:
             raise InputError(
                 f"{self.name} sends {self._format}, which is packed or processed: set "
                 f"PixelFormat among the features to one such as Mono16 or BayerRG12."
             )
-        self._bits = int(match["bits"])
-        self._cell = CELLS[match["cell"]] if match["cell"] else None
+        self._bits, self._cell = chosen
 
     def _set_exposure(self, seconds: float) -> float:
         with self._in_sentences():
@@ -168,3 +169,25 @@ class HarvestersCamera(Camera):
                 f"{self.name} does not do as told ({words}): check its cable, and that no other "
                 f"program uses it."
             ) from None
+
+
+class HarvestersTable(CameraTable):
+    """[camera] of a camera by a GenTL producer; the settings are those of `HarvestersCamera`."""
+
+    producer: str
+    features: dict[str, bool | int | float | str] = Field(default_factory=dict)
+    full_scale: PositiveLevel | None = None
+
+    def open(self, folder: Path) -> Camera:
+        """Open the camera; raises as `CameraTable.open`."""
+        return HarvestersCamera(
+            folder / self.producer,
+            self.device,
+            features=self.features,
+            full_scale=self.full_scale,
+            frames=self.average,
+            bracket=self.bracket,
+        )
+
+
+DRIVER = CameraDriver(HarvestersTable)

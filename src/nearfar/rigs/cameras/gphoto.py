@@ -7,12 +7,19 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from pydantic import Field
+
 from nearfar.errors import DeviceError, InputError, LostPhotoError, UnreadableFileError
 from nearfar.files.photos import decode_camera_file
 from nearfar.packages import needed
-from nearfar.rigs.cameras.base import Camera, FoundCamera, Frame
+from nearfar.rigs.cameras.base import Camera, Frame
+from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, FoundCamera
 
-DRIVER = "gphoto2"
+NAME = "gphoto2"
+SETTINGS = """\
+# Settings by gphoto2's names; 'gphoto2 --list-config' lists them.
+# settings = { iso = "100", "f-number" = "f/8" }
+"""
 # What cameras of several makers call the same.
 SHUTTER = ("shutterspeed", "shutterspeed2")
 QUALITY = ("imageformat", "imagequality")
@@ -33,9 +40,7 @@ def find() -> list[FoundCamera]:
     """
     gphoto = _gphoto()
     found = gphoto.Camera.autodetect()
-    return [
-        FoundCamera(DRIVER, found.get_value(i), found.get_name(i)) for i in range(found.count())
-    ]
+    return [FoundCamera(NAME, found.get_value(i), found.get_name(i)) for i in range(found.count())]
 
 
 class GphotoCamera(Camera):
@@ -100,7 +105,7 @@ class GphotoCamera(Camera):
 
     def describe(self) -> dict[str, Any]:
         """Tell what a capture remembers of the camera."""
-        return {**super().describe(), "driver": DRIVER, "settings": self._settings}
+        return {**super().describe(), "driver": NAME, "settings": self._settings}
 
     def close(self) -> None:
         """Give the camera back."""
@@ -240,3 +245,18 @@ def _gphoto() -> ModuleType:
         import gphoto2
     library: ModuleType = gphoto2
     return library
+
+
+class GphotoTable(CameraTable):
+    """[camera] of a camera that gphoto2 drives; the settings are those of `GphotoCamera`."""
+
+    settings: dict[str, str | int | float] = Field(default_factory=dict)
+
+    def open(self, folder: Path) -> Camera:
+        """Open the camera; raises as `CameraTable.open`."""
+        return GphotoCamera(
+            self.device, settings=self.settings, frames=self.average, bracket=self.bracket
+        )
+
+
+DRIVER = CameraDriver(GphotoTable, find, SETTINGS)

@@ -8,13 +8,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError, LostPhotoError
 from nearfar.packages import needed
-from nearfar.rigs.cameras.base import Camera, FoundCamera, Frame
+from nearfar.rigs.cameras.base import Camera, Frame
+from nearfar.rigs.cameras.driver import (
+    CameraDriver,
+    CameraTable,
+    FoundCamera,
+    SizeText,
+    optional_size,
+)
 
-DRIVER = "opencv"
+NAME = "opencv"
+SETTINGS = """\
+# Rows x columns of the picture.
+# size = "1080x1920"
+# Frames that the camera's queue holds.
+# skip = 4
+# OpenCV's properties without CAP_PROP_.
+# properties = { GAMMA = 100.0, WB_TEMPERATURE = 5000.0 }
+"""
 # Video4Linux counts exposures in 100 microseconds.
 TICKS = 1e4
 MANUAL = 1
@@ -35,7 +51,7 @@ def find() -> list[FoundCamera]:
         # Of a camera's devices the first gives pictures.
         if (path / "index").read_text().strip() == "0":
             name = (path / "name").read_text().strip()
-            found.append(FoundCamera(DRIVER, f"/dev/{path.name}", name))
+            found.append(FoundCamera(NAME, f"/dev/{path.name}", name))
     return found
 
 
@@ -106,7 +122,7 @@ class OpencvCamera(Camera):
         """Tell what a capture remembers of the camera."""
         return {
             **super().describe(),
-            "driver": DRIVER,
+            "driver": NAME,
             "source": str(self._source),
             "properties": self._properties,
         }
@@ -162,3 +178,25 @@ def _opencv() -> ModuleType:
     with needed(extra="webcam", what="a camera by OpenCV"):
         import cv2
     return cv2
+
+
+class OpencvTable(CameraTable):
+    """[camera] of a webcam by OpenCV; the settings are those of `OpencvCamera`."""
+
+    size: SizeText | None = None
+    properties: dict[str, float] = Field(default_factory=dict)
+    skip: int = Field(default=4, ge=0)
+
+    def open(self, folder: Path) -> Camera:
+        """Open the camera; raises as `CameraTable.open`."""
+        return OpencvCamera(
+            self.device,
+            size=optional_size(self.size),
+            properties=self.properties,
+            skip=self.skip,
+            frames=self.average,
+            bracket=self.bracket,
+        )
+
+
+DRIVER = CameraDriver(OpencvTable, find, SETTINGS)

@@ -77,9 +77,9 @@ def run(name: str) -> None:
 
     photos = shoot(plan, scene, SimulatedCamera())
     started = time.perf_counter()
-    pixels = correspond_by_stripes(photos).pixels
+    q = correspond_by_stripes(photos).q
     measurements = measure(photos)
-    found = estimate(measurements, pixels, window, far, plan.dropped)
+    found = estimate(measurements, q, window, far, plan.dropped)
     seconds = time.perf_counter() - started
     print(
         f"{name}: {plan.transport_photos} + {plan.counts['correspondence']} photos, W = {window}, "

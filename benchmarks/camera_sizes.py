@@ -28,7 +28,7 @@ def main() -> None:
         for photos in PHOTOS:
             plan, _ = choose_plan(scene.projector, photos)
             measurements = measure(shoot(plan, scene, SimulatedCamera()))
-            q = correspond_by_phase(measurements).pixels
+            q = correspond_by_phase(measurements).q
             found = estimate_jointly(measurements, q, plan.window, plan.far)
             print(f"{scene.camera}, {photos}: {scores(truth, found, lights)}", flush=True)
 

@@ -89,7 +89,7 @@ def report(
     unlit, lit = ~found.lit.ravel(), area >= 0.5
     cells = []
     for truth in truths:
-        off = np.abs(found.pixels.reshape(-1, 2)[lit] - truth[lit]).max(axis=1)
+        off = np.abs(found.q.reshape(-1, 2)[lit] - truth[lit]).max(axis=1)
         off[np.isnan(off)] = np.inf
         cells += [f"{np.mean(off <= limit):9.2%}" for limit in (0.5, 1.0)]
     for chosen in (~lit[unlit], unlit[area == 0]):

@@ -66,8 +66,8 @@ def run(name: str) -> list[dict[str, float]]:
     for share in SHARES:
         plan, _ = choose_plan(scene.projector, total // share, window=window)
         measurements = measure(shoot(plan, scene, SimulatedCamera()))
-        pixels = correspond_by_phase(measurements).pixels
-        found = estimate_jointly(measurements, pixels, plan.window, plan.far)
+        q = correspond_by_phase(measurements).q
+        found = estimate_jointly(measurements, q, plan.window, plan.far)
         results.append(coverage(scene, found))
         values = " ".join(f"{value:8.1f}" for value in results[-1].values())
         print(f"{name:14s} {len(plan.patterns):5d}  {values}", flush=True)

@@ -41,15 +41,15 @@ SHARES = (1, 4, 8, 16)
 
 def as_the_paper(plan: Plan, photos: PhotosInMemory) -> Transport:
     """Estimate with stripes and the paper's estimator."""
-    pixels = correspond_by_stripes(photos).pixels
-    return estimate(measure(photos), pixels, plan.window, plan.far, plan.dropped)
+    q = correspond_by_stripes(photos).q
+    return estimate(measure(photos), q, plan.window, plan.far, plan.dropped)
 
 
 def jointly(plan: Plan, photos: PhotosInMemory) -> Transport:
     """Estimate with phase and the joint estimator."""
     measurements = measure(photos)
-    pixels = correspond_by_phase(measurements).pixels
-    return estimate_jointly(measurements, pixels, plan.window, plan.far)
+    q = correspond_by_phase(measurements).q
+    return estimate_jointly(measurements, q, plan.window, plan.far)
 
 
 def report(name: str, plan: Plan, scene: ExactTransport, lights: dict[str, Floats]) -> None:

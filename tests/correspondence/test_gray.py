@@ -65,7 +65,7 @@ def test_whole_pixels_are_found_exactly(projector, shoot):
     # Direct light outshines the rest.
     world = replace(world, near=0.2 * world.near, far=0.2 * world.far)
     found = correspond_by_photos(shoot(_plan(projector), world))
-    np.testing.assert_array_equal(found.pixels, world.correspondence)
+    np.testing.assert_array_equal(found.q, world.correspondence)
     assert (found.confidence > 0.999).all()
 
 
@@ -74,7 +74,7 @@ def test_blocks_of_rows_are_those_of_the_whole(shoot):
     photos = shoot(_plan(SIZES[1]), world)
     whole = correspond_by_gray_code(photos)
     part = correspond_by_gray_code(photos, slice(4, 9))
-    np.testing.assert_array_equal(part.pixels, whole.pixels[4:9])
+    np.testing.assert_array_equal(part.q, whole.q[4:9])
 
 
 def test_a_camera_pixel_between_two_is_shared_by_them(shoot):
@@ -90,7 +90,7 @@ def test_a_camera_pixel_between_two_is_shared_by_them(shoot):
         far=0.2 * world.far,
     )
     found = correspond_by_gray_code(shoot(_plan(projector), world))
-    off = np.abs(found.pixels - q).max(axis=-1)
+    off = np.abs(found.q - q).max(axis=-1)
     assert np.isfinite(off).all()
     assert off.max() < 0.5
     assert np.median(off) < 0.2
@@ -123,7 +123,7 @@ def test_scenes_with_noise_are_found_about_as_well_as_by_stripes(name):
         plan = paper_plan(scene.projector, 5, Size(3, 3), correspondence=how)
         found = correspond_by_photos(hold(plan, rig))
         both = found.lit & np.isfinite(truth[..., 0])
-        off = np.abs(found.pixels - truth).max(axis=-1)[both]
+        off = np.abs(found.q - truth).max(axis=-1)[both]
         shares.append(np.mean(off <= 1.0))
         recalls.append(both.sum() / np.isfinite(truth[..., 0]).sum())
     assert shares[0] > 0.98
@@ -136,9 +136,7 @@ def test_what_is_no_gray_code_is_said(shoot):
     assert not has_gray_code(stripes.plan)
     with pytest.raises(InputError, match="no Gray code"):
         correspond_by_gray_code(stripes)
-    np.testing.assert_array_equal(
-        correspond_by_photos(stripes).pixels, correspond_by_stripes(stripes).pixels
-    )
+    np.testing.assert_array_equal(correspond_by_photos(stripes).q, correspond_by_stripes(stripes).q)
     plan = _plan(SIZES[0])
     missing = plan.first(len(plan.patterns) - 1)
     assert has_gray_code(plan)
@@ -175,7 +173,7 @@ def test_codes_that_no_pattern_pixel_has_are_no_direct_light():
     bits = {kind: _bits_of(places, 5) for kind in ("gray rows", "gray columns")}
     found = correspond_by_gray_code(_photos_of_bits(projector, bits, 0.4))
     np.testing.assert_array_equal(found.lit[0], places < 20)
-    np.testing.assert_array_equal(found.pixels[0, :20, 0], places[:20])
+    np.testing.assert_array_equal(found.q[0, :20, 0], places[:20])
 
 
 @pytest.mark.parametrize(("share", "lit"), [(0.4, True), (0.06, True), (0.02, False)])

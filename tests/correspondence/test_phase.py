@@ -90,28 +90,28 @@ def test_the_papers_frequencies_find_whole_pixels(size, window, far):
     alone = world.with_gains(near=0, far=0)
     found = correspond_by_phase(ideal_measurements(alone, window, far, Size(1, 1)))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.01)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.01)
     # Far-range light responses frequencies off the DFT grid as well.
     lit_by_all = world.with_gains(near=0)
     found = correspond_by_phase(ideal_measurements(lit_by_all, window, far, Size(1, 1)))
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.3)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.3)
 
 
 def test_near_and_far_light_pull_q_by_little():
     world = _world()
     found = correspond_by_phase(ideal_measurements(world, WINDOW, FAR, Size(1, 1)))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.35)
-    assert np.median(np.abs(found.pixels - world.correspondence)) < 0.05
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.35)
+    assert np.median(np.abs(found.q - world.correspondence)) < 0.05
 
 
 def test_a_finer_camera_falls_between_pixels():
     world = _world(Size(61, 77), fractional=True)
     found = correspond_by_phase(_responses(world.with_gains(near=0), FEW))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.05)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.05)
     found = correspond_by_phase(_responses(world, FEW, noise=0.003))
-    off = np.abs(found.pixels - world.correspondence)
+    off = np.abs(found.q - world.correspondence)
     assert found.lit.all()
     assert np.percentile(off, 95) < 0.2
     assert np.mean(off > 0.5) < 0.005
@@ -136,7 +136,7 @@ def test_a_coarse_camera_pixel_gets_the_centroid():
     q /= weight.sum(axis=(1, 3))
     found = correspond_by_phase(coarse)
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, q, atol=0.25)
+    np.testing.assert_allclose(found.q, q, atol=0.25)
 
 
 def test_photos_of_a_noisy_camera_move_nothing_by_half_a_pixel(shoot):
@@ -144,7 +144,7 @@ def test_photos_of_a_noisy_camera_move_nothing_by_half_a_pixel(shoot):
     plan = paper_plan(PROJECTOR, WINDOW, FAR, correspondence="none")
     found = correspond_by_phase(measure(shoot(plan, world, SimulatedCamera())))
     assert found.lit.all()
-    off = np.abs(found.pixels - world.correspondence)
+    off = np.abs(found.q - world.correspondence)
     assert off.max() < 0.5
     assert np.median(off) < 0.05
 
@@ -160,7 +160,7 @@ def test_a_channel_without_light_does_no_harm():
     )
     found = correspond_by_phase(_responses(world, FEW, noise=0.002))
     assert found.lit.all()
-    assert np.mean(np.abs(found.pixels - world.correspondence) < 0.5) > 0.999
+    assert np.mean(np.abs(found.q - world.correspondence) < 0.5) > 0.999
 
 
 def test_many_times_as_much_global_light_does_not_fool_it():
@@ -168,7 +168,7 @@ def test_many_times_as_much_global_light_does_not_fool_it():
     world = replace(world, direct=0.04 + 0 * world.direct)
     found = correspond_by_phase(_responses(world, FEW))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.1)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.1)
 
 
 def test_the_stronger_of_two_surfaces_wins():
@@ -177,7 +177,7 @@ def test_the_stronger_of_two_surfaces_wins():
     other = replace(one, correspondence=moved, direct=0.5 * one.direct)
     first, second = _responses(one, FEW), _responses(other, FEW)
     found = correspond_by_phase(replace(first, responses=first.responses + second.responses))
-    np.testing.assert_allclose(found.pixels, one.correspondence, atol=0.5)
+    np.testing.assert_allclose(found.q, one.correspondence, atol=0.5)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003])
@@ -187,7 +187,7 @@ def test_camera_pixels_without_direct_light_are_marked(noise):
     world = _with_shade(_world(channels=3), shade)
     found = correspond_by_phase(_responses(world, FEW, noise))
     np.testing.assert_array_equal(found.lit, ~shade)
-    assert np.all(np.isnan(found.pixels[shade]))
+    assert np.all(np.isnan(found.q[shade]))
     assert found.confidence[~shade].min() >= 0.5
     assert np.median(found.confidence[~shade]) > 0.9
     assert found.confidence[shade].max() < 0.5
@@ -218,9 +218,9 @@ def test_light_at_the_border_does_not_wrap_to_the_other_side():
     for noise in (0.0, 0.01):
         found = correspond_by_phase(_responses(world, FEW, noise))
         assert found.lit.all()
-        np.testing.assert_allclose(found.pixels, q, atol=0.05 if noise == 0 else 0.5)
-        assert np.nanmin(found.pixels) >= 0
-        assert np.all(found.pixels <= np.array(PROJECTOR) - 1)
+        np.testing.assert_allclose(found.q, q, atol=0.05 if noise == 0 else 0.5)
+        assert np.nanmin(found.q) >= 0
+        assert np.all(found.q <= np.array(PROJECTOR) - 1)
 
 
 def test_saturated_photos_still_correspond(shoot):
@@ -230,7 +230,7 @@ def test_saturated_photos_still_correspond(shoot):
     bright = replace(world, direct=world.direct + 0.65, far=1.2 * world.far)
     found = correspond_by_phase(measure(shoot(plan, bright, SimulatedCamera())))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.5)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.5)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
@@ -239,7 +239,7 @@ def test_black_photos_show_no_direct_light(noise):
     black = replace(world, direct=0 * world.direct, near=0 * world.near, far=0 * world.far)
     found = correspond_by_phase(_responses(black, FEW, noise))
     assert not found.lit.any()
-    assert np.all(np.isnan(found.pixels))
+    assert np.all(np.isnan(found.q))
     assert np.all(np.isfinite(found.confidence))
     assert found.confidence.max() < 0.5
 
@@ -264,7 +264,7 @@ def test_the_exposure_does_not_matter(scale):
     )
     again = correspond_by_phase(scaled)
     np.testing.assert_array_equal(again.lit, found.lit)
-    np.testing.assert_allclose(again.pixels, found.pixels, atol=2e-3)
+    np.testing.assert_allclose(again.q, found.q, atol=2e-3)
     np.testing.assert_allclose(again.confidence, found.confidence, atol=1e-3)
 
 
@@ -272,13 +272,13 @@ def test_a_block_of_camera_pixels_corresponds_on_its_own():
     measured = _responses(_world(), FEW, noise=0.003)
     whole = correspond_by_phase(measured)
     part = correspond_by_phase(measured.of_pixels(Size(6, 30), slice(90, 270)))
-    assert part.pixels.dtype == np.float32
+    assert part.q.dtype == np.float32
     assert part.confidence.dtype == np.float32
     # Its first and last rows lack neighbours, which may tell that light is not direct.
-    np.testing.assert_allclose(part.pixels[1:-1], whole.pixels[4:8], atol=2e-3)
+    np.testing.assert_allclose(part.q[1:-1], whole.q[4:8], atol=2e-3)
     both = part.lit & whole.lit[3:9]
     assert both.mean() > 0.9
-    np.testing.assert_allclose(part.pixels[both], whole.pixels[3:9][both], atol=2e-3)
+    np.testing.assert_allclose(part.q[both], whole.q[3:9][both], atol=2e-3)
 
 
 def test_light_by_way_of_another_surface_is_told_by_its_turning_round():

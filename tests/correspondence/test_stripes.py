@@ -34,16 +34,16 @@ def test_whole_pixels_are_found_exactly(shoot):
     assert found.lit.all()
     # Lopsided near-range light pulls the centroid a little; without any it is
     # exact, but for what bends in far-range light.
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.25)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.25)
     found = correspond_by_stripes(shoot(PLAN, world.with_gains(near=0)))
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.01)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.01)
 
 
 def test_noise_moves_nothing_by_half_a_pixel(shoot):
     world = _world(channels=3)
     found = correspond_by_stripes(shoot(PLAN, world, SimulatedCamera()))
     assert found.lit.mean() > 0.999
-    off = np.abs(found.pixels - world.correspondence)[found.lit]
+    off = np.abs(found.q - world.correspondence)[found.lit]
     assert off.max() < 0.5
     assert np.mean(off < 1e-3) > 0.95
 
@@ -52,11 +52,11 @@ def test_a_finer_camera_falls_between_pixels(shoot):
     world = _world(Size(61, 77), fractional=True)
     found = correspond_by_stripes(shoot(PLAN, world))
     assert found.lit.all()
-    off = np.abs(found.pixels - world.correspondence)
+    off = np.abs(found.q - world.correspondence)
     assert np.percentile(off, 95) < 0.1
     assert off.max() < 0.5
     plain = correspond_by_stripes(shoot(PLAN, world.with_gains(near=0)))
-    np.testing.assert_allclose(plain.pixels, world.correspondence, atol=0.02)
+    np.testing.assert_allclose(plain.q, world.correspondence, atol=0.02)
 
 
 def test_global_light_ten_times_the_direct_does_not_fool_it(shoot):
@@ -65,7 +65,7 @@ def test_global_light_ten_times_the_direct_does_not_fool_it(shoot):
     world = replace(world, direct=0.02 + 0 * world.direct, far=far, near=0 * world.near)
     found = correspond_by_stripes(shoot(PLAN, world))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.1)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.1)
 
 
 @pytest.mark.parametrize("noisy", [False, True])
@@ -84,7 +84,7 @@ def test_camera_pixels_without_direct_light_are_marked(shoot, noisy):
     photos = shoot(PLAN, world, SimulatedCamera()) if noisy else shoot(PLAN, world)
     found = correspond_by_stripes(photos)
     np.testing.assert_array_equal(found.lit, lit)
-    assert np.all(np.isnan(found.pixels[~lit]))
+    assert np.all(np.isnan(found.q[~lit]))
     assert found.confidence[lit].min() > 0.999
     if noisy:
         assert np.median(found.confidence[~lit]) < 0.9
@@ -96,13 +96,13 @@ def test_small_projectors_correspond(shoot, size):
     world = replace(world, near=np.zeros_like(world.near))
     found = correspond_by_stripes(shoot(paper_plan(size, 3, Size(1, 1)), world, SimulatedCamera()))
     assert found.lit.all()
-    np.testing.assert_allclose(found.pixels, world.correspondence, atol=0.2)
+    np.testing.assert_allclose(found.q, world.correspondence, atol=0.2)
 
 
 def test_rows_correspond_on_their_own(shoot):
     photos = shoot(PLAN, _world())
     whole, part = correspond_by_stripes(photos), correspond_by_stripes(photos, slice(3, 9))
-    np.testing.assert_array_equal(part.pixels, whole.pixels[3:9])
+    np.testing.assert_array_equal(part.q, whole.q[3:9])
 
 
 def test_a_plan_without_stripes_is_told(shoot):
@@ -116,13 +116,19 @@ def test_correspondence_goes_out_and_comes_in(tmp_path):
     q[2, 3] = np.nan
     np.save(tmp_path / "q.npy", q.astype(np.float64))
     found = read_correspondence(tmp_path / "q.npy", PROJECTOR, PROJECTOR)
-    np.testing.assert_allclose(found.pixels, q, atol=1e-5)
+    np.testing.assert_allclose(found.q, q, atol=1e-5)
     assert found.lit.sum() == PROJECTOR.pixels - 1
     assert found.confidence[2, 3] == 0
 
 
+def test_the_former_name_of_q_still_works():
+    found = given_correspondence(np.ones((2, 3, 2)), Size(2, 3), PROJECTOR)
+    with pytest.warns(DeprecationWarning, match="now called q"):
+        assert found.pixels is found.q
+
+
 @pytest.mark.parametrize(
-    ("pixels", "message"),
+    ("q", "message"),
     [
         (np.zeros((24, 30)), "24x30, the photos need 24x30x2"),
         (np.zeros((30, 24, 2)), "the photos need"),
@@ -131,9 +137,9 @@ def test_correspondence_goes_out_and_comes_in(tmp_path):
         (np.full((24, 30, 2), -3), "points off the projector"),
     ],
 )
-def test_correspondence_that_cannot_be_is_refused(pixels, message):
+def test_correspondence_that_cannot_be_is_refused(q, message):
     with pytest.raises(InputError, match=message):
-        given_correspondence(pixels, PROJECTOR, PROJECTOR)
+        given_correspondence(q, PROJECTOR, PROJECTOR)
 
 
 def test_a_file_that_is_no_correspondence_is_refused(tmp_path):
@@ -151,7 +157,7 @@ def test_the_square_transport_averages_the_camera_pixels_of_a_projector_pixel(sh
     photos = shoot(plan, world)
     correspondence = given_correspondence(world.correspondence, Size(20, 24), small)
     halves = [measure(photos, slice(0, 7)), measure(photos, slice(7, 20))]
-    measurements, pixels = onto_projector(halves, correspondence)
+    measurements, own = onto_projector(halves, correspondence)
     whole = measure(photos)
     q = np.rint(world.correspondence).reshape(-1, 2).astype(int)
     for y, x in ((0, 0), (4, 7), (9, 11)):
@@ -160,9 +166,9 @@ def test_the_square_transport_averages_the_camera_pixels_of_a_projector_pixel(sh
             measurements.responses[y * 12 + x], whole.responses[mine].mean(axis=0), atol=1e-5
         )
     assert measurements.camera == small
-    np.testing.assert_array_equal(pixels[3, 5], (3, 5))
+    np.testing.assert_array_equal(own[3, 5], (3, 5))
     # A projector pixel that lights no camera pixel has no direct light to give.
-    sparse = correspondence.pixels.copy()
+    sparse = correspondence.q.copy()
     sparse[(np.rint(sparse) == (4, 7)).all(axis=-1)] = np.nan
-    _, pixels = onto_projector(halves, given_correspondence(sparse, Size(20, 24), small))
-    assert np.isnan(pixels[4, 7]).all()
+    _, own = onto_projector(halves, given_correspondence(sparse, Size(20, 24), small))
+    assert np.isnan(own[4, 7]).all()

@@ -135,9 +135,9 @@ def test_the_square_transport_has_the_projectors_size(tmp_path):
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(fine))
     transport, correspondence = reconstruct(capture, square=True)
     assert transport.camera == PROJECTOR
-    assert correspondence.pixels.shape == (48, 60, 2)
+    assert correspondence.q.shape == (48, 60, 2)
     light = nearfar.natural_picture(PROJECTOR, 1)
-    picture, q = fine @ light, np.rint(correspondence.pixels).astype(int)
+    picture, q = fine @ light, np.rint(correspondence.q).astype(int)
     for y, x in ((3, 4), (12, 20)):
         mine = (q == (y, x)).all(axis=-1)
         assert (transport @ light)[y, x] == pytest.approx(picture[mine].mean(), rel=2e-3)
@@ -335,19 +335,19 @@ def test_a_plan_of_gray_code_corresponds_by_it(tmp_path, world, method):
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
     transport, correspondence = reconstruct(capture, method=method)
     expected = correspond_by_gray_code(capture)
-    np.testing.assert_array_equal(correspondence.pixels, expected.pixels)
+    np.testing.assert_array_equal(correspondence.q, expected.q)
     np.testing.assert_array_equal(transport.lit, expected.lit)
     # In blocks, too.
     memory = memory_for(5, plan, capture.camera, method)
     _, parts = reconstruct(capture, method=method, memory=memory)
-    assert np.mean(parts.pixels == expected.pixels) > 0.95
+    assert np.mean(parts.q == expected.q) > 0.95
 
 
 def test_a_plan_without_stripes_corresponds_by_phase(tmp_path, world):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
     transport, correspondence = reconstruct(capture)
-    assert np.abs(correspondence.pixels - world.correspondence).max() < 0.5
+    assert np.abs(correspondence.q - world.correspondence).max() < 0.5
     light = nearfar.random_pattern(PROJECTOR, 1)
     assert snr(world @ light, transport @ light) > 30
 

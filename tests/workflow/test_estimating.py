@@ -71,7 +71,7 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, tmp_path, pl
     part, estimate, capture = _follow(PLANS[plan], rig, tmp_path / "c.zarr")
     expected, correspondence = reconstruct(capture)
     assert 0 < estimate.chosen_by < len(PLANS[plan].patterns)
-    np.testing.assert_array_equal(part.correspondence.pixels, correspondence.pixels)
+    np.testing.assert_array_equal(part.correspondence.q, correspondence.q)
     assert part.transport.provenance == expected.provenance
     lights = standard_lights(SIZE)
     found, best = (relighting_snr(t, scene, lights) for t in (part.transport, expected))
@@ -92,7 +92,7 @@ def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, mon
 
     def unlit(*arguments):
         found = correspond_by_stripes(*arguments)
-        found.pixels[dark] = np.nan
+        found.q[dark] = np.nan
         return found
 
     monkeypatch.setattr("nearfar.workflow.blocks.correspond_by_photos", unlit)

@@ -1,5 +1,6 @@
 """Correspondence: where each camera pixel's direct light comes from."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,49 +11,55 @@ from nearfar.arrays import AnyPath, Booleans, Floats, Size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Correspondence:
     """The projector pixel q(c) that lights each camera pixel directly.
 
     Attributes
     ----------
-    pixels : ndarray, shape (Cy, Cx, 2), float32
-        q as (y, x), the centroid of the direct light; NaN where there is none.
+    q : ndarray, shape (Cy, Cx, 2), float32
+        (y, x) of the direct light's centroid, projector pixels; NaN where there is none.
     confidence : ndarray, shape (Cy, Cx), float32
         Between 0 and 1: how sure it is that direct light was seen, or, at unlit camera pixels,
         what speaks for direct light after all.
     """
 
-    pixels: Floats
+    q: Floats
     confidence: Floats
+
+    @property
+    def pixels(self) -> Floats:
+        """Former name of `q`."""
+        warnings.warn("Correspondence.pixels is now called q", DeprecationWarning, stacklevel=2)
+        return self.q
 
     @property
     def lit(self) -> Booleans:
         """Camera pixels with direct light, shape (Cy, Cx)."""
-        return np.isfinite(self.pixels[..., 0])
+        return np.isfinite(self.q[..., 0])
 
     def of_rows(self, rows: slice) -> "Correspondence":
         """Return that of some rows of the camera, as views."""
-        return Correspondence(self.pixels[rows], self.confidence[rows])
+        return Correspondence(self.q[rows], self.confidence[rows])
 
 
 def joined(parts: Sequence[Correspondence]) -> Correspondence:
     """Put those of blocks of camera rows together, in order."""
     return Correspondence(
-        np.concatenate([part.pixels for part in parts]),
+        np.concatenate([part.q for part in parts]),
         np.concatenate([part.confidence for part in parts]),
     )
 
 
 def given_correspondence(
-    pixels: Floats, camera: Size, projector: Size, *, source: str = "correspondence"
+    q: Floats, camera: Size, projector: Size, *, source: str = "correspondence"
 ) -> Correspondence:
     """Take correspondence from outside.
 
     Parameters
     ----------
-    pixels : ndarray, shape (Cy, Cx, 2)
-        q as (y, x) in projector pixels; NaN where there is no direct light.
+    q : ndarray, shape (Cy, Cx, 2)
+        (y, x) in projector pixels; NaN where there is no direct light.
     camera, projector : Size
     source : str
         For the message.
@@ -67,22 +74,22 @@ def given_correspondence(
     InputError
         If the shape does not fit the photos, or q lies off the projector.
     """
-    if pixels.shape != (*camera, 2) or pixels.dtype.kind not in "fiu":
+    if q.shape != (*camera, 2) or q.dtype.kind not in "fiu":
         raise InputError(
-            f"{source} is an array of {'x'.join(map(str, pixels.shape))}, the photos need "
+            f"{source} is an array of {'x'.join(map(str, q.shape))}, the photos need "
             f"{camera}x2: give (y, x) for each camera pixel, NaN where there is no direct light."
         )
-    q: Floats = np.array(pixels, dtype=np.float32)
-    lit = np.isfinite(q).all(axis=-1)
+    given: Floats = np.array(q, dtype=np.float32)
+    lit = np.isfinite(given).all(axis=-1)
     if not lit.any():
         raise InputError(f"{source} has no camera pixel with direct light: all of it is NaN.")
     limit = np.array(projector, dtype=np.float32) - 1
-    if np.any((q[lit] < -0.5) | (q[lit] > limit + 0.5)):
+    if np.any((given[lit] < -0.5) | (given[lit] > limit + 0.5)):
         raise InputError(
             f"{source} points off the projector of {projector}: q is (y, x) from (0, 0) to "
             f"({projector.height - 1}, {projector.width - 1})."
         )
-    on_projector: Floats = np.asarray(np.clip(q, 0, limit))
+    on_projector: Floats = np.asarray(np.clip(given, 0, limit))
     on_projector[~lit] = np.nan
     return Correspondence(on_projector, np.where(lit, np.float32(1), np.float32(0)))
 
@@ -96,7 +103,7 @@ def read_correspondence(path: AnyPath, camera: Size, projector: Size) -> Corresp
     """
     path = Path(path)
     try:
-        pixels = np.load(path, allow_pickle=False)
+        q = np.load(path, allow_pickle=False)
     except FileNotFoundError:
         raise MissingFileError(f"{path} is not there: name a .npy of H x W x 2.") from None
     except (OSError, ValueError, EOFError) as error:
@@ -104,6 +111,6 @@ def read_correspondence(path: AnyPath, camera: Size, projector: Size) -> Corresp
             f"{path} cannot be read as correspondence ({error}): save an H x W x 2 array with "
             f"numpy.save."
         ) from None
-    if not isinstance(pixels, np.ndarray):
+    if not isinstance(q, np.ndarray):
         raise UnreadableFileError(f"{path} is no .npy array: save q with numpy.save.")
-    return given_correspondence(pixels, camera, projector, source=str(path))
+    return given_correspondence(q, camera, projector, source=str(path))

@@ -26,13 +26,13 @@ def onto_projector(
     -------
     measurements : Measurements
         As of a camera with the projector's size; zero where no camera pixel is lit by it.
-    pixels : ndarray, shape (Py, Px, 2), float32
+    q : ndarray, shape (Py, Px, 2), float32
         Each projector pixel's own place, NaN where no camera pixel is lit by it.
     """
     projector = parts[0].projector
-    q = np.rint(correspondence.pixels).reshape(-1, 2)
-    lit = np.isfinite(q[:, 0])
-    place = (q[lit, 0] * projector.width + q[lit, 1]).astype(np.int64)
+    rounded = np.rint(correspondence.q).reshape(-1, 2)
+    lit = np.isfinite(rounded[:, 0])
+    place = (rounded[lit, 0] * projector.width + rounded[lit, 1]).astype(np.int64)
     count = np.bincount(place, minlength=projector.pixels)
     share = (1.0 / np.maximum(count, 1)).astype(np.float32)[:, None]
 
@@ -57,6 +57,6 @@ def onto_projector(
         light_noise=noise("light_noise"),
     )
     y, x = np.divmod(np.arange(projector.pixels), projector.width)
-    pixels = np.stack([y, x], axis=-1).astype(np.float32)
-    pixels[count == 0] = np.nan
-    return measurements, pixels.reshape(*projector, 2)
+    q = np.stack([y, x], axis=-1).astype(np.float32)
+    q[count == 0] = np.nan
+    return measurements, q.reshape(*projector, 2)

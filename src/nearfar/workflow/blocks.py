@@ -219,13 +219,13 @@ def reconstruct_block(
         else:
             found = by_phase(measurements, str(job.capture.path))
         transport = job.estimate(
-            plan, measurements, found.pixels, progress or (lambda _share: None), job.device
+            plan, measurements, found.q, progress or (lambda _share: None), job.device
         )
     provenance = provenance_of(job.capture, job.photos, method=job.method, square=False)
     provenance["excess_of_sums"] = measurements.excess_of_sums
     mine = of_rows(transport, core)
     provenance["rounding"] = rounding_over_noise(mine) if job.half else 0.0
-    seen = Correspondence(found.pixels[core], found.confidence[core])
+    seen = Correspondence(found.q[core], found.confidence[core])
     mine = replace(
         in_half(mine) if job.half else mine,
         provenance=provenance,

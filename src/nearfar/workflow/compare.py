@@ -266,8 +266,8 @@ def _jointly(bench: _Bench, job: _Job) -> Trial:
     plan, _ = choose_plan(projector, job.photos, window=bench.window, noise=float(noise))
     photos = len(plan.patterns)
     measurements = measure(hold(plan, bench.rig(job.exposure(photos))))
-    pixels = correspond_by_phase(measurements).pixels
-    found = estimate_jointly(measurements, pixels, plan.window, plan.far)
+    q = correspond_by_phase(measurements).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far)
     return bench.trial(job, photos, found)
 
 
@@ -276,10 +276,10 @@ def _as_the_paper(bench: _Bench, job: _Job) -> Trial | None:
     for plan in paper_plans(bench.scene.projector, job.photos):
         photos = len(plan.patterns)
         held = hold(plan, bench.rig(job.exposure(photos)))
-        pixels = correspond_by_stripes(held).pixels
-        if not np.isfinite(pixels).any():
+        q = correspond_by_stripes(held).q
+        if not np.isfinite(q).any():
             continue
-        found = estimate(measure(held), pixels, plan.window, plan.far, plan.dropped)
+        found = estimate(measure(held), q, plan.window, plan.far, plan.dropped)
         trial = bench.trial(job, photos, found)
         if best is None or trial.pictures > best.pictures:
             best = trial

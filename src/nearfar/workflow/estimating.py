@@ -252,15 +252,13 @@ class RunningEstimate:
         photos = without_drift(some, unheard)
         measurements = measure(photos, progress=self._heed)
         if has_correspondence_photos(plan):
-            pixels = correspond_by_photos(photos).pixels
+            q = correspond_by_photos(photos).q
         else:
             try:
-                pixels = correspond_by_phase(measurements).pixels
+                q = correspond_by_phase(measurements).q
             except InputError:
                 return None
-        kinds = choose_kinds(
-            measurements, pixels, plan.window, device=self._device, progress=self._heed
-        )
+        kinds = choose_kinds(measurements, q, plan.window, device=self._device, progress=self._heed)
         # Those for all photos, for when they are there.
         basis, repeats = answered(self._plan)
         build_model(basis, repeats, plan.window, self._device, unlit=True)

@@ -177,9 +177,9 @@ def _squarely(
         correspondence = by_phase(join(measured), str(capture.path))
     if not correspondence.lit.any():
         raise without_light(capture)
-    whole, pixels = onto_projector(measured, correspondence)
+    whole, q = onto_projector(measured, correspondence)
     transport = estimator.estimate(
-        photos.plan, whole, pixels, lambda share: report("reconstructing", share), device
+        photos.plan, whole, q, lambda share: report("reconstructing", share), device
     )
     provenance = provenance_of(capture, photos, method=method, square=True)
     provenance["excess_of_sums"] = max((part.excess_of_sums for part in measured), key=abs)

@@ -184,7 +184,7 @@ def _about(job: Job, correspondence: Correspondence | None) -> dict[str, Any]:
 def _digest(correspondence: Correspondence | None) -> str:
     if correspondence is None:
         return ""
-    return hashlib.sha256(np.ascontiguousarray(correspondence.pixels).tobytes()).hexdigest()
+    return hashlib.sha256(np.ascontiguousarray(correspondence.q).tobytes()).hexdigest()
 
 
 def _require_same(folder: Path, before: Mapping[str, Any], about: Mapping[str, Any]) -> None:

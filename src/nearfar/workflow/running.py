@@ -130,12 +130,12 @@ class RunningCheck:
         photos = remove_drift(held)
         measurements = measure(photos)
         try:
-            pixels = correspond_by_phase(measurements).pixels
+            q = correspond_by_phase(measurements).q
         except InputError:
             # Too few frequencies to settle q yet.
             return Standing(taken, -HIGHEST, "photos")
         plan = self._plan
-        found = estimate_jointly(measurements, pixels, plan.window, plan.far, turns=TURNS)
+        found = estimate_jointly(measurements, q, plan.window, plan.far, turns=TURNS)
         every = slice(0, held.camera.height)
         values, errors, expected, unmeasured = [], [], 0.0, 0.0
         bars, quiet = ErrorBars(found), ErrorBars(_without_noise(found))

@@ -181,5 +181,5 @@ def _off_by_decade(found: Floats, exact: Floats) -> dict[str, float]:
 def _share_found(correspondence: Correspondence, truth: ExactTransport) -> float:
     """Share of the camera pixels with direct light that were found, within one pixel."""
     lit = truth.lit
-    off = np.abs(correspondence.pixels - truth.correspondence).max(axis=-1)
+    off = np.abs(correspondence.q - truth.correspondence).max(axis=-1)
     return float(np.mean(off[lit] <= 1.0))

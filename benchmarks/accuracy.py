@@ -61,7 +61,7 @@ def scores(truth: Mapping[str, Floats], found: Transport, lights: Mapping[str, F
 
 def responses_of(transport: Transport, measurements: Measurements) -> NDArray[np.float32]:
     """Return the true responses of a transport to the measured patterns."""
-    patterns = measurements.basis.patterns + measurements.shown_error
+    patterns = measurements.basis.patterns + measurements.quantisation_error
     pixels = transport.camera.pixels
     parts = [transport.rows(slice(c, c + 512)) @ patterns.T for c in range(0, pixels, 512)]
     return np.concatenate(parts)

@@ -57,7 +57,7 @@ def _responses(world, frequencies, noise=0.0, seed=0):
         responses=responses.astype(np.float32),
         noise=level,
         black=np.zeros_like(level),
-        shown_error=np.zeros_like(basis.patterns),
+        quantisation_error=np.zeros_like(basis.patterns),
     )
 
 
@@ -129,7 +129,7 @@ def test_a_coarse_camera_pixel_gets_the_centroid():
         responses=together.mean(axis=(1, 3)).reshape(camera.pixels, 1, -1),
         noise=np.zeros((camera.pixels, 1), dtype=np.float32),
         black=np.zeros((camera.pixels, 1), dtype=np.float32),
-        shown_error=measured.shown_error,
+        quantisation_error=measured.quantisation_error,
     )
     weight = fine.direct.reshape(12, 2, 15, 2, 1)
     q = (fine.correspondence.reshape(12, 2, 15, 2, 2) * weight).sum(axis=(1, 3))

@@ -57,7 +57,7 @@ def test_by_reference_and_by_pairs_agree(small_world, shoot, plan, black):
     error = np.abs(found.responses[..., here] - pairs.responses[..., there])
     assert error.max() <= 3.2 * level
     np.testing.assert_allclose(found.black, pairs.black, atol=level)
-    np.testing.assert_array_equal(found.shown_error[here], pairs.shown_error[there])
+    np.testing.assert_array_equal(found.quantisation_error[here], pairs.quantisation_error[there])
 
 
 def test_an_inverse_among_them_counts_with_its_sign(small_world, shoot):
@@ -85,7 +85,7 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
     light = clean.places([DC])[0]
     sinusoids = np.setdiff1d(np.arange(clean.basis.count), [light])
     # The references' own error is that of all responses of a pixel; each has its own besides.
-    own = told("noise") ** 2 / clean.repeats[sinusoids]
+    own = told("noise") ** 2 / clean.multiplicity[sinusoids]
     shared = told("white_noise") ** 2 + told("black_noise") ** 2
     scatter = np.sqrt(np.mean(errors[..., sinusoids] ** 2, axis=(0, 1, 2)))
     np.testing.assert_allclose(scatter, np.sqrt(own + shared), rtol=0.1)
@@ -95,8 +95,8 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
     expected = np.sqrt(shared + np.mean(own) / len(sinusoids))
     assert between.std() == pytest.approx(expected, rel=0.1)
     # As many responses as the plan shows, white for DC.
-    assert clean.repeats[clean.places([CHECKERBOARD])] == [4]
-    assert clean.repeats[light] == sum(
+    assert clean.multiplicity[clean.places([CHECKERBOARD])] == [4]
+    assert clean.multiplicity[light] == sum(
         isinstance(p, Sinusoid) and p.frequency == DC and not p.inverse for p in plan.patterns
     )
 
@@ -172,7 +172,7 @@ def test_rows_are_measured_on_their_own(small_world, shoot, plan):
         np.testing.assert_allclose(getattr(part, name), mine, atol=1e-7)
     cut = whole.of_pixels(Size(3, 9), slice(2 * 9, 5 * 9))
     np.testing.assert_array_equal(cut.white_noise, whole.white_noise[18:45])
-    np.testing.assert_array_equal(cut.repeats, whole.repeats)
+    np.testing.assert_array_equal(cut.multiplicity, whole.multiplicity)
 
 
 def test_the_mean_over_camera_pixels_is_that_much_better(shoot):
@@ -191,7 +191,7 @@ def test_measurements_by_pairs_have_no_reference_noise(wide_world, shoot):
     found = measure(shoot(PAIRS, wide_world, NOISY))
     assert np.all(found.white_noise == 0)
     assert np.all(found.black_noise == 0)
-    assert np.all(found.repeats == 1)
+    assert np.all(found.multiplicity == 1)
     # White is the mean of all pairs.
     assert np.median(found.light_noise / found.noise) < 0.5
 
@@ -207,9 +207,14 @@ def test_the_noise_of_light_by_pairs_is_what_it_is(wide_world, shoot):
 def test_what_is_left_out_of_measurements_is_a_single_measurement(small_world, shoot):
     found = measure(shoot(PAIRS, small_world, NOISY))
     plain = Measurements(
-        found.camera, found.basis, found.responses, found.noise, found.black, found.shown_error
+        found.camera,
+        found.basis,
+        found.responses,
+        found.noise,
+        found.black,
+        found.quantisation_error,
     )
-    np.testing.assert_array_equal(plain.repeats, np.ones(found.basis.count))
+    np.testing.assert_array_equal(plain.multiplicity, np.ones(found.basis.count))
     assert np.all(plain.white_noise == 0)
     assert plain.black_noise.shape == found.noise.shape
     np.testing.assert_array_equal(plain.light_noise, found.noise)

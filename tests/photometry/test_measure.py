@@ -48,11 +48,11 @@ def test_responses_are_in_photo_units(small_world, shoot):
 
 def test_what_eight_bits_got_wrong_is_known(small_world, shoot):
     measurements = measure(shoot(PLAN, small_world))
-    ideal = small_world.dense() @ (measurements.basis.patterns + measurements.shown_error).T
+    ideal = small_world.dense() @ (measurements.basis.patterns + measurements.quantisation_error).T
     place = measurements.places([DC])
     keep = np.setdiff1d(np.arange(measurements.basis.count), place)
     np.testing.assert_allclose(measurements.responses[..., keep], ideal[..., keep], atol=2.5e-5)
-    assert 0.001 < np.abs(measurements.shown_error).max() <= 1 / 255 + 1e-6
+    assert 0.001 < np.abs(measurements.quantisation_error).max() <= 1 / 255 + 1e-6
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_what_was_shot_twice_counts_as_the_mean(shoot):
         mean = np.mean([taken[pair.photo] - taken[pair.inverse] for pair in mine], axis=0)
         found = measurements.responses[..., place]
         # What the sums' noise takes out of it is less than the noise.
-        assert measurements.repeats[place] == len(mine)
+        assert measurements.multiplicity[place] == len(mine)
         np.testing.assert_allclose(found, mean, atol=6 * measurements.noise.max())
 
 

@@ -108,7 +108,7 @@ def _quick_look(kind, strength, noise=0.01, shape=(6, 8, 3)):
         posterior=Posterior(
             kinds=(LIT[0], kind),
             frequencies=(),
-            repeats=np.zeros(0, np.float32),
+            multiplicity=np.zeros(0, np.float32),
             kind=np.ones(shape[:2], np.uint8),
             strength=np.full(shape[:2], strength, np.float32),
             white=white,

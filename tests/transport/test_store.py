@@ -66,7 +66,7 @@ def _believed(transport: Transport) -> Transport:
     posterior = Posterior(
         kinds=LIT[:3],
         frequencies=frequencies,
-        repeats=np.arange(real_basis(frequencies, PROJECTOR).count, dtype=np.float32),
+        multiplicity=np.arange(real_basis(frequencies, PROJECTOR).count, dtype=np.float32),
         kind=generator.integers(0, 3, shape[:2]).astype(np.uint8),
         strength=generator.random(shape[:2]).astype(np.float32),
         **values,
@@ -83,7 +83,7 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
     loaded = load_transport(tmp_path / "t.zarr").posterior
     assert loaded.kinds == transport.posterior.kinds
     assert loaded.frequencies == transport.posterior.frequencies
-    for name in ("repeats", *BELIEVED):
+    for name in ("multiplicity", *BELIEVED):
         values = getattr(loaded, name)
         np.testing.assert_array_equal(values, getattr(transport.posterior, name))
         assert values.dtype == getattr(transport.posterior, name).dtype

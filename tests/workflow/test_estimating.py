@@ -253,7 +253,7 @@ def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
 
 @pytest.mark.parametrize("plan", PLANS)
 def test_what_is_measured_is_known_before(rig, plan):
-    basis, repeats = answered(PLANS[plan])
+    basis, multiplicity = answered(PLANS[plan])
     measurements = measure(hold(PLANS[plan], rig), slice(0, 1))
     assert basis.frequencies == measurements.basis.frequencies
-    np.testing.assert_array_equal(repeats, measurements.repeats)
+    np.testing.assert_array_equal(multiplicity, measurements.multiplicity)

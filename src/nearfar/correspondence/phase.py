@@ -113,7 +113,7 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
 def answer_variance(measurements: Measurements) -> Floats:
     """Return the variance of each answer, broadcastable to (C, channels, R)."""
     references = measurements.white_noise**2 + measurements.black_noise**2
-    repeated = measurements.noise[..., None] ** 2 / measurements.repeats
+    repeated = measurements.noise[..., None] ** 2 / measurements.multiplicity
     return np.asarray(repeated + references[..., None])
 
 

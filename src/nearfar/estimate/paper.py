@@ -95,9 +95,9 @@ def estimate(
     move = mover(device)
     matrices = build_matrices(measurements, window, far, dropped)
     there = matrices.put(move)
-    errors = _ShownErrors(
+    errors = _QuantisationErrors(
         *(
-            np.ascontiguousarray(measurements.shown_error[band.places].T)
+            np.ascontiguousarray(measurements.quantisation_error[band.places].T)
             for band in (matrices.near, matrices.far)
         )
     )
@@ -134,7 +134,7 @@ def estimate(
     )
 
 
-class _ShownErrors(NamedTuple):
+class _QuantisationErrors(NamedTuple):
     """What 8 bits got wrong of the near and far patterns, a row for each projector pixel."""
 
     near: Floats
@@ -273,7 +273,7 @@ def _pixels(
     centres: NDArray[np.int64],
     block: slice,
     matrices: Matrices,
-    errors: _ShownErrors,
+    errors: _QuantisationErrors,
 ) -> _Pixels:
     """Gather what a block's rounds need."""
     projector = measurements.projector
@@ -282,7 +282,7 @@ def _pixels(
     corners = _corner_weights(where, centres, projector.width)
     responses = measurements.responses[block]
 
-    def shown_error(error: Floats) -> Floats:
+    def quantisation_error(error: Floats) -> Floats:
         """Responses (n, 1, R) of unit direct light to what 8 bits got wrong."""
         return look_up_each(error, where.pixels, where.weights)[:, None]
 
@@ -290,7 +290,7 @@ def _pixels(
         return np.asarray((corners @ band.on_corners.T)[:, None])
 
     checkerboard, near_band, far_band = matrices.checkerboard, matrices.near, matrices.far
-    near_error = near_band.recentre(shown_error(errors.near), centres)
+    near_error = near_band.recentre(quantisation_error(errors.near), centres)
     return _Pixels(
         centres=centres,
         lit=lit[block],
@@ -302,7 +302,8 @@ def _pixels(
         near=near_band.recentre(responses[..., near_band.places], centres),
         far=responses[..., far_band.places],
         near_of_direct=of_direct(near_band) + near_error,
-        far_of_direct=far_band.uncentre(of_direct(far_band), centres) + shown_error(errors.far),
+        far_of_direct=far_band.uncentre(of_direct(far_band), centres)
+        + quantisation_error(errors.far),
     )
 
 

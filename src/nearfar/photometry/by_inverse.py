@@ -27,7 +27,7 @@ from nearfar.photometry.photos import (
     Photos,
     Reference,
     basis_of,
-    shown_error,
+    quantisation_error,
     size_of_rows,
     stripe_references,
     two_levels,
@@ -79,7 +79,7 @@ def find_pairs(plan: Plan) -> list[Pair]:
 
 
 def responses_of_pairs(plan: Plan) -> tuple[RealBasis, Integers, Floats]:
-    """Return the basis that a plan's pairs answer, each pair's place in it, and repeats (R,)."""
+    """Return the basis that a plan's pairs measure, each pair's place in it, multiplicity (R,)."""
     pairs = find_pairs(plan)
     if all(pair.frequency != DC for pair in pairs):
         raise InputError(
@@ -117,7 +117,7 @@ def measure_pairs(
     """
     plan = photos.plan
     camera = size_of_rows(photos, rows)
-    pairs, (basis, places, repeats) = find_pairs(plan), responses_of_pairs(plan)
+    pairs, (basis, places, multiplicity) = find_pairs(plan), responses_of_pairs(plan)
     shape = (camera.pixels, photos.channels)
     differences = np.empty((len(pairs), *shape), dtype=np.float32)
     strays = np.empty((len(pairs), *shape), dtype=np.float32)
@@ -158,7 +158,7 @@ def measure_pairs(
         ]
     )
     left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
-    responses = _means(differences, places, repeats)
+    responses = _means(differences, places, multiplicity)
     responses[..., basis.places([DC])[0]] = levels.light
     return Measurements(
         camera=camera,
@@ -166,22 +166,22 @@ def measure_pairs(
         responses=responses,
         noise=np.sqrt(pair_variance * left).astype(np.float32),
         black=levels.black.astype(np.float32),
-        shown_error=shown_error(basis),
+        quantisation_error=quantisation_error(basis),
         excess_of_sums=excess,
-        repeats=repeats,
+        multiplicity=multiplicity,
         light_noise=np.sqrt(levels.light_variance).astype(np.float32),
     )
 
 
-def _means(differences: Floats, places: Integers, repeats: Floats) -> Floats:
+def _means(differences: Floats, places: Integers, multiplicity: Floats) -> Floats:
     """Mean of the differences (pairs, C, channels) of each answer, (C, channels, R)."""
     order = np.argsort(places, kind="stable")
     first = np.flatnonzero(np.diff(places[order], prepend=-1))
     shape = differences.shape[1:]
-    responses = np.empty((*shape, len(repeats)), dtype=np.float32)
+    responses = np.empty((*shape, len(multiplicity)), dtype=np.float32)
     for block in blocks(shape[0], TURNED):
         sums = np.add.reduceat(differences[:, block][order], first, axis=0)
-        responses[block] = np.moveaxis(sums, 0, -1) / repeats
+        responses[block] = np.moveaxis(sums, 0, -1) / multiplicity
     return responses
 
 

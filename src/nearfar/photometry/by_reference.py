@@ -26,7 +26,7 @@ from nearfar.photometry.photos import (
     find_shown,
     in_batches,
     mean_photo,
-    shown_error,
+    quantisation_error,
     size_of_rows,
     stripe_references,
     two_levels,
@@ -42,7 +42,7 @@ def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, 
     basis : RealBasis
     terms : dict
         Place and sign of the answer of each photo, but of white's and black's.
-    repeats : ndarray, shape (R,)
+    multiplicity : ndarray, shape (R,)
         How often each was shown, white for DC.
     """
     shown = find_shown(plan)
@@ -54,9 +54,9 @@ def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, 
         for number, sign in numbers
     }
     places = np.array([at for at, _ in terms.values()], dtype=np.int64)
-    repeats = np.bincount(places, minlength=basis.count).astype(np.float32)
-    repeats[place[DC, False]] = len(find_references(plan)[0])
-    return basis, terms, repeats
+    multiplicity = np.bincount(places, minlength=basis.count).astype(np.float32)
+    multiplicity[place[DC, False]] = len(find_references(plan)[0])
+    return basis, terms, multiplicity
 
 
 def measure_by_reference(
@@ -83,7 +83,7 @@ def measure_by_reference(
         If a cosine was shown without its sine.
     """
     camera = size_of_rows(photos, rows)
-    basis, terms, repeats = responses_by_reference(photos.plan)
+    basis, terms, multiplicity = responses_by_reference(photos.plan)
     whites, blacks = find_references(photos.plan)
     white = mean_photo(photos, whites.tolist(), rows)
     black = mean_photo(photos, blacks.tolist(), rows)
@@ -102,7 +102,7 @@ def measure_by_reference(
             responses[..., r] += sign * (2 * photo - both)
         if progress is not None:
             progress(numbers[-1] + 1)
-    responses /= repeats
+    responses /= multiplicity
     responses[..., basis.places([DC])[0]] = levels.light
 
     def deviation(variance: Floats) -> NDArray[np.float32]:
@@ -114,8 +114,8 @@ def measure_by_reference(
         responses=responses,
         noise=2 * deviation(photos.variance(levels.black + levels.light / 2)),
         black=levels.black.astype(np.float32),
-        shown_error=shown_error(basis),
-        repeats=repeats,
+        quantisation_error=quantisation_error(basis),
+        multiplicity=multiplicity,
         white_noise=deviation(levels.white_variance),
         black_noise=deviation(levels.black_variance),
         light_noise=deviation(levels.light_variance),

@@ -38,7 +38,7 @@ def answered(plan: Plan) -> tuple[RealBasis, Floats]:
     -------
     basis : RealBasis
         That of the measurements.
-    repeats : ndarray, shape (R,)
+    multiplicity : ndarray, shape (R,)
         How often each answer is measured.
 
     Raises
@@ -48,10 +48,10 @@ def answered(plan: Plan) -> tuple[RealBasis, Floats]:
     """
     plan.require_real("measure")
     if plan.offset == "reference":
-        basis, _, repeats = responses_by_reference(plan)
+        basis, _, multiplicity = responses_by_reference(plan)
     else:
-        basis, _, repeats = responses_of_pairs(plan)
-    return basis, repeats
+        basis, _, multiplicity = responses_of_pairs(plan)
+    return basis, multiplicity
 
 
 def measure(

@@ -34,19 +34,21 @@ class Measurements:
         references; 0 where there is none.
     black : ndarray, shape (C, channels), float32
         The photo under black.
-    shown_error : ndarray, shape (R, P), float32
-        What was shown (8 bits) less the ideal cosine or sine; 0 in theory.
+    quantisation_error : ndarray, shape (R, P), float32
+        The 8-bit pattern less the ideal cosine or sine; 0 in theory.
     excess_of_sums : float
         By what share of white inverse pairs sum to more than white + black; 0 where projector
         and camera are linear, and by reference.
-    repeats : ndarray, shape (R,), float32
-        How often each answer was measured; answer r has noise / sqrt(repeats[r]). Ones by default.
+    multiplicity : ndarray, shape (R,), float32
+        How often each response was measured: response r has noise / sqrt(multiplicity[r]). Ones
+        by default.
     white_noise, black_noise : ndarray, shape (C, channels), float32
         Standard deviations of the white and the black that all sinusoids' responses were taken
         against: errors e_w and e_k of theirs add -(e_w + e_k) to every one of them. 0, the
         default, where each was taken against its own inverse.
     light_noise : ndarray, shape (C, channels), float32
-        Standard deviation of DC's answer, white - black, whatever its repeats; by default `noise`.
+        Standard deviation of the response to DC, white - black, whatever its multiplicity; by
+        default `noise`.
     brightest : float
         Largest answer to DC of the camera of which these are some rows; 0, the default: of these.
     """
@@ -56,9 +58,9 @@ class Measurements:
     responses: Floats
     noise: Floats
     black: Floats
-    shown_error: Floats
+    quantisation_error: Floats
     excess_of_sums: float = 0.0
-    repeats: Floats = field(default_factory=_left_out)
+    multiplicity: Floats = field(default_factory=_left_out)
     white_noise: Floats = field(default_factory=_left_out)
     black_noise: Floats = field(default_factory=_left_out)
     light_noise: Floats = field(default_factory=_left_out)
@@ -66,7 +68,7 @@ class Measurements:
 
     def __post_init__(self) -> None:
         defaults = {
-            "repeats": np.ones(self.basis.count, dtype=np.float32),
+            "multiplicity": np.ones(self.basis.count, dtype=np.float32),
             "white_noise": np.zeros_like(self.noise),
             "black_noise": np.zeros_like(self.noise),
             "light_noise": self.noise,

@@ -107,8 +107,8 @@ def basis_of(responses: Sequence[Answer], projector: Size) -> tuple[RealBasis, d
     return basis, place
 
 
-def shown_error(basis: RealBasis) -> Floats:
-    """Return what 8 bits show of each cosine and sine, 2 l / 255 - 1, less the ideal: (R, P)."""
+def quantisation_error(basis: RealBasis) -> Floats:
+    """Return each 8-bit cosine and sine, 2 l / 255 - 1, less the ideal one, shape (R, P)."""
     ideal = basis.patterns
     error = np.empty_like(ideal)
     for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True)):

@@ -90,5 +90,5 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
         responses=responses,
         noise=nothing,
         black=nothing,
-        shown_error=np.zeros((basis.count, plan.projector.pixels), dtype=np.float32),
+        quantisation_error=np.zeros((basis.count, plan.projector.pixels), dtype=np.float32),
     )

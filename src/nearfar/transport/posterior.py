@@ -18,7 +18,7 @@ class Posterior:
     kinds : tuple of Kind
     frequencies : tuple of Frequency
         What was measured, one of each +-k, without DC.
-    repeats : ndarray, shape (R,), float32
+    multiplicity : ndarray, shape (R,), float32
         How often each real answer was measured.
     kind : ndarray of uint8, shape (Cy, Cx)
         Place in `kinds`.
@@ -36,7 +36,7 @@ class Posterior:
 
     kinds: tuple[Kind, ...]
     frequencies: tuple[Frequency, ...]
-    repeats: Floats
+    multiplicity: Floats
     kind: Integers
     strength: Floats
     white: Floats

@@ -151,7 +151,7 @@ def _described(posterior: Posterior) -> dict[str, Any]:
     return {
         "kinds": [list(kind) for kind in posterior.kinds],
         "frequencies": [frequency_to_text(k) for k in posterior.frequencies],
-        "repeats": [float(count) for count in posterior.repeats],
+        "repeats": [float(count) for count in posterior.multiplicity],
     }
 
 
@@ -312,7 +312,9 @@ def _shared_posterior(described: dict[str, Any]) -> dict[str, Any]:
     return {
         "kinds": tuple(Kind(*(float(value) for value in kind)) for kind in described["kinds"]),
         "frequencies": tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
-        "repeats": np.array([float(count) for count in described["repeats"]], dtype=np.float32),
+        "multiplicity": np.array(
+            [float(count) for count in described["repeats"]], dtype=np.float32
+        ),
     }
 
 
@@ -326,7 +328,7 @@ def _posterior_fits(
     kind, strength = (arrays[f"{POSTERIOR}_{name}"] for name in BELIEVED[:2])
     flat = (kind.shape, strength.shape) == (each[:2], each[:2])
     full = all(arrays[f"{POSTERIOR}_{name}"].shape == each for name in BELIEVED[2:])
-    return flat and full and kind.dtype == np.uint8 and posterior["repeats"].shape == (count,)
+    return flat and full and kind.dtype == np.uint8 and posterior["multiplicity"].shape == (count,)
 
 
 def _misfit(path: Path) -> UnreadableFileError:

@@ -260,8 +260,8 @@ class RunningEstimate:
                 return None
         kinds = choose_kinds(measurements, q, plan.window, device=self._device, progress=self._heed)
         # Those for all photos, for when they are there.
-        basis, repeats = answered(self._plan)
-        build_model(basis, repeats, plan.window, self._device, unlit=True)
+        basis, multiplicity = answered(self._plan)
+        build_model(basis, multiplicity, plan.window, self._device, unlit=True)
         return _Choice(taken, kinds, time.monotonic() - begun)
 
     def _heed(self, _done: float) -> None:

@@ -46,7 +46,7 @@ def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=Non
         responses=responses.astype(np.float32),
         noise=level,
         black=np.zeros_like(level),
-        shown_error=np.zeros((basis.count, PROJECTOR.pixels), dtype=np.float32),
+        quantisation_error=np.zeros((basis.count, PROJECTOR.pixels), dtype=np.float32),
         white_noise=np.full_like(level, offset),
     )
 

@@ -34,7 +34,7 @@ def test_the_evidence_is_that_of_dense_algebra(offset):
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
     pixels = pixels_of(measurements, centres, band)
-    prior = build_prior(KIND, band, measurements.repeats[band.places])
+    prior = build_prior(KIND, band, measurements.multiplicity[band.places])
     found = evidence(tell(pixels), prior)
     expected = np.stack(
         [dense(measurements, pixels, band, strength)[3] for strength in STRENGTHS], axis=1
@@ -56,9 +56,11 @@ def test_a_camera_pixel_chooses_the_kind_that_it_was_drawn_from():
     pixels = pixels_of(measurements, centres, band)
     far_from = Kind(6.0, 256.0, 0.7)
     priors = [
-        build_prior(kind, band, measurements.repeats[band.places]) for kind in (KIND, far_from)
+        build_prior(kind, band, measurements.multiplicity[band.places]) for kind in (KIND, far_from)
     ]
-    kind, strength, _ = best_kind(pixels, screened(priors, band, measurements.repeats[band.places]))
+    kind, strength, _ = best_kind(
+        pixels, screened(priors, band, measurements.multiplicity[band.places])
+    )
     assert np.mean(kind == 0) > 0.95
     # 0.02 in photo units, of a white that is 0.5 and a little.
     white = pixels.white[:, 0]
@@ -70,12 +72,12 @@ def test_few_responses_narrow_the_kinds_down_and_all_choose(monkeypatch):
     centres = np.stack([generator.integers(4, 12, 100), generator.integers(4, 16, 100)], axis=1)
     frequencies = chosen_frequencies()
     band = band_of_all(frequencies)
-    repeats = np.ones(band.basis.count, dtype=np.float32)
-    priors = tuple(build_prior(kind, band, repeats) for kind in LIT)
-    unscreened = screened(priors, band, repeats)
+    multiplicity = np.ones(band.basis.count, dtype=np.float32)
+    priors = tuple(build_prior(kind, band, multiplicity) for kind in LIT)
+    unscreened = screened(priors, band, multiplicity)
     assert unscreened.screens is priors
     monkeypatch.setattr("nearfar.estimate.joint.evidence.RESPONSES", 24)
-    narrowed = screened(priors, band, repeats)
+    narrowed = screened(priors, band, multiplicity)
     assert len(narrowed.chosen) == pytest.approx(24, abs=1)
     worse = []
     for strength in (0.003, 0.02, 0.1):
@@ -116,7 +118,7 @@ def test_narrow_projectors_and_windows_are_reconstructed(projector, window):
         responses=responses.astype(np.float32),
         noise=noise,
         black=np.zeros_like(noise),
-        shown_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
+        quantisation_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
     )
     found = estimate_jointly(measurements, world.correspondence, window, Size(1, 1))
     light = np.random.default_rng(1).random(projector)

@@ -41,7 +41,7 @@ def test_the_mean_is_that_of_dense_algebra_inside_and_at_the_border(offset):
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
     pixels = pixels_of(measurements, centres, band)
-    prior = build_prior(KIND, band, measurements.repeats[band.places])
+    prior = build_prior(KIND, band, measurements.multiplicity[band.places])
     found = solved(pixels, prior, np.full(len(centres), 0.05), band)
     shared, windows, far, _ = dense(measurements, pixels, band, 0.05)
     scale, far_scale = np.abs(windows).max(), np.abs(far).max()
@@ -58,16 +58,16 @@ def test_repeats_count_as_less_noise():
     band = band_of_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3)
-    nine = np.full_like(measurements.repeats, 9.0)
+    nine = np.full_like(measurements.multiplicity, 9.0)
     means = [
         solved(
             pixels_of(m, centres, band),
-            build_prior(KIND, band, m.repeats[band.places]),
+            build_prior(KIND, band, m.multiplicity[band.places]),
             np.full(2, 0.05),
             band,
         )
         for m in (
-            replace(measurements, repeats=nine),
+            replace(measurements, multiplicity=nine),
             replace(measurements, noise=measurements.noise / 3),
         )
     ]
@@ -83,14 +83,14 @@ def test_cut_windows_of_every_kind_are_those_of_dense_algebra(kind, uneven):
     band = band_of_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3)
-    repeats = measurements.repeats.copy()
+    multiplicity = measurements.multiplicity.copy()
     if uneven:
         # Cosines that were shown more often than their sines.
-        repeats[band.places[~band.basis.is_sine]] = 4.0
-    prior = build_prior(kind, band, repeats[band.places])
+        multiplicity[band.places[~band.basis.is_sine]] = 4.0
+    prior = build_prior(kind, band, multiplicity[band.places])
     pixels = pixels_of(measurements, centres, band)
     found = solved(pixels, prior, np.full(len(centres), 0.05), band, by=solve_cut)
-    spread = np.diag(1.0 / repeats[band.places])
+    spread = np.diag(1.0 / multiplicity[band.places])
     window, power = near_covariance(kind, WINDOW), far_power(band.basis, kind)
     for c in range(len(centres)):
         cut = band.on_window * pixels.inside[c]
@@ -114,7 +114,7 @@ def test_whole_and_cut_agree_where_nothing_is_cut():
     band = band_of_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=1e-3)
-    prior = build_prior(KIND, band, measurements.repeats[band.places])
+    prior = build_prior(KIND, band, measurements.multiplicity[band.places])
     pixels = with_spike(pixels_of(measurements, centres, band), np.array([0, 3, 24]))
     one, other = (
         solved(pixels, prior, np.full(3, 0.05), band, by=solver)
@@ -164,7 +164,7 @@ def test_what_eight_bits_make_of_direct_light_is_no_other_light():
         found = estimate_jointly(told, world.correspondence, WINDOW, FAR)
         return np.sqrt(np.mean(found.near**2)) / world.direct.mean()
 
-    unknown, known = stray(misdrawn), stray(replace(misdrawn, shown_error=error))
+    unknown, known = stray(misdrawn), stray(replace(misdrawn, quantisation_error=error))
     assert known < 0.3 * unknown
 
 
@@ -233,8 +233,8 @@ def test_responses_without_white_are_refused():
         measurements,
         basis=basis,
         responses=measurements.responses[..., 1:],
-        shown_error=measurements.shown_error[1:],
-        repeats=measurements.repeats[1:],
+        quantisation_error=measurements.quantisation_error[1:],
+        multiplicity=measurements.multiplicity[1:],
     )
     with pytest.raises(InputError, match="lack white"):
         estimate_jointly(lacking, np.array([[[8.0, 10.0]]]), WINDOW, FAR)

@@ -56,7 +56,7 @@ def _transport(centres, lit=True):
         posterior=Posterior(
             kinds=(Kind(0.0, 1.0, 1.0), KIND),
             frequencies=measured,
-            repeats=np.random.default_rng(0).integers(1, 4, count).astype(np.float32),
+            multiplicity=np.random.default_rng(0).integers(1, 4, count).astype(np.float32),
             kind=np.ones(shape[:2], np.uint8),
             strength=np.full(shape[:2], STRENGTH, np.float32),
             white=np.full(shape, WHITE, np.float32),
@@ -89,7 +89,7 @@ def _dense(transport, c, ask):
     end = 3 + WINDOW**2
     prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
     prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
-    noise = np.diag(NOISE**2 / posterior.repeats.astype(np.float64))
+    noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
     posterior = prior - gain @ responses @ prior
     return np.sqrt(ask @ posterior @ ask)
@@ -253,7 +253,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     prior[:3, :3] = np.diag([OFFSET**2, (4 * WHITE) ** 2, (OFF * WHITE) ** 2])
     prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
     prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
-    noise = np.diag(NOISE**2 / posterior.repeats.astype(np.float64))
+    noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
     posterior = prior - gain @ responses @ prior
     light = np.zeros(PROJECTOR)

@@ -61,7 +61,7 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
         posterior=Posterior(
             kinds=(*LIT, *UNLIT),
             frequencies=band.basis.frequencies,
-            repeats=fetch(problem.model.repeats),
+            multiplicity=fetch(problem.model.multiplicity),
             kind=fetch(first.kind).astype(np.uint8).reshape(measurements.camera),
             strength=fetch(first.strength).reshape(measurements.camera),
             white=fetch(whole.white).reshape(shape),

@@ -40,7 +40,7 @@ def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
     xp = namespace(pixels.responses)
     number, channels, count = pixels.responses.shape
     # m, how often each answer was measured: the squares of a row add up to it.
-    repeats = xp.sum(xp.astype(prior.directions, xp.float64) ** 2, axis=1)
+    multiplicity = xp.sum(xp.astype(prior.directions, xp.float64) ** 2, axis=1)
     power, deviation = (
         beside(values, pixels.responses) for values in (prior.power, prior.factors.deviation)
     )
@@ -57,7 +57,7 @@ def solve_cut(pixels: Pixels, prior: Prior, ratio: Floats, band: Band) -> Found:
     far, left = empty(number, channels, count), empty(number, channels, count)
     rounded_to = fetch(ratio)
     for value in np.unique(rounded_to):
-        weight = 1.0 / (float(value) * power + 1.0 / repeats)
+        weight = 1.0 / (float(value) * power + 1.0 / multiplicity)
         of, channel = np.nonzero(rounded_to == value)
         c, i = beside(of, known), beside(channel, known)
         y = xp.astype(xp.concat([pixels.responses[c, i, None], columns[c]], axis=1), xp.float64)

@@ -60,14 +60,14 @@ class Kinds(NamedTuple):
         )
 
 
-def screened(priors: tuple[Prior, ...], band: Band, repeats: Floats) -> Kinds:
+def screened(priors: tuple[Prior, ...], band: Band, multiplicity: Floats) -> Kinds:
     """Choose responses that tell kinds apart: evenly among the frequencies, in their order."""
     frequencies = len(band.basis.frequencies)
     if band.basis.count <= 2 * RESPONSES:
         return Kinds(priors, priors, np.arange(band.basis.count))
     kept = np.linspace(0, frequencies - 1, RESPONSES // 2).round().astype(np.int64)
     chosen = np.flatnonzero(np.isin(band.basis.index, kept))
-    screens = tuple(prior.told_by(chosen, band, repeats) for prior in priors)
+    screens = tuple(prior.told_by(chosen, band, multiplicity) for prior in priors)
     return Kinds(priors, screens, chosen)
 
 

@@ -20,7 +20,7 @@ TINY = 1e-30
 HELD = 2**22
 
 
-def expect_each(values: Floats, variance: Floats, repeats: Floats) -> Floats:
+def expect_each(values: Floats, variance: Floats, multiplicity: Floats) -> Floats:
     """Expect each coefficient by itself.
 
     Parameters
@@ -29,7 +29,7 @@ def expect_each(values: Floats, variance: Floats, repeats: Floats) -> Floats:
         As shares of white.
     variance : ndarray, shape (Cy, Cx, channels)
         Of their noise where they were measured once, above 0.
-    repeats : ndarray, shape (J,)
+    multiplicity : ndarray, shape (J,)
         How often each was measured.
     """
     xp = namespace(values)
@@ -40,8 +40,8 @@ def expect_each(values: Floats, variance: Floats, repeats: Floats) -> Floats:
         some, weight, core = _with_neighbours(values, rows), _with_neighbours(whole, rows), rows
         total = _sum(weight)
         mean, scatter = _mean_and_scatter(some, weight, total)
-        change = xp.clip(scatter - 1.0 / (total * repeats), min=0.0)
-        trust = change / (change + variance[core, ..., None] / repeats)
+        change = xp.clip(scatter - 1.0 / (total * multiplicity), min=0.0)
+        trust = change / (change + variance[core, ..., None] / multiplicity)
         found[core] = mean + trust * (values[core] - mean)
 
     side_by_side(work, _row_blocks(values))

@@ -327,7 +327,7 @@ class ErrorBars:
     def _prior(self, place: int) -> Prior:
         if place not in self._priors:
             kind: Kind = self._posterior.kinds[place]
-            self._priors[place] = build_prior(kind, self._band, self._posterior.repeats)
+            self._priors[place] = build_prior(kind, self._band, self._posterior.multiplicity)
         return self._priors[place]
 
 

@@ -96,11 +96,11 @@ class Prior(Spectrum):
     def _met(self) -> tuple[str, ...]:
         return (*super()._met, "to_near", "to_far", "of_window", "curvatures")
 
-    def told_by(self, chosen: Integers, band: Band, repeats: Floats) -> Spectrum:
+    def told_by(self, chosen: Integers, band: Band, multiplicity: Floats) -> Spectrum:
         """Return the spectrum of some responses alone."""
         patterns = band.on_window[chosen].astype(np.float64)
         matrix = patterns @ self.covariance @ patterns.T + np.diag(self.power[chosen])
-        levels, directions = _decomposed(matrix, repeats[chosen])
+        levels, directions = _decomposed(matrix, multiplicity[chosen])
         return Spectrum(
             levels=levels.astype(np.float32),
             directions=np.ascontiguousarray(directions, dtype=np.float32),
@@ -108,14 +108,14 @@ class Prior(Spectrum):
         )
 
 
-def _decomposed(matrix: Floats, repeats: Floats) -> tuple[Floats, Floats]:
+def _decomposed(matrix: Floats, multiplicity: Floats) -> tuple[Floats, Floats]:
     """Levels and directions of K, as `Spectrum` has them."""
-    root = np.sqrt(repeats.astype(np.float64))
+    root = np.sqrt(multiplicity.astype(np.float64))
     levels, vectors = np.linalg.eigh(matrix * root[:, None] * root)
     return np.maximum(levels[::-1], 0.0), vectors[:, ::-1] * root[:, None]
 
 
-def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
+def build_prior(kind: Kind, band: Band, multiplicity: Floats) -> Prior:
     """Build a kind's matrices.
 
     Parameters
@@ -123,7 +123,7 @@ def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
     kind : Kind
     band : Band
         The measured frequencies without DC.
-    repeats : ndarray, shape (R,)
+    multiplicity : ndarray, shape (R,)
         m, how often each answer was measured.
     """
     patterns = band.on_window.astype(np.float64)
@@ -131,7 +131,7 @@ def build_prior(kind: Kind, band: Band, repeats: Floats) -> Prior:
     covariance = near_covariance(kind, window)
     seen = patterns @ covariance
     power = far_power(band.basis, kind)
-    levels, directions = _decomposed(seen @ patterns.T + np.diag(power), repeats)
+    levels, directions = _decomposed(seen @ patterns.T + np.diag(power), multiplicity)
     to_near = directions.T @ seen
     of_window = directions.T @ patterns
     told = 1.0 / (RATIOS[:, None] * levels + 1.0)

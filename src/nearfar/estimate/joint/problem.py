@@ -66,7 +66,7 @@ class Model(NamedTuple):
     """Kinds for a set of measured frequencies."""
 
     band: Band
-    repeats: Floats
+    multiplicity: Floats
     lit: Kinds
     unlit: Kinds | None
 
@@ -81,7 +81,7 @@ class Problem(NamedTuple):
 
 
 def build_model(
-    measured: RealBasis, repeats: Floats, window: int, device: Device, *, unlit: bool
+    measured: RealBasis, multiplicity: Floats, window: int, device: Device, *, unlit: bool
 ) -> Model:
     """Build the kinds for what is measured; the last few are kept, so that blocks share them.
 
@@ -89,7 +89,7 @@ def build_model(
     ----------
     measured : RealBasis
         DC among it.
-    repeats : ndarray, shape (R,)
+    multiplicity : ndarray, shape (R,)
         How often each answer is.
     window : int
     device : {"cpu", "cuda", "torch"}
@@ -113,10 +113,10 @@ def build_model(
     places = measured.places(frequencies)
     plain = band_of(real_basis(frequencies, measured.projector), near.offsets(window))
     band = Band(plain.basis, places, plain.on_window, plain.on_corners)
-    shown = (tuple(frequencies), measured.projector, window, tuple(repeats[places].tolist()))
+    shown = (tuple(frequencies), measured.projector, window, tuple(multiplicity[places].tolist()))
     return Model(
         band.put(move),
-        move(repeats[places]),
+        move(multiplicity[places]),
         _kinds(LIT, *shown, device),
         _kinds(UNLIT, *shown, device) if unlit else None,
     )
@@ -145,7 +145,7 @@ def lay_out(
     correspondence = np.where(close, rounded, correspondence).astype(np.float64)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
     model = build_model(
-        measurements.basis, measurements.repeats, window, device, unlit=not lit.all()
+        measurements.basis, measurements.multiplicity, window, device, unlit=not lit.all()
     )
     white = scale_of(measurements)
     whole = Whole(
@@ -170,11 +170,11 @@ def _kinds(
     frequencies: tuple[Frequency, ...],
     projector: Size,
     window: int,
-    repeats: tuple[float, ...],
+    multiplicity: tuple[float, ...],
     device: Device,
 ) -> Kinds:
     """Build the kinds for a set of measured frequencies and how often each was measured."""
     band = band_of(real_basis(frequencies, projector), near.offsets(window))
-    measured = np.array(repeats, dtype=np.float32)
+    measured = np.array(multiplicity, dtype=np.float32)
     priors = tuple(build_prior(kind, band, measured) for kind in kinds)
     return screened(priors, band, measured).put(mover(device))

@@ -177,11 +177,11 @@ def _cut_alike(whole: Whole, kind: Integers, cut: Booleans) -> Iterator[NDArray[
 def _misdrawn(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return what tells the responses (n, R) of unit direct light to what 8 bits got wrong."""
     # A row for each projector pixel, so that what a camera pixel asks for lies side by side.
-    shown_error = problem.measurements.shown_error[problem.model.band.places]
+    quantisation_error = problem.measurements.quantisation_error[problem.model.band.places]
     where = footprint(fetch(problem.whole.correspondence), problem.measurements.projector)
     error, places, shares = (
         beside(np.ascontiguousarray(values), problem.whole.responses)
-        for values in (shown_error.T, where.pixels, where.weights)
+        for values in (quantisation_error.T, where.pixels, where.weights)
     )
 
     return lambda chosen: look_up_each(error, places[chosen], shares[chosen])
@@ -227,7 +227,7 @@ def _expected(problem: Problem, rows: Rows) -> Rows:
     tiny = float(np.finfo(np.float32).tiny) ** 0.5
     noise = beside(measurements.noise.reshape(shape), rows.near)
     variance = xp.clip((noise / white[..., 0]) ** 2, min=tiny)
-    far = expect_each(rows.far.reshape((*shape, -1)) / white, variance, problem.model.repeats)
+    far = expect_each(rows.far.reshape((*shape, -1)) / white, variance, problem.model.multiplicity)
     windows = expect_together(
         rows.near.reshape((*shape, -1)) / white,
         rows.near_noise.reshape(shape) / white[..., 0] ** 2,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nearfar.cli.main import COMMANDS
+from nearfar.cli.commands import COMMANDS
 from nearfar.scenes.cache import cached_scene
 from tests.rigs.displays import one_monitor
 from tests.rigs.test_loop import CAMERA, PROJECTOR, Bench
@@ -106,7 +106,7 @@ def test_every_command_has_its_place_in_the_reference():
         from reference import GROUPS, dependencies, licence_of
     finally:
         sys.path.remove(str(DOCS / "extensions"))
-    assert sorted(name for names in GROUPS.values() for name in names) == sorted(COMMANDS)
+    assert sorted(name for names in GROUPS.values() for name in names) == sorted(COMMANDS.own)
     needed = dependencies()
     assert {"numpy", "zarr"} <= set(needed[""])
     assert "fastapi" in needed["viewer"]

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nearfar.cli.main import COMMANDS
+from nearfar.cli.commands import COMMANDS
 from nearfar.version import version
 from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
 

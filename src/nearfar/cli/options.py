@@ -72,6 +72,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output that is 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdout.")]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
+NewCapture = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Capture to make.")]
 ReportPath = Annotated[
     Path | None,
     typer.Option("--report", help="Write a page of pictures and maps too.", metavar="REPORT.html"),
@@ -98,3 +99,4 @@ ScenesCamera = Annotated[
         "--camera", parser=size, metavar="HxW", help="Photo; the scene's own if left out."
     ),
 ]
+RigFile = Annotated[Path, typer.Argument(metavar="RIG.toml", help="Rig, projector and camera.")]

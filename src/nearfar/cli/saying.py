@@ -1,6 +1,11 @@
 """What a command says: on stdout for people, on stderr what is wrong."""
 
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nearfar.capture import Capture
 
 
 def say(text: str, *, quiet: bool = False) -> None:
@@ -12,3 +17,20 @@ def say(text: str, *, quiet: bool = False) -> None:
 def warn(text: str) -> None:
     """Print a warning on stderr."""
     print(f"warning: {text}", file=sys.stderr)
+
+
+def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:
+    """Say what was captured, and warn of saturated photos."""
+    from nearfar.capture import SATURATED
+
+    share = taken.saturated_share
+    if share > SATURATED:
+        warn(
+            f"{share:.2%} of the values in {output} are saturated: expose less, or their camera "
+            f"pixels will be wrong."
+        )
+    say(
+        f"{len(taken.plan.patterns)} photos of {taken.camera} with {taken.channels} "
+        f"channel{'s' if taken.channels > 1 else ''} written to {output}",
+        quiet=quiet,
+    )

@@ -1,4 +1,4 @@
-"""``nearfar acquire`` and ``nearfar import``."""
+"""``nearfar acquire``."""
 
 import time
 from collections.abc import Mapping
@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
-from nearfar.cli.options import Force, PlanFile, Quiet, Where, keep_input, scene_names
-from nearfar.cli.reconstructing import Seen
-from nearfar.cli.reshooting import photo_numbers, take_again
-from nearfar.cli.saying import say, warn
+from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, Where, keep_input, scene_names
+from nearfar.cli.reconstruct import Seen
+from nearfar.cli.reshoot import photo_numbers, take_again
+from nearfar.cli.saying import say, say_captured, warn
 from nearfar.errors import InputError
 from nearfar.progress import counted, progress_bar
 
 if TYPE_CHECKING:
-    from nearfar.capture import Capture
     from nearfar.rigs.base import Rig
     from nearfar.workflow.running import Standing
 
@@ -31,8 +30,6 @@ LIMITS = {
     "with a larger --near, and look at edges and moving things in the scene",
     "photos": "Most of the error is at frequencies that were not measured: plan for more photos",
 }
-
-NewCapture = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Capture to make.")]
 
 
 def acquire(
@@ -145,7 +142,7 @@ def acquire(
             told=warn,
         )
         last = time.monotonic()
-        _conclude(taken, output, quiet=quiet)
+        say_captured(taken, output, quiet=quiet)
         if estimate is not None and transport is not None:
             seen = Seen()
             transports = (seen.add(*part) for part in estimate.finish(taken, report))
@@ -224,61 +221,4 @@ def _say_what_limits(standing: "Standing", target: float, *, quiet: bool) -> Non
     warn(
         f"{target:g} dB is not reached: all {standing.photos} photos relight pictures at "
         f"{standing.snr:.1f} dB. {LIMITS[standing.limit]}."
-    )
-
-
-def import_photos(
-    plan_file: PlanFile,
-    photos: Annotated[Path, typer.Argument(metavar="PHOTOS_DIR", help="Folder of the photos.")],
-    output: NewCapture,
-    list_file: Annotated[
-        Path | None,
-        typer.Option("--list", help="Text file that names the photos in order.", metavar="FILE"),
-    ] = None,
-    full_scale: Annotated[
-        float | None,
-        typer.Option(help="Value of full scale, such as 16383 for 14 bits.", metavar="VALUE"),
-    ] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-) -> None:
-    """Bring in photos taken elsewhere, one per pattern, in natural order of their names.
-
-    Example: nearfar import plan.json photos capture.zarr --full-scale 16383
-    """
-    from nearfar.capture import import_photos as bring_in
-    from nearfar.capture import pair
-    from nearfar.files import check_output
-    from nearfar.plan import read_plan
-
-    made = read_plan(plan_file)
-    keep_input(output, plan_file, photos)
-    check_output(output, force=force)
-    paths = pair(made, photos, list_file)
-    with progress_bar("photos", quiet=quiet) as report:
-        summary = bring_in(
-            made,
-            paths,
-            output,
-            full_scale=full_scale,
-            force=force,
-            progress=counted(report, "photos", len(paths)),
-        )
-    say(f"first: {summary.first}\nlast: {summary.last}", quiet=quiet)
-    _conclude(summary.capture, output, quiet=quiet)
-
-
-def _conclude(taken: "Capture", output: Path, *, quiet: bool) -> None:
-    from nearfar.capture import SATURATED
-
-    share = taken.saturated_share
-    if share > SATURATED:
-        warn(
-            f"{share:.2%} of the values in {output} are saturated: expose less, or their camera "
-            f"pixels will be wrong."
-        )
-    say(
-        f"{len(taken.plan.patterns)} photos of {taken.camera} with {taken.channels} "
-        f"channel{'s' if taken.channels > 1 else ''} written to {output}",
-        quiet=quiet,
     )

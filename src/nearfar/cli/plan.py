@@ -1,4 +1,4 @@
-"""``nearfar plan`` and ``nearfar export``."""
+"""``nearfar plan``."""
 
 import json
 from enum import StrEnum
@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, PlanFile, Quiet, size
+from nearfar.cli.options import AsJson, Force, Quiet, size
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import counted, progress_bar
 
 if TYPE_CHECKING:
-    from nearfar.plan import Plan
     from nearfar.plan.typical import Typical
 
 
@@ -96,6 +95,7 @@ def plan(
     from nearfar.plan import choose_plan, paper_plan
     from nearfar.plan.choose import NOISE
     from nearfar.plan.typical import TYPICAL
+    from nearfar.report.plan import describe_plan
 
     expected = None
     if look is not None and photos is None:
@@ -174,59 +174,3 @@ def _refuse_with_photos(
         raise typer.BadParameter("--photos chooses plans by reference: leave --offset out")
     if correspondence not in (None, CorrespondenceBy.PHASE):
         raise typer.BadParameter("--photos needs no photos for correspondence: leave it out")
-
-
-def describe_plan(made: "Plan") -> str:
-    """Say in lines what a plan holds."""
-    counts = ", ".join(f"{count} {purpose}" for purpose, count in made.counts.items() if count)
-    return "\n".join(
-        [
-            f"projector {made.projector}, W = {made.window}, far band {made.far}, "
-            f"near frequencies dropped {made.dropped}, offset {made.offset}",
-            f"{len(made.patterns)} photos: {counts}",
-            f"{made.transport_photos} photos of transport against {made.projector.pixels} by brute "
-            f"force: {made.savings:.2f} times fewer",
-        ]
-    )
-
-
-def export(
-    plan_file: PlanFile,
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to make.")],
-    scale: Annotated[
-        int | None, typer.Option(min=1, help="Show each pattern pixel as N x N.", metavar="N")
-    ] = None,
-    native: Annotated[
-        Size | None,
-        typer.Option(
-            parser=size,
-            metavar="HxW",
-            help="Centre the pattern on a frame of this size, black around; as large as fits "
-            "unless --scale says.",
-        ),
-    ] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-) -> None:
-    """Write a plan's patterns as 8-bit grey PNG, one per photo in the order to shoot.
-
-    Example: nearfar export plan.json patterns --native 1080x1920
-    """
-    from nearfar.plan import read_plan
-    from nearfar.workflow.export import export_patterns
-
-    made = read_plan(plan_file)
-    with progress_bar("patterns", quiet=quiet) as report:
-        shown = export_patterns(
-            made,
-            folder,
-            scale=scale,
-            native=native,
-            force=force,
-            progress=counted(report, "patterns", len(made.patterns)),
-        )
-    say(
-        f"{len(made.patterns)} patterns of {shown.frame} written to {folder}, a pattern pixel as "
-        f"{shown.scale} x {shown.scale}",
-        quiet=quiet,
-    )

@@ -1,45 +1,52 @@
-"""``nearfar info``."""
+"""What a file or a folder holds, in lines."""
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import typer
+import numpy as np
 
-from nearfar.cli.options import Quiet
-from nearfar.cli.planning import describe_plan
-from nearfar.cli.saying import say
+from nearfar.arrays import Size
+from nearfar.capture import KIND as CAPTURE_KIND
+from nearfar.capture import Capture, open_capture
 from nearfar.errors import MissingFileError, UnreadableFileError
+from nearfar.files import kind_of_store, list_pictures, read_arrays, read_picture
+from nearfar.plan import read_plan
+from nearfar.report.plan import describe_plan
+from nearfar.rigs.config import read_rig_table
+from nearfar.scenes.mitsuba.loading import load_scene
+from nearfar.transport.exact_store import KIND as EXACT_KIND
+from nearfar.transport.exact_store import load_exact
+from nearfar.transport.store import KIND as TRANSPORT_KIND
+from nearfar.transport.store import load_transport
 
-if TYPE_CHECKING:
-    from nearfar.capture import Capture
 
+def describe(path: Path) -> str:
+    """Return in lines what a file or a folder holds.
 
-def info(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE",
-            help="Plan, capture, transport, array, picture, RIG.toml, Mitsuba scene or folder.",
-        ),
-    ],
-    quiet: Quiet = False,
-) -> None:
-    """Say what a file holds.
+    Parameters
+    ----------
+    path : Path
+        Plan, capture, transport, array, picture, RIG.toml, Mitsuba scene, or folder of pictures.
 
-    Example: nearfar info capture.zarr
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    MissingFileError
+        If nothing is there.
+    UnreadableFileError
+        If it is nothing of these, or damaged.
+    NearfarError
+        As what reads such a file.
     """
     if not path.exists():
         raise MissingFileError(f"{path} is not there: check the name.")
-    describe = _describe_folder if path.is_dir() else _describe_file
-    say(describe(path), quiet=quiet)
+    return _describe_folder(path) if path.is_dir() else _describe_file(path)
 
 
 def _describe_file(path: Path) -> str:
-    from nearfar.files import read_picture
-    from nearfar.plan import read_plan
-    from nearfar.rigs.config import read_rig_table
-
     match path.suffix.lower():
         case ".json":
             return "nearfar plan\n" + describe_plan(read_plan(path))
@@ -55,9 +62,6 @@ def _describe_file(path: Path) -> str:
 
 
 def _describe_mitsuba(path: Path) -> str:
-    from nearfar.arrays import Size
-    from nearfar.scenes.mitsuba.loading import load_scene
-
     loaded = load_scene(path, Size(1, 1))
     return (
         f"Mitsuba scene: projector {loaded.picture or 'without a picture of its own'}, camera "
@@ -67,10 +71,6 @@ def _describe_mitsuba(path: Path) -> str:
 
 
 def _describe_arrays(path: Path) -> str:
-    import numpy as np
-
-    from nearfar.files import read_arrays
-
     lines = []
     for name, array in read_arrays(path).items():
         shape = " x ".join(map(str, array.shape)) or "a single number"
@@ -86,11 +86,6 @@ def _describe_arrays(path: Path) -> str:
 
 
 def _describe_folder(path: Path) -> str:
-    from nearfar.capture import KIND as CAPTURE_KIND
-    from nearfar.files import kind_of_store, list_pictures
-    from nearfar.transport.exact_store import KIND as EXACT_KIND
-    from nearfar.transport.store import KIND as TRANSPORT_KIND
-
     describe = {
         CAPTURE_KIND: _describe_capture,
         TRANSPORT_KIND: _describe_transport,
@@ -108,22 +103,20 @@ def _describe_folder(path: Path) -> str:
 
 
 def _describe_capture(path: Path) -> str:
-    from nearfar.capture import KIND, open_capture
-
     capture = open_capture(path)
     return "\n".join(
         [
-            f"{KIND}: photos of {capture.camera}, {_channels(capture.channels)}, "
+            f"{CAPTURE_KIND}: photos of {capture.camera}, {_channels(capture.channels)}, "
             f"{capture.photos.dtype}, full scale {capture.full_scale:g}, "
             f"{capture.saturated_share:.3%} saturated",
             describe_plan(capture.plan),
             f"rig: {json.dumps(capture.rig)}",
-            *_told_while_taken(capture),
+            *_describe_taking(capture),
         ]
     )
 
 
-def _told_while_taken(capture: "Capture") -> list[str]:
+def _describe_taking(capture: Capture) -> list[str]:
     """Say how long it took, what changed from photo to photo, and what went wrong."""
     lines = [f"taken in {capture.times.max() - capture.times.min():.0f} s"]
     for name, values in capture.conditions.items():
@@ -134,10 +127,6 @@ def _told_while_taken(capture: "Capture") -> list[str]:
 
 
 def _describe_transport(path: Path) -> str:
-    import numpy as np
-
-    from nearfar.transport.store import KIND, load_transport
-
     transport = load_transport(path)
     floodlit = transport.components(np.ones(transport.projector, dtype=np.float32))
     sums = {name: float(part.sum()) for name, part in zip(floodlit._fields, floodlit, strict=True)}
@@ -145,7 +134,7 @@ def _describe_transport(path: Path) -> str:
     shares = ", ".join(f"{name} {value / total:.1%}" for name, value in sums.items() if total)
     return "\n".join(
         [
-            f"{KIND}: projector {transport.projector}, camera {transport.camera}, "
+            f"{TRANSPORT_KIND}: projector {transport.projector}, camera {transport.camera}, "
             f"{_channels(transport.channels)}, W = {transport.window}, "
             f"{transport.far_basis.count} far coefficients",
             f"{transport.lit.mean():.1%} of the camera pixels directly lit",
@@ -156,11 +145,9 @@ def _describe_transport(path: Path) -> str:
 
 
 def _describe_exact(path: Path) -> str:
-    from nearfar.transport.exact_store import KIND, load_exact
-
     exact = load_exact(path)
     return (
-        f"{KIND}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
+        f"{EXACT_KIND}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
         f"{_channels(exact.channels)}, components {'apart' if exact.is_apart else 'together'}"
     )
 

@@ -1,4 +1,4 @@
-"""``nearfar evaluate`` and ``nearfar render``."""
+"""``nearfar evaluate``."""
 
 import json
 from pathlib import Path
@@ -6,24 +6,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nearfar.arrays import Size
 from nearfar.cli.options import (
     AsJson,
     Force,
     Quiet,
     ReportPath,
-    ScenesCamera,
-    ScenesProjector,
     TransportPath,
     keep_for_page,
-    keep_input,
-    scene_names,
 )
-from nearfar.cli.saying import say, warn
-from nearfar.progress import Report, progress_bar
+from nearfar.cli.saying import say
+from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
-    from nearfar.transport.exact import ExactTransport
+    pass
 
 
 def evaluate(
@@ -99,78 +94,3 @@ def _lines(found: dict[str, Any], indent: str = "") -> str:
             shown = f"{value:8.2f} dB" if isinstance(value, float) else str(value)
             lines.append(f"{indent}{name:<14}{shown}")
     return "\n".join(lines)
-
-
-def render(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENE",
-            autocompletion=scene_names,
-            help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a Mitsuba 3 scene "
-            "(.xml).",
-        ),
-    ],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr to make.")],
-    projector: ScenesProjector = None,
-    camera: ScenesCamera = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Paths per camera pixel of a Mitsuba scene; 4096 if left out."
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=0, help="Seed of those paths; 0 if left out."),
-    ] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-) -> None:
-    """Compute a scene's transport: a built-in one's exactly, a Mitsuba scene's by path tracing.
-
-    Components are apart for a built-in scene, together for a Mitsuba scene.
-
-    Example: nearfar render cornell truth.zarr --projector 64x64
-    """
-    from nearfar.files import check_output
-    from nearfar.rigs.config import is_mitsuba
-    from nearfar.scenes import NAMES
-    from nearfar.transport.exact_store import save_exact
-
-    if scene not in NAMES:
-        keep_input(output, Path(scene))
-    check_output(output, force=force)
-    from_file = is_mitsuba(Path(scene))
-    if not from_file and (samples, seed) != (None, None):
-        raise typer.BadParameter("a built-in scene is computed without chance.", param_hint=scene)
-    with progress_bar("rendering", quiet=quiet) as report:
-        if from_file:
-            transport = _render_file(scene, projector, camera, samples, seed or 0, report)
-        else:
-            from nearfar.scenes.cache import cached_scene
-
-            transport = cached_scene(scene, projector, camera, progress=report)
-        save_exact(transport, output, force=force)
-    say(
-        f"transport of {scene}, projector {transport.projector}, camera {transport.camera}, "
-        f"written to {output}",
-        quiet=quiet,
-    )
-
-
-def _render_file(
-    scene: str,
-    projector: Size | None,
-    camera: Size | None,
-    samples: int | None,
-    seed: int,
-    report: Report,
-) -> "ExactTransport":
-    from nearfar.scenes.mitsuba.loading import load_scene
-    from nearfar.scenes.mitsuba.transport import SAMPLES, render_transport
-
-    loaded = load_scene(scene, projector, camera)
-    for note in loaded.notes:
-        warn(note)
-    return render_transport(loaded, samples or SAMPLES, seed, progress=report)

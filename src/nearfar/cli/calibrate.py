@@ -1,0 +1,64 @@
+"""``nearfar calibrate``."""
+
+from typing import TYPE_CHECKING
+
+from nearfar.cli.options import Force, Quiet, RigFile
+from nearfar.cli.saying import say, warn
+from nearfar.errors import InputError
+from nearfar.progress import progress_bar
+
+if TYPE_CHECKING:
+    from nearfar.workflow.calibrate import Findings
+
+
+def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
+    """Measure how a rig's projector and camera turn numbers into light, and back.
+
+    The calibration and its plots are kept in a folder beside the rig, which acquire reads.
+
+    Example: nearfar calibrate rig.toml
+    """
+    from nearfar.files import check_output
+    from nearfar.report.calibration import is_calibration, write_calibration
+    from nearfar.rigs.calibration import calibration_folder
+    from nearfar.rigs.config import read_rig_table
+    from nearfar.rigs.opening import RealTable, rig_to_calibrate
+    from nearfar.workflow.calibrate import calibrate as measure
+
+    table = read_rig_table(rig)
+    if not isinstance(table, RealTable):
+        raise InputError(
+            f"{rig} is a simulated rig, whose response is what projector.gamma says: name the "
+            f"RIG.toml of a real one."
+        )
+    folder = calibration_folder(rig)
+    check_output(folder, force=force, replaceable=is_calibration)
+    with (
+        progress_bar("opening the rig", quiet=quiet) as report,
+        rig_to_calibrate(rig, table, told=warn) as opened,
+    ):
+        found = measure(opened, report)
+    write_calibration(folder, found, force=force)
+    for note in found.notes:
+        warn(note)
+    say(_told(found), quiet=quiet)
+    say(f"calibration and plots written to {folder}", quiet=quiet)
+
+
+def _told(found: "Findings") -> str:
+    """Say in lines what a calibration found."""
+    known = found.calibration
+    half = sum(row[0] < 0.5 for row in known.response)
+    lines = [
+        f"half of white's light at level {half} of 255; straightened to "
+        f"{known.residual:.2%} of white",
+        f"red, green and blue together: {1 + known.superposition:.1%} of white",
+        f"camera: black level {known.black:.4g}, {known.gain:.4g} levels an electron, read noise "
+        f"{known.read:.3g} levels",
+        f"light under black: {known.ambient:.2%} of full scale",
+    ]
+    if known.exposure is not None:
+        lines.append(f"exposure {known.exposure:.4g} s")
+    if known.linearity is not None:
+        lines.append(f"camera linear to {known.linearity:.2%} of full scale")
+    return "\n".join(lines)

@@ -1,0 +1,95 @@
+"""How faults and interrupts of a command reach people: a sentence, and an exit status."""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+import typer
+
+from nearfar.errors import KeptInterrupt, NearfarError
+
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+# Signals to stop that came while a command ran.
+_stops: list[int] = []
+
+
+@contextmanager
+def faults_in_sentences() -> Iterator[None]:
+    """Turn whatever stops a command into a sentence on stderr and an exit status."""
+    try:
+        yield
+        # At exit it would be too late to say that a disk or a pipe took nothing.
+        sys.stdout.flush()
+    except NearfarError as error:
+        _fail(str(error))
+    except KeyboardInterrupt as stopped:
+        _interrupted(stopped)
+    except BrokenPipeError:
+        # Whoever read our output has gone; the interpreter must not complain at exit.
+        _discard_stdout()
+        sys.exit(1)
+    except MemoryError as error:
+        _fail(f"there is not enough memory ({error}): choose smaller sizes.")
+    except (typer.Exit, typer.BadParameter):
+        raise
+    except OSError as error:
+        if error.filename is None:
+            # Files have names; faults of writing them are sentences already.
+            _discard_stdout()
+            _fail(f"stdout could not be written ({error.strerror or error}): send it elsewhere.")
+        _fail(
+            f"{error.filename} could not be used ({error.strerror}): check that it is there and "
+            f"may be read."
+        )
+    except Exception as error:  # A fault of our own still owes the user a sentence.
+        if _stops:
+            # A library interrupted while it loads says so in words of its own.
+            _interrupted()
+        if os.environ.get("NEARFAR_TRACEBACK"):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        _fail(
+            f"the program met a fault of its own ({what}): run again with NEARFAR_TRACEBACK=1 and "
+            f"report what it prints."
+        )
+
+
+@contextmanager
+def stopped_cleanly() -> Iterator[None]:
+    """Let a command that is told to end remove what it has half-written."""
+
+    def stop(number: int, _frame: FrameType | None) -> NoReturn:
+        _stops.append(number)
+        raise KeyboardInterrupt
+
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    # What is ignored, as under nohup, stays ignored.
+    replaced = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) in usual}
+    _stops.clear()
+    for number in replaced:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number, handler in replaced.items():
+            signal.signal(number, handler)
+
+
+def _interrupted(stopped: KeyboardInterrupt | None = None) -> NoReturn:
+    status = 128 + (_stops[-1] if _stops else signal.SIGINT)
+    what = "interrupted: nothing half-written was left behind."
+    _fail(str(stopped) if isinstance(stopped, KeptInterrupt) else what, status=status)
+
+
+def _discard_stdout() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _fail(sentence: str, *, status: int = 1) -> NoReturn:
+    print(f"nearfar: {sentence}", file=sys.stderr)
+    sys.exit(status)

@@ -1,0 +1,44 @@
+"""``nearfar preview``."""
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from nearfar.cli.options import Browser, Port, Quiet, RigFile
+from nearfar.cli.saying import say
+from nearfar.errors import InputError
+
+if TYPE_CHECKING:
+    pass
+
+
+def preview(
+    rig: RigFile,
+    port: Port = 8627,
+    browser: Browser = True,
+    quiet: Quiet = False,
+) -> None:
+    """Show what the camera sees, live: picture, histogram, focus and saturation.
+
+    Example: nearfar preview rig.toml
+    """
+    import webbrowser
+
+    from nearfar.rigs.config import read_rig_table
+    from nearfar.rigs.opening import RealTable, rig_to_preview
+    from nearfar.viewer.preview import run_preview
+
+    table = read_rig_table(rig)
+    if not isinstance(table, RealTable):
+        raise InputError(
+            f"{rig} is a simulated rig, which needs no focus: name the RIG.toml of a real one."
+        )
+
+    def started(address: str) -> None:
+        print(f"preview at {address}, Esc on the projector or Ctrl-C here ends it", flush=True)
+        if browser:
+            webbrowser.open(address)
+
+    # Esc on the projector and Ctrl-C are how a preview ends.
+    with rig_to_preview(rig, table) as opened, suppress(KeyboardInterrupt):
+        run_preview(opened, port, started)
+    say("preview ended", quiet=quiet)

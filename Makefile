@@ -24,6 +24,7 @@ check: lint types layers test
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/oxlint --deny-warnings src/nearfar/viewer
 
 types: $(READY)
 	$(BIN)/mypy

@@ -69,7 +69,7 @@ def test_what_is_installed_runs_by_itself(built, kind, tmp_path):
     assert run("-m", "nearfar", "--version").startswith("nearfar 0.")
     run("-m", "nearfar", "plan", "--projector", "16x16", "--photos", "30", "-o", "plan.json")
     assert "30 photos" in run("-m", "nearfar", "info", "plan.json")
-    page = "from nearfar.viewer.responses import read_asset; print(len(read_asset('main.js')))"
+    page = "from nearfar.viewer.payloads import read_asset; print(len(read_asset('main.js')))"
     assert int(run("-c", page)) > 5000
 
 

@@ -25,9 +25,9 @@ from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
 from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
 from nearfar.viewer import view, viewed
-from nearfar.viewer.answers import answer_map
 from nearfar.viewer.inspecting import inspect_row
 from nearfar.viewer.messages import pack, unpack_light
+from nearfar.viewer.payloads import answer_map
 from nearfar.viewer.serving import Place, serve
 from nearfar.viewer.viewed import ViewedTransport
 from tests.absent import said_without

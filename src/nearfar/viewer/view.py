@@ -14,7 +14,10 @@ from nearfar.errors import InputError, NearfarError
 from nearfar.files import encode_png
 from nearfar.packages import needed
 from nearfar.report.maps import maps_of
-from nearfar.viewer.answers import (
+from nearfar.viewer.decoding import LARGEST
+from nearfar.viewer.following import BusyError, Newest, Work, answer_lights, take_lights
+from nearfar.viewer.messages import WHITE, largest_light, unpack_light
+from nearfar.viewer.payloads import (
     READERS,
     answer_column,
     answer_exr,
@@ -23,9 +26,6 @@ from nearfar.viewer.answers import (
     read_asset,
     tell_scene,
 )
-from nearfar.viewer.decoding import LARGEST
-from nearfar.viewer.following import BusyError, Newest, Work, answer_lights, take_lights
-from nearfar.viewer.messages import WHITE, largest_light, unpack_light
 from nearfar.viewer.serving import Place, serve
 from nearfar.viewer.viewed import ViewedTransport
 

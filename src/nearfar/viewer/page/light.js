@@ -89,8 +89,8 @@ export class Light {
 
   stroke({ colour, radius, points }, from) {
     const rgb = linearColour(colour);
-    if (from === 0) { this.dab(points[0], points[1], radius, rgb); from = 2; }
-    for (let i = from; i < points.length; i += 2) {
+    if (from === 0) this.dab(points[0], points[1], radius, rgb);
+    for (let i = Math.max(2, from); i < points.length; i += 2) {
       const [x0, y0, x1, y1] = points.slice(i - 2, i + 2);
       const steps = Math.max(1, Math.ceil(Math.hypot(x1 - x0, y1 - y0) / (radius / 3)));
       for (let n = 1; n <= steps; n++)

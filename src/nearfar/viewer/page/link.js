@@ -3,7 +3,7 @@
 const TYPES = { float32: Float32Array, float16: Uint16Array, uint16: Uint16Array, uint8: Uint8Array };
 
 export function pack(words, levels) {
-  let text = new TextEncoder().encode(JSON.stringify(words));
+  const text = new TextEncoder().encode(JSON.stringify(words));
   const padding = (8 - (4 + text.length) % 8) % 8;
   const message = new Uint8Array(4 + text.length + padding + levels.byteLength);
   new DataView(message.buffer).setUint32(0, text.length + padding, true);

@@ -277,17 +277,18 @@ function controls() {
   matchMedia('(prefers-color-scheme: dark)').onchange = refresh;
 }
 
+const moveTo = event => {
+  const [y, x] = placeOn(event, scene.projector).map(rounded);
+  if (state.kind === 'paint') {
+    const last = state.strokes.at(-1);
+    if (last.points.at(-2) === x && last.points.at(-1) === y) return;
+    last.points.push(x, y);
+    relight({});
+  } else relight({ x, y });
+};
+
 function drawing(canvas) {
   let pressed = null;
-  const move = event => {
-    const [y, x] = placeOn(event, scene.projector).map(rounded);
-    if (state.kind === 'paint') {
-      const last = state.strokes.at(-1);
-      if (last.points.at(-2) === x && last.points.at(-1) === y) return;
-      last.points.push(x, y);
-      relight({});
-    } else relight({ x, y });
-  };
   canvas.onpointerdown = event => {
     if (event.button || pressed) return;
     canvas.setPointerCapture(event.pointerId);
@@ -297,10 +298,10 @@ function drawing(canvas) {
       state.strokes = [...state.strokes, { colour: state.colour, radius: state.brush, points: [] }];
     }
     fault('');
-    if (!['white', 'sinusoid', 'checkerboard', 'picture'].includes(state.kind)) move(event);
+    if (!['white', 'sinusoid', 'checkerboard', 'picture'].includes(state.kind)) moveTo(event);
   };
   canvas.onpointermove = event => {
-    if (pressed?.id === event.pointerId) dragged(event, pressed, move);
+    if (pressed?.id === event.pointerId) dragged(event, pressed);
   };
   canvas.onpointercancel = event => { if (pressed?.id === event.pointerId) pressed = null; };
   canvas.onpointerup = event => {
@@ -314,7 +315,7 @@ function drawing(canvas) {
 
 // What has no place is shifted, or turned on.
 let dragFrom = null;
-function dragged(event, pressed, move) {
+function dragged(event, pressed) {
   if (state.kind === 'sinusoid' || state.kind === 'checkerboard') {
     if (dragFrom?.pressed !== pressed) dragFrom = { pressed, phase: state.phase, shift: state.shift };
     const [y, x] = placeOn(event, scene.projector), dy = y - pressed[0], dx = x - pressed[1];
@@ -323,7 +324,7 @@ function dragged(event, pressed, move) {
     const turns = along * state.cycles / Math.max(...scene.projector);
     return relight({ phase: ((Math.round(dragFrom.phase + 360 * turns) % 360) + 360) % 360 });
   }
-  if (!['white', 'picture'].includes(state.kind)) move(event);
+  if (!['white', 'picture'].includes(state.kind)) moveTo(event);
 }
 
 const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
@@ -416,11 +417,11 @@ async function addPhoto(file) {
 const pictureOf = url => new Blob([Uint8Array.from(atob(url.split(',')[1]), c => c.charCodeAt(0))], { type: 'image/png' });
 
 function download(blob, name) {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  const anchor = document.createElement('a');
+  anchor.href = URL.createObjectURL(blob);
+  anchor.download = name;
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(anchor.href), 10000);
 }
 
 // As it is seen; the exact picture, once it is there.

@@ -1,7 +1,27 @@
-"""A Python in which a package is not there."""
+"""What may be absent, skipped by name; and a Python in which a package is not there."""
 
+import ctypes
 import subprocess
 import sys
+from importlib.util import find_spec
+
+import pytest
+
+PYTORCH_ABSENT = "PyTorch is not installed" if find_spec("torch") is None else ""
+NEEDS_PYTORCH = pytest.mark.skipif(bool(PYTORCH_ABSENT), reason=PYTORCH_ABSENT)
+
+
+def need_mitsuba() -> None:
+    """Skip where Mitsuba cannot be loaded; it is not loaded here, for nearfar names its LLVM."""
+    if find_spec("mitsuba") is None:
+        pytest.skip("mitsuba is not installed", allow_module_level=True)
+    try:
+        ctypes.CDLL("libatomic.so.1")
+    except OSError:
+        pytest.skip(
+            "libatomic.so.1, which Mitsuba needs, is not installed (Debian: libatomic1)",
+            allow_module_level=True,
+        )
 
 
 def said_without(package: str, program: str) -> str:

@@ -26,7 +26,6 @@ def _run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("scene", "projector", "window", "far", "pictures", "white"), CASES)
 def test_a_scene_is_relit_as_well_as_asked(
     tmp_path: Path, monkeypatch, capsys, scene, projector, window, far, pictures, white
@@ -49,7 +48,6 @@ def test_a_scene_is_relit_as_well_as_asked(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_without_noise_every_frequency_and_camera_pixel_is_as_good_as_in_the_paper():
     found = acquire_in_theory(WEDGE, lambda _what, _share: None).numbers
     assert found["plan"]["transport_photos"] == 423
@@ -62,7 +60,6 @@ def test_without_noise_every_frequency_and_camera_pixel_is_as_good_as_in_the_pap
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_the_demo_ends_in_a_page(tmp_path: Path, monkeypatch, capsys):
     _run(monkeypatch, "demo", tmp_path / "out")
     said = capsys.readouterr().out

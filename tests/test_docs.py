@@ -61,7 +61,6 @@ def rig(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", ["tutorial.md", "howto/real-rig.md"])
 def test_what_is_shown_on_a_rig_runs_on_one(rig, name, tmp_path):
     rig.folder = tmp_path

@@ -23,7 +23,6 @@ def _blocks(language: str) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_the_quick_start_runs(tmp_path: Path, monkeypatch):
     (code,) = _blocks("python")
     assert len([line for line in code.splitlines() if line]) <= 13

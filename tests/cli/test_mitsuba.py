@@ -1,6 +1,5 @@
 """Mitsuba scenes on the command line: rendered, photographed, reconstructed, judged."""
 
-import importlib.util
 import json
 import os
 import subprocess
@@ -11,12 +10,11 @@ import numpy as np
 import pytest
 
 from nearfar.transport.exact_store import load_exact
+from tests.absent import need_mitsuba
 from tests.cli.conftest import BY_PAPER, check_done, check_sentence, run_nearfar
 from tests.scenes.mitsuba import descriptions as d
 
-# Looked for, not imported: before it loads, nearfar names the LLVM that it shall use.
-if importlib.util.find_spec("mitsuba") is None:
-    pytest.skip("mitsuba is not installed", allow_module_level=True)
+need_mitsuba()
 
 GRID = "16x16"
 

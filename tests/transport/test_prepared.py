@@ -1,7 +1,6 @@
 """Prepared transports make the same pictures, by any library."""
 
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -11,12 +10,10 @@ from nearfar.devices import mover
 from nearfar.errors import InputError
 from nearfar.transport.half import in_half
 from nearfar.transport.prepared import prepare_transport
+from tests.absent import NEEDS_PYTORCH
 from tests.transport.test_operators import CAMERA, PROJECTOR, _transport
 
-WITH_TORCH = pytest.param(
-    "torch", marks=pytest.mark.skipif(find_spec("torch") is None, reason="PyTorch is not installed")
-)
-DEVICES = ["cpu", WITH_TORCH]
+DEVICES = ["cpu", pytest.param("torch", marks=NEEDS_PYTORCH)]
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from nearfar.transport.store import load_transport
 from nearfar.workflow import blocks
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.resuming import LOG, reconstruct_into
+from tests.absent import NEEDS_PYTORCH
 from tests.cli.conftest import run_nearfar
 from tests.worlds import model_transport
 
@@ -101,7 +102,6 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
         reconstruct_into(path, capture, **given)
     for other in (
         {**given, "half": True},
-        {**given, "method": "joint", "device": "torch"},
         {"memory": 10**9},
         {**given, "correspondence": Correspondence(
             np.ones((*CAMERA, 2), np.float32), np.ones(CAMERA, np.float32))},
@@ -118,6 +118,15 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["t.zarr"]
     with pytest.raises(MissingFileError, match="nothing to go on with"):
         reconstruct_into(path, capture, resume=True, force=True, **given)
+
+
+@NEEDS_PYTORCH
+def test_another_device_does_not_go_on_with_it(capture, memory, tmp_path):
+    path = tmp_path / "t.zarr"
+    with pytest.raises(KeptInterrupt):
+        reconstruct_into(path, capture, memory=memory, progress=_stop_after(20))
+    with pytest.raises(InputError, match="was begun with another"):
+        reconstruct_into(path, capture, memory=memory, device="torch", resume=True)
 
 
 def test_photos_that_were_taken_again_are_another_capture(capture, memory, tmp_path):

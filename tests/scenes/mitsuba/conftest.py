@@ -6,17 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nearfar.errors import MissingPackageError
 from nearfar.scenes.mitsuba.variant import choose_variant
+from tests.absent import need_mitsuba
 
 
 @pytest.fixture(autouse=True)
 def _variant() -> Iterator[None]:
     """Skip by name without Mitsuba; put back the variant that a test changes."""
-    try:
-        chosen = choose_variant()
-    except MissingPackageError:
-        pytest.skip("mitsuba is not installed")
+    need_mitsuba()
+    chosen = choose_variant()
     yield
     import mitsuba
 

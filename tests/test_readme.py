@@ -10,8 +10,7 @@ import pytest
 
 from nearfar.cli.commands import COMMANDS
 from nearfar.plan import Plan, paper_plan
-from nearfar.rigs.config import RigTable
-from nearfar.rigs.opening import RealTable
+from nearfar.rigs.tables import RealTable, SimulatedTable
 from nearfar.transport.model import Transport
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
@@ -57,10 +56,10 @@ def test_every_command_it_shows_is_one():
 def test_the_rig_files_it_shows_are_read():
     text, real = _blocks("toml")
     assert RealTable.model_validate(tomllib.loads(real)).camera.driver == "aravis"
-    table = RigTable.model_validate(tomllib.loads(text))
+    table = SimulatedTable.model_validate(tomllib.loads(text))
     assert table.camera.bits == 14
     # Uncommented lines too.
-    RigTable.model_validate(tomllib.loads(text.replace("# exposure", "exposure")))
+    SimulatedTable.model_validate(tomllib.loads(text.replace("# exposure", "exposure")))
 
 
 def test_the_counts_it_states():

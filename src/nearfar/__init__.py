@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
     from nearfar.progress import counted, progress_bar
-    from nearfar.rigs.config import open_rig, opened_rig
+    from nearfar.rigs.opening import open_rig, opened_rig
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_store import load_exact, save_exact
     from nearfar.transport.model import Transport
@@ -53,8 +53,8 @@ _HOMES = {
     "load_transport": "nearfar.transport.store",
     "natural_picture": "nearfar.illumination.pictures",
     "open_capture": "nearfar.capture",
-    "open_rig": "nearfar.rigs.config",
-    "opened_rig": "nearfar.rigs.config",
+    "open_rig": "nearfar.rigs.opening",
+    "opened_rig": "nearfar.rigs.opening",
     "choose_plan": "nearfar.plan",
     "paper_plan": "nearfar.plan",
     "parse_plan": "nearfar.plan",

@@ -18,12 +18,16 @@ class TableScreen:
         self.monitor = Monitor(0, "table", size, (0, 0), REFRESH)
         self.period = 1 / REFRESH
         self.clock = 0.0
+        self.closed = False
         # What was shown, and since when.
         self.shown = [(0.0, np.zeros((*size, 3), dtype=np.uint8))]
 
     def show(self, frame):
         colour = np.broadcast_to(np.atleast_3d(frame), (*self.monitor.size, 3))
         self.shown.append((self.clock, colour.copy()))
+
+    def close(self):
+        self.closed = True
 
     def wait(self, seconds):
         self.clock += seconds

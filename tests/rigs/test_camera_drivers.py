@@ -13,9 +13,8 @@ import pytest
 from nearfar.errors import DeviceError, ExtensionError, UnreadableFileError
 from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, FoundCamera
 from nearfar.rigs.cameras.registry import CAMERAS, find_cameras
-from nearfar.rigs.config import read_rig_table
 from nearfar.rigs.initial import draft_rig
-from nearfar.rigs.opening import RealTable
+from nearfar.rigs.tables import RealTable, read_rig_table
 from tests.cli.conftest import run_nearfar
 
 

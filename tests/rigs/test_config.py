@@ -2,15 +2,17 @@
 
 import shutil
 
+import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.errors import InputError, UnreadableFileError
+from nearfar.errors import DeviceError, UnreadableFileError
 from nearfar.rigs.cameras.driver import FoundCamera
-from nearfar.rigs.config import open_rig, read_rig_table
+from nearfar.rigs.cameras.folder import FolderCamera
 from nearfar.rigs.initial import draft_rig
-from nearfar.rigs.opening import RealTable
+from nearfar.rigs.opening import open_rig, opened_rig
 from nearfar.rigs.screens import Monitor
+from nearfar.rigs.tables import RealTable, read_rig_table
 from tests.cli.conftest import run_nearfar
 
 MONITORS = (
@@ -55,11 +57,32 @@ def test_a_real_rig_that_cannot_be_is_named(tmp_path, text, words):
     assert "rig.toml" in str(refused.value)
 
 
-def test_a_real_rig_is_no_simulated_one(tmp_path):
+def test_a_real_rig_is_opened_too_and_its_camera_given_back(tmp_path, monkeypatch):
+    monkeypatch.setenv("DISPLAY", "")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    closed = []
+    monkeypatch.setattr(FolderCamera, "close", lambda camera: closed.append(camera.name))
     path = tmp_path / "rig.toml"
     path.write_text('[camera]\ndriver = "folder"\npath = "."\n')
-    with pytest.raises(InputError, match="is a real rig"):
-        open_rig(str(path), Size(4, 4))
+    with pytest.raises(DeviceError, match="set DISPLAY"):
+        open_rig(path, Size(4, 4))
+    assert closed == [f"folder {tmp_path}"]
+
+
+def test_a_simulated_rig_is_a_context_and_works_without(tmp_path):
+    np.save(tmp_path / "T.npy", np.full((1, 1, 4, 4), 0.01, np.float32))
+    white = [np.full((4, 4), 255, np.uint8)]
+    with open_rig(tmp_path / "T.npy", Size(4, 4)) as rig:
+        photos = list(rig.shoot(white))
+    np.testing.assert_array_equal(list(rig.shoot(white)), photos)
+    with (
+        pytest.warns(DeprecationWarning, match="use nearfar.open_rig"),
+        opened_rig(str(tmp_path / "T.npy"), Size(4, 4), told=print) as old,
+    ):
+        np.testing.assert_array_equal(list(old.shoot(white)), photos)
+
+
+def test_a_simulated_rig_is_not_calibrated(tmp_path):
     simulated = tmp_path / "simulated.toml"
     simulated.write_text('[scene]\nname = "corner"\n')
     ran = run_nearfar("calibrate", simulated)

@@ -43,7 +43,11 @@ def table(transport):
         camera = TableCamera(screen, transport, CAMERA, PROJECTOR, **options)
         told = []
         rig = RealRig(
-            screen, camera, PROJECTOR, told=told.append, **{"exposure": 0.1, **dict(rig_options)}
+            screen,
+            camera,
+            PROJECTOR,
+            on_alarm=told.append,
+            **{"exposure": 0.1, **dict(rig_options)},
         )
         return rig, camera, told
 
@@ -67,6 +71,18 @@ def _check(photos, expected):
     # 30 000 electrons: half a percent of noise.
     assert np.abs(photos - expected).max() < 0.04 * 65535
     assert np.sqrt(np.mean((photos - expected) ** 2)) < 0.006 * 65535
+
+
+def test_a_rig_that_is_left_gives_both_devices_back_once(table, monkeypatch):
+    closed = []
+    monkeypatch.setattr(TableCamera, "close", lambda _camera: closed.append("camera"))
+    monkeypatch.setattr(TableScreen, "close", lambda _screen: closed.append("screen"))
+    rig, _, _ = table()
+    with rig as entered:
+        assert entered is rig
+        assert closed == []
+    rig.close()
+    assert closed == ["screen", "camera"]
 
 
 def test_photos_are_those_of_the_patterns(table, plan, expected):

@@ -6,7 +6,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.plan import paper_plan
-from nearfar.rigs.config import open_rig
+from nearfar.rigs.opening import open_rig
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.drift import SimulatedDrift
 from nearfar.rigs.simulated.projector import SimulatedProjector

@@ -7,9 +7,10 @@ from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError
 from nearfar.report.calibration import is_calibration, write_calibration
 from nearfar.rigs.calibration import read_calibration
-from nearfar.rigs.opening import RealTable, real_rig
+from nearfar.rigs.opening import open_real_rig
 from nearfar.rigs.real import RealRig
 from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.tables import RealTable
 from nearfar.workflow.calibrate import calibrate
 from tests.rigs.table import TableCamera, TableScreen
 
@@ -143,6 +144,6 @@ def test_a_bracket_asks_for_a_calibration(tmp_path):
     table = RealTable.model_validate({"camera": {"driver": "aravis", "bracket": [1, 4]}})
     with (
         pytest.raises(InputError, match="run nearfar calibrate first"),
-        real_rig(tmp_path / "rig.toml", table, PROJECTOR),
+        open_real_rig(tmp_path / "rig.toml", table, PROJECTOR),
     ):
         pass

@@ -14,7 +14,7 @@ from nearfar.correspondence import correspond_by_gray_code, given_correspondence
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import natural_picture
 from nearfar.plan import choose_plan, paper_plan
-from nearfar.rigs.config import open_rig
+from nearfar.rigs.opening import open_rig
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.drift import SimulatedDrift
 from nearfar.rigs.simulated.projector import SimulatedProjector

@@ -85,7 +85,7 @@ def acquire(
     from nearfar.files import check_resumable
     from nearfar.plan import read_plan
     from nearfar.plan.checks import with_checks
-    from nearfar.rigs.config import notes_of, opened_rig
+    from nearfar.rigs.opening import open_rig
     from nearfar.transport.store import write_transport
     from nearfar.workflow.acquire import acquire as shoot
     from nearfar.workflow.estimating import RunningEstimate
@@ -112,13 +112,16 @@ def acquire(
         report = stack.enter_context(progress_bar("opening the rig", quiet=quiet))
         # What was begun with one exposure is gone on with by it.
         before, exposure = begun_capture(output) if resume else (0, None)
-        begun = partial(_tell_time, len(made.patterns) - before, quiet=quiet)
-        opened = stack.enter_context(
-            opened_rig(
-                rig, made.projector, exposure=exposure, progress=report, told=warn, begun=begun
-            )
+        opened = open_rig(
+            rig,
+            made.projector,
+            exposure=exposure,
+            progress=report,
+            on_alarm=warn,
+            on_start=partial(_tell_time, len(made.patterns) - before, quiet=quiet),
         )
-        for note in notes_of(opened):
+        stack.enter_context(opened)
+        for note in opened.notes:
             warn(note)
         check = estimate = None
         if target is not None:

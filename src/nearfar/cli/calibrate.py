@@ -21,8 +21,8 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
     from nearfar.files import check_output
     from nearfar.report.calibration import is_calibration, write_calibration
     from nearfar.rigs.calibration import calibration_folder
-    from nearfar.rigs.config import read_rig_table
-    from nearfar.rigs.opening import RealTable, rig_to_calibrate
+    from nearfar.rigs.opening import open_rig_to_calibrate
+    from nearfar.rigs.tables import RealTable, read_rig_table
     from nearfar.workflow.calibrate import calibrate as measure
 
     table = read_rig_table(rig)
@@ -35,7 +35,7 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
     check_output(folder, force=force, replaceable=is_calibration)
     with (
         progress_bar("opening the rig", quiet=quiet) as report,
-        rig_to_calibrate(rig, table, told=warn) as opened,
+        open_rig_to_calibrate(rig, table, on_alarm=warn) as opened,
     ):
         found = measure(opened, report)
     write_calibration(folder, found, force=force)

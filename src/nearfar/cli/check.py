@@ -42,7 +42,7 @@ def check(
     from nearfar.files import new_output
     from nearfar.plan import paper_plan
     from nearfar.report.model_check import check_page, check_rows
-    from nearfar.rigs.config import load_world
+    from nearfar.rigs.simulated.opening import load_world
     from nearfar.workflow.check import SAMPLE, check_model, numbers_of
     from nearfar.workflow.conditioning import condition_near
 

@@ -23,8 +23,8 @@ def preview(
     """
     import webbrowser
 
-    from nearfar.rigs.config import read_rig_table
-    from nearfar.rigs.opening import RealTable, rig_to_preview
+    from nearfar.rigs.opening import open_rig_to_preview
+    from nearfar.rigs.tables import RealTable, read_rig_table
     from nearfar.viewer.preview import run_preview
 
     table = read_rig_table(rig)
@@ -39,6 +39,6 @@ def preview(
             webbrowser.open(address)
 
     # Esc on the projector and Ctrl-C are how a preview ends.
-    with rig_to_preview(rig, table) as opened, suppress(KeyboardInterrupt):
+    with open_rig_to_preview(rig, table) as opened, suppress(KeyboardInterrupt):
         run_preview(opened, port, started)
     say("preview ended", quiet=quiet)

@@ -54,7 +54,7 @@ def render(
     Example: nearfar render cornell truth.zarr --projector 64x64
     """
     from nearfar.files import check_output
-    from nearfar.rigs.config import is_mitsuba
+    from nearfar.rigs.opening import is_mitsuba
     from nearfar.scenes import NAMES
     from nearfar.transport.exact_store import save_exact
 

@@ -12,14 +12,14 @@ def take_again(plan_file: Path, output: Path, rig: str, numbers: list[int], *, q
     """Take photos of a finished capture again."""
     from nearfar.capture import open_capture
     from nearfar.plan import read_plan
-    from nearfar.rigs.config import opened_rig
+    from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import shoot_again
 
     made, before = read_plan(plan_file), open_capture(output)
     with (
         progress_bar("opening the rig", quiet=quiet) as report,
-        opened_rig(
-            rig, made.projector, exposure=before.exposure, progress=report, told=warn
+        open_rig(
+            rig, made.projector, exposure=before.exposure, progress=report, on_alarm=warn
         ) as opened,
     ):
         progress = counted(report, "photos", len(numbers))

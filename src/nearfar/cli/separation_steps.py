@@ -79,7 +79,7 @@ def shoot_photos(
 ) -> "tuple[PhotosToSeparate, dict[str, Any]]":
     """Shoot a method's patterns; tell what the rig says of itself."""
     from nearfar.baselines.separation_photos import shoot_to_separate
-    from nearfar.rigs.config import notes_of, opened_rig
+    from nearfar.rigs.opening import open_rig
     from nearfar.scenes import NAMES, sizes
 
     if projector is None:
@@ -91,8 +91,8 @@ def shoot_photos(
     assert method.draw is not None
     # Patterns that do not fit are refused before a scene is computed.
     patterns = method.draw(projector)
-    with opened_rig(rig, projector, progress=report, told=warn) as opened:
-        for note in notes_of(opened):
+    with open_rig(rig, projector, progress=report, on_alarm=warn) as opened:
+        for note in opened.notes:
             warn(note)
         progress = counted(report, "photos", len(patterns) + 1)
         return shoot_to_separate(opened, patterns, progress=progress), opened.describe()

@@ -12,7 +12,7 @@ from nearfar.errors import MissingFileError, UnreadableFileError
 from nearfar.files import kind_of_store, list_pictures, read_arrays, read_picture
 from nearfar.plan import read_plan
 from nearfar.report.plan import describe_plan
-from nearfar.rigs.config import read_rig_table
+from nearfar.rigs.tables import read_rig_table
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.transport.exact_store import KIND as EXACT_KIND
 from nearfar.transport.exact_store import load_exact

@@ -12,7 +12,7 @@ from nearfar.files import new_output
 from nearfar.illumination.pictures import natural_picture, penguin, white
 from nearfar.plan import paper_plan
 from nearfar.report.demonstration import demonstration_page
-from nearfar.rigs.config import open_rig
+from nearfar.rigs.opening import open_rig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.store import save_transport
 from nearfar.workflow.acquire import acquire

@@ -1,4 +1,4 @@
-"""What a rig is: something that shows patterns and takes photos."""
+"""What a rig is: a projector that displays patterns, and a camera that photographs them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
@@ -25,20 +25,20 @@ class Rig(Protocol):
         ...
 
     def describe(self) -> dict[str, Any]:
-        """Tell what the capture should remember of the rig, as JSON."""
+        """Return what the capture should remember of the rig, as JSON."""
         ...
 
     @property
     def alarms(self) -> Sequence[str]:
-        """What has gone wrong so far and was mended or must be known, a sentence each."""
+        """What went wrong so far, a sentence each: mended by the rig, or for the user to know."""
         ...
 
     def conditions(self) -> Mapping[str, float]:
-        """Tell of the last photo what may change from one to the next, such as temperatures."""
+        """Return what may change from photo to photo, such as temperatures, for the last one."""
         ...
 
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
-        """Show each 8-bit pattern and yield its photo, (Cy, Cx, channels), in order.
+        """Display each 8-bit pattern and yield its photo, (Cy, Cx, channels), in order.
 
         `first` is the number of the first pattern in its plan.
         """

@@ -1,65 +1,144 @@
-"""Open whatever a command names as its rig, simulated or real, and give its devices back."""
+"""Open whatever names a rig, simulated or real."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+import os
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field
-
-from nearfar.arrays import Size
-from nearfar.errors import InputError
+from nearfar.arrays import AnyPath, Size
+from nearfar.deprecation import warn_of
+from nearfar.errors import InputError, MissingFileError
+from nearfar.progress import Report
 from nearfar.rigs.calibration import calibration_folder, read_calibration
 from nearfar.rigs.cameras.base import Camera
-from nearfar.rigs.cameras.registry import AnyCameraTable
-from nearfar.rigs.real import Begun, RealRig, Told
+from nearfar.rigs.real import RealRig
 from nearfar.rigs.screens import Window
+from nearfar.rigs.simulated.opening import open_simulated_rig
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.rigs.tables import RealTable, SceneTable, SimulatedTable, read_rig_table
+from nearfar.scenes import NAMES
 
-# Seconds, where a camera begins that is not aimed yet.
-FIRST_EXPOSURE = 1 / 30
+# A camera that is not aimed yet begins with this exposure, if it can.
+PREVIEW_EXPOSURE_SECONDS = 1 / 30
 
 
-class ScreenTable(BaseModel):
-    """[projector] of a real RIG.toml.
+def open_rig(
+    rig: AnyPath,
+    projector: Size,
+    *,
+    exposure: float | None = None,
+    progress: Report | None = None,
+    on_alarm: Callable[[str], None] | None = None,
+    on_start: Callable[[float], None] | None = None,
+) -> SimulatedRig | RealRig:
+    """Open a rig: a projector and a camera, simulated or real.
 
-    Attributes
+    A rig is a context: leaving it gives its devices back. A simulated rig has none, and works
+    without ``with`` too.
+
+    Parameters
     ----------
-    monitor : str or int, optional
-        Name or index, as ``nearfar devices`` lists them; the second, or the only one, if left out.
-    scale : int, optional
-        Side of a pattern pixel in the projector's; the largest that fits if left out.
-    brightness : float
-        Light of a white pattern over the projector's full white.
-    settle : int
-        Refreshes from a pattern's appearance to the exposure.
+    rig : str or Path
+        Name of a scene; path of a Mitsuba 3 scene (.xml), of a stored transport (.npy, .npz, or a
+        Zarr that ``render`` or ``reconstruct`` wrote), or of a RIG.toml.
+    projector : Size
+        Pattern grid of the plan. A scene by name is made for it, a Mitsuba scene's projector
+        displays it, and so does a real one in blocks of its pixels.
+    exposure : float, optional
+        Of a real camera, in seconds, instead of what its RIG.toml says.
+    progress : callable, optional
+        Called with what is computed of a scene, and the share of it that is done, 0 to 1.
+    on_alarm : callable, optional
+        Called by a real rig with each alarm, a sentence.
+    on_start : callable, optional
+        Called by a real rig before the first photo with the seconds that each will take.
+
+    Returns
+    -------
+    SimulatedRig or RealRig
+
+    Raises
+    ------
+    InputError
+        If a transport has another projector, or the pattern grid does not fit on the real one.
+    MissingFileError, UnreadableFileError
+    MissingPackageError
+        If a package is not installed: Mitsuba's, the window's or the camera's.
+    DeviceError
+        If the projector or the camera is not there or does not do what it should.
+
+    Examples
+    --------
+    >>> with nearfar.open_rig("cornell", plan.projector) as rig:
+    ...     capture = nearfar.acquire(plan, "capture.zarr", rig)
     """
+    name, path = os.fspath(rig), Path(rig)
+    table: SimulatedTable | RealTable
+    if name in NAMES:
+        table = SimulatedTable(scene=SceneTable(name=name))
+    elif path.suffix.lower() == ".toml":
+        table = read_rig_table(path)
+    elif not path.exists():
+        raise MissingFileError(
+            f"{name} is no rig: name a scene ({', '.join(NAMES)}), a Mitsuba scene, a stored "
+            f"transport or a RIG.toml."
+        )
+    elif is_mitsuba(path):
+        table = SimulatedTable(scene=SceneTable(mitsuba=path.name))
+    else:
+        table = SimulatedTable(scene=SceneTable(transport=path.name))
+    if isinstance(table, SimulatedTable):
+        return open_simulated_rig(table, path.parent, projector, progress=progress)
+    return open_real_rig(
+        path, table, projector, exposure=exposure, on_alarm=on_alarm, on_start=on_start
+    )
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    monitor: str | int | None = None
-    scale: int | None = Field(default=None, ge=1)
-    brightness: float = Field(default=1.0, gt=0.0, le=1.0)
-    settle: int = Field(default=2, ge=0, le=64)
+def opened_rig(
+    rig: str,
+    projector: Size,
+    *,
+    exposure: float | None = None,
+    progress: Report | None = None,
+    told: Callable[[str], None] | None = None,
+    begun: Callable[[float], None] | None = None,
+) -> SimulatedRig | RealRig:
+    """Open a rig as a context; `open_rig` does so too.
+
+    .. deprecated:: 0.1
+        Use `open_rig`.
+
+    Parameters
+    ----------
+    rig, projector, exposure, progress
+        As `open_rig`.
+    told, begun : callable, optional
+        `on_alarm` and `on_start` of `open_rig`.
+
+    Returns
+    -------
+    SimulatedRig or RealRig
+    """
+    warn_of("nearfar.opened_rig", "use nearfar.open_rig, whose rigs are contexts too")
+    return open_rig(
+        rig, projector, exposure=exposure, progress=progress, on_alarm=told, on_start=begun
+    )
 
 
-class RealTable(BaseModel):
-    """A RIG.toml of a real projector and camera."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    projector: ScreenTable = ScreenTable()
-    camera: AnyCameraTable
+def is_mitsuba(path: Path) -> bool:
+    """Return whether a path is that of a Mitsuba scene, by its ending."""
+    return path.suffix.lower() == ".xml"
 
 
-@contextmanager
-def real_rig(
+def open_real_rig(
     path: Path,
     table: RealTable,
     projector: Size,
     *,
     exposure: float | None = None,
-    told: Told | None = None,
-    begun: Begun | None = None,
-) -> Iterator[RealRig]:
+    on_alarm: Callable[[str], None] | None = None,
+    on_start: Callable[[float], None] | None = None,
+) -> RealRig:
     """Open the window and the camera of a real rig.
 
     Parameters
@@ -67,14 +146,9 @@ def real_rig(
     path : Path
         Its RIG.toml; the calibration lies beside it.
     table : RealTable
-    projector : Size
-        Pattern grid.
-    exposure : float, optional
-        In seconds, instead of the table's: what a capture was begun with.
-    told : callable, optional
-        Called with each alarm, a sentence.
-    begun : callable, optional
-        Called before the first photo with the seconds that each is going to take.
+        What `path` says.
+    projector, exposure, on_alarm, on_start
+        As `open_rig`.
 
     Raises
     ------
@@ -86,8 +160,9 @@ def real_rig(
             f"{path} asks for a bracket, which cannot be merged without the camera's black level: "
             f"run nearfar calibrate first, or remove bracket."
         )
-    with _devices(path, table) as (screen, camera):
-        yield RealRig(
+
+    def set_up(screen: Window, camera: Camera) -> RealRig:
+        return RealRig(
             screen,
             camera,
             projector,
@@ -95,46 +170,57 @@ def real_rig(
             scale=table.projector.scale,
             brightness=table.projector.brightness,
             settle=table.projector.settle,
-            exposure=exposure or _wanted(table),
-            told=told,
-            begun=begun,
+            exposure=exposure or _exposure_of(table),
+            on_alarm=on_alarm,
+            on_start=on_start,
         )
 
-
-@contextmanager
-def rig_to_calibrate(
-    path: Path, table: RealTable, *, told: Told | None = None
-) -> Iterator[RealRig]:
-    """Open a real rig as it is: full brightness, one pattern pixel for each of the projector's.
-
-    Raises
-    ------
-    MissingPackageError, DeviceError, InputError
-    """
-    # Single frames: averages have another noise, and a bracket needs what is to be found.
-    single = {"camera": table.camera.model_copy(update={"average": 1, "bracket": (1.0,)})}
-    with _devices(path, table.model_copy(update=single)) as (screen, camera):
-        yield _bare(screen, camera, table, _wanted(table), told)
+    return _open_devices(path, table, set_up)
 
 
-@contextmanager
-def rig_to_preview(path: Path, table: RealTable) -> Iterator[RealRig]:
-    """Open a real rig as `rig_to_calibrate`, whatever its camera sees: it is to be set up yet.
+def open_rig_to_calibrate(
+    path: Path, table: RealTable, *, on_alarm: Callable[[str], None] | None = None
+) -> RealRig:
+    """Open a real rig without its calibration, one pattern pixel for each of the projector's.
 
     Raises
     ------
     MissingPackageError, DeviceError, InputError
     """
-    with _devices(path, table) as (screen, camera):
-        exposure = _wanted(table)
+    # Single frames: averages have another noise, and a bracket needs the black level, which is
+    # still to be found.
+    single = table.camera.model_copy(update={"average": 1, "bracket": (1.0,)})
+
+    def set_up(screen: Window, camera: Camera) -> RealRig:
+        return _uncalibrated(screen, camera, table, _exposure_of(table), on_alarm)
+
+    return _open_devices(path, table.model_copy(update={"camera": single}), set_up)
+
+
+def open_rig_to_preview(path: Path, table: RealTable) -> RealRig:
+    """Open a real rig as `open_rig_to_calibrate`, whatever its camera sees: it is not aimed yet.
+
+    Raises
+    ------
+    MissingPackageError, DeviceError, InputError
+    """
+
+    def set_up(screen: Window, camera: Camera) -> RealRig:
+        exposure = _exposure_of(table)
         if exposure is None and camera.exposure_limits is not None:
             shortest, longest = camera.exposure_limits
-            exposure = min(max(FIRST_EXPOSURE, shortest), longest)
-        yield _bare(screen, camera, table, exposure, None)
+            exposure = min(max(PREVIEW_EXPOSURE_SECONDS, shortest), longest)
+        return _uncalibrated(screen, camera, table, exposure, None)
+
+    return _open_devices(path, table, set_up)
 
 
-def _bare(
-    screen: Window, camera: Camera, table: RealTable, exposure: float | None, told: Told | None
+def _uncalibrated(
+    screen: Window,
+    camera: Camera,
+    table: RealTable,
+    exposure: float | None,
+    on_alarm: Callable[[str], None] | None,
 ) -> RealRig:
     return RealRig(
         screen,
@@ -143,18 +229,23 @@ def _bare(
         scale=1,
         settle=table.projector.settle,
         exposure=exposure,
-        told=told,
+        on_alarm=on_alarm,
     )
 
 
-def _wanted(table: RealTable) -> float | None:
-    """Exposure of the table in seconds; None where it is to be chosen."""
+def _exposure_of(table: RealTable) -> float | None:
+    """Return the exposure of the table in seconds; None where it is to be chosen."""
     return None if table.camera.exposure == "auto" else table.camera.exposure
 
 
-@contextmanager
-def _devices(path: Path, table: RealTable) -> Iterator[tuple[Window, Camera]]:
+def _open_devices(
+    path: Path, table: RealTable, set_up: Callable[[Window, Camera], RealRig]
+) -> RealRig:
+    """Open the devices and set up a rig of them; give them back if anything fails."""
     with ExitStack() as stack:
         # The camera first: it fails more often, and leaves the monitor alone meanwhile.
         camera = stack.enter_context(table.camera.open(path.parent))
-        yield stack.enter_context(Window(table.projector.monitor)), camera
+        rig = set_up(stack.enter_context(Window(table.projector.monitor)), camera)
+        # The rig has them now.
+        stack.pop_all()
+    return rig

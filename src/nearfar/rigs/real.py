@@ -6,7 +6,8 @@ Index convention: patterns are (Py, Px), photos (Cy, Cx, channels) in raw levels
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from contextlib import ExitStack
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +31,11 @@ PAUSE = 12
 # Two halves of white that miss it by more than this share are told.
 SUPERPOSITION = 0.02
 
-Told = Callable[[str], None]
-Begun = Callable[[float], None]
-
 
 class RealRig:
     """A projector's screen and a camera.
+
+    It is a context: leaving it gives both back.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ class RealRig:
         takes longer.
     exposure : float, optional
         In seconds, rounded to whole refreshes; chosen by white's photo if left out.
-    told : callable, optional
+    on_alarm : callable, optional
         Called with each alarm, a sentence.
-    begun : callable, optional
-        Called before the first photo with the seconds that each is going to take.
+    on_start : callable, optional
+        Called before the first photo with the seconds that each will take.
 
     Raises
     ------
@@ -78,8 +78,8 @@ class RealRig:
         brightness: float = 1.0,
         settle: int = 2,
         exposure: float | None = None,
-        told: Told | None = None,
-        begun: Begun | None = None,
+        on_alarm: Callable[[str], None] | None = None,
+        on_start: Callable[[float], None] | None = None,
     ) -> None:
         self._screen, self.camera, self._projector = screen, camera, projector
         self.shown: Shown = fit_frame(projector, scale, screen.monitor.size)
@@ -90,12 +90,30 @@ class RealRig:
         self._mixing = [list(row) for row in calibration.mixing] if calibration else None
         if calibration is not None:
             camera.sensor = calibration.sensor
-        self._told = told or (lambda _alarm: None)
-        self._begun = begun or (lambda _seconds: None)
+        self._on_alarm = on_alarm or (lambda _alarm: None)
+        self._on_start = on_start or (lambda _seconds: None)
         self.alarms: list[str] = []
         self._like = ""
         self._conditions: dict[str, float] = {}
         self._set_exposure(exposure)
+        self._devices = ExitStack()
+        self._devices.callback(camera.close)
+        self._devices.callback(screen.close)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_fault: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the projector and the camera back."""
+        self._devices.close()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the rig before photos are taken: nothing."""
+        return ()
 
     @property
     def projector(self) -> Size:
@@ -290,7 +308,7 @@ class RealRig:
                 )
         watch.learn_bands(*photos)
         watch.begin(255 - left, photos[-1])
-        self._begun((time.monotonic() - start) / sum(map(len, sums.values())))
+        self._on_start((time.monotonic() - start) / sum(map(len, sums.values())))
 
     def _of_pattern(self, number: int, pattern: NDArray[np.uint8], watch: Watch) -> Photo:
         """Take the photo of a pattern; again, by way of black, while it seems not to be of it."""
@@ -399,7 +417,7 @@ class RealRig:
 
     def _alarm(self, sentence: str) -> None:
         self.alarms.append(sentence)
-        self._told(sentence)
+        self._on_alarm(sentence)
 
     def _note(self, sentence: str) -> None:
         self._alarm(sentence if sentence.endswith(".") else f"{sentence}.")

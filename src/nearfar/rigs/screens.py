@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError
 from nearfar.packages import needed
-
-if TYPE_CHECKING:
-    pass
 
 # Assumed where a monitor does not tell, refreshes a second.
 USUAL_REFRESH = 60.0
@@ -90,6 +87,10 @@ class Screen(Protocol):
 
     def show(self, frame: NDArray[np.uint8]) -> None:
         """Show a frame and return once it is on the way to the projector."""
+        ...
+
+    def close(self) -> None:
+        """Give the monitor back."""
         ...
 
     def wait(self, seconds: float) -> None:

@@ -27,8 +27,8 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, choose_plan, paper_plan
 from nearfar.plan.choose import LEAST_PHOTOS, NOISE, default_window
-from nearfar.rigs.config import choose_exposure
 from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.opening import choose_exposure
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport

@@ -85,7 +85,7 @@ def test_a_variant_that_is_set_is_kept(tmp_path: Path, write):
 
 def test_nothing_loads_mitsuba_before_it_is_needed():
     program = (
-        "import sys, nearfar, nearfar.cli, nearfar.rigs.config, nearfar.scenes.mitsuba.photos\n"
+        "import sys, nearfar, nearfar.cli, nearfar.rigs.opening, nearfar.scenes.mitsuba.photos\n"
         "print('mitsuba' in sys.modules, 'drjit' in sys.modules)"
     )
     assert _run(program).split() == ["False", "False"]

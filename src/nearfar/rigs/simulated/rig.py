@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,8 @@ class SimulatedRig:
         Each photo's noise follows from the seed and its number alone.
     details : mapping
         What else a capture should remember of how the world was made, as JSON.
+    notes : tuple of str
+        What a user should know of the world, a sentence each.
     """
 
     world: World
@@ -57,6 +59,13 @@ class SimulatedRig:
     exposure: float
     seed: int
     details: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_fault: object) -> None:
+        """Do nothing: there are no devices to give back."""
 
     @property
     def projector(self) -> Size:
@@ -69,7 +78,7 @@ class SimulatedRig:
         return float(self.sensor.full_scale)
 
     def describe(self) -> dict[str, Any]:
-        """Tell what the capture remembers: scene, settings, exposure."""
+        """Return what the capture remembers: scene, settings, exposure."""
         return {
             "kind": "simulated",
             "scene": self.name,
@@ -82,11 +91,11 @@ class SimulatedRig:
 
     @property
     def alarms(self) -> tuple[str, ...]:
-        """None: a simulation does as it is told."""
+        """None: nothing goes wrong in a simulation."""
         return ()
 
     def conditions(self) -> dict[str, float]:
-        """Nothing changes but by the settings."""
+        """Return nothing: only the settings change a simulation."""
         return {}
 
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:

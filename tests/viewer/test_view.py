@@ -383,12 +383,12 @@ def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypa
 def test_too_much_at_once_is_told_to_wait(serve_it, monkeypatch):
     from concurrent.futures import ThreadPoolExecutor
 
-    from nearfar.viewer import answers, following
+    from nearfar.viewer import following, payloads
 
     monkeypatch.setattr(following, "MOST", 2)
-    inspect = answers.inspect_row
+    inspect = payloads.inspect_row
     monkeypatch.setattr(
-        answers, "inspect_row", lambda *given: [time.sleep(0.5), inspect(*given)][1]
+        payloads, "inspect_row", lambda *given: [time.sleep(0.5), inspect(*given)][1]
     )
     address = serve_it()
 

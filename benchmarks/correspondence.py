@@ -28,10 +28,10 @@ from nearfar.arrays import Floats, parse_size
 from nearfar.correspondence import Correspondence, correspond_by_phase, correspond_by_stripes
 from nearfar.photometry.measure import measure
 from nearfar.rigs.simulated.camera import SimulatedCamera
-from nearfar.scenes import sizes
+from nearfar.scenes import SCENES, sizes
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.camera import gather
-from nearfar.scenes.library import describe
+from nearfar.scenes.description import ByRadiosity
 from nearfar.scenes.optics import pinhole
 from nearfar.scenes.patches import build_patches
 from nearfar.scenes.rays import surface
@@ -48,7 +48,9 @@ CAMERA = SimulatedCamera()
 
 def lit_area(name: str, projector: Size, camera: Size) -> Floats:
     """Share of each camera pixel that the projector lights directly, shape (C,)."""
-    scene = describe(name)
+    compute = SCENES[name].compute
+    assert isinstance(compute, ByRadiosity), f"{name} has no surfaces"
+    scene = compute.surfaces()
     everything = surface(scene.parts, range(len(scene.parts)))
     eye = pinhole(scene.projector_view, projector)
     lens = pinhole(scene.camera_view or scene.projector_view, projector)

@@ -24,7 +24,7 @@ from nearfar.baselines.separation_photos import PhotosToSeparate, separate, shoo
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.scenes import NAMES
+from nearfar.scenes import SCENES
 from nearfar.scenes.cache import cached_scene
 
 NOISY = SimulatedCamera()
@@ -86,5 +86,5 @@ def run(name: str) -> None:
 
 
 if __name__ == "__main__":
-    for scene_name in sys.argv[1:] or NAMES:
+    for scene_name in sys.argv[1:] or SCENES:
         run(scene_name)

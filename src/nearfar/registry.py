@@ -79,6 +79,19 @@ class Registry(Generic[Registered]):
             self._loaded[name] = self._load(name)
         return self._loaded[name]
 
+    def entry(self, name: str) -> EntryPoint:
+        """Return where an object comes from; ``dist`` is the package that adds it, None for own.
+
+        Raises
+        ------
+        InputError
+            If nothing has that name.
+        """
+        found = self._own.get(name) or self._added.get(name)
+        if found is None:
+            raise InputError(f"there is no {self._what} {name!r}: choose one of {', '.join(self)}.")
+        return found
+
     @cached_property
     def _added(self) -> dict[str, EntryPoint]:
         """Entry points of other packages by name."""
@@ -96,12 +109,10 @@ class Registry(Generic[Registered]):
         return added
 
     def _load(self, name: str) -> Registered:
+        entry = self.entry(name)
         if name in self._own:
-            found: Registered = self._own[name].load()
+            found: Registered = entry.load()
             return found
-        if name not in self._added:
-            raise InputError(f"there is no {self._what} {name!r}: choose one of {', '.join(self)}.")
-        entry = self._added[name]
         try:
             found = entry.load()
         except Exception as error:

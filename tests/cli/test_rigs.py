@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nearfar.capture import open_capture
-from nearfar.scenes import NAMES
+from nearfar.scenes import SCENES
 from tests.cli.conftest import BY_PAPER, PLAN, check_done, check_sentence, run_nearfar
 
 CORNER = ("render", "corner", "--projector", "16x20", "--camera", "8x9")
@@ -163,7 +163,7 @@ def test_info_tells_what_each_file_is(finished, tmp_path: Path):
 def test_help_names_every_scene():
     for command in ("acquire", "render", "separate"):
         said = " ".join(run_nearfar(command, "--help").out.split())
-        for name in NAMES:
+        for name in SCENES:
             assert name in said
 
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import imagecodecs
@@ -12,6 +13,7 @@ import pytest
 from nearfar import Size, load_exact, load_transport, snr
 from nearfar.baselines.separation_patterns import checkerboards, sinusoids
 from nearfar.files import read_picture
+from nearfar.scenes import SCENES
 from tests.cli.conftest import Job, check_done, check_sentence, photograph, run_nearfar
 
 GRID = ("--projector", "16x20")
@@ -118,7 +120,8 @@ def test_a_reconstruction_is_compared_with(finished, tmp_path: Path):
 
 def test_a_scene_has_its_own_projector(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     # The scenes' own sizes take long to compute.
-    monkeypatch.setitem(__import__("nearfar.scenes").scenes._SIZES, "corner", (Size(16, 16), 1))
+    small = replace(SCENES["corner"], projector=Size(16, 16))
+    monkeypatch.setitem(SCENES._loaded, "corner", small)
     check_done(run_nearfar("separate", tmp_path / "out", "--rig", "corner", "--quiet"))
     assert np.load(tmp_path / "out" / "direct.npy").shape == (16, 16, 3)
 

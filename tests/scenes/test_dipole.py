@@ -3,10 +3,10 @@ import pytest
 from scipy import integrate
 
 from nearfar.arrays import Size
+from nearfar.scenes import SCENES
 from nearfar.scenes.cornell import WAX
 from nearfar.scenes.dipole import diffuse_profile, diffuse_reflectance, dipole, subsurface
 from nearfar.scenes.geometry import Material, View, quadrilateral
-from nearfar.scenes.library import describe
 from nearfar.scenes.optics import pinhole
 from nearfar.scenes.patches import build_patches, with_medium
 from nearfar.scenes.rays import surface
@@ -59,7 +59,7 @@ def test_patch_matrix_returns_the_total_in_the_middle_of_a_plane():
 @pytest.mark.parametrize(("name", "size"), [("shelf", Size(10, 10)), ("alcove", Size(8, 8))])
 def test_patch_matrix_is_positive_definite_on_a_coarse_grid(name, size):
     """Where a sample seen at a glancing angle stands for more than its true area."""
-    scene = describe(name)
+    scene = SCENES[name].compute.surfaces()
     everything = surface(scene.parts, range(len(scene.parts)))
     patches = build_patches(everything, scene.parts, pinhole(scene.projector_view, size), size)
     body = body_of(patches, np.flatnonzero(with_medium(patches, scene.parts)))

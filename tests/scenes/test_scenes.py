@@ -10,7 +10,6 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.scenes.dipole import dipole, subsurface
 from nearfar.scenes.form_factors import exchange
-from nearfar.scenes.library import describe
 from nearfar.scenes.optics import pinhole, sub_rays
 from nearfar.scenes.patches import albedo, build_patches, with_medium
 from nearfar.scenes.radiosity import bounced, reflection_factor
@@ -50,9 +49,14 @@ def case():
     return scenes.build("shelf", Size(16, 24))
 
 
+def surfaces(name):
+    """Surfaces and views of a built-in scene."""
+    return scenes.SCENES[name].compute.surfaces()
+
+
 def described(name, size):
     """Parts, patches and exchange of a scene."""
-    scene = describe(name)
+    scene = surfaces(name)
     parts = scene.parts
     everything = surface(parts, range(len(parts)))
     occluders = surface(parts, [i for i, part in enumerate(parts) if part.occludes])
@@ -63,7 +67,10 @@ def described(name, size):
 def test_names_are_light_to_import_and_a_wrong_one_is_told():
     with pytest.raises(InputError, match="cornell, cornell-aside, wedge, corner, alcove, shelf"):
         scenes.build("teapot")
-    code = "import nearfar.scenes, sys; sys.exit('trimesh' in sys.modules)"
+    code = (
+        "import nearfar.scenes as s, sys; [s.SCENES[name] for name in s.SCENES.own]; "
+        "sys.exit('trimesh' in sys.modules)"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
@@ -127,7 +134,7 @@ def test_coaxial_transport_is_reciprocal(name, box, niche):
     """T(c, p) / T(p, c) is the ratio of the fluxes of p and c, solid angles in the image plane."""
     known = {"cornell": box, "alcove": niche}
     transport = known.get(name) or scenes.build(name, TINY)
-    _, solid_angle, pixel = sub_rays(pinhole(describe(name).projector_view, TINY), TINY, 4)
+    _, solid_angle, pixel = sub_rays(pinhole(surfaces(name).projector_view, TINY), TINY, 4)
     even = total(transport) / np.bincount(pixel, solid_angle)
     np.testing.assert_allclose(even, np.swapaxes(even, 1, 2), atol=1e-6 * even.max())
 
@@ -181,7 +188,7 @@ def test_finer_camera_averages_to_the_coarser(name):
     np.testing.assert_allclose(mean, expected, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", scenes.NAMES)
+@pytest.mark.parametrize("name", scenes.SCENES.own)
 def test_nothing_reflects_more_than_falls(name):
     """No patch of any scene sends out more than arrives, nor reflects more than falls on it."""
     parts, patches, form = described(name, Size(12, 15))

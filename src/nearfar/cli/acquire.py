@@ -17,6 +17,7 @@ from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, warn
 from nearfar.errors import InputError
 from nearfar.progress import counted, progress_bar
+from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
     from nearfar.rigs.base import Rig
@@ -38,8 +39,8 @@ def acquire(
     rig: Annotated[
         str,
         typer.Option(
-            help="Scene (cornell, cornell-aside, wedge, corner, alcove, shelf), Mitsuba 3 scene "
-            "(.xml), stored transport (.npy, .npz, Zarr), or RIG.toml.",
+            help=f"Scene ({', '.join(SCENES)}), Mitsuba 3 scene (.xml), stored transport (.npy, "
+            ".npz, Zarr), or RIG.toml.",
             metavar="RIG",
             autocompletion=scene_names,
         ),

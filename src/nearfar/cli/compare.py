@@ -6,9 +6,17 @@ from typing import Annotated
 
 import typer
 
-from nearfar.cli.options import AsJson, Force, Quiet, ScenesCamera, ScenesProjector, scene_names
+from nearfar.cli.options import (
+    AsJson,
+    Force,
+    Quiet,
+    ScenesCamera,
+    ScenesProjector,
+    scene_names,
+)
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
+from nearfar.scenes import SCENES
 
 
 def compare(
@@ -17,8 +25,7 @@ def compare(
         typer.Argument(
             metavar="SCENE",
             autocompletion=scene_names,
-            help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a transport that "
-            "render wrote.",
+            help=f"Scene ({', '.join(SCENES)}), or a transport that render wrote.",
         ),
     ],
     output: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Folder to make.")] = None,
@@ -50,7 +57,6 @@ def compare(
     """
     from nearfar.files import check_output
     from nearfar.report.comparison import INDEX, is_comparison, winners, write_comparison
-    from nearfar.scenes import NAMES
     from nearfar.scenes.cache import cached_scene
     from nearfar.transport.exact_store import load_exact
     from nearfar.workflow.compare import METHODS
@@ -60,7 +66,7 @@ def compare(
         check_output(output, force=force, replaceable=is_comparison)
     budgets = _budgets(photos)
     with progress_bar("comparing", quiet=quiet or as_json) as report:
-        if scene in NAMES:
+        if scene in SCENES:
             truth = cached_scene(scene, projector, camera, progress=report)
         else:
             truth = load_exact(Path(scene), projector=projector, camera=camera)

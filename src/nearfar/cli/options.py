@@ -28,10 +28,10 @@ def size(text: str | Size) -> Size:
 
 
 def scene_names(begun: str) -> list[str]:
-    """Names of built-in scenes that begin so, for shells to complete; of none they try files."""
-    from nearfar.scenes import NAMES
+    """Names of scenes that begin so, for shells to complete; of none they try files."""
+    from nearfar.scenes import SCENES
 
-    return [name for name in NAMES if name.startswith(begun)]
+    return [name for name in SCENES if name.startswith(begun)]
 
 
 def keep_input(output: Path, *inputs: Path) -> None:

@@ -16,6 +16,7 @@ from nearfar.cli.options import (
 )
 from nearfar.cli.saying import say, warn
 from nearfar.progress import Report, progress_bar
+from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
     from nearfar.transport.exact import ExactTransport
@@ -27,8 +28,7 @@ def render(
         typer.Argument(
             metavar="SCENE",
             autocompletion=scene_names,
-            help="cornell, cornell-aside, wedge, corner, alcove or shelf, or a Mitsuba 3 scene "
-            "(.xml).",
+            help=f"Scene ({', '.join(SCENES)}), or a Mitsuba 3 scene (.xml).",
         ),
     ],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr to make.")],
@@ -55,10 +55,9 @@ def render(
     """
     from nearfar.files import check_output
     from nearfar.rigs.opening import is_mitsuba
-    from nearfar.scenes import NAMES
     from nearfar.transport.exact_store import save_exact
 
-    if scene not in NAMES:
+    if scene not in SCENES:
         keep_input(output, Path(scene))
     check_output(output, force=force)
     from_file = is_mitsuba(Path(scene))

@@ -12,6 +12,7 @@ from nearfar.cli import separation_steps as steps
 from nearfar.cli.options import AsJson, Force, Quiet, keep_input, scene_names, size
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
+from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
     from nearfar.baselines.separation_methods import Method
@@ -30,8 +31,8 @@ def separate(
     rig: Annotated[
         str | None,
         typer.Option(
-            help="Shoot on this rig: a scene (cornell, cornell-aside, wedge, corner, alcove, "
-            "shelf), stored transport (.npy, .npz, Zarr), or RIG.toml.",
+            help=f"Shoot on this rig: a scene ({', '.join(SCENES)}), stored transport (.npy, .npz, "
+            "Zarr), or RIG.toml.",
             metavar="RIG",
             autocompletion=scene_names,
         ),
@@ -143,8 +144,6 @@ def separate(
     _refuse(source, ("--rig", "--photos"), {"--json": as_json or None})
     if pattern is Pattern.ANY and source != "--photos":
         raise typer.BadParameter("any goes with --photos only.", param_hint="--pattern")
-    from nearfar.scenes import NAMES
-
     method = _method(pattern, side=side, step=step, period=period, shifts=shifts)
     inputs = (
         photos,
@@ -152,7 +151,7 @@ def separate(
         black,
         truth,
         transport,
-        Path(rig) if rig and rig not in NAMES else None,
+        Path(rig) if rig and rig not in SCENES else None,
     )
     keep_input(output, *(path for path in inputs if path is not None))
     check_output(output, force=force, replaceable=is_separation)

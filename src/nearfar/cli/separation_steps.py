@@ -80,10 +80,10 @@ def shoot_photos(
     """Shoot a method's patterns; tell what the rig says of itself."""
     from nearfar.baselines.separation_photos import shoot_to_separate
     from nearfar.rigs.opening import open_rig
-    from nearfar.scenes import NAMES, sizes
+    from nearfar.scenes import SCENES, sizes
 
     if projector is None:
-        if rig not in NAMES:
+        if rig not in SCENES:
             raise typer.BadParameter(
                 f"--rig {rig} needs the pattern grid.", param_hint="--projector"
             )

@@ -16,7 +16,7 @@ from nearfar.rigs.screens import Window
 from nearfar.rigs.simulated.opening import open_simulated_rig
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.rigs.tables import RealTable, SceneTable, SimulatedTable, read_rig_table
-from nearfar.scenes import NAMES
+from nearfar.scenes import SCENES
 
 # A camera that is not aimed yet begins with this exposure, if it can.
 PREVIEW_EXPOSURE_SECONDS = 1 / 30
@@ -74,13 +74,13 @@ def open_rig(
     """
     name, path = os.fspath(rig), Path(rig)
     table: SimulatedTable | RealTable
-    if name in NAMES:
+    if name in SCENES:
         table = SimulatedTable(scene=SceneTable(name=name))
     elif path.suffix.lower() == ".toml":
         table = read_rig_table(path)
     elif not path.exists():
         raise MissingFileError(
-            f"{name} is no rig: name a scene ({', '.join(NAMES)}), a Mitsuba scene, a stored "
+            f"{name} is no rig: name a scene ({', '.join(SCENES)}), a Mitsuba scene, a stored "
             f"transport or a RIG.toml."
         )
     elif is_mitsuba(path):

@@ -11,7 +11,7 @@ from nearfar.rigs.cameras.driver import SizeText
 from nearfar.rigs.cameras.registry import AnyCameraTable
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
-from nearfar.scenes import NAMES
+from nearfar.scenes import SCENES
 
 
 class SceneTable(BaseModel):
@@ -42,8 +42,8 @@ class SceneTable(BaseModel):
     @field_validator("name")
     @classmethod
     def _require_scene(cls, name: str | None) -> str | None:
-        if name is not None and name not in NAMES:
-            raise ValueError(f"there is no scene {name!r}, choose one of {', '.join(NAMES)}")
+        if name is not None and name not in SCENES:
+            raise ValueError(f"there is no scene {name!r}, choose one of {', '.join(SCENES)}")
         return name
 
     @model_validator(mode="after")

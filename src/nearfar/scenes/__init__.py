@@ -4,26 +4,33 @@ Direct light and one reflection, light under the surface of a translucent body, 
 inter-reflections are computed without noise on patches that follow the projector's pixels
 (radiosity with the dipole of Jensen et al. 2001).
 
-Estimators are judged on alcove and shelf: neither serves to tune one.
+A built-in scene is one file, which describes it, and one line of `SCENES`.
 """
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from nearfar.arrays import Size
-from nearfar.errors import InputError
-from nearfar.transport.exact import ExactTransport
+from nearfar.errors import ExtensionError
+from nearfar.registry import Registry
+from nearfar.scenes.description import SceneDescription
 
-# Each scene's own pattern grid, and how many times finer its camera is on both axes.
-_SIZES = {
-    "cornell": (Size(64, 64), 1),
-    "cornell-aside": (Size(64, 64), 2),
-    "wedge": (Size(68, 100), 1),
-    "corner": (Size(128, 128), 1),
-    "alcove": (Size(64, 64), 1),
-    "shelf": (Size(60, 90), 2),
-}
+if TYPE_CHECKING:
+    from nearfar.transport.exact import ExactTransport
 
-NAMES: tuple[str, ...] = tuple(_SIZES)
+SCENES: Registry[SceneDescription] = Registry(
+    "scene",
+    "nearfar.scenes",
+    {
+        "cornell": "nearfar.scenes.cornell:CORNELL",
+        "cornell-aside": "nearfar.scenes.cornell:CORNELL_ASIDE",
+        "wedge": "nearfar.scenes.wedge:WEDGE",
+        "corner": "nearfar.scenes.corner:CORNER",
+        "alcove": "nearfar.scenes.alcove:ALCOVE",
+        "shelf": "nearfar.scenes.shelf:SHELF",
+    },
+    SceneDescription,
+)
 
 
 def sizes(
@@ -36,10 +43,9 @@ def sizes(
     InputError
         If there is no scene of that name.
     """
-    if name not in NAMES:
-        raise InputError(f"there is no scene {name!r}: choose one of {', '.join(NAMES)}.")
-    own, finer = _SIZES[name]
-    projector = projector or own
+    scene = SCENES[name]
+    projector = projector or scene.projector
+    finer = scene.camera_scale
     return projector, camera or Size(finer * projector.height, finer * projector.width)
 
 
@@ -49,33 +55,38 @@ def build(
     camera: Size | None = None,
     *,
     progress: Callable[[str, float], None] | None = None,
-) -> ExactTransport:
-    """Compute the transport of a built-in scene.
+) -> "ExactTransport":
+    """Compute the transport of a scene.
 
     Parameters
     ----------
     name : str
-        One of `NAMES`.
+        One of `SCENES`.
     projector, camera : Size, optional
         Sizes of the pattern grid and of the photo; the scene's own where left out. The field of
-        view is shaped like the pattern grid.
+        view of a built-in scene is shaped like the pattern grid.
     progress : callable, optional
         Called with what is being done and the share done, 0 to 1.
 
     Returns
     -------
     ExactTransport
-        Three channels (red, green, blue), in photo units: the brightest camera pixel is 0.9
-        under full white.
+        In photo units. A built-in scene has three channels (red, green, blue), and its brightest
+        camera pixel is 0.9 under full white.
 
     Raises
     ------
     InputError
         If there is no scene of that name.
+    ExtensionError
+        If a scene of another package cannot be loaded, or its transport has other sizes.
     """
     projector, camera = sizes(name, projector, camera)
-    # Ray casting is heavy to import and not needed to name the scenes.
-    from nearfar.scenes.library import describe
-    from nearfar.scenes.render import render
-
-    return render(describe(name), projector, camera, progress=progress or (lambda _, __: None))
+    transport = SCENES[name].compute(projector, camera, progress or (lambda _, __: None))
+    if (transport.projector, transport.camera) != (projector, camera):
+        raise ExtensionError(
+            f"the scene {name} was to be computed for a projector of {projector} and a camera of "
+            f"{camera}, and came out for {transport.projector} and {transport.camera}: ask for "
+            f"these sizes, or update the package that adds the scene."
+        )
+    return transport

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Size
+from nearfar.scenes.description import ByRadiosity, SceneDescription
 from nearfar.scenes.geometry import (
     Gloss,
     Material,
@@ -137,3 +138,11 @@ def alcove() -> Scene:
         projector_view=VIEW,
         camera_view=None,
     )
+
+
+ALCOVE = SceneDescription(
+    summary="marble bust in a niche of saturated colours",
+    projector=Size(64, 64),
+    compute=ByRadiosity(alcove),
+    held_out=True,
+)

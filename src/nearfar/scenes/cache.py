@@ -2,16 +2,16 @@
 
 import hashlib
 import os
-from collections.abc import Callable
+import re
+import sys
 from pathlib import Path
 
 from nearfar.arrays import Size
 from nearfar.errors import NearfarError
-from nearfar.scenes import build, sizes
+from nearfar.scenes import SCENES, build, sizes
+from nearfar.scenes.description import Progress
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact, save_exact
-
-Progress = Callable[[str, float], None]
 
 
 def cache_folder() -> Path:
@@ -29,7 +29,7 @@ def cached_scene(
     *,
     progress: Progress | None = None,
 ) -> ExactTransport:
-    """Compute a built-in scene's transport, or read what an earlier call kept.
+    """Compute a scene's transport, or read what an earlier call kept.
 
     Parameters
     ----------
@@ -42,11 +42,13 @@ def cached_scene(
 
     Raises
     ------
-    InputError
-        If there is no scene of that name.
+    InputError, ExtensionError
+        As `nearfar.scenes.build`.
     """
     projector, camera = sizes(name, projector, camera)
-    path = cache_folder() / f"{name}-{projector}-{camera}-{_fingerprint()}.zarr"
+    # The names of another package's scenes may hold what the name of a file cannot.
+    known_as = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+    path = cache_folder() / f"{known_as}-{projector}-{camera}-{_fingerprint(name)}.zarr"
     if path.exists():
         try:
             return load_exact(path)
@@ -63,9 +65,18 @@ def cached_scene(
     return transport
 
 
-def _fingerprint() -> str:
-    """Return a name that changes with the code of the scenes: no stale scene is read."""
+def _fingerprint(name: str) -> str:
+    """Return a name that changes with the code of a scene, so that no stale scene is read.
+
+    Of a scene of another package, that is the package's version and the module of the scene.
+    """
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
+    entry = SCENES.entry(name)
+    if entry.dist is not None:
+        digest.update(f"{name}\n{entry.dist.name}\n{entry.dist.version}\n{entry.value}".encode())
+        file = getattr(sys.modules.get(entry.module), "__file__", None)
+        if file is not None:
+            digest.update(Path(file).read_bytes())
     return digest.hexdigest()[:12]

@@ -1,7 +1,11 @@
 """A box with a red and a green wall, a glazed cup and a translucent candle."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from nearfar.arrays import Size
+from nearfar.scenes.description import ByRadiosity, SceneDescription
 from nearfar.scenes.geometry import (
     Gloss,
     Material,
@@ -29,6 +33,7 @@ WAX = Material(
 )
 
 PROJECTOR = View((0.0, 0.56, 2.3), (0.0, 0.5, 0.0), 0.207)
+CAMERA = View((0.3, 0.62, 2.28), (-0.015, 0.5, -0.25), 0.204)
 
 
 def _room() -> list[Part]:
@@ -68,13 +73,25 @@ def _candle(move: Vector) -> list[Part]:
     ]
 
 
-def cornell(*, aside: bool = False) -> Scene:
-    """Describe the Cornell-like box; its camera is coaxial, or stands aside and is finer."""
+def cornell() -> Scene:
+    """Describe the Cornell-like box, under a coaxial camera."""
     parts = _room() + _cup((0.2, 0.0, -0.33)) + _candle((-0.18, 0.0, -0.42))
-    camera = View((0.3, 0.62, 2.28), (-0.015, 0.5, -0.25), 0.204)
-    return Scene(
-        name="cornell-aside" if aside else "cornell",
-        parts=tuple(parts),
-        projector_view=PROJECTOR,
-        camera_view=camera if aside else None,
-    )
+    return Scene(name="cornell", parts=tuple(parts), projector_view=PROJECTOR, camera_view=None)
+
+
+def cornell_aside() -> Scene:
+    """Describe the same box; its finer camera stands on the right of the projector."""
+    return replace(cornell(), name="cornell-aside", camera_view=CAMERA)
+
+
+CORNELL = SceneDescription(
+    summary="box of coloured walls, glazed cup, translucent candle",
+    projector=Size(64, 64),
+    compute=ByRadiosity(cornell),
+)
+CORNELL_ASIDE = SceneDescription(
+    summary="the box of cornell, seen from the right",
+    projector=Size(64, 64),
+    camera_scale=2,
+    compute=ByRadiosity(cornell_aside),
+)

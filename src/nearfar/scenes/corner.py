@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Size
+from nearfar.scenes.description import ByRadiosity, SceneDescription
 from nearfar.scenes.geometry import Material, Scene, View, quadrilateral
 
 
@@ -33,3 +34,10 @@ def corner() -> Scene:
         projector_view=VIEW,
         camera_view=None,
     )
+
+
+CORNER = SceneDescription(
+    summary="three walls",
+    projector=Size(128, 128),
+    compute=ByRadiosity(corner),
+)

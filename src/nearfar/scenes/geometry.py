@@ -1,14 +1,16 @@
 """What a simulated scene is made of: parts with a material each, seen from one or two pinholes.
 
 World units are metres, y points up. Directions and positions are arrays [..., 3] as (x, y, z).
+
+Functions that make a mesh import trimesh themselves: it is slow to import, and a scene is described
+without it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from nearfar.arrays import Floats, Integers
 
@@ -193,8 +195,17 @@ def sheet(curves: Any) -> Any:
     return _tiled(points, corners)
 
 
+def box(low: Vector, high: Vector) -> Any:
+    """Box between two opposite corners, sides along the axes, as a `trimesh.Trimesh`."""
+    import trimesh
+
+    return trimesh.creation.box(bounds=[low, high])
+
+
 def ball(radius: float | Vector, *, subdivisions: int = 5) -> Any:
     """Sphere or ellipsoid about the origin, as a `trimesh.Trimesh`."""
+    import trimesh
+
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions)
     mesh.apply_transform(np.diag([*np.broadcast_to(radius, 3), 1.0]))
     return mesh
@@ -202,6 +213,8 @@ def ball(radius: float | Vector, *, subdivisions: int = 5) -> Any:
 
 def tube(start: Vector, end: Vector, radius: float) -> Any:
     """Capsule between two points, as a `trimesh.Trimesh`."""
+    import trimesh
+
     first, last = np.asarray(start), np.asarray(end)
     height = float(np.linalg.norm(last - first))
     mesh = trimesh.creation.capsule(height=height, radius=radius, count=[48, 48])
@@ -214,17 +227,30 @@ def tube(start: Vector, end: Vector, radius: float) -> Any:
 
 def ring(major: float, minor: float) -> Any:
     """Torus in the xy plane about the origin, as a `trimesh.Trimesh`."""
+    import trimesh
+
     return trimesh.creation.torus(major, minor, major_sections=96, minor_sections=32)
 
 
 def rotation(angle: float, axis: Vector, *, point: Vector = (0.0, 0.0, 0.0)) -> Floats:
     """Matrix (4, 4) that turns by an angle (radians) about an axis through a point."""
+    import trimesh
+
     turn: Any = trimesh.transformations.rotation_matrix(angle, axis, point)  # type: ignore[no-untyped-call]
     return np.asarray(turn)
 
 
+def transformed(part: Part, matrix: Floats) -> Part:
+    """Apply a matrix (4, 4) to the corners of a part."""
+    import trimesh
+
+    return replace(part, vertices=trimesh.transform_points(part.vertices, matrix))
+
+
 def _tiled(points: Floats, corners: Integers) -> Any:
     """Mesh of quadrilaterals (..., 4), numbers of points (..., 3); empty ones are left out."""
+    import trimesh
+
     corners = corners.reshape(-1, 4)
     faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     mesh = trimesh.Trimesh(points.reshape(-1, 3), faces, process=False)

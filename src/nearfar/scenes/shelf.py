@@ -1,13 +1,12 @@
 """A bookcase: spines of many colours, a glazed vase and a duck of soap, seen from aside."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import trimesh
 from scipy.interpolate import PchipInterpolator
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Size
+from nearfar.scenes.description import ByRadiosity, SceneDescription
 from nearfar.scenes.geometry import (
     Gloss,
     Material,
@@ -17,10 +16,12 @@ from nearfar.scenes.geometry import (
     Vector,
     View,
     ball,
+    box,
     lathe,
     quadrilateral,
     rotation,
     solid,
+    transformed,
 )
 
 # Half the inner width, the depth, and the heights between the boards, in metres.
@@ -90,7 +91,7 @@ def _box(
     name: str, low: Vector, high: Vector, cover: Material, top: Material, *, sides: str
 ) -> list[Part]:
     """Make some sides of a box; others lie on what carries it."""
-    mesh = trimesh.creation.box(bounds=[low, high])
+    mesh = box(low, high)
     ways = {"left": (0, -1), "right": (0, 1), "bottom": (1, -1), "top": (1, 1), "front": (2, 1)}
     parts = []
     for side in sides.split():
@@ -144,11 +145,8 @@ def _stray_books() -> list[Part]:
     # Its lower left edge stands on the board.
     low, high = (-0.023, UPPER[0], -DEPTH), (0.027, 0.72, -0.09)
     leaning = _box("leaning book", low, high, Material(PINK), PAGES, sides=f"{sides} bottom")
-    turn = rotation(0.22, (0.0, 0.0, 1.0), point=low)
-    tilted = [
-        replace(part, vertices=trimesh.transform_points(part.vertices, turn)) for part in leaning
-    ]
-    return atlas + album + tilted
+    tilt = rotation(0.22, (0.0, 0.0, 1.0), point=low)
+    return atlas + album + [transformed(part, tilt) for part in leaning]
 
 
 def _vase(move: Vector) -> Part:
@@ -190,3 +188,12 @@ def shelf() -> Scene:
         projector_view=PROJECTOR,
         camera_view=CAMERA,
     )
+
+
+SHELF = SceneDescription(
+    summary="books, glazed vase, duck of soap",
+    projector=Size(60, 90),
+    camera_scale=2,
+    compute=ByRadiosity(shelf),
+    held_out=True,
+)

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, Size
+from nearfar.scenes.description import ByRadiosity, SceneDescription
 from nearfar.scenes.geometry import (
     Material,
     Part,
@@ -87,3 +88,10 @@ def wedge() -> Scene:
         projector_view=VIEW,
         camera_view=None,
     )
+
+
+WEDGE = SceneDescription(
+    summary="toy bear where two planes meet",
+    projector=Size(68, 100),
+    compute=ByRadiosity(wedge),
+)

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
-from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, Where, keep_input, scene_names
+from nearfar.cli.choices import choice
+from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
 from nearfar.cli.reconstruct import Seen
 from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, warn
+from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.progress import counted, progress_bar
 from nearfar.scenes import SCENES
@@ -73,7 +75,8 @@ def acquire(
         str | None, typer.Option(help="Memory for --transport.", metavar="2GB")
     ] = None,
     device: Annotated[
-        Where | None, typer.Option(help="Where --transport is made; cuda needs PyTorch.")
+        Device | None,
+        choice(("cpu", "cuda"), help="Where --transport is made; cuda needs PyTorch."),
     ] = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -129,9 +132,7 @@ def acquire(
             check = RunningCheck(made, target, opened.full_scale, partial(_tell, quiet=quiet))
         if transport is not None:
             estimate = stack.enter_context(
-                RunningEstimate(
-                    made, opened.full_scale, memory=available, device=(device or Where.CPU).value
-                )
+                RunningEstimate(made, opened.full_scale, memory=available, device=device or "cpu")
             )
         told = [each for each in (estimate, check) if each is not None]
         taken = shoot(

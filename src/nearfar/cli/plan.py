@@ -1,37 +1,21 @@
 """``nearfar plan``."""
 
 import json
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from nearfar.arrays import Size
+from nearfar.cli.choices import choice
 from nearfar.cli.options import AsJson, Force, Quiet, size
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import counted, progress_bar
 
 if TYPE_CHECKING:
+    from nearfar.plan.paper import Correspondence, Offset
     from nearfar.plan.typical import Typical
-
-
-class Offset(StrEnum):
-    """How the offset of a sinusoid is taken out."""
-
-    INVERSE = "inverse"
-    REFERENCE = "reference"
-    NONE = "none"
-
-
-class CorrespondenceBy(StrEnum):
-    """What is projected for correspondence."""
-
-    STRIPES = "stripes"
-    GRAY = "gray"
-    PHASE = "phase"
-    NONE = "none"
 
 
 def plan(
@@ -58,17 +42,19 @@ def plan(
         ),
     ] = None,
     offset: Annotated[
-        Offset | None,
-        typer.Option(
+        str | None,
+        choice(
+            "nearfar.plan.paper:Offset",
             help="Each pattern with its inverse, or once with white and black at intervals; none "
-            "is for counting and simulation only. By default inverse with --far, else reference."
+            "is for counting and simulation only. By default inverse with --far, else reference.",
         ),
     ] = None,
     correspondence: Annotated[
-        CorrespondenceBy | None,
-        typer.Option(
+        str | None,
+        choice(
+            "nearfar.plan.paper:Correspondence",
             help="Photos of black stripes or of Gray code, the patterns' own phase, or none. By "
-            "default stripes with --far, else phase."
+            "default stripes with --far, else phase.",
         ),
     ] = None,
     look: Annotated[
@@ -120,8 +106,8 @@ def plan(
             near,
             far,
             dropped=drop,
-            offset=(offset or Offset.INVERSE).value,
-            correspondence=(correspondence or CorrespondenceBy.STRIPES).value,
+            offset=cast("Offset", offset or "inverse"),
+            correspondence=cast("Correspondence", correspondence or "stripes"),
         )
     if output is not None:
         from nearfar.files import new_output
@@ -164,13 +150,13 @@ def _looked_at(look: Path, projector: Size) -> "tuple[Typical, float]":
 def _refuse_with_photos(
     far: Size | None,
     drop: Size | None,
-    offset: Offset | None,
-    correspondence: CorrespondenceBy | None,
+    offset: str | None,
+    correspondence: str | None,
 ) -> None:
     """Refuse what only the paper's plan has a use for."""
     if far is not None or drop is not None:
         raise typer.BadParameter("--far and --drop are of the paper's plan: leave --photos out")
-    if offset not in (None, Offset.REFERENCE):
+    if offset not in (None, "reference"):
         raise typer.BadParameter("--photos chooses plans by reference: leave --offset out")
-    if correspondence not in (None, CorrespondenceBy.PHASE):
+    if correspondence not in (None, "phase"):
         raise typer.BadParameter("--photos needs no photos for correspondence: leave it out")

@@ -1,14 +1,14 @@
 """``nearfar separate``."""
 
 import json
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
 from nearfar.arrays import Size
 from nearfar.cli import separation_steps as steps
+from nearfar.cli.choices import choice
 from nearfar.cli.options import AsJson, Force, Quiet, keep_input, scene_names, size
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
@@ -18,12 +18,7 @@ if TYPE_CHECKING:
     from nearfar.baselines.separation_methods import Method
 
 
-class Pattern(StrEnum):
-    """What is projected."""
-
-    CHECKERBOARD = "checkerboard"
-    SINUSOID = "sinusoid"
-    ANY = "any"
+Pattern = Literal["checkerboard", "sinusoid", "any"]
 
 
 def separate(
@@ -57,11 +52,12 @@ def separate(
     ] = None,
     pattern: Annotated[
         Pattern,
-        typer.Option(
+        choice(
+            get_args(Pattern),
             help="Shifted checkerboards, which a projector that is not linear shows as well; "
-            "shifted sinusoids; any half-lit fine patterns, known by their photos only."
+            "shifted sinusoids; any half-lit fine patterns, known by their photos only.",
         ),
-    ] = Pattern.CHECKERBOARD,
+    ] = "checkerboard",
     side: Annotated[
         int | None,
         typer.Option(
@@ -142,7 +138,7 @@ def separate(
     _refuse(source, ("--export",), {"--scale": scale, "--native": native})
     _refuse(source, ("--rig", "--photos"), {"--truth": truth, "--transport": transport})
     _refuse(source, ("--rig", "--photos"), {"--json": as_json or None})
-    if pattern is Pattern.ANY and source != "--photos":
+    if pattern == "any" and source != "--photos":
         raise typer.BadParameter("any goes with --photos only.", param_hint="--pattern")
     method = _method(pattern, side=side, step=step, period=period, shifts=shifts)
     inputs = (
@@ -206,16 +202,14 @@ def _method(pattern: Pattern, **numbers: int | None) -> "Method":
         by_sinusoids,
     )
 
-    own = {Pattern.CHECKERBOARD: ("side", "step"), Pattern.SINUSOID: ("period", "shifts")}
+    own = {"checkerboard": ("side", "step"), "sinusoid": ("period", "shifts")}
     for name, value in numbers.items():
         if value is not None and name not in own.get(pattern, ()):
-            raise typer.BadParameter(
-                f"is not for --pattern {pattern.value}.", param_hint=f"--{name}"
-            )
+            raise typer.BadParameter(f"is not for --pattern {pattern}.", param_hint=f"--{name}")
     match pattern:
-        case Pattern.CHECKERBOARD:
+        case "checkerboard":
             return by_checkerboards(numbers["side"], numbers["step"])
-        case Pattern.SINUSOID:
+        case "sinusoid":
             return by_sinusoids(numbers["period"], numbers["shifts"])
         case _:
             return by_any_patterns()

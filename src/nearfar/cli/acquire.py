@@ -18,11 +18,14 @@ from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, warn
 from nearfar.devices import Device
 from nearfar.errors import InputError
-from nearfar.progress import counted, progress_bar
+from nearfar.progress import Report, counted, progress_bar
 from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
+    from nearfar.capture import Capture
+    from nearfar.plan import Plan
     from nearfar.rigs.base import Rig
+    from nearfar.workflow.estimating import RunningEstimate
     from nearfar.workflow.running import Standing
 
 # Beyond this no photo of a real camera tells anything.
@@ -87,10 +90,7 @@ def acquire(
     """
     from nearfar.capture.begun import begun_capture
     from nearfar.files import check_resumable
-    from nearfar.plan import read_plan
-    from nearfar.plan.checks import with_checks
     from nearfar.rigs.opening import open_rig
-    from nearfar.transport.store import write_transport
     from nearfar.workflow.acquire import acquire as shoot
     from nearfar.workflow.estimating import RunningEstimate
     from nearfar.workflow.running import RunningCheck
@@ -104,10 +104,7 @@ def acquire(
     if transport is None:
         _refuse({"--memory": memory, "--device": device}, "is for --transport.")
     available = parse_bytes(memory or "2GB", name="--memory")
-    made = read_plan(plan_file)
-    made.require_real("shoot")
-    if target is not None:
-        made = with_checks(made)
+    made = _plan_to_shoot(plan_file, with_check_photos=target is not None)
     keep_input(output, plan_file, Path(rig))
     check_resumable(output, resume=resume, force=force)
     if transport is not None:
@@ -146,17 +143,42 @@ def acquire(
             enough=lambda number, photo: any(each(number, photo) for each in told),
             told=warn,
         )
-        last = time.monotonic()
         say_captured(taken, output, quiet=quiet)
         if estimate is not None and transport is not None:
-            seen = Seen()
-            transports = (seen.add(*part) for part in estimate.finish(taken, report))
-            write_transport(transport, transports, taken.camera.height, force=force)
-            seen.conclude(taken, transport, quiet=quiet)
-            say(f"{time.monotonic() - last:.1f} s after the last photo", quiet=quiet)
+            _finish(estimate, taken, transport, report, force=force, quiet=quiet)
     _say_exposure(opened, quiet=quiet)
     if target is not None and check is not None and check.standing is not None:
         _say_what_limits(check.standing, target, quiet=quiet)
+
+
+def _plan_to_shoot(plan_file: Path, *, with_check_photos: bool) -> "Plan":
+    """Read a plan that can be shot, and add photos to check by if they are asked for."""
+    from nearfar.plan import read_plan
+    from nearfar.plan.checks import with_checks
+
+    made = read_plan(plan_file)
+    made.require_real("shoot")
+    return with_checks(made) if with_check_photos else made
+
+
+def _finish(
+    estimate: "RunningEstimate",
+    taken: "Capture",
+    transport: Path,
+    report: Report,
+    *,
+    force: bool,
+    quiet: bool,
+) -> None:
+    """Make and write the transport, most of whose work was done while photos were taken."""
+    from nearfar.transport.store import write_transport
+
+    start = time.monotonic()
+    seen = Seen()
+    transports = (seen.add(*part) for part in estimate.finish(taken, report))
+    write_transport(transport, transports, taken.camera.height, force=force)
+    seen.conclude(taken, transport, quiet=quiet)
+    say(f"{time.monotonic() - start:.1f} s after the last photo", quiet=quiet)
 
 
 def _tell_time(photos: int, seconds: float, *, quiet: bool) -> None:

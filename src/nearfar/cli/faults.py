@@ -3,13 +3,15 @@
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
 
+from nearfar.cli.saying import warn
 from nearfar.errors import KeptInterrupt, NearfarError
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -57,6 +59,18 @@ def faults_in_sentences() -> Iterator[None]:
             f"the program met a fault of its own ({what}): run again with NEARFAR_TRACEBACK=1 and "
             f"report what it prints."
         )
+
+
+@contextmanager
+def warnings_in_lines() -> Iterator[None]:
+    """Print Python's warnings as those of a command: a line each, without the place in the code."""
+
+    def show(message: Warning | str, *_where: Any, **_more: Any) -> None:
+        warn(str(message))
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
 
 
 @contextmanager

@@ -90,7 +90,7 @@ def _built(name: str, function: "FunctionType") -> Any:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ExtensionError(
             f"the command {name!r} of the module {function.__module__} cannot be used ({reason}): "
-            f"update or uninstall its package."
+            f"update or uninstall that package."
         ) from error
 
 

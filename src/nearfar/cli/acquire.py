@@ -38,6 +38,17 @@ LIMITS = {
 }
 
 
+def decibels(text: str) -> float:
+    """Read an SNR written 35dB or 35; another text is wrong usage."""
+    try:
+        value = float(text.strip().lower().removesuffix("db"))
+    except ValueError:
+        value = nan
+    if not 0 < value < MOST_DECIBELS:
+        raise typer.BadParameter(f"{text!r} is no SNR to reach: write it as 35dB.")
+    return value
+
+
 def acquire(
     plan_file: PlanFile,
     output: NewCapture,
@@ -51,11 +62,12 @@ def acquire(
         ),
     ],
     until: Annotated[
-        str | None,
+        float | None,
         typer.Option(
             help="Stop as soon as pictures that are shot to check by, and never estimated from, "
             "are relit this well.",
             metavar="35dB",
+            parser=decibels,
         ),
     ] = None,
     transport: Annotated[
@@ -100,11 +112,10 @@ def acquire(
         _refuse(given, "goes not with --reshoot.")
         take_again(plan_file, output, rig, photo_numbers(reshoot), quiet=quiet)
         return
-    target = _decibels(until) if until is not None else None
     if transport is None:
         _refuse({"--memory": memory, "--device": device}, "is for --transport.")
     available = parse_bytes(memory or "2GB", name="--memory")
-    made = _plan_to_shoot(plan_file, with_check_photos=target is not None)
+    made = _plan_to_shoot(plan_file, with_check_photos=until is not None)
     keep_input(output, plan_file, Path(rig))
     check_resumable(output, resume=resume, force=force)
     if transport is not None:
@@ -125,8 +136,8 @@ def acquire(
         for note in opened.notes:
             warn(note)
         check = estimate = None
-        if target is not None:
-            check = RunningCheck(made, target, opened.full_scale, partial(_tell, quiet=quiet))
+        if until is not None:
+            check = RunningCheck(made, until, opened.full_scale, partial(_tell, quiet=quiet))
         if transport is not None:
             estimate = stack.enter_context(
                 RunningEstimate(made, opened.full_scale, memory=available, device=device or "cpu")
@@ -147,8 +158,8 @@ def acquire(
         if estimate is not None and transport is not None:
             _finish(estimate, taken, transport, report, force=force, quiet=quiet)
     _say_exposure(opened, quiet=quiet)
-    if target is not None and check is not None and check.standing is not None:
-        _say_what_limits(check.standing, target, quiet=quiet)
+    if until is not None and check is not None and check.standing is not None:
+        _say_what_limits(check.standing, until, quiet=quiet)
 
 
 def _plan_to_shoot(plan_file: Path, *, with_check_photos: bool) -> "Plan":
@@ -213,19 +224,6 @@ def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool)
             f"{capture} cannot be both capture and transport: choose another name for one."
         )
     check_output(transport, force=force)
-
-
-def _decibels(text: str) -> float:
-    """Read 35dB or 35."""
-    try:
-        value = float(text.strip().lower().removesuffix("db"))
-    except ValueError:
-        value = nan
-    if not 0 < value < MOST_DECIBELS:
-        raise typer.BadParameter(
-            f"{text!r} is no SNR to reach: write it as 35dB.", param_hint="--until"
-        )
-    return value
 
 
 def _tell(standing: "Standing", *, quiet: bool) -> None:

@@ -200,7 +200,7 @@ def test_half_precision_is_half_the_size_and_says_when_it_shows(
         pictures.append(np.load(out))
     np.testing.assert_allclose(*pictures, atol=2e-3 * pictures[0].max())
     # Where there is hardly any noise, it is told.
-    monkeypatch.setattr("nearfar.report.faults.ROUNDED", 1e-5)
+    monkeypatch.setattr("nearfar.faults.of_capture.ROUNDING_SHARE_OF_NOISE", 1e-5)
     ran = run_nearfar("reconstruct", capture, half, "--half", "--force")
     assert ran.status == 0
     assert ran.err.startswith("warning: float16 strays from the windows and bands by 0.0")

@@ -11,7 +11,7 @@ from nearfar.errors import DeviceError, InputError
 from nearfar.photometry.exposures import Sensor
 from nearfar.plan import paper_plan
 from nearfar.plan.choose import choose_plan
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.workflow.acquire import acquire
 from tests.cli.conftest import run_nearfar
@@ -334,7 +334,7 @@ def test_a_small_part_of_the_view_is_enough(transport, plan):
     screen = TableScreen()
     dim = SimulatedCamera(bits=12, read_noise=60.0)
     camera = TableCamera(screen, 0.3 * small, size, PROJECTOR, sensor=dim)
-    RealRig(screen, camera, PROJECTOR, exposure=0.1).in_step()
+    RealRig(screen, camera, PROJECTOR, exposure=0.1).synchronise()
 
 
 def test_photos_of_floats_are_as_good(table, plan, expected):

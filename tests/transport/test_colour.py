@@ -6,7 +6,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.plan import paper_plan
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 from nearfar.transport.colour import as_channels_see
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.calibrate import calibrate

@@ -14,7 +14,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.errors import InputError
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 from nearfar.viewer.preview import run_preview
 from nearfar.viewer.sight import BINS, MARK, look, picture
 from tests.absent import said_without

@@ -8,7 +8,7 @@ from nearfar.errors import DeviceError, InputError
 from nearfar.report.calibration import is_calibration, write_calibration
 from nearfar.rigs.calibration import read_calibration
 from nearfar.rigs.opening import open_real_rig
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.tables import RealTable
 from nearfar.workflow.calibrate import calibrate

@@ -1,12 +1,11 @@
 """Captures: raw photos on the disk, and photos taken elsewhere."""
 
 from nearfar.capture.importing import ImportSummary, Pairing, import_photos, pair, pairing
-from nearfar.capture.store import KIND, SATURATED, Capture, open_capture, white_and_black
+from nearfar.capture.store import KIND, Capture, open_capture, white_and_black
 from nearfar.capture.writing import CaptureWriter, write_capture
 
 __all__ = [
     "KIND",
-    "SATURATED",
     "Capture",
     "CaptureWriter",
     "ImportSummary",

@@ -30,8 +30,6 @@ CHUNK_BYTES = 2**22
 THUMBNAIL = 256
 KIND = "nearfar capture"
 FORMAT_VERSION = 1
-# A share of saturated values above this is worth a warning.
-SATURATED = 1e-4
 DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 

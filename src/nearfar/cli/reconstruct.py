@@ -194,10 +194,10 @@ class Seen:
 
     def conclude(self, capture: "Capture", output: Path, *, quiet: bool) -> None:
         """Say what was made, and what is wrong with the photos."""
-        from nearfar.report.faults import faults_of
+        from nearfar.faults.of_capture import find_faults
 
-        for fault in faults_of(capture, self.provenance):
-            warn(fault)
+        for fault in find_faults(capture, self.provenance):
+            warn(str(fault))
         say(
             f"transport of {self.camera} camera pixels with {capture.channels} "
             f"channel{'s' if capture.channels > 1 else ''}, "

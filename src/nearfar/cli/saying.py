@@ -21,14 +21,10 @@ def warn(text: str) -> None:
 
 def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:
     """Say what was captured, and warn of saturated photos."""
-    from nearfar.capture import SATURATED
+    from nearfar.faults.of_capture import find_saturation
 
-    share = taken.saturated_share
-    if share > SATURATED:
-        warn(
-            f"{share:.2%} of the values in {output} are saturated: expose less, or their camera "
-            f"pixels will be wrong."
-        )
+    for fault in find_saturation(str(output), taken.saturated_share):
+        warn(str(fault))
     say(
         f"{len(taken.plan.patterns)} photos of {taken.camera} with {taken.channels} "
         f"channel{'s' if taken.channels > 1 else ''} written to {output}",

@@ -123,13 +123,10 @@ def compare(
 def warn_of_faults(taken: "PhotosToSeparate", method: "Method", source: str) -> None:
     """Say what the photos themselves tell of a fault."""
     from nearfar.baselines.separation_photos import unsteadiness
-    from nearfar.capture import SATURATED
+    from nearfar.faults.of_capture import find_saturation
 
-    if taken.saturated_share > SATURATED:
-        warn(
-            f"{taken.saturated_share:.2%} of the values in the photos of {source} are saturated: "
-            f"expose less, or their camera pixels will be wrong."
-        )
+    for fault in find_saturation(f"the photos of {source}", taken.saturated_share):
+        warn(str(fault))
     if taken.dark is None and taken.black_level == 0.0:
         warn(
             f"the photos of {source} have none under black and none of ambient light, so ambient "

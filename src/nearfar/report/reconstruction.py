@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from nearfar.arrays import Floats
 from nearfar.capture import Capture
+from nearfar.faults.of_capture import find_faults
 from nearfar.illumination.pictures import natural_picture, white
 from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
-from nearfar.report.faults import faults_of
 from nearfar.report.figures.style import new_figure, styled
 from nearfar.report.maps import Map, maps_of
 from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
@@ -69,7 +69,7 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
             (median, f"{sure.title}, median"),
         ]
     )
-    faults = [*faults_of(capture, stored.provenance), *capture.alarms]
+    faults = [*map(str, find_faults(capture, stored.provenance)), *capture.alarms]
     thinned = "" if step == 1 else f" One row and column of the camera in {step} is shown."
     body = f"""
 <h1>{escape(stored.path.name)}</h1>

@@ -10,6 +10,9 @@ from nearfar.arrays import Size
 
 Photo = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
+# A photo that is lost or wrong is taken so often before the rig gives up.
+MAXIMUM_TRIES = 6
+
 
 class Rig(Protocol):
     """A projector and a camera before a scene; a rig knows nothing of transport."""

@@ -11,7 +11,7 @@ from nearfar.errors import InputError, MissingFileError
 from nearfar.progress import Report
 from nearfar.rigs.calibration import calibration_folder, read_calibration
 from nearfar.rigs.cameras.base import Camera
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 from nearfar.rigs.screens import Window
 from nearfar.rigs.simulated.opening import open_simulated_rig
 from nearfar.rigs.simulated.rig import SimulatedRig

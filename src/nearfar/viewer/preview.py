@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError
 from nearfar.packages import needed
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 from nearfar.viewer.preview_page import PAGE
 from nearfar.viewer.serving import HERE, Place, serve
 from nearfar.viewer.sight import look, picture

@@ -12,11 +12,11 @@ from nearfar.capture import Capture, CaptureWriter, open_capture
 from nearfar.capture.begun import LOG, count_photos, require_same_rig
 from nearfar.capture.replacing import replace_photos
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
+from nearfar.faults.while_capturing import FaultsWhileCapturing
 from nearfar.files import resumable_output
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import Plan
 from nearfar.rigs.base import Photo, Rig
-from nearfar.workflow.alarms import CaptureAlarms
 
 
 def acquire(
@@ -82,8 +82,8 @@ def acquire(
             writer = _writer(folder, plan, rig, resume=resume)
             kept.folder = folder
             ended, taken, heard = writer.ended, writer.taken, 0
-            look = CaptureAlarms(plan, rig.full_scale)
-            look.recall(writer.read, taken)
+            finder = FaultsWhileCapturing(plan, rig.full_scale)
+            finder.recall(writer.read, taken)
             alarms: list[str] = []
             for number in range(taken):
                 answer = enough is not None and enough(number, writer.read(number))
@@ -96,7 +96,7 @@ def acquire(
                 heard = len(rig.alarms)
                 photo = writer.add(photo, rig.conditions(), alarms)
                 # Of a photo that is good and kept: what it tells is noted with the next.
-                alarms = look(writer.taken - 1, photo)
+                alarms = [str(fault) for fault in finder.examine(writer.taken - 1, photo)]
                 for alarm in alarms:
                     tell(alarm)
                 if progress is not None:

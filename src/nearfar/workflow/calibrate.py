@@ -24,7 +24,7 @@ from nearfar.photometry.response import (
 from nearfar.rigs.base import Photo
 from nearfar.rigs.calibration import Calibration
 from nearfar.rigs.linear import LinearProjector
-from nearfar.rigs.real import RealRig
+from nearfar.rigs.real.rig import RealRig
 
 # The ramp's levels: close together where a gamma is steep.
 RAMP = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
@@ -98,10 +98,10 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
         If the photos do not follow the levels.
     """
     report = progress or (lambda _what, _share: None)
-    ends = rig.in_step()
-    lit = _lit(ends.white - ends.black)
+    levels = rig.synchronise()
+    lit = _lit(levels.white - levels.black)
     full = rig.camera.full_scale
-    if float(np.mean(ends.white[lit] >= CLIPPED * full)) > 0.01:
+    if float(np.mean(levels.white[lit] >= CLIPPED * full)) > 0.01:
         raise DeviceError(
             f"{rig.camera.name} is saturated by white: give a shorter exposure, or close its "
             f"aperture."
@@ -110,14 +110,14 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
     ramp = generator.permutation(np.repeat(RAMP, 2))
     photos: dict[int, list[Photo]] = {level: [] for level in RAMP}
     for i, level in enumerate(ramp):
-        photos[int(level)].append(rig.show_levels((level, level, level)))
+        photos[int(level)].append(rig.photograph_levels((level, level, level)))
         report("grey ramp", (i + 1) / len(ramp))
     black_light = _light(photos[0], lit)
     light = np.stack([_light(photos[level], lit) - black_light for level in RAMP])
     primaries = []
     for primary in range(3):
         red, green, blue = (255 if p == primary else 0 for p in range(3))
-        pair = [rig.show_levels((red, green, blue)) for _ in range(2)]
+        pair = [rig.photograph_levels((red, green, blue)) for _ in range(2)]
         primaries.append(_light(pair, lit) - black_light)
         report("primaries", (primary + 1) / 3)
     mixing = np.stack(primaries, axis=-1)
@@ -206,7 +206,7 @@ def _camera_line(
     try:
         for i, length in enumerate(lengths):
             seconds.append(camera.set_exposure(length))
-            photos.append(rig.show_levels((level, level, level)))
+            photos.append(rig.photograph_levels((level, level, level)))
             report("exposures", (i + 1) / len(lengths))
     finally:
         camera.set_exposure(shortest)
@@ -231,7 +231,7 @@ def _dark_pair(rig: RealRig) -> list[Photo]:
         return []
     try:
         camera.set_exposure(camera.exposure_limits[0])
-        return [rig.show_levels((0, 0, 0)) for _ in range(2)]
+        return [rig.photograph_levels((0, 0, 0)) for _ in range(2)]
     finally:
         camera.set_exposure(usual)
 
@@ -247,7 +247,7 @@ def _checked(
     rig: RealRig, response: Floats, lit: NDArray[np.bool_], black: Floats, report: Step
 ) -> Floats:
     """Show a ramp through the new table; return levels and light, over 255 and white's."""
-    linear = LinearProjector(response, rig.shown)
+    linear = LinearProjector(response, rig.layout)
     grid = np.ones(rig.projector, dtype=np.uint8)
     found = []
     for i, level in enumerate((*CHECKS, 255)):

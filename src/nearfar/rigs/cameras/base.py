@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nearfar.errors import DeviceError, InputError, LostPhotoError
 from nearfar.photometry.exposures import Sensor, average, merge_exposures
-from nearfar.rigs.base import Photo
+from nearfar.rigs.base import MAXIMUM_TRIES, Photo
 
 # Auto-exposure: the brightest light is to reach this share of full scale ...
 BRIGHT = 0.8
@@ -24,8 +24,6 @@ GLINTS = 1e-3
 # Where as much is clipped the light can only be guessed.
 CLIPPED = 0.98
 STEPS = 10
-# A frame that is only looked at is tried so often.
-TRIES = 4
 # An exposure this close to what is wanted will do.
 CLOSE = 0.05
 
@@ -160,7 +158,7 @@ class Camera(ABC):
         DeviceError
             As `take`.
         """
-        for _ in range(TRIES - 1):
+        for _ in range(MAXIMUM_TRIES - 1):
             with suppress(LostPhotoError):
                 return self.take()
         return self.take()

@@ -1,4 +1,4 @@
-"""Alarms of photos while they are taken: when there is a fault, once, and remembered."""
+"""Faults that photos show while they are taken: found where there is one, once, and kept."""
 
 import numpy as np
 import pytest

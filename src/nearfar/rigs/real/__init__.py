@@ -1,0 +1,1 @@
+"""A real projector and camera: exposed in step, each photo checked before it counts."""

@@ -4,7 +4,7 @@ import sys
 import warnings
 from pathlib import Path
 
-from nearfar.version import version as _version
+from nearfar.release import version as _version
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
@@ -14,6 +14,7 @@ copyright = "the nearfar developers"
 release = version = _version()
 extensions = [
     "equations",
+    "examples",
     "myst_parser",
     "numpydoc",
     "reference",

@@ -1,7 +1,98 @@
-"""Light transport between a projector and a camera: plan, acquire, reconstruct, relight.
+"""Light transport between a projector and a camera: measure it, split it, relight the scene.
 
 After Reddy, Ramamoorthi and Curless, "Frequency-Space Decomposition and Acquisition of Light
 Transport under Spatially Varying Illumination", ECCV 2012.
+
+Each step takes what the steps before it return::
+
+    plan -> rig -> capture -> measurements, correspondence -> transport -> pictures
+
+Plan what to project
+    Size                   height and width of a grid of pixels; plain (height, width) does, too
+    parse_size             read a size from text, for instance "68x100"
+    Plan                   the patterns of all photos, in the order to shoot
+    paper_plan             plan the patterns of the paper
+    choose_plan            choose the patterns that relight best with a number of photos
+    read_plan              read a plan from a file
+    parse_plan             read a plan from JSON text
+
+Open a rig
+    open_rig               open a projector and a camera, simulated or real, as a context
+
+Capture the photos
+    acquire                show a plan on a rig and keep the photos
+    write_capture          keep photos that were taken elsewhere
+    open_capture           open the photos that are kept
+    Capture                the photos of a plan, on the disk
+
+Measure
+    measure                turn photos into responses to cosines and sines
+    Measurements           the responses of every camera pixel, and their noise
+
+Correspond
+    correspond             find the projector pixel that lights each camera pixel directly
+    given_correspondence   take it from an array
+    read_correspondence    read it from a file
+    Correspondence         that projector pixel, q, for every camera pixel
+
+Estimate
+    estimate_transport     estimate the transport from measurements and correspondence
+    reconstruct            measure, correspond and estimate in bounded memory
+    reconstruct_on         the same on the machines of a Dask cluster
+
+Use the transport
+    Transport              direct, near- and far-range transport: relights and takes apart
+    ErrorBars              standard deviations of a transport and of relit pictures
+    prepare_transport      lay a transport out to relight it many times
+    save_transport         write a transport
+    load_transport         read a transport
+
+Lights to relight under
+    white                  full white
+    natural_picture        a picture with the statistics of photographs
+    penguin                the penguin of the paper's figure 2
+    random_pattern         an independent value at every pixel
+
+Judge
+    ExactTransport         the transport of a scene, known without a model
+    save_exact             write an exact transport
+    load_exact             read an exact transport
+    relighting_snr         SNR_b: how well pictures under lights agree
+    row_snr                SNR_t: how well the rows of two transports agree
+    snr                    the signal-to-noise ratio of any two arrays
+    check_model            where the paper's assumptions hold on a scene
+    condition_near         how well near patterns tell the entries of a window apart
+
+Besides
+    progress_bar           draw a bar while a long step runs
+    NearfarError           base of all errors that nearfar raises
+
+Examples
+--------
+The transport of a small scene, its photos simulated. Examples of single functions go on from here.
+
+>>> import numpy as np
+>>> import nearfar
+>>> size = (8, 8)  # height and width of the projector, and here of the camera
+>>> scene = 0.5 * np.eye(64) + 0.003  # direct light, and some that reaches every pixel
+>>> np.save("scene.npy", scene)
+>>> light = nearfar.natural_picture(size, seed=1)
+
+The steps:
+
+>>> plan = nearfar.paper_plan(size, window=3, far=(3, 3))
+>>> with nearfar.open_rig("scene.npy", size) as rig:
+...     capture = nearfar.acquire(plan, "capture.zarr", rig)
+>>> measurements = nearfar.measure(capture)
+>>> correspondence = nearfar.correspond(capture)
+>>> transport = nearfar.estimate_transport(measurements, correspondence, window=3, far=(3, 3))
+>>> relit = transport @ light
+
+The picture that the camera would see agrees with the scene's:
+
+>>> truth = nearfar.load_exact("scene.npy", projector=size)
+>>> bool(nearfar.relighting_snr(transport, truth, {"picture": light})["picture"] > 30)
+True
 """
 
 from importlib import import_module
@@ -9,122 +100,146 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nearfar.arrays import Size, parse_size
-    from nearfar.capture import open_capture, write_capture
+    from nearfar.capture import Capture, open_capture, write_capture
     from nearfar.correspondence import (
         Correspondence,
-        correspond_by_stripes,
         given_correspondence,
         read_correspondence,
     )
     from nearfar.errors import NearfarError
+    from nearfar.estimate.joint import ErrorBars
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
+    from nearfar.photometry.measurements import Measurements
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
-    from nearfar.progress import counted, progress_bar
-    from nearfar.rigs.opening import open_rig, opened_rig
+    from nearfar.progress import progress_bar
+    from nearfar.rigs.opening import open_rig
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_store import load_exact, save_exact
     from nearfar.transport.model import Transport
     from nearfar.transport.prepared import prepare_transport
     from nearfar.transport.store import load_transport, save_transport
-    from nearfar.version import version
     from nearfar.workflow.acquire import acquire
     from nearfar.workflow.check import check_model
     from nearfar.workflow.cluster import reconstruct_on
     from nearfar.workflow.conditioning import condition_near
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruct import reconstruct
+    from nearfar.workflow.steps import correspond, estimate_transport, measure
 
-# Where each public name lives; loaded when first asked for, so that importing stays quick.
+    __version__: str
+
+# Where each public name lives, in the order of the flow; loaded when it is first asked for, so
+# that importing stays quick.
 _HOMES = {
-    "Correspondence": "nearfar.correspondence",
-    "ErrorBars": "nearfar.estimate.joint",
-    "ExactTransport": "nearfar.transport.exact",
-    "NearfarError": "nearfar.errors",
-    "Plan": "nearfar.plan",
     "Size": "nearfar.arrays",
-    "Transport": "nearfar.transport.model",
-    "acquire": "nearfar.workflow.acquire",
-    "check_model": "nearfar.workflow.check",
-    "counted": "nearfar.progress",
-    "condition_near": "nearfar.workflow.conditioning",
-    "correspond_by_stripes": "nearfar.correspondence",
-    "given_correspondence": "nearfar.correspondence",
-    "load_exact": "nearfar.transport.exact_store",
-    "load_transport": "nearfar.transport.store",
-    "natural_picture": "nearfar.illumination.pictures",
-    "open_capture": "nearfar.capture",
-    "open_rig": "nearfar.rigs.opening",
-    "opened_rig": "nearfar.rigs.opening",
-    "choose_plan": "nearfar.plan",
-    "paper_plan": "nearfar.plan",
-    "parse_plan": "nearfar.plan",
     "parse_size": "nearfar.arrays",
-    "progress_bar": "nearfar.progress",
-    "prepare_transport": "nearfar.transport.prepared",
-    "penguin": "nearfar.illumination.pictures",
-    "random_pattern": "nearfar.illumination.pictures",
-    "read_correspondence": "nearfar.correspondence",
+    "Plan": "nearfar.plan",
+    "paper_plan": "nearfar.plan",
+    "choose_plan": "nearfar.plan",
     "read_plan": "nearfar.plan",
+    "parse_plan": "nearfar.plan",
+    "open_rig": "nearfar.rigs.opening",
+    "acquire": "nearfar.workflow.acquire",
+    "write_capture": "nearfar.capture",
+    "open_capture": "nearfar.capture",
+    "Capture": "nearfar.capture",
+    "measure": "nearfar.workflow.steps",
+    "Measurements": "nearfar.photometry.measurements",
+    "correspond": "nearfar.workflow.steps",
+    "given_correspondence": "nearfar.correspondence",
+    "read_correspondence": "nearfar.correspondence",
+    "Correspondence": "nearfar.correspondence",
+    "estimate_transport": "nearfar.workflow.steps",
     "reconstruct": "nearfar.workflow.reconstruct",
     "reconstruct_on": "nearfar.workflow.cluster",
+    "Transport": "nearfar.transport.model",
+    "ErrorBars": "nearfar.estimate.joint",
+    "prepare_transport": "nearfar.transport.prepared",
+    "save_transport": "nearfar.transport.store",
+    "load_transport": "nearfar.transport.store",
+    "white": "nearfar.illumination.pictures",
+    "natural_picture": "nearfar.illumination.pictures",
+    "penguin": "nearfar.illumination.pictures",
+    "random_pattern": "nearfar.illumination.pictures",
+    "ExactTransport": "nearfar.transport.exact",
+    "save_exact": "nearfar.transport.exact_store",
+    "load_exact": "nearfar.transport.exact_store",
     "relighting_snr": "nearfar.workflow.evaluate",
     "row_snr": "nearfar.workflow.evaluate",
-    "save_exact": "nearfar.transport.exact_store",
-    "save_transport": "nearfar.transport.store",
     "snr": "nearfar.workflow.evaluate",
-    "version": "nearfar.version",
-    "white": "nearfar.illumination.pictures",
-    "write_capture": "nearfar.capture",
+    "check_model": "nearfar.workflow.check",
+    "condition_near": "nearfar.workflow.conditioning",
+    "progress_bar": "nearfar.progress",
+    "NearfarError": "nearfar.errors",
 }
 
-__all__ = [
-    "Correspondence",
-    "ErrorBars",
-    "ExactTransport",
-    "NearfarError",
-    "Plan",
+# In the order of the flow, as `help(nearfar)` lists them.
+__all__ = [  # noqa: RUF022
     "Size",
-    "Transport",
-    "acquire",
-    "check_model",
-    "choose_plan",
-    "condition_near",
-    "correspond_by_stripes",
-    "counted",
-    "given_correspondence",
-    "load_exact",
-    "load_transport",
-    "natural_picture",
-    "open_capture",
-    "open_rig",
-    "opened_rig",
-    "paper_plan",
-    "parse_plan",
     "parse_size",
-    "penguin",
-    "prepare_transport",
-    "progress_bar",
-    "random_pattern",
-    "read_correspondence",
+    "Plan",
+    "paper_plan",
+    "choose_plan",
     "read_plan",
+    "parse_plan",
+    "open_rig",
+    "acquire",
+    "write_capture",
+    "open_capture",
+    "Capture",
+    "measure",
+    "Measurements",
+    "correspond",
+    "given_correspondence",
+    "read_correspondence",
+    "Correspondence",
+    "estimate_transport",
     "reconstruct",
     "reconstruct_on",
+    "Transport",
+    "ErrorBars",
+    "prepare_transport",
+    "save_transport",
+    "load_transport",
+    "white",
+    "natural_picture",
+    "penguin",
+    "random_pattern",
+    "ExactTransport",
+    "save_exact",
+    "load_exact",
     "relighting_snr",
     "row_snr",
-    "save_exact",
-    "save_transport",
     "snr",
-    "version",
-    "white",
-    "write_capture",
+    "check_model",
+    "condition_near",
+    "progress_bar",
+    "NearfarError",
 ]
+
+# Public names of before: where each lives, and what to use instead.
+_OLD = {
+    "correspond_by_stripes": (
+        "nearfar.correspondence",
+        "use nearfar.correspond(capture, method='stripes')",
+    ),
+    "counted": ("nearfar.progress", "give progress what nearfar.progress_bar yields, as it is"),
+    "opened_rig": ("nearfar.rigs.opening", "use nearfar.open_rig, whose rigs are contexts, too"),
+    "version": ("nearfar.release", "use nearfar.__version__"),
+}
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("nearfar.release").version()
+    if name in _OLD:
+        home, instead = _OLD[name]
+        import_module("nearfar.deprecation").warn_of(f"nearfar.{name}", instead)
+        return getattr(import_module(home), name)
     if name not in _HOMES:
         raise AttributeError(f"module 'nearfar' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return [*__all__, "__version__"]

@@ -6,8 +6,9 @@ projector pixels are flattened row by row.
 
 import math
 import os
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from operator import index
+from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 from array_api_compat import array_namespace, device, is_numpy_array, to_device
@@ -25,7 +26,23 @@ Booleans = NDArray[np.bool_]
 
 
 class Size(NamedTuple):
-    """Height and width of a grid of pixels."""
+    """Height and width of a grid of pixels.
+
+    A plain ``(height, width)`` does wherever a size is asked for.
+
+    Attributes
+    ----------
+    height, width : int
+        In pixels.
+
+    Examples
+    --------
+    >>> size = nearfar.Size(68, 100)
+    >>> size.pixels
+    6800
+    >>> print(size)
+    68x100
+    """
 
     height: int
     width: int
@@ -37,6 +54,52 @@ class Size(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.height}x{self.width}"
+
+
+# What public functions take as a size.
+AnySize = Size | Sequence[SupportsIndex]
+
+
+def as_size(value: AnySize, name: str = "size") -> Size:
+    """Return a size given as a `Size` or as any two whole numbers.
+
+    Parameters
+    ----------
+    value : Size, or (height, width)
+        Python's or NumPy's integers, both at least 1.
+    name : str
+        What the size is of, for the message.
+
+    Returns
+    -------
+    Size
+        Of Python's integers.
+
+    Raises
+    ------
+    InputError
+        If it is anything else.
+    """
+    sides: tuple[Any, ...] = () if isinstance(value, str | bytes) else _listed(value)
+    if any(isinstance(side, bool | np.bool_) for side in sides) or len(sides) != 2:
+        sides = ()
+    try:
+        height, width = (index(side) for side in sides)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"the {name} {value!r} is not a size: give two whole numbers, (height, width), for "
+            f"instance (68, 100)."
+        ) from None
+    if height < 1 or width < 1:
+        raise InputError(f"the {name} {value!r} has a side under 1: both must be at least 1.")
+    return Size(height, width)
+
+
+def _listed(value: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(value)
+    except TypeError:
+        return ()
 
 
 def parse_size(text: str, *, name: str = "size") -> Size:
@@ -57,6 +120,11 @@ def parse_size(text: str, *, name: str = "size") -> Size:
     ------
     InputError
         If the text is no size or a side is under 1.
+
+    Examples
+    --------
+    >>> nearfar.parse_size("68x100")
+    Size(height=68, width=100)
     """
     parts = text.lower().replace("×", "x").split("x")
     try:

@@ -7,7 +7,16 @@ names the thing, says what is wrong with it, and gives the cure, in one sentence
 
 
 class NearfarError(Exception):
-    """Base of all faults that nearfar reports in a sentence."""
+    """Base of all faults that nearfar reports in a sentence.
+
+    Examples
+    --------
+    >>> try:
+    ...     transport @ np.ones((3, 3))
+    ... except nearfar.NearfarError as error:
+    ...     print(error)
+    the light is 3x3, this transport's projector is 8x8: resize the light to 8x8.
+    """
 
 
 class InputError(NearfarError, ValueError):

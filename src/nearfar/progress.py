@@ -1,61 +1,130 @@
-"""Progress of work that takes long: a bar on a terminal, and in a notebook."""
+"""Progress of work that takes long: a bar on a terminal and in a notebook."""
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from html import escape
+from inspect import signature
 from threading import Timer
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
+
+from nearfar.deprecation import warn_of
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-# Seconds; a job that ends sooner shows no bar.
-PATIENCE = 1.0
-# Shares of a job between two drawings in a notebook, each of which is a message.
-STEP = 0.01
+# A job that ends sooner shows no bar.
+SECONDS_BEFORE_A_BAR = 1.0
+# A notebook redraws a bar after this share of a job: each drawing is a message to the browser.
+SHARE_BETWEEN_DRAWINGS = 0.01
 
+# What every function that takes long calls as `progress`: with what is being done, and the share
+# of it that is done, 0 to 1.
 Report = Callable[[str, float], None]
+# A callback of before: called with a count, or with a share.
+OldReport = Callable[[Any], None]
 
 
 @contextmanager
 def progress_bar(what: str = "working", *, quiet: bool = False) -> Iterator[Report]:
-    """Yield a function to tell what is being done and the share done, 0 to 1.
+    """Yield a function that draws a bar for what is being done and the share done, 0 to 1.
 
-    On a terminal and in a notebook it draws a bar; elsewhere, or if it is to be quiet, nothing. It
-    is what `nearfar.reconstruct` and others take as `progress`; `counted` turns it into what
-    `nearfar.acquire` takes.
+    On a terminal and in a notebook it draws a bar; elsewhere it draws nothing. It is what
+    `nearfar.acquire`, `nearfar.reconstruct` and others take as `progress`.
 
     Parameters
     ----------
     what : str
-        What is being done until the job itself tells.
+        What is being done until the job itself says so.
     quiet : bool
-        Show nothing.
+        Draw nothing anywhere.
+
+    Yields
+    ------
+    callable
+        Takes what is being done, a str, and the share of it that is done, 0 to 1.
 
     Examples
     --------
-    >>> with nearfar.progress_bar() as report:  # doctest: +SKIP
+    >>> with nearfar.progress_bar() as report:
     ...     transport, _ = nearfar.reconstruct(capture, progress=report)
     """
     if quiet:
-        yield _unheard
+        yield ignore_progress
     elif _in_notebook():
         yield _in_cell()
     elif sys.stderr.isatty():
         with _on_terminal(what) as report:
             yield report
     else:
-        yield _unheard
+        yield ignore_progress
 
 
-def counted(report: Report, what: str, total: int) -> Callable[[int], None]:
-    """Turn a report of shares into one of counts."""
+def counting(report: Report, what: str, total: int) -> Callable[[int], None]:
+    """Return a function that takes the number of things done, and reports the share of `total`."""
     return lambda done: report(what, done / max(1, total))
 
 
-def _unheard(_what: str, _share: float) -> None:
-    pass
+def counted(report: Report, what: str, total: int) -> Callable[..., None]:
+    """Return a callback that takes a count; every function now takes a report of shares as it is.
+
+    .. deprecated:: 0.1
+        Give `report` itself as `progress`.
+
+    Parameters
+    ----------
+    report : callable
+        Takes what is being done and the share of it that is done.
+    what : str
+        What is counted.
+    total : int
+        The count at which all is done.
+
+    Returns
+    -------
+    callable
+        Takes a count, or what is being done and its share.
+    """
+
+    def report_either(*done: Any) -> None:
+        report(*(done if len(done) == 2 else (what, done[0] / max(1, total))))
+
+    return report_either
+
+
+def as_report(progress: Report | OldReport | None, total: float = 1.0) -> Report:
+    """Return a callback of shares, whichever callback a user gave.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        A report of shares; or, with a warning, a callback of one argument as before.
+    total : float
+        What a callback of one argument is called with when all is done: a count as an int, or
+        a share as a float.
+    """
+    if progress is None:
+        return ignore_progress
+    try:
+        signature(progress).bind("", 0.0)
+    except TypeError:
+        warn_of(
+            "a progress callback of one argument",
+            "take what is being done, a str, and the share of it that is done, a float",
+            stacklevel=4,
+        )
+        of_one = cast("OldReport", progress)
+        if isinstance(total, int):
+            return lambda _what, share: of_one(round(share * total))
+        return lambda _what, share: of_one(share * total)
+    except ValueError:
+        # A built-in that does not tell its arguments.
+        pass
+    return cast("Report", progress)
+
+
+def ignore_progress(_what: str, _share: float) -> None:
+    """Draw nothing: for functions that were given no `progress`."""
 
 
 def _in_notebook() -> bool:
@@ -77,7 +146,7 @@ def _in_cell() -> Report:
 
     def report(what: str, share: float) -> None:
         shares[what] = share
-        if share < 1.0 and share - drawn.get(what, -1.0) < STEP:
+        if share < 1.0 and share - drawn.get(what, -1.0) < SHARE_BETWEEN_DRAWINGS:
             return
         drawn[what] = share
         bars = "".join(
@@ -109,8 +178,8 @@ def _on_terminal(what: str) -> Iterator[Report]:
             tasks[what] = bars.add_task(what, total=1.0)
         bars.update(tasks[what], completed=share)
 
-    # A clock of its own: a job whose first step is long tells nothing meanwhile.
-    clock = Timer(PATIENCE, bars.start)
+    # By a clock of its own: a job whose first step is long reports nothing meanwhile.
+    clock = Timer(SECONDS_BEFORE_A_BAR, bars.start)
     clock.daemon = True
     clock.start()
     try:

@@ -18,7 +18,7 @@ import pytest
 
 from nearfar.cli.commands import COMMANDS
 from nearfar.cli.faults import STOPS
-from nearfar.version import version
+from nearfar.release import version
 from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
 
 SCRIPT = Path(sys.executable).with_name("nearfar")

@@ -58,6 +58,13 @@ class Capture:
         in degrees Celsius; a list with None where it did not.
     alarms : tuple of str
         What the rig told of while the photos were taken, a sentence each.
+
+    Examples
+    --------
+    >>> capture.camera, capture.channels
+    (Size(height=8, width=8), 1)
+    >>> capture.read([0, 1]).shape  # the first two photos, linear, full scale = 1
+    (2, 8, 8, 1)
     """
 
     path: Path
@@ -150,6 +157,11 @@ def open_capture(path: AnyPath) -> Capture:
         If it is not there.
     UnreadableFileError
         If it is damaged, not finished, something else, or it or its plan of another version.
+
+    Examples
+    --------
+    >>> nearfar.open_capture("capture.zarr")
+    <nearfar capture: 52 photos of 8x8, capture.zarr>
     """
     path = Path(path)
     group = open_store(path, KIND, FORMAT_VERSION)

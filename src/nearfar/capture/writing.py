@@ -43,7 +43,7 @@ from nearfar.files import (
 from nearfar.files.logs import note, read_notes
 from nearfar.files.output import synchronise_entry
 from nearfar.plan.model import Plan
-from nearfar.version import version
+from nearfar.release import version
 
 
 class CaptureWriter:
@@ -332,6 +332,12 @@ def write_capture(
         than black.
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`; nothing is left behind.
+
+    Examples
+    --------
+    >>> photos = capture.read(slice(None))  # or those of your own camera
+    >>> nearfar.write_capture(plan, "own.zarr", photos, full_scale=1.0)
+    <nearfar capture: 52 photos of 8x8, own.zarr>
     """
     path = Path(path)
     count = len(plan.patterns)

@@ -18,7 +18,7 @@ from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, warn
 from nearfar.devices import Device
 from nearfar.errors import InputError
-from nearfar.progress import Report, counted, progress_bar
+from nearfar.progress import Report, counting, progress_bar
 from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def acquire(
             opened,
             resume=resume,
             force=force,
-            progress=counted(report, "photos", len(made.patterns)),
+            progress=counting(report, "photos", len(made.patterns)),
             # The estimate hears of every photo, for it never says that they are enough.
             enough=lambda number, photo: any(each(number, photo) for each in told),
             told=warn,

@@ -21,7 +21,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from nearfar.version import version
+        from nearfar.release import version
 
         print(f"nearfar {version()}")
         raise typer.Exit()

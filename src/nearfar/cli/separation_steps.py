@@ -7,7 +7,7 @@ import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.saying import say, warn
-from nearfar.progress import Report, counted, progress_bar
+from nearfar.progress import Report, counting, progress_bar
 
 if TYPE_CHECKING:
     from nearfar.baselines.separation import Separation
@@ -42,7 +42,7 @@ def export_patterns(
             scale=scale,
             native=native,
             force=force,
-            progress=counted(report, "patterns", count),
+            progress=counting(report, "patterns", count),
         )
     say(
         f"{count} patterns of {shown.frame}, the last one black, written to {output}, a pattern "
@@ -94,7 +94,7 @@ def shoot_photos(
     with open_rig(rig, projector, progress=report, on_alarm=warn) as opened:
         for note in opened.notes:
             warn(note)
-        progress = counted(report, "photos", len(patterns) + 1)
+        progress = counting(report, "photos", len(patterns) + 1)
         return shoot_to_separate(opened, patterns, progress=progress), opened.describe()
 
 

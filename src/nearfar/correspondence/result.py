@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from nearfar.arrays import AnyPath, Booleans, Floats, Size
+from nearfar.arrays import AnyPath, AnySize, Booleans, Floats, as_size
+from nearfar.checks import real_numbers
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 
 
@@ -22,6 +24,13 @@ class Correspondence:
     confidence : ndarray, shape (Cy, Cx), float32
         Between 0 and 1: how sure it is that direct light was seen, or, at unlit camera pixels,
         what speaks for direct light after all.
+
+    Examples
+    --------
+    >>> correspondence.q.shape
+    (8, 8, 2)
+    >>> bool(np.allclose(correspondence.q[3, 5], (3, 5), atol=0.1))
+    True
     """
 
     q: Floats
@@ -52,7 +61,7 @@ def joined(parts: Sequence[Correspondence]) -> Correspondence:
 
 
 def given_correspondence(
-    q: Floats, camera: Size, projector: Size, *, source: str = "correspondence"
+    q: ArrayLike, camera: AnySize, projector: AnySize, *, source: str = "correspondence"
 ) -> Correspondence:
     """Take correspondence from outside.
 
@@ -60,7 +69,7 @@ def given_correspondence(
     ----------
     q : ndarray, shape (Cy, Cx, 2)
         (y, x) in projector pixels; NaN where there is no direct light.
-    camera, projector : Size
+    camera, projector : Size or (height, width)
     source : str
         For the message.
 
@@ -73,13 +82,24 @@ def given_correspondence(
     ------
     InputError
         If the shape does not fit the photos, or q lies off the projector.
+
+    Examples
+    --------
+    >>> q = np.stack(np.indices((8, 8)), axis=-1)  # each camera pixel sees its own
+    >>> given = nearfar.given_correspondence(q, camera=(8, 8), projector=(8, 8))
+    >>> given.lit.all()
+    np.True_
     """
-    if q.shape != (*camera, 2) or q.dtype.kind not in "fiu":
+    camera, projector = as_size(camera, "camera"), as_size(projector, "projector")
+    array = real_numbers(q, source)
+    if array.shape != (*camera, 2):
         raise InputError(
-            f"{source} is an array of {'x'.join(map(str, q.shape))}, the photos need "
+            f"{source} is an array of {'x'.join(map(str, array.shape))}, the photos need "
             f"{camera}x2: give (y, x) for each camera pixel, NaN where there is no direct light."
         )
-    given: Floats = np.array(q, dtype=np.float32)
+    if np.isinf(array).any():
+        raise InputError(f"{source} holds infinite values: give NaN where no direct light is.")
+    given: Floats = np.array(array, dtype=np.float32)
     lit = np.isfinite(given).all(axis=-1)
     if not lit.any():
         raise InputError(f"{source} has no camera pixel with direct light: all of it is NaN.")
@@ -94,12 +114,19 @@ def given_correspondence(
     return Correspondence(on_projector, np.where(lit, np.float32(1), np.float32(0)))
 
 
-def read_correspondence(path: AnyPath, camera: Size, projector: Size) -> Correspondence:
+def read_correspondence(path: AnyPath, camera: AnySize, projector: AnySize) -> Correspondence:
     """Read correspondence from a .npy file; see `given_correspondence`.
 
     Raises
     ------
     MissingFileError, UnreadableFileError, InputError
+
+    Examples
+    --------
+    >>> np.save("q.npy", correspondence.q)
+    >>> read = nearfar.read_correspondence("q.npy", camera=(8, 8), projector=(8, 8))
+    >>> bool(np.array_equal(read.q, correspondence.q))
+    True
     """
     path = Path(path)
     try:

@@ -7,45 +7,85 @@ photographs. They are made here, so they come with no licence and in any size.
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import AnySize, Floats, Size, as_size
+from nearfar.checks import as_count
 
-# Drawn this much finer than shown, then averaged: edges fall between pixels as in photographs.
+# Drawn this many times finer on each axis, then averaged: edges fall between pixels, as in
+# photographs.
 FINER = 4
-LEAVES = 2000
-SMALLEST = 0.035
-LARGEST = 0.6
+NUMBER_OF_LEAVES = 2000
+# Radii, as shares of the longer side.
+SMALLEST_RADIUS = 0.035
+LARGEST_RADIUS = 0.6
 
 
-def white(size: Size) -> Floats:
-    """Full white, (Py, Px), float32."""
-    return np.ones((size.height, size.width), dtype=np.float32)
-
-
-def _shown(drawn: Floats, size: Size) -> Floats:
-    """Average what was drawn finer: (Py, Px, channels), float32."""
-    shown = drawn.reshape(size.height, FINER, size.width, FINER, -1).mean(axis=(1, 3))
-    return np.asarray(shown, dtype=np.float32)
-
-
-def natural_picture(size: Size, seed: int, *, colour: bool = False) -> Floats:
-    """Draw dead leaves in linear light, float32, (Py, Px) or (Py, Px, 3), values in [0, 1].
+def white(size: AnySize) -> Floats:
+    """Return full white.
 
     Parameters
     ----------
-    size : Size
+    size : Size or (height, width)
+
+    Returns
+    -------
+    ndarray, shape (Py, Px), float32
+
+    Raises
+    ------
+    InputError
+        If the size is not one.
+
+    Examples
+    --------
+    >>> nearfar.white((2, 3))
+    array([[1., 1., 1.],
+           [1., 1., 1.]], dtype=float32)
+    """
+    return np.ones(as_size(size), dtype=np.float32)
+
+
+def _averaged(drawn: Floats, size: Size) -> Floats:
+    """Average what was drawn finer: (Py, Px, channels), float32."""
+    averaged = drawn.reshape(size.height, FINER, size.width, FINER, -1).mean(axis=(1, 3))
+    return np.asarray(averaged, dtype=np.float32)
+
+
+def natural_picture(size: AnySize, seed: int, *, colour: bool = False) -> Floats:
+    """Draw dead leaves in linear light.
+
+    Parameters
+    ----------
+    size : Size or (height, width)
     seed : int
         Which picture.
     colour : bool
         Three channels instead of one.
+
+    Returns
+    -------
+    ndarray, shape (Py, Px) or (Py, Px, 3), float32
+        Values in [0, 1].
+
+    Raises
+    ------
+    InputError
+        If the size is not one, or the seed is not a whole number from 0 on.
+
+    Examples
+    --------
+    >>> picture = nearfar.natural_picture((8, 8), seed=3, colour=True)
+    >>> picture.shape, picture.dtype
+    ((8, 8, 3), dtype('float32'))
     """
+    size, seed = as_size(size), as_count(seed, "the seed", 0)
     generator = np.random.default_rng([seed, 2001])
     height, width = size.height * FINER, size.width * FINER
     longest = max(height, width)
     drawn = np.zeros((height, width, 3 if colour else 1))
     empty = np.ones((height, width), dtype=bool)
     # Areas fall off as 1/r^3.
-    low, high = LARGEST**-2, SMALLEST**-2
-    for _ in range(LEAVES):
+    low, high = LARGEST_RADIUS**-2, SMALLEST_RADIUS**-2
+    for _ in range(NUMBER_OF_LEAVES):
         radius = longest * generator.uniform(low, high) ** -0.5
         middle = generator.uniform(0, [height, width])
         # Reflectances of natural scenes are skewed to the dark.
@@ -64,7 +104,7 @@ def natural_picture(size: Size, seed: int, *, colour: bool = False) -> Floats:
         drawn[box][leaf] = np.clip(tint * shading[leaf][:, None], 0.0, 1.0)
         empty[box] &= ~leaf
     drawn[empty] = 0.2
-    picture = _shown(drawn, size)
+    picture = _averaged(drawn, size)
     return picture if colour else picture[..., 0]
 
 
@@ -87,8 +127,29 @@ _PENGUIN = (
 )
 
 
-def penguin(size: Size) -> Floats:
-    """Draw a penguin on ice under a sky, after the paper's figure 2: (Py, Px, 3), float32."""
+def penguin(size: AnySize) -> Floats:
+    """Draw a penguin on ice under a sky, after the paper's figure 2.
+
+    Parameters
+    ----------
+    size : Size or (height, width)
+
+    Returns
+    -------
+    ndarray, shape (Py, Px, 3), float32
+        Linear light, values in [0, 1].
+
+    Raises
+    ------
+    InputError
+        If the size is not one.
+
+    Examples
+    --------
+    >>> nearfar.penguin((8, 8)).shape
+    (8, 8, 3)
+    """
+    size = as_size(size)
     height, width = size.height * FINER, size.width * FINER
     side = min(height, width)
     y = (np.arange(height)[:, None] + 0.5 - height / 2) / side + 0.5
@@ -100,7 +161,7 @@ def penguin(size: Size) -> Floats:
         along = down * np.cos(tilt) - across * np.sin(tilt)
         beside = down * np.sin(tilt) + across * np.cos(tilt)
         drawn[(along / half_y) ** 2 + (beside / half_x) ** 2 <= 1.0] = colour
-    return _shown(drawn, size)
+    return _averaged(drawn, size)
 
 
 def landscape(size: Size) -> Floats:
@@ -123,7 +184,7 @@ def landscape(size: Size) -> Floats:
         shade = 1.0 - 0.6 * np.clip((y - ridge) / 0.25, 0, 1)
         drawn[below] = (np.array(colour) * shade[..., None])[below]
     drawn[((y - 0.9) / 0.05) ** 2 + ((x - 0.36) / 0.26) ** 2 < 1] = (0.15, 0.35, 0.60)
-    return _shown(drawn, size)
+    return _averaged(drawn, size)
 
 
 # Letters of 5 x 7 dots, a row of dots in each number's bits.
@@ -159,10 +220,32 @@ def lettering(size: Size) -> Floats:
     return picture
 
 
-def random_pattern(size: Size, seed: int) -> Floats:
-    """Draw independent values between 0 and 1 at every pixel, float32, (Py, Px)."""
-    generator = np.random.default_rng([seed, 1])
-    return np.asarray(generator.random((size.height, size.width), dtype=np.float32))
+def random_pattern(size: AnySize, seed: int) -> Floats:
+    """Draw an independent value at every pixel, uniform between 0 and 1.
+
+    Parameters
+    ----------
+    size : Size or (height, width)
+    seed : int
+        Which pattern.
+
+    Returns
+    -------
+    ndarray, shape (Py, Px), float32
+
+    Raises
+    ------
+    InputError
+        If the size is not one, or the seed is not a whole number from 0 on.
+
+    Examples
+    --------
+    >>> pattern = nearfar.random_pattern((8, 8), seed=0)
+    >>> bool(pattern.min() >= 0 and pattern.max() < 1)
+    True
+    """
+    generator = np.random.default_rng([as_count(seed, "the seed", 0), 1])
+    return np.asarray(generator.random(as_size(size), dtype=np.float32))
 
 
 def standard_lights(size: Size) -> dict[str, Floats]:

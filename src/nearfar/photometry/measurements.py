@@ -51,6 +51,11 @@ class Measurements:
         default `noise`.
     brightest : float
         Largest answer to DC of the camera of which these are some rows; 0, the default: of these.
+
+    Examples
+    --------
+    >>> measurements.basis.count, measurements.responses.shape
+    (18, (64, 1, 18))
     """
 
     camera: Size

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import AnySize, Floats, Size, as_size
+from nearfar.checks import as_count, as_number
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
@@ -87,7 +88,7 @@ class Choice(NamedTuple):
 
 
 def choose_plan(
-    projector: Size,
+    projector: AnySize,
     photos: int,
     *,
     window: int | None = None,
@@ -121,7 +122,18 @@ def choose_plan(
     ------
     PlanError
         If the photos are too few or the projector too small.
+    InputError
+        If the size, the photos or W are not whole numbers, or the noise is not a number.
+
+    Examples
+    --------
+    >>> chosen, expected = nearfar.choose_plan((8, 8), photos=24)
+    >>> len(chosen.patterns)
+    24
     """
+    projector, photos = as_size(projector, "projector"), as_count(photos, "photos")
+    window = None if window is None else as_count(window, "window")
+    noise = as_number(noise, "noise")
     if photos < LEAST_PHOTOS:
         raise PlanError(
             f"{photos} photos are too few to settle correspondence and light: plan with --photos "

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from nearfar.arrays import AnyPath, Size
+from nearfar.arrays import AnyPath, Size, as_size
 from nearfar.errors import MissingFileError, PlanError, UnreadableFileError
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import (
@@ -37,17 +37,12 @@ Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
 
 
-def _size(value: Any) -> Size:
-    height, width = (int(side) for side in value)
-    return Size(height, width)
-
-
 FrequencyField = Annotated[
     Frequency,
     BeforeValidator(frequency_from_text),
     PlainSerializer(frequency_to_text),
 ]
-SizeField = Annotated[Size, BeforeValidator(_size), PlainSerializer(list)]
+SizeField = Annotated[Size, BeforeValidator(as_size), PlainSerializer(list)]
 
 
 class _Frozen(BaseModel):
@@ -141,6 +136,15 @@ class Plan(_Frozen):
     correspondence : {"stripes", "gray", "phase", "none"}
         Photos of stripes or of Gray code, the phase of the transport's own photos, or none at all.
     patterns : tuple of Sinusoid, Exponential, Stripe, GrayCode or Picture
+
+    Examples
+    --------
+    >>> plan
+    <nearfar plan: projector 8x8, 52 photos>
+    >>> plan.counts["near"], plan.counts["correspondence"]
+    (16, 16)
+    >>> plan.draw(0).shape  # the 8-bit pattern of the first photo
+    (8, 8)
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
@@ -253,6 +257,11 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
     ------
     UnreadableFileError
         If the text is no plan, or a plan of another version; the message says which.
+
+    Examples
+    --------
+    >>> nearfar.parse_plan(plan.to_json()) == plan
+    True
     """
     try:
         data = json.loads(text)
@@ -287,6 +296,13 @@ def read_plan(path: AnyPath) -> Plan:
     Raises
     ------
     MissingFileError, UnreadableFileError
+
+    Examples
+    --------
+    >>> with open("plan.json", "w") as file:
+    ...     _ = file.write(plan.to_json())
+    >>> nearfar.read_plan("plan.json") == plan
+    True
     """
     path = Path(path)
     try:

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Literal
 
-from nearfar.arrays import Size
+from nearfar.arrays import AnySize, Size, as_size
+from nearfar.checks import as_count
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
@@ -26,11 +27,11 @@ Correspondence = Literal["stripes", "gray", "phase", "none"]
 
 
 def paper_plan(
-    projector: Size,
+    projector: AnySize,
     window: int,
-    far: Size,
+    far: AnySize,
     *,
-    dropped: Size | None = None,
+    dropped: AnySize | None = None,
     offset: Offset = "inverse",
     correspondence: Correspondence = "stripes",
 ) -> Plan:
@@ -38,13 +39,13 @@ def paper_plan(
 
     Parameters
     ----------
-    projector : Size
+    projector : Size or (height, width)
         Pattern grid Py x Px.
     window : int
         W; the near set is W x W.
-    far : Size
+    far : Size or (height, width)
         Far band, in DFT frequencies of the pattern grid.
-    dropped : Size, optional
+    dropped : Size or (height, width), optional
         Block of lowest near frequencies to leave out, odd by odd. By default those with both
         ``|k| <= k_far``, at least DC.
     offset : {"inverse", "reference", "none"}
@@ -65,7 +66,17 @@ def paper_plan(
     PlanError
         If the projector has a side over `LARGEST`, if W or the far band is larger than it, or if
         the dropped block is even or larger than W.
+    InputError
+        If a size or W is not made of whole numbers.
+
+    Examples
+    --------
+    >>> plan = nearfar.paper_plan((128, 128), window=19, far=(13, 13))
+    >>> plan.transport_photos  # as in the paper's figure 2
+    1060
     """
+    projector, far = as_size(projector, "projector"), as_size(far, "far band")
+    window = as_count(window, "window")
     if max(projector) > LARGEST:
         raise PlanError(
             f"a projector of {projector} has a side over {LARGEST}: give the pattern grid, of "
@@ -81,8 +92,11 @@ def paper_plan(
             f"the far band {far} is larger than the projector {projector}: choose --far at most "
             f"{projector}."
         )
-    if dropped is None:
-        dropped = default_dropped(window, far, projector)
+    dropped = (
+        default_dropped(window, far, projector)
+        if dropped is None
+        else as_size(dropped, "block of dropped frequencies")
+    )
     if dropped.height % 2 == 0 or dropped.width % 2 == 0 or max(dropped) > window:
         raise PlanError(
             f"--drop {dropped} is not a block of near frequencies around DC: both sides must be "

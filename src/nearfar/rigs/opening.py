@@ -5,8 +5,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from nearfar.arrays import AnyPath, Size
-from nearfar.deprecation import warn_of
+from nearfar.arrays import AnyPath, AnySize, Size, as_size
 from nearfar.errors import InputError, MissingFileError
 from nearfar.progress import Report
 from nearfar.rigs.calibration import calibration_folder, read_calibration
@@ -24,7 +23,7 @@ PREVIEW_EXPOSURE_SECONDS = 1 / 30
 
 def open_rig(
     rig: AnyPath,
-    projector: Size,
+    projector: AnySize,
     *,
     exposure: float | None = None,
     progress: Report | None = None,
@@ -41,7 +40,7 @@ def open_rig(
     rig : str or Path
         Name of a scene; path of a Mitsuba 3 scene (.xml), of a stored transport (.npy, .npz, or a
         Zarr that ``render`` or ``reconstruct`` wrote), or of a RIG.toml.
-    projector : Size
+    projector : Size or (height, width)
         Pattern grid of the plan. A scene by name is made for it, a Mitsuba scene's projector
         displays it, and so does a real one in blocks of its pixels.
     exposure : float, optional
@@ -69,9 +68,10 @@ def open_rig(
 
     Examples
     --------
-    >>> with nearfar.open_rig("cornell", plan.projector) as rig:
-    ...     capture = nearfar.acquire(plan, "capture.zarr", rig)
+    >>> with nearfar.open_rig("scene.npy", (8, 8)) as rig:
+    ...     again = nearfar.acquire(plan, "again.zarr", rig)
     """
+    projector = as_size(projector, "projector")
     name, path = os.fspath(rig), Path(rig)
     table: SimulatedTable | RealTable
     if name in SCENES:
@@ -96,7 +96,7 @@ def open_rig(
 
 def opened_rig(
     rig: str,
-    projector: Size,
+    projector: AnySize,
     *,
     exposure: float | None = None,
     progress: Report | None = None,
@@ -119,7 +119,6 @@ def opened_rig(
     -------
     SimulatedRig or RealRig
     """
-    warn_of("nearfar.opened_rig", "use nearfar.open_rig, whose rigs are contexts too")
     return open_rig(
         rig, projector, exposure=exposure, progress=progress, on_alarm=told, on_start=begun
     )

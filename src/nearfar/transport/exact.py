@@ -1,25 +1,36 @@
 """A transport that is known: dense or sparse components, per channel, without a model."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Booleans, Floats, Size, as_size
+from nearfar.checks import (
+    NoArray,
+    as_image,
+    as_light,
+    as_lights,
+    as_number,
+    as_pixels,
+    finite_numbers,
+    real_numbers,
+)
 from nearfar.errors import InputError
+from nearfar.transport.adjoint import AdjointTransport
 
 
-@dataclass(frozen=True)
-class ExactTransport:
+@dataclass(frozen=True, eq=False)
+class ExactTransport(NoArray):
     """Transport T = D + N + F of a scene, each component a C x P matrix per channel.
 
     Index convention: c is a camera pixel and p a projector pixel, both flattened row by row.
 
     Attributes
     ----------
-    projector, camera : Size
+    projector, camera : Size or (height, width)
         Sizes of the pattern grid and of the photo.
     direct, near : tuple of scipy.sparse.csr_array, one per channel
         D and N, shape (C, P), float32. Empty tuples where the components are not known apart;
@@ -28,6 +39,18 @@ class ExactTransport:
         F, or all of T.
     name : str
         What scene or file this is.
+
+    Raises
+    ------
+    InputError
+        If the matrices do not fit the sizes or each other, or do not hold finite numbers.
+
+    Examples
+    --------
+    >>> matrix = 0.5 * np.eye(64, dtype=np.float32)
+    >>> mirror = nearfar.ExactTransport((8, 8), (8, 8), (), (), matrix[None], "a mirror")
+    >>> bool(np.allclose((mirror @ light)[..., 0], 0.5 * light))
+    True
     """
 
     projector: Size
@@ -38,7 +61,13 @@ class ExactTransport:
     name: str = field(default="transport")
 
     def __post_init__(self) -> None:
-        channels, rows, columns = self.far.shape
+        for name in ("projector", "camera"):
+            object.__setattr__(self, name, as_size(getattr(self, name), name))
+        far = real_numbers(self.far, f"{self.name}: far")
+        if far.ndim != 3:
+            raise InputError(f"{self.name}: far has shape {far.shape}: give (channels, C, P).")
+        object.__setattr__(self, "far", far)
+        channels, rows, columns = far.shape
         if (rows, columns) != (self.camera.pixels, self.projector.pixels):
             raise InputError(
                 f"{self.name}: a matrix of {rows} x {columns} does not fit a camera of "
@@ -47,6 +76,13 @@ class ExactTransport:
         for part in (self.direct, self.near):
             if len(part) not in (0, channels):
                 raise InputError(f"{self.name}: its components differ in their channels.")
+            for matrix in part:
+                if matrix.shape != (rows, columns):
+                    raise InputError(f"{self.name}: its components differ in their sizes.")
+                finite_numbers(matrix.data, f"{self.name}: its components")
+        # Row by row: all of it at once would take another fourth of its memory.
+        for row in far.reshape(-1, columns):
+            finite_numbers(row, f"{self.name}: far")
 
     @property
     def channels(self) -> int:
@@ -61,6 +97,7 @@ class ExactTransport:
     @cached_property
     def correspondence(self) -> Floats:
         """Centroid of the direct light, shape (Cy, Cx, 2) as (y, x); NaN where there is none."""
+        self._require_apart()
         y, x = np.divmod(np.arange(self.projector.pixels), self.projector.width)
         total = sum((part for part in self.direct[1:]), start=self.direct[0])
         weight = total @ np.ones(self.projector.pixels)
@@ -75,19 +112,85 @@ class ExactTransport:
         return np.isfinite(self.correspondence[..., 0])
 
     def rows(self, pixels: slice) -> Floats:
-        """Dense rows t of camera pixels, flattened row by row: (n, channels, P), float32."""
-        return sum_rows((*self._sparse_parts(), self.far), pixels)
+        """Return dense rows t of chosen camera pixels.
 
-    def _sparse_parts(self) -> tuple[tuple[sparse.csr_array, ...], ...]:
-        return (self.direct, self.near) if self.is_apart else ()
+        Parameters
+        ----------
+        pixels : slice
+            Camera pixels, flattened row by row.
+
+        Returns
+        -------
+        ndarray, shape (n, channels, P), float32
+
+        Raises
+        ------
+        InputError
+            If `pixels` is not a slice.
+        """
+        return sum_rows(self._parts, as_pixels(pixels, self.camera.pixels))
+
+    @property
+    def _parts(self) -> tuple[tuple[sparse.csr_array, ...] | Floats, ...]:
+        return (self.direct, self.near, self.far) if self.is_apart else (self.far,)
 
     def component_rows(self, pixels: slice) -> tuple[Floats, Floats, Floats]:
-        """Dense rows of D, N and F, each (n, channels, P), float32."""
+        """Return dense rows of D, N and F of chosen camera pixels; see `rows`.
+
+        Raises
+        ------
+        InputError
+            As `rows`; if the components are not known apart.
+        """
+        self._require_apart()
+        pixels = as_pixels(pixels, self.camera.pixels)
         d, n = (sum_rows((part,), pixels) for part in (self.direct, self.near))
         return d, n, sum_rows((self.far,), pixels)
 
+    def _require_apart(self) -> None:
+        if not self.is_apart:
+            raise InputError(
+                f"the components of {self.name} are not known apart: give direct and near, one "
+                f"matrix for each channel."
+            )
+
     def __matmul__(self, light: Floats) -> Floats:
-        return np.asarray(self.pictures(np.asarray(light)[None])[0])
+        light = as_light(light, self.projector, self.channels)
+        return np.asarray(self.pictures(light[None])[0])
+
+    def __mul__(self, factor: float) -> "ExactTransport":
+        scale = np.float32(as_number(factor, "the factor"))
+        direct, near = (
+            tuple(matrix * scale for matrix in part) for part in (self.direct, self.near)
+        )
+        return replace(self, direct=direct, near=near, far=self.far * scale)
+
+    __rmul__ = __mul__
+
+    @property
+    def H(self) -> "AdjointTransport[ExactTransport]":  # noqa: N802
+        """The adjoint T^T, an operator that takes images of the camera."""
+        return AdjointTransport(self)
+
+    def adjoint(self, image: Floats) -> Floats:
+        """Send an image back: T^T per channel.
+
+        Parameters
+        ----------
+        image : ndarray, shape (Cy, Cx) for one channel or (Cy, Cx, channels)
+
+        Returns
+        -------
+        ndarray, shape (Py, Px, channels)
+
+        Raises
+        ------
+        InputError
+            If the image does not hold finite numbers, or is of another shape.
+        """
+        flat = as_image(image, self.camera, self.channels)
+        back = [sum(part[i].T @ flat[:, i] for part in self._parts) for i in range(self.channels)]
+        return np.stack(back, axis=-1).reshape(*self.projector, self.channels)
 
     def pictures(self, lights: Floats) -> Floats:
         """Light the scene with many lights at once.
@@ -99,35 +202,43 @@ class ExactTransport:
         Returns
         -------
         ndarray, shape (n, Cy, Cx, channels), float32
+
+        Raises
+        ------
+        InputError
+            If the lights do not hold finite numbers, or have another size than the pattern grid
+            or other channels.
         """
-        lights = np.asarray(lights, dtype=np.float32)
-        if lights.shape[1:3] != self.projector:
-            raise InputError(
-                f"the light is {'x'.join(map(str, lights.shape[1:]))}, the projector of "
-                f"{self.name} is {self.projector}: resize the light to {self.projector}."
-            )
+        checked = as_lights(lights, self.projector, self.channels).astype(np.float32, copy=False)
+        # F first, as the last digit of a sum depends on the order.
+        return self._pictures(checked, (self.far, *self._parts[:-1]))
+
+    def _pictures(
+        self, lights: Floats, parts: Sequence[tuple[sparse.csr_array, ...] | Floats]
+    ) -> Floats:
+        """Add the pictures of some components, (n, Cy, Cx, channels)."""
         pictures = np.empty((len(lights), self.camera.pixels, self.channels), dtype=np.float32)
         for i in range(self.channels):
             chosen = lights if lights.ndim == 3 else lights[..., min(i, lights.shape[3] - 1)]
             columns = np.ascontiguousarray(chosen.reshape(len(lights), -1).T)
-            total = self.far[i] @ columns
-            for part in (self.direct, self.near):
-                if part:
-                    total += part[i] @ columns
+            total = parts[0][i] @ columns
+            for part in parts[1:]:
+                total += part[i] @ columns
             pictures[..., i] = total.T
         return pictures.reshape(len(lights), *self.camera, self.channels)
 
     def component_pictures(self, light: Floats) -> tuple[Floats, Floats, Floats]:
-        """Direct, near and far pictures under one light, each (Cy, Cx, channels)."""
-        empty = tuple(0 * self.direct[i] for i in range(self.channels))
-        nothing = np.zeros((self.channels, 1, 1), dtype=np.float32)
-        parts = (
-            replace(self, near=empty, far=np.broadcast_to(nothing, self.far.shape)),
-            replace(self, direct=empty, far=np.broadcast_to(nothing, self.far.shape)),
-            replace(self, direct=(), near=()),
-        )
-        first, second, third = (part @ light for part in parts)
-        return first, second, third
+        """Return the direct, near and far pictures under one light, each (Cy, Cx, channels).
+
+        Raises
+        ------
+        InputError
+            As `pictures`; if the components are not known apart.
+        """
+        self._require_apart()
+        checked = as_light(light, self.projector, self.channels)[None].astype(np.float32)
+        direct, near, far = (self._pictures(checked, (part,))[0] for part in self._parts)
+        return direct, near, far
 
 
 def sum_rows(parts: Iterable[tuple[sparse.csr_array, ...] | Floats], pixels: slice) -> Floats:
@@ -138,5 +249,6 @@ def sum_rows(parts: Iterable[tuple[sparse.csr_array, ...] | Floats], pixels: sli
 
 
 def _dense_rows(matrix: sparse.csr_array | Floats, pixels: slice) -> Floats:
-    cut = matrix[pixels]
-    return np.asarray(cut if isinstance(cut, np.ndarray) else cut.toarray(), dtype=np.float32)
+    rows = matrix[pixels]
+    dense = rows if isinstance(rows, np.ndarray) else rows.toarray()
+    return np.asarray(dense, dtype=np.float32)

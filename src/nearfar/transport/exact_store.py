@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import (
@@ -44,6 +44,12 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
     ------
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`.
+
+    Examples
+    --------
+    >>> nearfar.save_exact(truth, "truth.zarr")
+    >>> nearfar.load_exact("truth.zarr").projector
+    Size(height=8, width=8)
     """
     path = Path(path)
     attributes = {
@@ -82,7 +88,7 @@ def _read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_ar
 
 
 def load_exact(
-    path: AnyPath, *, projector: Size | None = None, camera: Size | None = None
+    path: AnyPath, *, projector: AnySize | None = None, camera: AnySize | None = None
 ) -> ExactTransport:
     """Read an exact transport: a Zarr of `save_exact`, or a dense .npy or .npz.
 
@@ -92,8 +98,8 @@ def load_exact(
         A dense T is (C, P) or (C, P, channels), or with its axes apart (Cy, Cx, Py, Px) or
         (Cy, Cx, Py, Px, channels). An .npz holds it as ``T``, or as ``direct``, ``near`` and
         ``far``, and may hold ``projector`` and ``camera`` as (height, width).
-    projector, camera : Size, optional
-        Sizes for a dense T that does not tell them. A camera that is left out is as large as the
+    projector, camera : Size or (height, width), optional
+        Sizes for a dense T that does not hold them. A camera that is left out is as large as the
         projector, or a whole number of times finer on both axes.
 
     Raises
@@ -101,11 +107,20 @@ def load_exact(
     MissingFileError, UnreadableFileError
         If it is not there, damaged or of another kind.
     InputError
-        If its sizes cannot be told or do not fit.
+        If its sizes do not follow from it, or do not fit.
+
+    Examples
+    --------
+    >>> nearfar.load_exact("scene.npy", projector=(8, 8)).camera
+    Size(height=8, width=8)
     """
     path = Path(path)
+    sizes = (
+        None if projector is None else as_size(projector, "projector"),
+        None if camera is None else as_size(camera, "camera"),
+    )
     if path.suffix.lower() in {".npy", ".npz"}:
-        return _load_dense(path, projector, camera)
+        return _load_dense(path, *sizes)
     group = open_store(path, KIND, FORMAT_VERSION)
     try:
         attributes = dict(group.attrs)

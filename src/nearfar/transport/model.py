@@ -10,11 +10,23 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator
 
 from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.checks import (
+    NoArray,
+    as_count,
+    as_image,
+    as_light,
+    as_lights,
+    as_number,
+    as_pixels,
+    as_place,
+    finite_numbers,
+)
 from nearfar.errors import InputError
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
+from nearfar.transport.adjoint import AdjointTransport
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior
@@ -34,8 +46,8 @@ class Components(NamedTuple):
     far: Floats
 
 
-@dataclass(frozen=True, repr=False)
-class Transport:
+@dataclass(frozen=True, repr=False, eq=False)
+class Transport(NoArray):
     """Light transport between a projector and a camera, in photo units.
 
     ``transport @ light`` is the photo under `light` less the photo under black. Index
@@ -58,13 +70,28 @@ class Transport:
     black : ndarray, shape (Cy, Cx, channels), float32
         The photo under black: ambient light and black level.
     noise : ndarray, shape (Cy, Cx, channels), float32
-        Standard deviation of one real measurement (a cosine's or sine's answer).
+        Standard deviation of one response to a cosine or sine.
     provenance : mapping
         Plan, estimator, exposure and version: whatever JSON holds.
     posterior : Posterior, optional
-        What error bars follow from, where the estimate can tell them.
+        What error bars follow from, where the estimate gives them.
     quality : Quality, optional
-        How far each camera pixel is to be trusted, where photos told.
+        How far each camera pixel is to be trusted, where the photos show it.
+
+    Examples
+    --------
+    >>> relit = transport @ light  # photo(light) - photo(black)
+    >>> direct, near, far = transport.components(light)  # the same, taken apart
+    >>> bool(np.allclose(direct + near + far, relit))
+    True
+    >>> soft = transport.relight(light, direct=0.5, near=3.0)  # a gain for each component
+    >>> one_pixel = transport.column(4, 2)  # lit by one projector pixel alone
+    >>> twice = 2 * transport  # as lit by a lamp of twice the power
+    >>> bool(np.allclose(twice @ light, 2 * relit))
+    True
+    >>> dual = transport.H @ relit  # the adjoint: back to the projector
+    >>> dual.shape
+    (8, 8)
     """
 
     projector: Size
@@ -141,6 +168,18 @@ class Transport:
     def __matmul__(self, light: Floats) -> Floats:
         return np.asarray(sum(self.components(light)))
 
+    def __mul__(self, factor: float) -> "Transport":
+        scale = as_number(factor, "the factor")
+        scaled = self.with_gains(direct=scale, near=scale, far=scale)
+        return replace(scaled, noise=self.noise * np.float32(abs(scale)))
+
+    __rmul__ = __mul__
+
+    @property
+    def H(self) -> "AdjointTransport[Transport]":  # noqa: N802
+        """The adjoint T^T, an operator that takes images of the camera."""
+        return AdjointTransport(self)
+
     def components(self, light: Floats) -> Components:
         """Relight each component apart.
 
@@ -180,17 +219,31 @@ class Transport:
         Raises
         ------
         InputError
-            As `components`; if a gain is no finite number.
+            As `components`; if a gain is not a finite number.
         """
-        if not np.isfinite([direct, near, far]).all():
-            raise InputError(f"the gains {direct}, {near}, {far} are no finite numbers.")
+        direct, near, far = as_gains(direct, near, far)
         parts = self.components(light)
         return np.asarray(direct * parts.direct + near * parts.near + far * parts.far)
 
     def with_gains(
         self, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
     ) -> "Transport":
-        """Return the transport with its components scaled, without error bars."""
+        """Return the transport with its components scaled, without error bars.
+
+        Parameters
+        ----------
+        direct, near, far : float
+
+        Returns
+        -------
+        Transport
+
+        Raises
+        ------
+        InputError
+            If a gain is not a finite number.
+        """
+        direct, near, far = as_gains(direct, near, far)
         return replace(
             self,
             posterior=None,
@@ -216,9 +269,10 @@ class Transport:
         InputError
             As `components`.
         """
-        if not len(lights):
+        checked: Floats = as_lights(lights, self.projector, self.channels)
+        if not len(checked):
             return np.zeros((0, *self.camera, self.channels), dtype=np.float32)
-        flat = np.stack([self.lights(light) for light in lights])
+        flat = np.stack([self._flat(light) for light in checked])
         direct, near, far = self._components(flat)
         direct += near
         direct += far
@@ -234,11 +288,13 @@ class Transport:
         Returns
         -------
         ndarray, shape (Py, Px) or (Py, Px, channels)
+
+        Raises
+        ------
+        InputError
+            If the image does not hold finite numbers, or is of another shape.
         """
-        expected = (*self.camera, self.channels)
-        if image.shape != expected and not (self.channels == 1 and image.shape == self.camera):
-            raise InputError(f"the image is {image.shape}, this transport's photos are {expected}.")
-        flat = image.reshape(-1, self.channels)
+        flat = as_image(image, self.camera, self.channels)
         back = [self._adjoint_channel(flat[:, i], i) for i in range(self.channels)]
         stacked = np.stack(back, axis=-1)
         return stacked[..., 0] if self.channels == 1 else stacked
@@ -254,11 +310,17 @@ class Transport:
         Returns
         -------
         ndarray, shape (n, channels, P), float32
+
+        Raises
+        ------
+        InputError
+            If `pixels` is not a slice.
         """
         return np.asarray(sum(self.component_rows(pixels)))
 
     def component_rows(self, pixels: slice) -> Components:
         """Return dense rows of D, N and F of chosen camera pixels; see `rows`."""
+        pixels = as_pixels(pixels, self.camera.pixels)
         flat_far = self.far.reshape(-1, self.channels, self.far_basis.count)[pixels]
         f = self.far_basis.synthesise(flat_far).astype(np.float32, copy=False)
         number = np.arange(len(f))[:, None]
@@ -300,17 +362,28 @@ class Transport:
         InputError
             If there is no such projector pixel.
         """
-        if not (0 <= y < self.projector.height and 0 <= x < self.projector.width):
-            raise InputError(f"({y}, {x}) is no pixel of the projector of {self.projector}.")
         light = np.zeros(self.projector, dtype=np.float32)
-        light[y, x] = 1.0
+        light[as_place(y, x, self.projector, "projector")] = 1.0
         return self @ light
 
     def as_linear_operator(self, channel: int = 0) -> LinearOperator:
-        """Return one channel of T as a SciPy operator of shape (C, P)."""
-        if not 0 <= channel < self.channels:
-            raise InputError(f"channel {channel} is not one of this transport's {self.channels}.")
+        """Return one channel of T as a SciPy operator of shape (C, P).
 
+        Parameters
+        ----------
+        channel : int
+
+        Raises
+        ------
+        InputError
+            If there is no such channel.
+        """
+        channel = as_count(channel, "the channel")
+        if not 0 <= channel < self.channels:
+            raise InputError(
+                f"channel {channel} is not one of this transport's: give one from 0 to "
+                f"{self.channels - 1}."
+            )
         one = replace(
             self,
             posterior=None,
@@ -321,34 +394,31 @@ class Transport:
         )
 
         def matvec(light: Floats) -> Floats:
-            lights = np.reshape(light, (1, 1, -1)).astype(np.float64)
+            lights = finite_numbers(light, "the light").reshape(1, 1, -1).astype(np.float64)
             return np.asarray(sum(one._components(lights)))[0, :, 0]
 
         def rmatvec(image: Floats) -> Floats:
-            return self._adjoint_channel(np.ravel(image), channel).ravel()
+            flat = finite_numbers(image, "the image").ravel()
+            return self._adjoint_channel(flat, channel).ravel()
 
         shape = (self.camera.pixels, self.projector.pixels)
         return LinearOperator(shape, matvec=matvec, rmatvec=rmatvec, dtype=np.float64)
 
     def lights(self, light: Floats) -> Floats:
-        """Check a light and lay it flat: (1, P) for all channels, or (channels, P)."""
-        light = np.asarray(light)
-        if light.dtype.kind in "biu":
-            light = light.astype(np.float32)
-        if light.dtype.kind != "f" or not np.isfinite(light).all():
-            raise InputError("the light holds values that are no finite numbers: mend it first.")
-        if light.shape[:2] != self.projector or light.ndim not in (2, 3):
-            raise InputError(
-                f"the light is {'x'.join(map(str, light.shape))}, this transport's projector is "
-                f"{self.projector}: resize the light to {self.projector}."
-            )
+        """Check a light and lay it flat: (1, P) for all channels, or (channels, P).
+
+        Raises
+        ------
+        InputError
+            As `components`.
+        """
+        return self._flat(as_light(light, self.projector, self.channels))
+
+    @staticmethod
+    def _flat(light: Floats) -> Floats:
+        """Lay a light flat: (1, P) for all channels, or (channels, P)."""
         if light.ndim == 2:
             return light.reshape(1, -1)
-        if light.shape[2] not in (1, self.channels):
-            raise InputError(
-                f"the light has {light.shape[2]} channels, this transport {self.channels}: "
-                f"give a grey light, or one with {self.channels} channels."
-            )
         return np.moveaxis(light, 2, 0).reshape(light.shape[2], -1)
 
     def picture(self, flat: Floats) -> Floats:
@@ -377,3 +447,18 @@ class Transport:
             values = n[block] * image[block, None]
             back += windows.spread(values, self._centres[block], self.window, self.projector)
         return np.asarray(back)
+
+
+def as_gains(direct: float, near: float, far: float) -> tuple[float, float, float]:
+    """Return the gains of the components as floats.
+
+    Raises
+    ------
+    InputError
+        If one is not a finite number.
+    """
+    return (
+        as_number(direct, "the gain of direct"),
+        as_number(near, "the gain of near"),
+        as_number(far, "the gain of far"),
+    )

@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 from array_api_compat import device as device_of
+from array_api_compat import is_array_api_obj, is_numpy_array
 
 from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace
+from nearfar.checks import NoArray, as_light, as_lights
 from nearfar.devices import Device, mover
-from nearfar.errors import InputError
 from nearfar.transport import near as windows
 from nearfar.transport.direct import footprint
 from nearfar.transport.half import rounding_over_noise
-from nearfar.transport.model import Transport
+from nearfar.transport.model import Transport, as_gains
 
 # Values gathered at once: few enough to lie near the processor; many, where each call takes a way.
 HELD: dict[Device, int] = {"cpu": 2**19, "torch": 2**19, "cuda": 2**26}
@@ -28,8 +29,8 @@ HELD: dict[Device, int] = {"cpu": 2**19, "torch": 2**19, "cuda": 2**26}
 UNSEEN = 0.25
 
 
-@dataclass(frozen=True)
-class PreparedTransport:
+@dataclass(frozen=True, eq=False)
+class PreparedTransport(NoArray):
     """A transport laid out for relighting; make one by `prepare_transport`.
 
     Attributes
@@ -85,8 +86,10 @@ class PreparedTransport:
         Raises
         ------
         InputError
-            If the lights have another size than the pattern grid, or other channels.
+            If the lights do not hold finite numbers, have another size than the pattern grid, or
+            other channels; if a gain is not a finite number.
         """
+        direct, near, far = as_gains(direct, near, far)
         lights = self._there(lights)
         xp, count = namespace(lights), len(lights)
         kinds = lights.shape[3] if lights.ndim == 4 else 1
@@ -112,20 +115,19 @@ class PreparedTransport:
 
     def __matmul__(self, light: Any) -> Floats:
         """Relight under one light, (Py, Px) or (Py, Px, channels), as `Transport` does."""
-        picture: Floats = fetch(self.pictures(light[None])[0])
+        if is_array_api_obj(light):
+            lights = light[None]
+        else:
+            lights = as_light(light, self.projector, self.channels)[None]
+        picture: Floats = fetch(self.pictures(lights)[0])
         return picture[..., 0] if self.channels == 1 else picture
 
     def _there(self, lights: Any) -> Any:
-        if isinstance(lights, np.ndarray):
-            lights = beside(np.ascontiguousarray(lights, dtype=np.float32), self.direct)
-        shape = tuple(lights.shape)
-        if shape[1:3] != self.projector or shape[3:] not in {(), (1,), (self.channels,)}:
-            raise InputError(
-                f"the lights are {'x'.join(map(str, shape))}, this transport's projector is "
-                f"{self.projector} with {self.channels} channels: give L x {self.projector}, or "
-                f"that with channels."
-            )
-        return lights
+        checked = as_lights(lights, self.projector, self.channels)
+        if is_numpy_array(checked):
+            return beside(np.ascontiguousarray(checked, dtype=np.float32), self.direct)
+        xp = namespace(checked)
+        return xp.astype(checked, xp.float32, copy=False)
 
 
 def _weighed(values: Any, seen: Any) -> Any:
@@ -156,6 +158,13 @@ def prepare_transport(
     ------
     InputError, MissingPackageError
         As `nearfar.devices.mover`.
+
+    Examples
+    --------
+    >>> prepared = nearfar.prepare_transport(transport)
+    >>> lights = np.stack([nearfar.white(size), light])
+    >>> prepared.pictures(lights).shape
+    (2, 8, 8, 1)
     """
     move = mover(device)
     if half is None:

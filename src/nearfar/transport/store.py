@@ -58,6 +58,10 @@ def save_transport(transport: Transport, path: AnyPath, *, force: bool = False) 
     ------
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.new_output`.
+
+    Examples
+    --------
+    >>> nearfar.save_transport(transport, "transport.zarr")
     """
     write_transport(path, [transport], transport.camera.height, force=force)
 
@@ -339,12 +343,28 @@ def _misfit(path: Path) -> UnreadableFileError:
 
 
 def load_transport(path: AnyPath) -> Transport:
-    """Read a transport, all of it.
+    """Read all of a transport.
+
+    Parameters
+    ----------
+    path : str or Path
+        What `save_transport` or ``nearfar reconstruct`` wrote.
+
+    Returns
+    -------
+    Transport
 
     Raises
     ------
     MissingFileError, UnreadableFileError
         If it is not there, damaged, of another kind or of another version.
+
+    Examples
+    --------
+    >>> nearfar.save_transport(transport, "kept.zarr")
+    >>> kept = nearfar.load_transport("kept.zarr")
+    >>> bool(np.allclose(kept @ light, relit))
+    True
     """
     return open_transport(path).rows()
 

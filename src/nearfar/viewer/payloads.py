@@ -11,9 +11,9 @@ from nearfar.errors import InputError
 from nearfar.files import from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
 from nearfar.markup import SCALE
+from nearfar.release import version
 from nearfar.report.maps import TITLES, Map, map_named
 from nearfar.report.page import STYLE
-from nearfar.version import version
 from nearfar.viewer.decoding import decode_apart
 from nearfar.viewer.inspecting import inspect_row
 from nearfar.viewer.messages import WHITE, Gains, Light, pack

@@ -72,6 +72,12 @@ def acquire(
         As `nearfar.files.resumable_output`. What was taken is kept, and the message says where.
     KeptInterrupt
         If it was told to stop; likewise.
+
+    Examples
+    --------
+    >>> with nearfar.open_rig("scene.npy", size) as rig:
+    ...     nearfar.acquire(plan, "taken.zarr", rig)
+    <nearfar capture: 52 photos of 8x8, taken.zarr>
     """
     path = Path(path)
     _require(plan, rig)

@@ -29,11 +29,11 @@ from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos
 from nearfar.plan import Plan
+from nearfar.release import version
 from nearfar.transport.half import in_half, rounding_over_noise
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import of_rows
-from nearfar.version import version
 from nearfar.workflow.methods import ESTIMATORS, Estimate, Method
 
 # Bytes of memory that a reconstruction takes at most, unless told otherwise.

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from nearfar.arrays import Floats, Size, blocks
+from nearfar.arrays import AnySize, Floats, Size, as_size, blocks
+from nearfar.checks import as_count, as_number
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band
 from nearfar.transport import near
@@ -90,7 +91,7 @@ def default_k_near(window: int) -> float:
 def check_model(
     transport: Apart,
     window: int,
-    far: Size,
+    far: AnySize,
     *,
     k_near: float | None = None,
     sample: int = SAMPLE,
@@ -104,7 +105,7 @@ def check_model(
         With its components apart.
     window : int
         W.
-    far : Size
+    far : Size or (height, width)
         Far band.
     k_near : float, optional
         Cycles per projector pixel; `default_k_near` if left out.
@@ -121,8 +122,15 @@ def check_model(
     ------
     InputError
         If W or the far band do not fit the projector, or the components are not apart.
+
+    Examples
+    --------
+    >>> found = nearfar.check_model(transport, window=3, far=(3, 3))
+    >>> sorted(found.floodlit)  # shares of the light under full white
+    ['direct', 'far', 'near']
     """
-    projector = transport.projector
+    projector, far = transport.projector, as_size(far, "far band")
+    window, sample = as_count(window, "window"), as_count(sample, "the sample of camera pixels")
     if not 1 <= window <= min(projector) or far.height > projector[0] or far.width > projector[1]:
         raise InputError(
             f"W = {window} and a far band of {far} do not fit a projector of {projector}: choose "
@@ -134,7 +142,7 @@ def check_model(
             "a built-in scene's, which 'nearfar render' writes, or what 'nearfar reconstruct' "
             "wrote."
         )
-    limit = default_k_near(window) if k_near is None else k_near
+    limit = default_k_near(window) if k_near is None else as_number(k_near, "k_near")
     if sample < 1 or not limit > 0:
         raise InputError(
             f"a sample of {sample} camera pixels and k_near = {limit} tell nothing: both must be "

@@ -21,8 +21,8 @@ from nearfar.correspondence import Correspondence
 from nearfar.errors import ClusterError, MissingPackageError
 from nearfar.files import check_output, new_output
 from nearfar.files.writes import abandon
+from nearfar.release import version
 from nearfar.transport.store import write_provenance
-from nearfar.version import version
 from nearfar.workflow.blocks import (
     MEMORY,
     Job,
@@ -95,6 +95,17 @@ def reconstruct_on(
         it, memory or the files, or are lost again and again.
     NearfarError
         As `nearfar.reconstruct` and `nearfar.files.new_output`.
+
+    Examples
+    --------
+    Here with a worker in this process:
+
+    >>> from distributed import LocalCluster
+    >>> options = {"n_workers": 1, "processes": False, "dashboard_address": None}
+    >>> with LocalCluster(**options) as cluster:
+    ...     done = nearfar.reconstruct_on(cluster.scheduler_address, capture, "made.zarr")
+    >>> nearfar.load_transport("made.zarr").camera
+    Size(height=8, width=8)
     """
     output, report = Path(output), progress or unheard
     check_output(output, force=force)

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import AnySize, Floats, as_size
+from nearfar.checks import as_count
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import as_array, near_frequencies, representatives
 from nearfar.transport import near
@@ -35,15 +36,15 @@ class Conditioning:
     worst: float
 
 
-def condition_near(projector: Size, window: int, dropped: Size) -> Conditioning:
+def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditioning:
     """Condition of the near patterns over every window on a projector (equation 5).
 
     Parameters
     ----------
-    projector : Size
+    projector : Size or (height, width)
     window : int
         W.
-    dropped : Size
+    dropped : Size or (height, width)
         Block of lowest near frequencies that are not shot.
 
     Returns
@@ -54,7 +55,15 @@ def condition_near(projector: Size, window: int, dropped: Size) -> Conditioning:
     ------
     InputError
         If no near frequency is left.
+
+    Examples
+    --------
+    >>> nearfar.condition_near((32, 32), window=5, dropped=(1, 1)).unseen
+    1
     """
+    projector = as_size(projector, "projector")
+    dropped = as_size(dropped, "block of dropped frequencies")
+    window = as_count(window, "window", 1)
     frequencies = representatives(near_frequencies(window, dropped))
     if not frequencies:
         raise InputError(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from nearfar.arrays import Floats, blocks, processors
+from nearfar.checks import finite_numbers
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
 from nearfar.transport.exact import ExactTransport
@@ -24,13 +25,34 @@ PERCENTILES = (0, 5, 25, 50, 75, 95, 100)
 
 
 def snr(truth: Floats, estimate: Floats) -> float:
-    """``20 log10 |truth| / |truth - estimate|`` in dB, between -HIGHEST and HIGHEST.
+    """Return the signal-to-noise ratio ``20 log10 |truth| / |truth - estimate|`` (section 5.1).
 
     Parameters
     ----------
-    truth, estimate : ndarray
+    truth, estimate : array_like
         Of one shape.
+
+    Returns
+    -------
+    float
+        In dB, between -HIGHEST and HIGHEST.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, or the arrays do not hold finite numbers.
+
+    Examples
+    --------
+    >>> round(nearfar.snr([1.0, 1.0], [1.1, 0.9]), 1)
+    20.0
     """
+    truth, estimate = finite_numbers(truth, "the truth"), finite_numbers(estimate, "the estimate")
+    if truth.shape != estimate.shape:
+        raise InputError(
+            f"the truth has shape {truth.shape} and the estimate {estimate.shape}: compare arrays "
+            f"of one shape."
+        )
     signal = float(np.linalg.norm(truth.astype(np.float64).ravel()))
     error = float(np.linalg.norm((truth.astype(np.float64) - estimate).ravel()))
     return decibels(signal**2, error**2)
@@ -89,12 +111,30 @@ def transport_exposure(transport: Transport) -> float:
 def relighting_snr(
     transport: Transport, truth: ExactTransport, lights: Mapping[str, Floats]
 ) -> dict[str, float]:
-    """SNR_b for each light, dB.
+    """Return SNR_b under each light: how well relit pictures agree with the truth (section 5.1).
+
+    Parameters
+    ----------
+    transport : Transport
+    truth : ExactTransport
+    lights : mapping of str to ndarray
+        Lights by name, (Py, Px) or (Py, Px, channels).
+
+    Returns
+    -------
+    dict of str to float
+        In dB.
 
     Raises
     ------
     InputError
-        If sizes differ.
+        If the sizes of the two transports differ, or a light does not fit them.
+
+    Examples
+    --------
+    >>> found = nearfar.relighting_snr(transport, truth, {"white": nearfar.white(size)})
+    >>> bool(found["white"] > 30)
+    True
     """
     require_same_kind(transport, truth)
     exposure = np.float32(transport_exposure(transport))
@@ -125,6 +165,14 @@ def row_snr(
     ------
     InputError
         If sizes differ.
+
+    Examples
+    --------
+    >>> rows = nearfar.row_snr(transport, truth)
+    >>> rows.snr_t.shape  # SNR_t of each camera pixel, in dB
+    (8, 8)
+    >>> list(rows.components)
+    ['T']
     """
     require_same_kind(transport, truth)
     exposure = np.float32(transport_exposure(transport))

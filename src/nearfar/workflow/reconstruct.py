@@ -81,6 +81,12 @@ def reconstruct(
         If there is no correspondence to be had, no light in the photos, the plan by reference
         has too few whites and blacks, a row of the camera does not fit in the memory, or the
         device is not there.
+
+    Examples
+    --------
+    >>> transport, correspondence = nearfar.reconstruct(capture)
+    >>> (transport @ light).shape
+    (8, 8)
     """
     if square:
         return _squarely(capture, correspondence, method, device, progress or unheard)

@@ -14,8 +14,8 @@ from nearfar.devices import Device
 from nearfar.errors import InputError, KeptInterrupt, NearfarError
 from nearfar.files import UNFINISHED, resumable_output
 from nearfar.files.logs import note, read_notes
+from nearfar.release import version
 from nearfar.transport.store import write_provenance
-from nearfar.version import version
 from nearfar.workflow.blocks import (
     MEMORY,
     Job,

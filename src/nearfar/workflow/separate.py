@@ -14,9 +14,9 @@ from nearfar.baselines.separation_photos import PhotosToSeparate
 from nearfar.errors import InputError
 from nearfar.files import encode_png, new_output, write_picture
 from nearfar.illumination.frames import Shown, draw_frame, fit_frame
+from nearfar.release import version
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
-from nearfar.version import version
 from nearfar.workflow.evaluate import snr
 
 NUMBERS = "numbers.json"

@@ -86,6 +86,12 @@ class ErrorBars:
     ------
     InputError
         If the transport does not tell its errors.
+
+    Examples
+    --------
+    >>> bars = nearfar.ErrorBars(transport)
+    >>> bars.picture(light).shape  # the standard deviation of `transport @ light`
+    (8, 8)
     """
 
     def __init__(self, transport: Transport) -> None:

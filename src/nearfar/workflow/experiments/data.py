@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from nearfar.errors import NearfarError, UnreadableFileError
 from nearfar.files import new_output, read_arrays
+from nearfar.release import version
 from nearfar.scenes.cache import cache_folder
-from nearfar.version import version
 
 FORMAT = "nearfar figure data"
 FORMAT_VERSION = 1

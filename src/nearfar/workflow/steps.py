@@ -1,0 +1,206 @@
+"""The steps from a capture to a transport, each by itself: measure, correspond, estimate.
+
+`nearfar.reconstruct` takes all of them tile by tile of the camera, in bounded memory. Here each
+step takes the whole camera at once and returns what the next one needs.
+"""
+
+from dataclasses import replace
+from typing import Literal
+
+from threadpoolctl import threadpool_limits
+
+from nearfar.arrays import AnySize, as_size
+from nearfar.capture import Capture
+from nearfar.correspondence import (
+    Correspondence,
+    correspond_by_gray_code,
+    correspond_by_phase,
+    correspond_by_stripes,
+    has_correspondence_photos,
+    has_stripes,
+)
+from nearfar.devices import Device
+from nearfar.errors import InputError
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.paper import estimate
+from nearfar.illumination.frequencies import default_dropped
+from nearfar.photometry.measure import measure as measure_photos
+from nearfar.photometry.measurements import Measurements
+from nearfar.progress import Report, counting, ignore_progress
+from nearfar.transport.model import Transport
+from nearfar.workflow.blocks import brightest_white, without_drift
+from nearfar.workflow.methods import Method
+
+CorrespondenceMethod = Literal["stripes", "gray", "phase"]
+
+
+def measure(capture: Capture, *, progress: Report | None = None) -> Measurements:
+    """Turn the photos of a capture into responses to cosines and sines (section 4.1).
+
+    Drift of the lamp and of ambient light is removed where the plan shows references.
+
+    Parameters
+    ----------
+    capture : Capture
+    progress : callable, optional
+        Called with what is being done and the share of it that is done, 0 to 1.
+
+    Returns
+    -------
+    Measurements
+        Of the whole camera, in photo units.
+
+    Raises
+    ------
+    PlanError
+        If the plan's patterns are complex.
+    InputError
+        If a pattern lacks its inverse, or the plan has too few references.
+
+    Examples
+    --------
+    >>> measurements = nearfar.measure(capture)
+    >>> measurements.responses.shape  # camera pixels, channels, cosines and sines
+    (64, 1, 18)
+    """
+    report = progress or ignore_progress
+    photos = without_drift(capture, report)
+    count = len(capture.plan.patterns)
+    with threadpool_limits(1, "blas"):
+        found = measure_photos(photos, progress=counting(report, "measuring", count))
+    return replace(found, brightest=brightest_white(photos))
+
+
+def correspond(
+    capture: Capture,
+    *,
+    method: CorrespondenceMethod | None = None,
+    measurements: Measurements | None = None,
+    progress: Report | None = None,
+) -> Correspondence:
+    """Find the projector pixel that lights each camera pixel directly (section 5.1).
+
+    Parameters
+    ----------
+    capture : Capture
+    method : {"stripes", "gray", "phase"}, optional
+        By photos of stripes or of Gray code, or by the phase of the photos of transport. By
+        default the photos that the plan has for it, or else the phase.
+    measurements : Measurements, optional
+        The capture's, which the phase is read from; measured here if left out.
+    progress : callable, optional
+        Called with what is being done and the share of it that is done, 0 to 1.
+
+    Returns
+    -------
+    Correspondence
+        At the camera's resolution; NaN where no direct light is seen.
+
+    Raises
+    ------
+    InputError
+        If the capture does not have the photos that the method needs.
+
+    Examples
+    --------
+    >>> correspondence = nearfar.correspond(capture)
+    >>> int(correspondence.lit.sum())
+    64
+    """
+    report, plan = progress or ignore_progress, capture.plan
+    if method is None and has_correspondence_photos(plan):
+        method = "stripes" if has_stripes(plan) else "gray"
+    if method in {None, "phase"}:
+        found = measurements or measure(capture, progress=report)
+        with threadpool_limits(1, "blas"):
+            return correspond_by_phase(found)
+    if method not in {"stripes", "gray"}:
+        raise InputError(
+            f"there is no correspondence method {method!r}: choose stripes, gray or phase."
+        )
+    photos = without_drift(capture, report)
+    decode = correspond_by_stripes if method == "stripes" else correspond_by_gray_code
+    count = sum(pattern.purpose == "correspondence" for pattern in plan.patterns)
+    return decode(photos, progress=counting(report, "correspondence", count))
+
+
+def estimate_transport(
+    measurements: Measurements,
+    correspondence: Correspondence,
+    window: int,
+    far: AnySize,
+    *,
+    method: Method = "joint",
+    dropped: AnySize | None = None,
+    device: Device = "cpu",
+    progress: Report | None = None,
+) -> Transport:
+    """Estimate direct, near- and far-range transport from measurements and correspondence.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    correspondence : Correspondence
+    window : int
+        W: near-range light comes from a window of W x W projector pixels around q.
+    far : Size or (height, width)
+        Far band, in DFT frequencies of the pattern grid.
+    method : {"joint", "paper"}
+        Estimator: all three components in one model, or one after the other as in the paper.
+    dropped : Size or (height, width), optional
+        Block of near frequencies that were not shot, which the paper's estimator needs; by
+        default those of `nearfar.paper_plan`.
+    device : {"cpu", "cuda", "torch"}
+        Where the estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
+        processor.
+    progress : callable, optional
+        Called with what is being done and the share of it that is done, 0 to 1.
+
+    Returns
+    -------
+    Transport
+
+    Raises
+    ------
+    InputError
+        If the measurements lack what the estimator needs, the correspondence has no camera pixel
+        with direct light, or the device is not there.
+
+    Examples
+    --------
+    >>> estimate = nearfar.estimate_transport(measurements, correspondence, 3, (3, 3))
+    >>> estimate
+    <nearfar transport: projector 8x8, camera 8x8, channels 1, W = 3>
+    """
+    report, far = progress or ignore_progress, as_size(far, "far")
+    if not correspondence.lit.any():
+        raise InputError(
+            "the correspondence has no camera pixel with direct light, so there is nothing to "
+            "estimate: check that the camera sees the projector's light."
+        )
+
+    def done(share: float) -> None:
+        report("estimating", share)
+
+    with threadpool_limits(1, "blas"):
+        if method == "joint":
+            return estimate_jointly(
+                measurements, correspondence.q, window, far, device=device, progress=done
+            )
+        if method != "paper":
+            raise InputError(f"there is no estimator {method!r}: choose joint or paper.")
+        left_out = (
+            default_dropped(window, far, measurements.projector)
+            if dropped is None
+            else as_size(dropped, "dropped")
+        )
+        pixels = measurements.camera.pixels
+        return estimate(
+            measurements,
+            correspondence.q,
+            window,
+            far,
+            left_out,
+            device=device,
+            progress=lambda count: done(count / pixels),
+        )

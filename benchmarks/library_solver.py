@@ -12,9 +12,9 @@ from sklearn.linear_model import ARDRegression
 
 from nearfar import Size
 from nearfar.estimate.sparse import least_risk, solve
+from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import near_frequencies, representatives
 from nearfar.illumination.real_basis import real_basis
-from nearfar.transport import near
 
 WINDOW, NOISE = 19, 0.003
 ALONE, TOGETHER = 20, 128 * 128 * 3
@@ -25,7 +25,7 @@ BLOCK = 2048
 def main() -> None:
     """Print the seconds of both, and their ratio."""
     generator = np.random.default_rng(0)
-    offsets = near.offsets(WINDOW)
+    offsets = window_offsets(WINDOW)
     frequencies = representatives(near_frequencies(WINDOW, Size(1, 1)))
     patterns = real_basis(frequencies, Size(128, 128)).patterns_at(offsets)
     windows = generator.uniform(0, 0.05, (TOGETHER, len(offsets))).astype(np.float32)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from nearfar.arrays import Size
+from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
@@ -41,7 +42,7 @@ def model_transport(
     shape = (*camera, channels)
     windows = np.zeros((pixels, channels, window**2))
     inside = near.inside(near.centre(q, projector), window, projector)
-    parity = 1 - 2 * (near.offsets(window).sum(axis=1) % 2)
+    parity = 1 - 2 * (window_offsets(window).sum(axis=1) % 2)
     for c in range(pixels):
         for i in range(channels):
             # One more entry of the other parity silences the checkerboard.

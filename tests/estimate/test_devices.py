@@ -60,7 +60,7 @@ def test_the_estimate_is_numpys(shoot, by, offset, between, device):
         for told, where in ((measurements, "cpu"), (again, "cpu"), (measurements, device))
     )
     if ours.posterior is not None:
-        assert np.mean(ours.posterior.kind == theirs.posterior.kind) > 0.99
+        assert np.mean(ours.posterior.prior_component == theirs.posterior.prior_component) > 0.99
     for name in ("direct", "near", "far", "correspondence"):
         one, jolted, other = (np.nan_to_num(getattr(each, name)) for each in (ours, shaken, theirs))
         assert type(other) is np.ndarray

@@ -10,14 +10,15 @@ from nearfar.errors import InputError, PlanError
 from nearfar.illumination.frequencies import CHECKERBOARD, DC
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan import choose_plan, parse_plan
-from nearfar.plan.choose import LEAST_PHOTOS, candidates, choose_frequencies, default_window
-from nearfar.plan.typical import TYPICAL, noise_of, typical_of
-from nearfar.transport.kinds import LIT, STRENGTHS, Kind
+from nearfar.plan.choose import FEWEST_PHOTOS, candidates, choose_frequencies, default_window
+from nearfar.plan.typical import noise_of, typical_of
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.fitted import LIT_COMPONENTS, PRIOR_SCALES, TYPICAL_SCENES
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 
 
-@pytest.mark.parametrize("photos", [LEAST_PHOTOS, 61, 150])
+@pytest.mark.parametrize("photos", [FEWEST_PHOTOS, 61, 150])
 @pytest.mark.parametrize("projector", [Size(16, 20), Size(31, 24), Size(33, 33)])
 def test_a_plan_takes_no_more_photos_than_asked_for(projector, photos):
     plan, expected = choose_plan(projector, photos)
@@ -90,8 +91,8 @@ def test_what_cannot_be_chosen_is_said(projector, photos, window, said):
         choose_plan(projector, photos, window=window)
 
 
-def _quick_look(kind, strength, noise=0.01, shape=(6, 8, 3)):
-    """Make a transport whose camera pixels are all of one kind."""
+def _quick_look(component, scale, noise=0.01, shape=(6, 8, 3)):
+    """Make a transport whose camera pixels are all of one prior component."""
     generator = np.random.default_rng(0)
     basis = real_basis([DC], Size(24, 24))
     dark = np.zeros(shape, np.float32)
@@ -106,11 +107,11 @@ def _quick_look(kind, strength, noise=0.01, shape=(6, 8, 3)):
         black=dark,
         noise=noise * white,
         posterior=Posterior(
-            kinds=(LIT[0], kind),
+            prior_components=(LIT_COMPONENTS[0], component),
             frequencies=(),
             multiplicity=np.zeros(0, np.float32),
-            kind=np.ones(shape[:2], np.uint8),
-            strength=np.full(shape[:2], strength, np.float32),
+            prior_component=np.ones(shape[:2], np.uint8),
+            prior_scale=np.full(shape[:2], scale, np.float32),
             white=white,
             offset_noise=dark,
             light_noise=dark,
@@ -119,34 +120,36 @@ def _quick_look(kind, strength, noise=0.01, shape=(6, 8, 3)):
     )
 
 
-def test_a_quick_look_tells_the_kinds_and_the_noise():
-    kind = Kind(6.0, 64.0, 8.0)
-    look = _quick_look(kind, STRENGTHS[4], noise=0.02)
+def test_a_quick_look_gives_prior_components_and_noise():
+    component = PriorComponent(6.0, 64.0, 8.0)
+    look = _quick_look(component, PRIOR_SCALES[4], noise=0.02)
     found = typical_of(look)
-    assert found.kinds == ((kind, pytest.approx(STRENGTHS[4])),)
+    assert found.prior_components == ((component, pytest.approx(PRIOR_SCALES[4])),)
     np.testing.assert_allclose(found.shares, [[1.0]])
     assert noise_of(look) == pytest.approx(0.02, rel=1e-5)
 
 
 def test_the_plan_follows_what_was_looked_at():
-    def highest(kind, strength):
+    def highest(component, scale):
         chosen = choose_frequencies(
-            Size(24, 24), 90, 5, typical=typical_of(_quick_look(kind, strength))
+            Size(24, 24), 90, 5, typical=typical_of(_quick_look(component, scale))
         ).frequencies
         return np.mean([np.hypot(float(k.fy), float(k.fx)) for k in chosen])
 
     # Far-range light alone asks for low frequencies, a rough window for all.
-    assert highest(Kind(0.8, 256.0, 3.0), 0.002) < highest(Kind(6.0, 1.0, 3.0, rough=1.0), 0.02)
+    smooth, rough = PriorComponent(0.8, 256.0, 3.0), PriorComponent(6.0, 1.0, 3.0, roughness=1.0)
+    assert highest(smooth, 0.002) < highest(rough, 0.02)
 
 
-def test_a_look_without_kinds_is_refused():
-    look = replace(_quick_look(LIT[0], 0.01), posterior=None)
+def test_a_look_without_prior_components_is_refused():
+    look = replace(_quick_look(LIT_COMPONENTS[0], 0.01), posterior=None)
     for ask in (typical_of, noise_of):
         with pytest.raises(InputError, match="--method joint"):
             ask(look)
 
 
 def test_the_typical_scenes_are_whole():
-    assert np.all(TYPICAL.shares >= 0)
-    assert np.all((TYPICAL.shares.sum(axis=1) > 0.8) & (TYPICAL.shares.sum(axis=1) <= 1.001))
-    assert TYPICAL.shares.shape == (len(TYPICAL.weights), len(TYPICAL.kinds))
+    components, shares, weights = TYPICAL_SCENES
+    assert np.all(shares >= 0)
+    assert np.all((shares.sum(axis=1) > 0.8) & (shares.sum(axis=1) <= 1.001))
+    assert shares.shape == (len(weights), len(components))

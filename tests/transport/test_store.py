@@ -16,15 +16,15 @@ from nearfar.errors import (
     UnreadableFileError,
 )
 from nearfar.illumination.real_basis import real_basis
+from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.transport.exact_store import load_exact, save_exact
-from nearfar.transport.kinds import LIT
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import TRUSTED, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.store import (
-    BELIEVED,
     FACTORS,
+    POSTERIOR_FIELDS,
     load_transport,
     open_transport,
     save_transport,
@@ -64,11 +64,11 @@ def _believed(transport: Transport) -> Transport:
     }
     frequencies = transport.far_basis.frequencies[1:]
     posterior = Posterior(
-        kinds=LIT[:3],
+        prior_components=LIT_COMPONENTS[:3],
         frequencies=frequencies,
         multiplicity=np.arange(real_basis(frequencies, PROJECTOR).count, dtype=np.float32),
-        kind=generator.integers(0, 3, shape[:2]).astype(np.uint8),
-        strength=generator.random(shape[:2]).astype(np.float32),
+        prior_component=generator.integers(0, 3, shape[:2]).astype(np.uint8),
+        prior_scale=generator.random(shape[:2]).astype(np.float32),
         **values,
     )
     quality = Quality(
@@ -81,9 +81,9 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
     transport = _believed(_transport(generator))
     save_transport(transport, tmp_path / "t.zarr")
     loaded = load_transport(tmp_path / "t.zarr").posterior
-    assert loaded.kinds == transport.posterior.kinds
+    assert loaded.prior_components == transport.posterior.prior_components
     assert loaded.frequencies == transport.posterior.frequencies
-    for name in ("multiplicity", *BELIEVED):
+    for name in ("multiplicity", *POSTERIOR_FIELDS):
         values = getattr(loaded, name)
         np.testing.assert_array_equal(values, getattr(transport.posterior, name))
         assert values.dtype == getattr(transport.posterior, name).dtype
@@ -173,7 +173,7 @@ def test_rows_are_read_in_blocks(tmp_path, generator, size):
     whole = stacked(parts)
     for name in FACTORS:
         np.testing.assert_array_equal(getattr(whole, name), getattr(transport, name))
-    for name in BELIEVED:
+    for name in POSTERIOR_FIELDS:
         got = getattr(whole.posterior, name)
         np.testing.assert_array_equal(got, getattr(transport.posterior, name))
     for name in TRUSTED:

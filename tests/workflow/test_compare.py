@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.baselines.brute_force import BruteForce
 from nearfar.baselines.reference import acquire_reference
 from nearfar.errors import InputError
-from nearfar.plan.choose import LEAST_PHOTOS
+from nearfar.plan.choose import FEWEST_PHOTOS
 from nearfar.report.comparison import HEAD, comparison_page, is_comparison, rows, write_comparison
 from nearfar.report.comparison import winners as best_of
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -111,7 +111,7 @@ def test_the_papers_plans_fit_and_are_the_largest(projector):
 
 def test_the_default_budgets_end_with_the_papers_photos():
     assert default_budgets(Size(64, 64)) == (29, 58, 117, 234, 468)
-    assert min(default_budgets(Size(16, 16))) >= LEAST_PHOTOS
+    assert min(default_budgets(Size(16, 16))) >= FEWEST_PHOTOS
 
 
 @pytest.mark.parametrize(

@@ -82,8 +82,10 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, tmp_path, pl
 def test_kinds_are_those_that_were_chosen_on_the_way(rig, tmp_path):
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
     chosen = estimate._choice.kinds[0]
-    np.testing.assert_array_equal(part.transport.posterior.kind.ravel(), chosen.kind)
-    np.testing.assert_array_equal(part.transport.posterior.strength.ravel(), chosen.strength)
+    np.testing.assert_array_equal(
+        part.transport.posterior.prior_component.ravel(), chosen.prior_component
+    )
+    np.testing.assert_array_equal(part.transport.posterior.prior_scale.ravel(), chosen.prior_scale)
 
 
 def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, monkeypatch):
@@ -99,8 +101,8 @@ def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, mon
     part, estimate, capture = _follow(plan, rig, tmp_path / "c.zarr")
     assert estimate.chosen_by > 0
     expected, _ = reconstruct(capture)
-    kind = part.transport.posterior.kind
-    assert kind[dark] == expected.posterior.kind[dark]
+    kind = part.transport.posterior.prior_component
+    assert kind[dark] == expected.posterior.prior_component[dark]
     assert kind[dark] > kind[:3].max()
     np.testing.assert_array_equal(part.transport.near[dark], 0)
 
@@ -175,7 +177,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
     def faulty(*_arguments, **_options):
         raise RuntimeError("out of memory")
 
-    monkeypatch.setattr(estimating, "choose_kinds", faulty)
+    monkeypatch.setattr(estimating, "choose_components", faulty)
     plan = PLANS["reference"]
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(plan, tmp_path / "c.zarr", rig, enough=estimate)
@@ -193,7 +195,7 @@ def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
             time.sleep(0.01)
             progress(0.0)
 
-    monkeypatch.setattr(estimating, "choose_kinds", endless)
+    monkeypatch.setattr(estimating, "choose_components", endless)
 
     def stop(_number, _photo):
         if begun.is_set():

@@ -15,7 +15,7 @@ from nearfar.progress import counting, progress_bar
 
 if TYPE_CHECKING:
     from nearfar.plan.paper import Correspondence, Offset
-    from nearfar.plan.typical import Typical
+    from nearfar.priors.typical import TypicalScenes
 
 
 def plan(
@@ -80,7 +80,7 @@ def plan(
     """
     from nearfar.plan import choose_plan, paper_plan
     from nearfar.plan.choose import NOISE
-    from nearfar.plan.typical import TYPICAL
+    from nearfar.priors.fitted import TYPICAL_SCENES
     from nearfar.report.plan import describe_plan
 
     expected = None
@@ -88,7 +88,7 @@ def plan(
         raise typer.BadParameter("--look is of plans chosen for --photos N")
     if photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
-        typical, noise = (TYPICAL, NOISE) if look is None else _looked_at(look, projector)
+        typical, noise = (TYPICAL_SCENES, NOISE) if look is None else _looked_at(look, projector)
         with progress_bar("choosing patterns", quiet=quiet or as_json) as report:
             made, expected = choose_plan(
                 projector,
@@ -130,8 +130,8 @@ def plan(
             say(f"plan written to {output}", quiet=quiet)
 
 
-def _looked_at(look: Path, projector: Size) -> "tuple[Typical, float]":
-    """Read the kinds of camera pixel and the noise that a quick look tells of."""
+def _looked_at(look: Path, projector: Size) -> "tuple[TypicalScenes, float]":
+    """Read the mixture of prior components, and the noise, of a quick first estimate."""
     from nearfar.plan.typical import noise_of, typical_of
     from nearfar.transport.store import load_transport
 

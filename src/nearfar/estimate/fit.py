@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, blocks
-from nearfar.estimate.matrices import Band, band_of
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import direct, near
 from nearfar.transport.exact import ExactTransport
@@ -47,7 +47,7 @@ def fit_model(
     where = direct.footprint(q, truth.projector)
     centres = near.centre(q, truth.projector)
     lit = np.isfinite(q[..., 0]).ravel()
-    band = band_of(far_basis, near.offsets(window))
+    centred = centred_basis(far_basis, window_offsets(window))
     pixels, channels = truth.camera.pixels, truth.channels
     d = np.zeros((pixels, channels), dtype=np.float32)
     n = np.zeros((pixels, channels, window**2), dtype=np.float32)
@@ -65,11 +65,13 @@ def fit_model(
         places = near.places_on(centres[block], window, truth.projector)
         within = rows[number[:, :, None], np.arange(channels)[:, None], places[:, None]]
         within = within * inside[:, None]
-        f[block] = _far(rows, within, inside, band, centres[block])
-        seen: Floats = band.recentre(f[block] * far_basis.weights, centres[block]) @ band.on_window
+        f[block] = _far(rows, within, inside, centred, centres[block])
+        seen: Floats = (
+            centred.recentre(f[block] * far_basis.weights, centres[block]) @ centred.on_window
+        )
         n[block] = (within - seen) * inside[:, None]
         # The paper's own far step: what D and N leave at the far frequencies is f's.
-        responses = band.uncentre(n[block] @ band.on_window.T, centres[block])
+        responses = centred.uncentre(n[block] @ centred.on_window.T, centres[block])
         f[block] = rows @ far_basis.patterns.T - responses
     shape = (*truth.camera, channels)
     return Transport(
@@ -102,19 +104,21 @@ def _far(
     rows: Floats,
     within: Floats,
     inside: Booleans,
-    band: Band,
+    centred: CentredBasis,
     centres: NDArray[np.int64],
 ) -> Floats:
     """Weighted least squares for f by conjugate gradients, all rows at once."""
-    weights = band.basis.weights.astype(np.float32)
+    weights = centred.basis.weights.astype(np.float32)
     less: Floats = np.float32(1.0 - INSIDE) * inside[:, None]
 
     def normal(f: Floats) -> Floats:
-        seen = (band.recentre(f * weights, centres) @ band.on_window) * less
-        return np.asarray(f * weights - weights * band.uncentre(seen @ band.on_window.T, centres))
+        seen = (centred.recentre(f * weights, centres) @ centred.on_window) * less
+        return np.asarray(
+            f * weights - weights * centred.uncentre(seen @ centred.on_window.T, centres)
+        )
 
-    right = weights * (rows @ band.basis.patterns.T)
-    right -= weights * band.uncentre((within * less) @ band.on_window.T, centres)
+    right = weights * (rows @ centred.basis.patterns.T)
+    right -= weights * centred.uncentre((within * less) @ centred.on_window.T, centres)
     f = np.zeros_like(right)
     residual = right.copy()
     # Preconditioned by the diagonal without a window.

@@ -27,8 +27,9 @@ from nearfar.arrays import (
     product,
 )
 from nearfar.devices import Device, mover
-from nearfar.estimate.matrices import CORNERS, Band, Matrices, build_matrices
+from nearfar.estimate.matrices import Matrices, build_matrices
 from nearfar.estimate.sparse import least_risk, solve
+from nearfar.illumination.centred_basis import FOOTPRINT_OFFSETS, CentredBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
@@ -147,7 +148,7 @@ class _Pixels(NamedTuple):
     centres: NDArray[np.int64]
     lit: Booleans
     inside: Booleans
-    corners: Floats  # weights of the direct light over CORNERS, (n, 9)
+    corners: Floats  # weights of the direct light over FOOTPRINT_OFFSETS, (n, 9)
     noise: Floats
     light: Floats  # largest answer, (n,)
     checkerboard: Floats  # responses, re-centred
@@ -253,14 +254,14 @@ def _round(pixels: _Pixels, start: Floats | None, leaks: _Leaks, matrices: Matri
 
 
 def _corner_weights(where: Footprint, centres: NDArray[np.int64], width: int) -> Floats:
-    """Weights of the footprint over `CORNERS`, shape (n, 9)."""
+    """Weights of the footprint over `FOOTPRINT_OFFSETS`, shape (n, 9)."""
     y, x = np.divmod(where.pixels, width)
     place = (y - centres[:, 0, None] + 1) * 3 + (x - centres[:, 1, None] + 1)
-    weights = np.zeros((len(centres), len(CORNERS)), dtype=np.float32)
+    weights = np.zeros((len(centres), len(FOOTPRINT_OFFSETS)), dtype=np.float32)
     # Weightless corners of unlit or whole pixels may lie anywhere: clip, they add nothing.
     np.add.at(
         weights,
-        (np.arange(len(weights))[:, None], np.clip(place, 0, len(CORNERS) - 1)),
+        (np.arange(len(weights))[:, None], np.clip(place, 0, len(FOOTPRINT_OFFSETS) - 1)),
         where.weights,
     )
     return weights
@@ -286,8 +287,8 @@ def _pixels(
         """Responses (n, 1, R) of unit direct light to what 8 bits got wrong."""
         return look_up_each(error, where.pixels, where.weights)[:, None]
 
-    def of_direct(band: Band) -> Floats:
-        return np.asarray((corners @ band.on_corners.T)[:, None])
+    def of_direct(band: CentredBasis) -> Floats:
+        return np.asarray((corners @ band.on_footprint.T)[:, None])
 
     checkerboard, near_band, far_band = matrices.checkerboard, matrices.near, matrices.far
     near_error = near_band.recentre(quantisation_error(errors.near), centres)
@@ -316,10 +317,10 @@ def _direct(
     highest near frequencies are weighed in as far as it does.
     """
     xp = namespace(near_responses)
-    answer = pixels.corners @ matrices.checkerboard.on_corners.T
+    answer = pixels.corners @ matrices.checkerboard.on_footprint.T
     frequencies = np.abs(matrices.near.basis.cycles).max(axis=1, initial=0.0)
     high = beside(np.flatnonzero(frequencies[matrices.near.basis.index] > HIGH), near_responses)
-    high_answer = pixels.corners @ matrices.near.on_corners[high].T
+    high_answer = pixels.corners @ matrices.near.on_footprint[high].T
     faded = 1.0 - answer[:, 0] ** 2
     energy = answer[:, 0] ** 2 + faded * xp.sum(high_answer**2, axis=1)
     of_high = (near_responses[..., high] @ high_answer[..., None])[..., 0]

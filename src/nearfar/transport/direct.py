@@ -82,3 +82,34 @@ def spread(image: Floats, where: Footprint, projector: Size) -> Floats:
     values = (where.weights * image[:, None]).ravel()
     summed = np.bincount(where.pixels.ravel(), weights=values, minlength=projector.pixels)
     return np.asarray(summed, dtype=np.float64)
+
+
+def footprint_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats:
+    """Return weights of direct light at q about the rounded q, and their derivatives by q.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (n, 2)
+        q; NaN where there is no direct light, which gets weights of 0.
+    centres : ndarray, shape (n, 2)
+        q rounded.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 9), float32
+        Over the 3 x 3 `FOOTPRINT_OFFSETS`: the bilinear footprint, and its derivatives by q down
+        and across; 0 along an axis on which q is whole.
+    """
+    xp = namespace(correspondence)
+    lit = xp.all(xp.isfinite(correspondence), axis=1)
+    off = xp.where(lit[:, None], correspondence - centres, 0.0)
+    weights = xp.stack([xp.clip(-off, min=0.0), 1 - xp.abs(off), xp.clip(off, min=0.0)], axis=-1)
+    sign = xp.sign(off)
+    steps = xp.stack([xp.clip(sign, max=0.0), -sign, xp.clip(sign, min=0.0)], axis=-1)
+    sides = ((weights, weights), (steps, weights), (weights, steps))
+    found = [
+        (of_y[:, 0, :, None] * of_x[:, 1, None, :]).reshape((len(off), 9)) for of_y, of_x in sides
+    ]
+    placed = xp.where(lit[:, None, None], xp.stack(found, axis=1), 0.0)
+    weighed: Floats = xp.astype(placed, xp.float32)
+    return weighed

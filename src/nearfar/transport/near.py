@@ -1,20 +1,14 @@
 """Near-range transport: a W x W window of projector pixels around the rounded q.
 
-Index convention: c runs over camera pixels, w over the W x W window offsets row by row. The
-window of an odd W reaches (W-1)/2 to each side, that of an even W from -W/2 to W/2 - 1.
+Index convention: c runs over camera pixels, w over the W x W offsets of
+`nearfar.illumination.centred_basis.window_offsets`.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Size, beside
-
-
-def offsets(window: int) -> NDArray[np.int64]:
-    """Window offsets w = (y, x) from the rounded q, shape (W^2, 2)."""
-    side = np.arange(window) - window // 2
-    y, x = np.meshgrid(side, side, indexing="ij")
-    return np.stack([y.ravel(), x.ravel()], axis=1)
+from nearfar.illumination.centred_basis import window_offsets
 
 
 def centre(correspondence: Floats, projector: Size) -> NDArray[np.int64]:
@@ -30,7 +24,7 @@ def line_through(q: Floats, projector: Size) -> int:
 
 
 def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans:
-    """Tell which window entries lie on the projector, shape (C, W^2)."""
+    """Return whether each window entry lies on the projector, shape (C, W^2)."""
     side = beside(np.arange(window) - window // 2, centres)
     rows = centres[:, 0, None] + side
     columns = centres[:, 1, None] + side
@@ -42,7 +36,7 @@ def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans
 
 def places_on(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
     """Flat projector pixels (C, W^2) of the window entries; 0 for those beyond the border."""
-    places = centres[:, None, :] + offsets(window)
+    places = centres[:, None, :] + window_offsets(window)
     flat = places[..., 0] * projector.width + places[..., 1]
     return np.asarray(np.where(inside(centres, window, projector), flat, 0))
 
@@ -50,7 +44,7 @@ def places_on(centres: NDArray[np.int64], window: int, projector: Size) -> NDArr
 def _places(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
     """Flat places (C, W^2) of the window entries on a projector with a border of W."""
     y, x = (centres + window).T
-    dy, dx = offsets(window).T
+    dy, dx = window_offsets(window).T
     width = projector.width + 2 * window
     return np.asarray((y * width + x)[:, None] + (dy * width + dx)[None, :])
 
@@ -73,7 +67,7 @@ def read(padded: Floats, centres: NDArray[np.int64], window: int) -> Floats:
 
 
 def reached(padded: Booleans, centres: NDArray[np.int64], window: int) -> Booleans:
-    """Tell of which windows a pixel of a padded light, (..., ...) of bool, is lit: (C,)."""
+    """Return whether any pixel of a padded light (bool) is lit in each window, shape (C,)."""
     counts = np.pad(np.cumsum(np.cumsum(padded, axis=0), axis=1), [(1, 0), (1, 0)])
     y, x = (centres + window - window // 2).T
     inside = counts[y + window, x + window] + counts[y, x]

@@ -1,4 +1,4 @@
-"""What an estimate believed of each camera pixel: what a transport's error bars follow from."""
+"""The state of a joint estimate's posterior at each camera pixel: error bars follow from it."""
 
 from dataclasses import dataclass
 
@@ -6,39 +6,39 @@ import numpy as np
 
 from nearfar.arrays import Floats, Integers
 from nearfar.illumination.frequencies import Frequency
-from nearfar.transport.kinds import Kind
+from nearfar.priors.component import PriorComponent
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Kinds, strengths and noise that a joint estimate ended with.
+    """Prior components, their scales, and the noise of a joint estimate.
 
     Attributes
     ----------
-    kinds : tuple of Kind
+    prior_components : tuple of PriorComponent
     frequencies : tuple of Frequency
         What was measured, one of each +-k, without DC.
     multiplicity : ndarray, shape (R,), float32
-        How often each real answer was measured.
-    kind : ndarray of uint8, shape (Cy, Cx)
-        Place in `kinds`.
-    strength : ndarray, shape (Cy, Cx), float32
-        Deviation of near-range light at q, as a share of white.
+        How often each real response was measured.
+    prior_component : ndarray of uint8, shape (Cy, Cx)
+        Place in `prior_components`.
+    prior_scale : ndarray, shape (Cy, Cx), float32
+        Standard deviation of near-range light at q before any photo, as a share of white.
     white : ndarray, shape (Cy, Cx, channels), float32
         Light under white, above 0, photo units.
     offset_noise : ndarray, shape (Cy, Cx, channels), float32
-        Standard deviation of the error that the references add to every answer.
+        Standard deviation of the error that the references add to every response.
     light_noise : ndarray, shape (Cy, Cx, channels), float32
-        Standard deviation of the answer to white.
+        Standard deviation of the response to white.
     share_of_white : ndarray, shape (Cy, Cx, channels), float32
-        How much of the references' error is, on average, that of the answer to white.
+        Mean share of the references' error that is the error of the response to white.
     """
 
-    kinds: tuple[Kind, ...]
+    prior_components: tuple[PriorComponent, ...]
     frequencies: tuple[Frequency, ...]
     multiplicity: Floats
-    kind: Integers
-    strength: Floats
+    prior_component: Integers
+    prior_scale: Floats
     white: Floats
     offset_noise: Floats
     light_noise: Floats
@@ -46,10 +46,11 @@ class Posterior:
 
 
 def deviation_of_mean(deviations: Floats) -> Floats:
-    """Return the deviation of a mean over channels that err independently, of theirs.
+    """Return the standard deviation of a mean over channels with independent errors.
 
     Parameters
     ----------
     deviations : ndarray, shape (channels, ...)
+        Standard deviation of each channel.
     """
     return np.asarray(np.linalg.norm(deviations, axis=0) / len(deviations))

@@ -11,10 +11,17 @@ from nearfar.transport.model import Transport
 
 # What each camera pixel has its own of.
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
-BELIEVED = ("kind", "strength", "white", "offset_noise", "light_noise", "share_of_white")
+POSTERIOR_FIELDS = (
+    "prior_component",
+    "prior_scale",
+    "white",
+    "offset_noise",
+    "light_noise",
+    "share_of_white",
+)
 TRUSTED = ("confidence", "saturated")
 # Parts that a transport may lack, and what each camera pixel has of them.
-OPTIONAL = {"posterior": BELIEVED, "quality": TRUSTED}
+OPTIONAL = {"posterior": POSTERIOR_FIELDS, "quality": TRUSTED}
 
 
 def of_rows(transport: Transport, rows: slice) -> Transport:

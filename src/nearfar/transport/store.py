@@ -22,11 +22,18 @@ from nearfar.files import (
 )
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.real_basis import RealBasis, real_basis
-from nearfar.transport.kinds import Kind
+from nearfar.priors.component import PriorComponent
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import BELIEVED, FACTORS, OPTIONAL, TRUSTED, stacked, thinned_blocks
+from nearfar.transport.rows import (
+    FACTORS,
+    OPTIONAL,
+    POSTERIOR_FIELDS,
+    TRUSTED,
+    stacked,
+    thinned_blocks,
+)
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
@@ -36,10 +43,11 @@ CHUNK_BYTES = 8 * 2**20
 # Bytes of a transport that are read at once where it is gone through in blocks.
 READ_BYTES = 2**28
 
-# Parts that may be lacking: a mapping of their own in the attributes, and arrays PART_NAME.
-# Names in the file of what a transport may lack; the posterior's is the format's of old.
+# Parts that a transport may lack: in the file, a mapping of their own in the attributes, and
+# arrays PART_FIELD. The format has older names for the posterior and some of its fields.
 POSTERIOR, QUALITY = "belief", "quality"
-STORED_AS = {"posterior": POSTERIOR, "quality": QUALITY}
+STORED_PARTS = {"posterior": POSTERIOR, "quality": QUALITY}
+STORED_FIELDS = {"prior_component": "kind", "prior_scale": "strength"}
 
 
 @path_after_content
@@ -117,7 +125,8 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
     for optional, names in OPTIONAL.items():
         owner = getattr(part, optional)
         if owner is not None:
-            values |= {f"{STORED_AS[optional]}_{name}": getattr(owner, name) for name in names}
+            part_name = STORED_PARTS[optional]
+            values |= {_array_name(part_name, name): getattr(owner, name) for name in names}
     group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
     for name, one in values.items():
         # A single block has its chunks to itself, whatever their rows.
@@ -127,12 +136,17 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
         array[first : first + len(one)] = one
 
 
+def _array_name(part: str, field: str) -> str:
+    """Return the name in the file of a field of a part that may be lacking."""
+    return f"{part}_{STORED_FIELDS.get(field, field)}"
+
+
 def _as_stored(values: Floats) -> Floats:
     return values if values.dtype == np.float16 else np.asarray(values, np.float32)
 
 
 def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
-    """Say of a transport, all rows of which are written, how it was made."""
+    """Write how a transport was made, once all of its rows are written."""
     group = add_to_store(folder, KIND, FORMAT_VERSION)
     group.attrs["provenance"] = json.loads(json.dumps(dict(provenance)))
 
@@ -153,7 +167,7 @@ def _attributes(transport: Transport) -> dict[str, Any]:
 def _described(posterior: Posterior) -> dict[str, Any]:
     """Lay what all camera pixels share of a posterior out for JSON."""
     return {
-        "kinds": [list(kind) for kind in posterior.kinds],
+        "kinds": [list(component) for component in posterior.prior_components],
         "frequencies": [frequency_to_text(k) for k in posterior.frequencies],
         "repeats": [float(count) for count in posterior.multiplicity],
     }
@@ -207,17 +221,21 @@ class StoredTransport:
             If what belongs to them is damaged.
         """
         read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
-        believed: dict[str, Any] = {
-            name: read.pop(f"{POSTERIOR}_{name}", None) for name in BELIEVED
+        posterior_fields: dict[str, Any] = {
+            name: read.pop(_array_name(POSTERIOR, name), None) for name in POSTERIOR_FIELDS
         }
         posterior = (
-            Posterior(**self._posterior, **believed) if self._posterior is not None else None
+            Posterior(**self._posterior, **posterior_fields)
+            if self._posterior is not None
+            else None
         )
         trusted: dict[str, Any] = {
             name: read.pop(f"{QUALITY}_{name}") for name in TRUSTED if f"{QUALITY}_{name}" in read
         }
-        if posterior is not None and int(posterior.kind.max(initial=0)) >= len(posterior.kinds):
-            raise _misfit(self.path)
+        if posterior is not None:
+            last = int(posterior.prior_component.max(initial=0))
+            if last >= len(posterior.prior_components):
+                raise _misfit(self.path)
         return Transport(
             projector=self.projector,
             far_basis=self.far_basis,
@@ -293,15 +311,16 @@ def open_transport(path: AnyPath) -> StoredTransport:
             )
     if posterior is not None:
         arrays |= {
-            f"{POSTERIOR}_{name}": open_array(group, f"{POSTERIOR}_{name}") for name in BELIEVED
+            _array_name(POSTERIOR, name): open_array(group, _array_name(POSTERIOR, name))
+            for name in POSTERIOR_FIELDS
         }
         if not _posterior_fits(posterior, arrays, basis.projector, each):
             raise _misfit(path)
     if QUALITY in group.attrs:
-        told = {f"{QUALITY}_{name}": open_array(group, f"{QUALITY}_{name}") for name in TRUSTED}
-        arrays |= told
-        kinds = [(array.shape, array.dtype.kind) for array in told.values()]
-        if kinds != [(each[:2], "f"), (each[:2], "b")]:
+        quality = {f"{QUALITY}_{name}": open_array(group, f"{QUALITY}_{name}") for name in TRUSTED}
+        arrays |= quality
+        sorts = [(array.shape, array.dtype.kind) for array in quality.values()]
+        if sorts != [(each[:2], "f"), (each[:2], "b")]:
             raise UnreadableFileError(
                 f"{path} is damaged: what tells how far to trust it does not fit the transport; "
                 f"reconstruct it again."
@@ -314,7 +333,9 @@ def open_transport(path: AnyPath) -> StoredTransport:
 def _shared_posterior(described: dict[str, Any]) -> dict[str, Any]:
     """Read what all camera pixels share of a posterior."""
     return {
-        "kinds": tuple(Kind(*(float(value) for value in kind)) for kind in described["kinds"]),
+        "prior_components": tuple(
+            PriorComponent(*(float(value) for value in numbers)) for numbers in described["kinds"]
+        ),
         "frequencies": tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
         "multiplicity": np.array(
             [float(count) for count in described["repeats"]], dtype=np.float32
@@ -329,10 +350,15 @@ def _posterior_fits(
     each: tuple[int, ...],
 ) -> bool:
     count = real_basis(posterior["frequencies"], projector).count
-    kind, strength = (arrays[f"{POSTERIOR}_{name}"] for name in BELIEVED[:2])
-    flat = (kind.shape, strength.shape) == (each[:2], each[:2])
-    full = all(arrays[f"{POSTERIOR}_{name}"].shape == each for name in BELIEVED[2:])
-    return flat and full and kind.dtype == np.uint8 and posterior["multiplicity"].shape == (count,)
+    component, scale = (arrays[_array_name(POSTERIOR, name)] for name in POSTERIOR_FIELDS[:2])
+    flat = (component.shape, scale.shape) == (each[:2], each[:2])
+    full = all(arrays[_array_name(POSTERIOR, name)].shape == each for name in POSTERIOR_FIELDS[2:])
+    return (
+        flat
+        and full
+        and component.dtype == np.uint8
+        and posterior["multiplicity"].shape == (count,)
+    )
 
 
 def _misfit(path: Path) -> UnreadableFileError:

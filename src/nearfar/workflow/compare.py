@@ -26,7 +26,7 @@ from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, choose_plan, paper_plan
-from nearfar.plan.choose import LEAST_PHOTOS, NOISE, default_window
+from nearfar.plan.choose import FEWEST_PHOTOS, NOISE, default_window
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.opening import choose_exposure
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -168,7 +168,7 @@ def default_budgets(projector: Size) -> tuple[int, ...]:
     """Shares of the photos of the paper's plan with a default window, the largest last."""
     window = default_window(projector)
     total = len(paper_plan(projector, window, _band(projector, window, BANDS[1])).patterns)
-    return tuple(total // share for share in SHARES if total // share >= LEAST_PHOTOS)
+    return tuple(total // share for share in SHARES if total // share >= FEWEST_PHOTOS)
 
 
 def compare(
@@ -215,10 +215,10 @@ def compare(
             f"{', '.join(METHODS)}."
         )
     budgets = sorted(set(default_budgets(scene.projector) if budgets is None else budgets))
-    if not budgets or budgets[0] < LEAST_PHOTOS:
+    if not budgets or budgets[0] < FEWEST_PHOTOS:
         raise InputError(
             f"a budget of {budgets[0] if budgets else 'no'} photos is too small to compare: "
-            f"choose budgets of {LEAST_PHOTOS} photos or more."
+            f"choose budgets of {FEWEST_PHOTOS} photos or more."
         )
     lights = standard_lights(scene.projector)
     gain = choose_exposure(None, scene, scene.name)

@@ -7,6 +7,7 @@ import numpy as np
 from nearfar.arrays import AnySize, Floats, as_size
 from nearfar.checks import as_count
 from nearfar.errors import InputError
+from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import as_array, near_frequencies, representatives
 from nearfar.transport import near
 
@@ -70,7 +71,7 @@ def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditi
             f"W = {window} with {dropped} near frequencies dropped leaves no near pattern: choose "
             f"a larger W or drop fewer."
         )
-    angle = 2 * np.pi * (as_array(frequencies) @ near.offsets(window).T)
+    angle = 2 * np.pi * (as_array(frequencies) @ window_offsets(window).T)
     # Each pair +-k counts twice, k = -k once; its sine is zero.
     twice = np.array([1.0 if k.is_own_negative else 2.0 for k in frequencies])[:, None]
     patterns = np.concatenate([np.sqrt(twice) * np.cos(angle), np.sqrt(twice) * np.sin(angle)])

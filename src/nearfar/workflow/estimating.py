@@ -26,7 +26,7 @@ from nearfar.correspondence import (
 )
 from nearfar.devices import Device, require_device
 from nearfar.errors import InputError
-from nearfar.estimate.joint import Choices, choose_kinds
+from nearfar.estimate.joint import Choices, choose_components
 from nearfar.estimate.joint.problem import build_model
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import answered, measure
@@ -189,7 +189,7 @@ class RunningEstimate:
         )
         kinds = self._choice.kinds if self._choice is not None and self.chosen_by else ()
         # All of the camera is one block, since the photos fit beside it.
-        yield from parts_of(replace(job, estimate=partial(jointly, kept=kinds)), None, report)
+        yield from parts_of(replace(job, estimate=partial(jointly, chosen=kinds)), None, report)
 
     @property
     def chosen_by(self) -> int:
@@ -258,7 +258,9 @@ class RunningEstimate:
                 q = correspond_by_phase(measurements).q
             except InputError:
                 return None
-        kinds = choose_kinds(measurements, q, plan.window, device=self._device, progress=self._heed)
+        kinds = choose_components(
+            measurements, q, plan.window, device=self._device, progress=self._heed
+        )
         # Those for all photos, for when they are there.
         basis, multiplicity = answered(self._plan)
         build_model(basis, multiplicity, plan.window, self._device, unlit=True)

@@ -7,14 +7,14 @@ from nearfar.arrays import Floats
 from nearfar.devices import Device
 from nearfar.errors import PlanError
 from nearfar.estimate.joint import Choices, estimate_jointly
-from nearfar.estimate.joint.estimate import TURNS
-from nearfar.estimate.joint.prior import RATIOS
+from nearfar.estimate.joint.estimate import SWEEPS
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.frequencies import CHECKERBOARD, far_frequencies, near_frequencies
 from nearfar.photometry.measure import measured_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
-from nearfar.transport.kinds import LIT, UNLIT
+from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
+from nearfar.priors.responses import VARIANCE_RATIOS
 from nearfar.transport.model import Transport
 
 Method = Literal["joint", "paper"]
@@ -61,11 +61,11 @@ def jointly(
     pixels: Floats,
     progress: Shares,
     device: Device,
-    kept: Choices = (),
+    chosen: Choices = (),
 ) -> Transport:
     """Estimate jointly, with the plan's window and far band."""
     return estimate_jointly(
-        measurements, pixels, plan.window, plan.far, kept=kept, device=device, progress=progress
+        measurements, pixels, plan.window, plan.far, chosen=chosen, device=device, progress=progress
     )
 
 
@@ -78,15 +78,16 @@ def _bytes_of_paper(plan: Plan, channels: int) -> tuple[int, int]:
 def _bytes_of_joint(plan: Plan, channels: int) -> tuple[int, int]:
     responses = 2 * len(measured_frequencies(plan))
     entries = plan.window**2
-    kinds = len(LIT) + len(UNLIT)
+    components = len(LIT_COMPONENTS) + len(UNLIT_COMPONENTS)
     prior = 4 * (
-        2 * responses**2 + 2 * responses * entries + len(RATIOS) * entries + 2 * entries**2
+        2 * responses**2 + 2 * responses * entries + len(VARIANCE_RATIOS) * entries + 2 * entries**2
     )
-    # Responses, re-ordered; what a turn begins with, what neighbours expect, what it finds, sum.
+    # Responses, re-ordered; and four sets of rows: what a sweep starts from, what is expected from
+    # neighbours, what it finds, and their sum.
     rows = 4 * channels * (2 * responses + 4 * (responses + entries))
     # Inverse pairs are held while they are measured.
     pairs = 4 * channels * len(plan.patterns) if plan.offset == "inverse" else 0
-    return kinds * prior, rows + entries + pairs
+    return components * prior, rows + entries + pairs
 
 
 class Estimator(NamedTuple):
@@ -110,6 +111,6 @@ class Estimator(NamedTuple):
 
 ESTIMATORS: dict[Method, Estimator] = {
     "paper": Estimator(require_paper_plan, _as_the_paper, 0, _bytes_of_paper),
-    # Each turn but the first hears the neighbours, and the first sees their q.
-    "joint": Estimator(_require_photos, jointly, TURNS, _bytes_of_joint),
+    # Each sweep but the first reads the neighbours, and the first reads their q.
+    "joint": Estimator(_require_photos, jointly, SWEEPS, _bytes_of_joint),
 }

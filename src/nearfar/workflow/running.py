@@ -135,7 +135,7 @@ class RunningCheck:
             # Too few frequencies to settle q yet.
             return Standing(taken, -HIGHEST, "photos")
         plan = self._plan
-        found = estimate_jointly(measurements, q, plan.window, plan.far, turns=TURNS)
+        found = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=TURNS)
         every = slice(0, held.camera.height)
         values, errors, expected, unmeasured = [], [], 0.0, 0.0
         bars, quiet = ErrorBars(found), ErrorBars(_without_noise(found))

@@ -1,34 +1,35 @@
-"""Rows drawn from a kind, what is measured of them, and what dense algebra makes of that."""
+"""Rows drawn from a prior component, measured, and solved by dense algebra."""
 
 import numpy as np
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint.cut import solve_cut
-from nearfar.estimate.joint.nuisance import columns, precision
-from nearfar.estimate.joint.pixels import Whole, gather, offset_noise, scale_of
-from nearfar.estimate.joint.solve import Found, ratio_of, solve_whole
-from nearfar.estimate.matrices import Band, band_of
+from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_scale
+from nearfar.estimate.joint.clipped import solve_clipped
+from nearfar.estimate.joint.nuisance import columns, prior_precision
+from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose import choose_frequencies
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.transport import near
-from nearfar.transport.kinds import Kind, far_power, near_covariance
 
 PROJECTOR = Size(16, 20)
 WINDOW = 5
 FAR = Size(5, 5)
-KIND = Kind(1.5, 8.0, 2.0)
+COMPONENT = PriorComponent(1.5, 8.0, 2.0)
 
 
 def chosen_frequencies(photos=70):
     return list(choose_frequencies(PROJECTOR, photos, WINDOW).frequencies)
 
 
-def band_of_all(frequencies):
+def centred_on_all(frequencies):
     basis = real_basis(frequencies, PROJECTOR)
-    plain = band_of(basis, near.offsets(WINDOW))
-    return Band(basis, np.arange(1, basis.count + 1), plain.on_window, plain.on_corners)
+    plain = centred_basis(basis, window_offsets(WINDOW))
+    return CentredBasis(basis, np.arange(1, basis.count + 1), plain.on_window, plain.on_footprint)
 
 
 def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=None, offset=0.0):
@@ -51,11 +52,11 @@ def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=Non
     )
 
 
-def drawn_rows(count, centres, strength, seed=0):
-    """Draw rows of KIND about chosen q, (C, 1, P), with direct light of 0.5, and their parts."""
+def drawn_rows(count, centres, scale, seed=0):
+    """Draw rows of COMPONENT about chosen q, (C, 1, P), with direct light of 0.5; and windows."""
     generator = np.random.default_rng(seed)
-    covariance = near_covariance(KIND, WINDOW)
-    windows = strength * generator.multivariate_normal(
+    covariance = near_covariance(COMPONENT, WINDOW)
+    windows = scale * generator.multivariate_normal(
         np.zeros(WINDOW**2), covariance, count, method="eigh"
     )
     rows = np.zeros((count, PROJECTOR.pixels))
@@ -67,57 +68,62 @@ def drawn_rows(count, centres, strength, seed=0):
     return rows[:, None], windows * inside
 
 
-def pixels_of(measurements, centres, band):
+def batch_of(measurements, centres, centred):
     count = len(centres)
-    whole = Whole(
-        responses=measurements.responses[..., band.places],
+    pixels = AllPixels(
+        responses=measurements.responses[..., centred.places],
         correspondence=centres.astype(float),
         centres=centres,
         lit=np.ones(count, dtype=bool),
         noise=measurements.noise,
         offset_noise=offset_noise(measurements),
-        white=scale_of(measurements),
-        likely=np.zeros((count, WINDOW**2), dtype=bool),
+        white=white_scale(measurements),
+        spike_expected=np.zeros((count, WINDOW**2), dtype=bool),
     )
-    return gather(whole, slice(None), band, PROJECTOR)
+    return gather(pixels, slice(None), centred, PROJECTOR)
 
 
-def solved(pixels, prior, strength, band, *, by=None):
-    """Solve each camera pixel as its window asks, or all as told."""
-    ratio = ratio_of(pixels, strength)
+def solved(batch, prior, scale, centred, *, by=None):
+    """Solve each camera pixel as its window asks, or all by one solver."""
+    ratio = variance_ratio(batch, scale)
     if by is not None:
-        return by(pixels, prior, ratio, band)
-    inner = pixels.inside.all(axis=1)
+        return by(batch, prior, ratio, centred)
+    inner = batch.inside.all(axis=1)
     parts = [
-        (np.flatnonzero(mine), solver(pixels.only(np.flatnonzero(mine)), prior, ratio[mine], band))
-        for mine, solver in ((inner, solve_whole), (~inner, solve_cut))
+        (
+            np.flatnonzero(mine),
+            solver(batch.only(np.flatnonzero(mine)), prior, ratio[mine], centred),
+        )
+        for mine, solver in ((inner, solve_whole), (~inner, solve_clipped))
         if mine.any()
     ]
     order = np.argsort(np.concatenate([number for number, _ in parts]))
-    return Found(
+    return PosteriorMean(
         *(np.concatenate(values)[order] for values in zip(*(f for _, f in parts), strict=True))
     )
 
 
-def dense(measurements, pixels, band, strength, kind=KIND):
+def dense(measurements, batch, centred, scale, component=COMPONENT):
     """Posterior mean of (o, d, n, f) and the log evidence by plain linear algebra."""
     results = []
-    window = near_covariance(kind, WINDOW)
-    power = far_power(band.basis, kind)
-    for c in range(len(pixels.white)):
-        white, noise = float(pixels.white[c, 0]), float(pixels.noise[c, 0])
-        cut = band.on_window * pixels.inside[c]
-        s = (strength * white) ** 2
-        shared = columns(pixels, band)[c].T.astype(np.float64)
-        known = precision(pixels)[c, 0]
+    window = near_covariance(component, WINDOW)
+    variance = far_variance(centred.basis, component)
+    for c in range(len(batch.white)):
+        white, noise = float(batch.white[c, 0]), float(batch.noise[c, 0])
+        patterns = centred.on_window * batch.inside[c]
+        s = (scale * white) ** 2
+        design = columns(batch, centred)[c].T.astype(np.float64)
+        precision = prior_precision(batch)[c, 0]
         covariance = (
-            s * (cut @ window @ cut.T + np.diag(power))
-            + shared @ np.diag(1 / known) @ shared.T
-            + noise**2 * np.eye(len(power))
+            s * (patterns @ window @ patterns.T + np.diag(variance))
+            + design @ np.diag(1 / precision) @ design.T
+            + noise**2 * np.eye(len(variance))
         )
-        y = pixels.responses[c, 0].astype(np.float64)
+        y = batch.responses[c, 0].astype(np.float64)
         x = np.linalg.solve(covariance, y)
         _, logarithm = np.linalg.slogdet(covariance)
-        near_mean = s * (window @ cut.T @ x) * pixels.inside[c]
-        results.append((shared.T @ x / known, near_mean, s * power * x, -0.5 * (y @ x + logarithm)))
+        near_mean = s * (window @ patterns.T @ x) * batch.inside[c]
+        results.append(
+            (design.T @ x / precision, near_mean, s * variance * x, -0.5 * (y @ x + logarithm))
+        )
     return [np.stack(part) for part in zip(*results, strict=True)]

@@ -1,4 +1,4 @@
-"""Which kind a camera pixel is: against dense Gaussian algebra, and as kinds are drawn."""
+"""Evidence of prior components: against dense Gaussian algebra, and of rows drawn from them."""
 
 from dataclasses import replace
 
@@ -7,21 +7,24 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.joint.evidence import best_kind, evidence, screened, tell
-from nearfar.estimate.joint.prior import build_prior
+from nearfar.estimate.joint.evidence import log_evidence, most_probable, prior_set, whiten
+
+# _probable, whiten
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose import choose_frequencies
-from nearfar.transport.kinds import LIT, STRENGTHS, Kind
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.fitted import LIT_COMPONENTS, PRIOR_SCALES
+from nearfar.priors.responses import response_prior
 from tests.estimate.joint.draws import (
-    KIND,
-    band_of_all,
+    COMPONENT,
+    batch_of,
+    centred_on_all,
     chosen_frequencies,
     dense,
     drawn_rows,
     measured,
-    pixels_of,
 )
 from tests.worlds import model_transport
 
@@ -30,14 +33,14 @@ from tests.worlds import model_transport
 def test_the_evidence_is_that_of_dense_algebra(offset):
     centres = np.array([[8, 10], [7, 9], [6, 12]])
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
+    centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
-    pixels = pixels_of(measurements, centres, band)
-    prior = build_prior(KIND, band, measurements.multiplicity[band.places])
-    found = evidence(tell(pixels), prior)
+    batch = batch_of(measurements, centres, centred)
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.places])
+    found = log_evidence(whiten(batch), prior)
     expected = np.stack(
-        [dense(measurements, pixels, band, strength)[3] for strength in STRENGTHS], axis=1
+        [dense(measurements, batch, centred, scale)[3] for scale in PRIOR_SCALES], axis=1
     )
     # The table rounds (s / sigma)^2 to half a step, which the log evidence feels a little.
     difference = (found - found[:, :1]) - (expected - expected[:, :1])
@@ -46,56 +49,59 @@ def test_the_evidence_is_that_of_dense_algebra(offset):
     assert np.array_equal(found.argmax(axis=1), expected.argmax(axis=1))
 
 
-def test_a_camera_pixel_chooses_the_kind_that_it_was_drawn_from():
+def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():
     generator = np.random.default_rng(3)
     centres = np.stack([generator.integers(4, 12, 200), generator.integers(4, 16, 200)], axis=1)
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
+    centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=1e-3)
-    pixels = pixels_of(measurements, centres, band)
-    far_from = Kind(6.0, 256.0, 0.7)
+    batch = batch_of(measurements, centres, centred)
+    far_from = PriorComponent(6.0, 256.0, 0.7)
     priors = [
-        build_prior(kind, band, measurements.multiplicity[band.places]) for kind in (KIND, far_from)
+        response_prior(one, centred, measurements.multiplicity[centred.places])
+        for one in (COMPONENT, far_from)
     ]
-    kind, strength, _ = best_kind(
-        pixels, screened(priors, band, measurements.multiplicity[band.places])
+    component, scale, _ = most_probable(
+        batch, prior_set(priors, centred, measurements.multiplicity[centred.places])
     )
-    assert np.mean(kind == 0) > 0.95
+    assert np.mean(component == 0) > 0.95
     # 0.02 in photo units, of a white that is 0.5 and a little.
-    white = pixels.white[:, 0]
-    assert np.median(strength * white) == pytest.approx(0.02, rel=0.5)
+    white = batch.white[:, 0]
+    assert np.median(scale * white) == pytest.approx(0.02, rel=0.5)
 
 
-def test_few_responses_narrow_the_kinds_down_and_all_choose(monkeypatch):
+def test_few_responses_make_a_shortlist_and_all_choose(monkeypatch):
     generator = np.random.default_rng(3)
     centres = np.stack([generator.integers(4, 12, 100), generator.integers(4, 16, 100)], axis=1)
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
-    multiplicity = np.ones(band.basis.count, dtype=np.float32)
-    priors = tuple(build_prior(kind, band, multiplicity) for kind in LIT)
-    unscreened = screened(priors, band, multiplicity)
+    centred = centred_on_all(frequencies)
+    multiplicity = np.ones(centred.basis.count, dtype=np.float32)
+    priors = tuple(response_prior(one, centred, multiplicity) for one in LIT_COMPONENTS)
+    unscreened = prior_set(priors, centred, multiplicity)
     assert unscreened.screens is priors
-    monkeypatch.setattr("nearfar.estimate.joint.evidence.RESPONSES", 24)
-    narrowed = screened(priors, band, multiplicity)
-    assert len(narrowed.chosen) == pytest.approx(24, abs=1)
+    monkeypatch.setattr("nearfar.estimate.joint.evidence.SCREENING_RESPONSES", 24)
+    narrowed = prior_set(priors, centred, multiplicity)
+    assert len(narrowed.screening) == pytest.approx(24, abs=1)
     worse = []
-    for strength in (0.003, 0.02, 0.1):
-        rows, _ = drawn_rows(len(centres), centres, strength)
-        pixels = pixels_of(measured(rows, frequencies, noise=1e-3), centres, band)
-        _, _, most = best_kind(pixels, unscreened)
-        kind, _, found = best_kind(pixels, narrowed)
-        # What is told of the kind that was chosen is told by all responses.
-        values = np.stack([evidence(tell(pixels), prior).max(axis=1) for prior in priors])
+    for scale in (0.003, 0.02, 0.1):
+        rows, _ = drawn_rows(len(centres), centres, scale)
+        batch = batch_of(measured(rows, frequencies, noise=1e-3), centres, centred)
+        _, _, most = most_probable(batch, unscreened)
+        component, _, found = most_probable(batch, narrowed)
+        # The evidence of the chosen component is that of all responses.
+        values = np.stack([log_evidence(whiten(batch), prior).max(axis=1) for prior in priors])
         # Sums of squares are float32, and how they round depends on which pixels stand beside.
-        told = tell(pixels)
-        squares = np.bincount(told.pixel, np.sum(told.responses.astype(np.float64) ** 2, axis=1))
+        whitened = whiten(batch)
+        squares = np.bincount(
+            whitened.pixel, np.sum(whitened.responses.astype(np.float64) ** 2, axis=1)
+        )
         rounding = np.finfo(np.float32).eps / 4 * squares
         assert np.median(rounding) < 0.3
-        chosen = values[kind, np.arange(100)]
+        chosen = values[component, np.arange(100)]
         assert (np.abs(found - chosen) <= 1e-4 * np.abs(chosen) + rounding).all()
         worse.append(most - found)
-    # Odds of 20 against the kind that few responses left: hardly ever, of the 300.
+    # Odds of 20 against the component that the shortlist left: hardly ever, of the 300.
     assert np.mean(np.concatenate(worse) > 3.0) < 0.03
 
 
@@ -126,5 +132,5 @@ def test_narrow_projectors_and_windows_are_reconstructed(projector, window):
     assert np.linalg.norm(found @ light - truth) < 0.01 * np.linalg.norm(truth)
 
 
-def test_kinds_are_different():
-    assert len(set(LIT)) == len(LIT)
+def test_prior_components_are_different():
+    assert len(set(LIT_COMPONENTS)) == len(LIT_COMPONENTS)

@@ -8,25 +8,26 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.joint.cut import solve_cut
-from nearfar.estimate.joint.edges import with_spike
-from nearfar.estimate.joint.nuisance import columns, precision
-from nearfar.estimate.joint.prior import build_prior
-from nearfar.estimate.joint.solve import Found, solve_whole
+from nearfar.estimate.joint.clipped import solve_clipped
+from nearfar.estimate.joint.nuisance import columns, prior_precision
+from nearfar.estimate.joint.solve import PosteriorMean, solve_whole
+from nearfar.estimate.joint.spikes import with_spike
 from nearfar.illumination.patterns import exponential
 from nearfar.illumination.real_basis import real_basis
-from nearfar.transport.kinds import Kind, far_power, near_covariance
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.covariance import far_variance, near_covariance
+from nearfar.priors.responses import response_prior
 from tests.estimate.joint.draws import (
+    COMPONENT,
     FAR,
-    KIND,
     PROJECTOR,
     WINDOW,
-    band_of_all,
+    batch_of,
+    centred_on_all,
     chosen_frequencies,
     dense,
     drawn_rows,
     measured,
-    pixels_of,
     solved,
 )
 from tests.worlds import model_transport
@@ -37,34 +38,34 @@ def test_the_mean_is_that_of_dense_algebra_inside_and_at_the_border(offset):
     # Far inside, at one border, at a corner.
     centres = np.array([[8, 10], [7, 9], [0, 10], [8, 18], [0, 0], [15, 19], [1, 18]])
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
+    centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
-    pixels = pixels_of(measurements, centres, band)
-    prior = build_prior(KIND, band, measurements.multiplicity[band.places])
-    found = solved(pixels, prior, np.full(len(centres), 0.05), band)
-    shared, windows, far, _ = dense(measurements, pixels, band, 0.05)
+    batch = batch_of(measurements, centres, centred)
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.places])
+    found = solved(batch, prior, np.full(len(centres), 0.05), centred)
+    amplitudes, windows, far, _ = dense(measurements, batch, centred, 0.05)
     scale, far_scale = np.abs(windows).max(), np.abs(far).max()
     np.testing.assert_allclose(found.near[:, 0], windows, atol=2e-3 * scale)
     np.testing.assert_allclose(found.far[:, 0], far, atol=2e-3 * far_scale)
-    np.testing.assert_allclose(found.shared[:, 0, 1], shared[:, -1], atol=1e-4)
+    np.testing.assert_allclose(found.amplitudes[:, 0, 1], amplitudes[:, -1], atol=1e-4)
     if offset:
-        np.testing.assert_allclose(found.shared[:, 0, 0], shared[:, 0], atol=1e-5)
+        np.testing.assert_allclose(found.amplitudes[:, 0, 0], amplitudes[:, 0], atol=1e-5)
 
 
 def test_repeats_count_as_less_noise():
     centres = np.array([[8, 10], [7, 9]])
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
+    centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3)
     nine = np.full_like(measurements.multiplicity, 9.0)
     means = [
         solved(
-            pixels_of(m, centres, band),
-            build_prior(KIND, band, m.multiplicity[band.places]),
+            batch_of(m, centres, centred),
+            response_prior(COMPONENT, centred, m.multiplicity[centred.places]),
             np.full(2, 0.05),
-            band,
+            centred,
         )
         for m in (
             replace(measurements, multiplicity=nine),
@@ -72,38 +73,41 @@ def test_repeats_count_as_less_noise():
         )
     ]
     np.testing.assert_allclose(means[0].near, means[1].near, atol=1e-5)
-    np.testing.assert_allclose(means[0].shared, means[1].shared, atol=1e-5)
+    np.testing.assert_allclose(means[0].amplitudes, means[1].amplitudes, atol=1e-5)
 
 
-@pytest.mark.parametrize("kind", [KIND, Kind(2.0, 8.0, 2.0, 3.0), Kind(2.0, 8.0, 2.0, rough=1.0)])
+@pytest.mark.parametrize(
+    "component",
+    [COMPONENT, PriorComponent(2.0, 8.0, 2.0, 3.0), PriorComponent(2.0, 8.0, 2.0, roughness=1.0)],
+)
 @pytest.mark.parametrize("uneven", [False, True])
-def test_cut_windows_of_every_kind_are_those_of_dense_algebra(kind, uneven):
+def test_clipped_windows_of_every_component_are_those_of_dense_algebra(component, uneven):
     centres = np.array([[0, 10], [8, 19], [1, 0], [8, 10], [15, 18], [0, 10]])
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
+    centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3)
     multiplicity = measurements.multiplicity.copy()
     if uneven:
         # Cosines that were shown more often than their sines.
-        multiplicity[band.places[~band.basis.is_sine]] = 4.0
-    prior = build_prior(kind, band, multiplicity[band.places])
-    pixels = pixels_of(measurements, centres, band)
-    found = solved(pixels, prior, np.full(len(centres), 0.05), band, by=solve_cut)
-    spread = np.diag(1.0 / multiplicity[band.places])
-    window, power = near_covariance(kind, WINDOW), far_power(band.basis, kind)
+        multiplicity[centred.places[~centred.basis.is_sine]] = 4.0
+    prior = response_prior(component, centred, multiplicity[centred.places])
+    batch = batch_of(measurements, centres, centred)
+    found = solved(batch, prior, np.full(len(centres), 0.05), centred, by=solve_clipped)
+    spread = np.diag(1.0 / multiplicity[centred.places])
+    window, power = near_covariance(component, WINDOW), far_variance(centred.basis, component)
     for c in range(len(centres)):
-        cut = band.on_window * pixels.inside[c]
-        squared = (0.05 * float(pixels.white[c, 0])) ** 2
-        direct = columns(pixels, band)[c, 0].astype(np.float64)
-        covariance = squared * (cut @ window @ cut.T + np.diag(power))
-        covariance += float(pixels.noise[c, 0]) ** 2 * spread
-        covariance += np.outer(direct, direct) / precision(pixels)[c, 0, 0]
-        x = np.linalg.solve(covariance, pixels.responses[c, 0].astype(np.float64))
+        clipped = centred.on_window * batch.inside[c]
+        squared = (0.05 * float(batch.white[c, 0])) ** 2
+        direct = columns(batch, centred)[c, 0].astype(np.float64)
+        covariance = squared * (clipped @ window @ clipped.T + np.diag(power))
+        covariance += float(batch.noise[c, 0]) ** 2 * spread
+        covariance += np.outer(direct, direct) / prior_precision(batch)[c, 0, 0]
+        x = np.linalg.solve(covariance, batch.responses[c, 0].astype(np.float64))
         for got, exact in (
-            (found.near[c, 0], squared * (window @ cut.T @ x) * pixels.inside[c]),
+            (found.near[c, 0], squared * (window @ clipped.T @ x) * batch.inside[c]),
             (found.far[c, 0], squared * power * x),
-            (found.pull[c, 0], band.on_window.T @ x),
+            (found.score[c, 0], centred.on_window.T @ x),
         ):
             np.testing.assert_allclose(got, exact, atol=1e-3 * np.abs(exact).max())
 
@@ -111,16 +115,16 @@ def test_cut_windows_of_every_kind_are_those_of_dense_algebra(kind, uneven):
 def test_whole_and_cut_agree_where_nothing_is_cut():
     centres = np.array([[8, 10], [7, 9], [6, 12]])
     frequencies = chosen_frequencies()
-    band = band_of_all(frequencies)
+    centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=1e-3)
-    prior = build_prior(KIND, band, measurements.multiplicity[band.places])
-    pixels = with_spike(pixels_of(measurements, centres, band), np.array([0, 3, 24]))
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.places])
+    batch = with_spike(batch_of(measurements, centres, centred), np.array([0, 3, 24]))
     one, other = (
-        solved(pixels, prior, np.full(3, 0.05), band, by=solver)
-        for solver in (solve_whole, solve_cut)
+        solved(batch, prior, np.full(3, 0.05), centred, by=solver)
+        for solver in (solve_whole, solve_clipped)
     )
-    for name in Found._fields:
+    for name in PosteriorMean._fields:
         a, b = getattr(one, name), getattr(other, name)
         np.testing.assert_allclose(a, b, atol=2e-3 * np.abs(b).max(), err_msg=name)
 
@@ -153,7 +157,7 @@ def test_what_eight_bits_make_of_direct_light_is_no_other_light():
     drawn = np.rint(127.5 + 127.5 * basis.patterns.astype(np.float64)) / 127.5 - 1
     error = (drawn - basis.patterns).astype(np.float32)
     error[0] = 0
-    misdrawn = replace(
+    quantisation = replace(
         measurements,
         responses=(
             measurements.responses + world.direct.reshape(-1, 1, 1) * error.T[:, None]
@@ -164,7 +168,7 @@ def test_what_eight_bits_make_of_direct_light_is_no_other_light():
         found = estimate_jointly(told, world.correspondence, WINDOW, FAR)
         return np.sqrt(np.mean(found.near**2)) / world.direct.mean()
 
-    unknown, known = stray(misdrawn), stray(replace(misdrawn, quantisation_error=error))
+    unknown, known = stray(quantisation), stray(replace(quantisation, quantisation_error=error))
     assert known < 0.3 * unknown
 
 

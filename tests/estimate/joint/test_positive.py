@@ -9,6 +9,7 @@ from scipy.optimize import minimize
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.positive import raise_to
+from nearfar.illumination.centred_basis import window_offsets
 from nearfar.transport import near
 from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
 from tests.worlds import model_transport
@@ -73,7 +74,7 @@ def test_an_estimate_has_no_negative_transport_in_its_windows(noise):
     rows = found.dense()[:, 0]
     centres = near.centre(found.correspondence, PROJECTOR)
     inside = near.inside(centres, WINDOW, PROJECTOR)
-    apart = np.abs(near.offsets(WINDOW)).max(axis=1) > 1
+    apart = np.abs(window_offsets(WINDOW)).max(axis=1) > 1
     places = near.places_on(centres, WINDOW, PROJECTOR)
     entries = np.where(inside & apart, np.take_along_axis(rows, places, axis=1), 0.0)
     # A window that noise leaves no light at all has none to give.

@@ -1,4 +1,4 @@
-"""From the rows of the last turn to a transport.
+"""From the rows of the last sweep to a transport.
 
 Index convention: arrays are (C, channels, ...); w runs over window entries.
 """
@@ -6,50 +6,51 @@ Index convention: arrays are (C, channels, ...); w runs over window entries.
 import numpy as np
 
 from nearfar.arrays import Floats, Size, beside, blocks, fetch, namespace, product
-from nearfar.estimate.joint.pixels import (
-    dc_place,
-)
+from nearfar.estimate.joint.batch import dc_place
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.problem import Problem, Rows
-from nearfar.estimate.matrices import Band, band_of
+from nearfar.estimate.joint.spikes import away_from_q
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
+from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.transport import near
-from nearfar.transport.kinds import LIT, UNLIT
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 
-# Camera pixels at once.
-BLOCK = 2048
+# Camera pixels of a batch.
+BATCH_PIXELS = 2048
 
 
 def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
     """Put the factors together: f at the far band's frequencies, its DC what d and n leave."""
-    measurements, band, whole = problem.measurements, problem.model.band, problem.whole
+    measurements, centred, pixels = problem.measurements, problem.model.centred, problem.pixels
     wanted = set(far_frequencies(far, measurements.projector))
-    low = [k for k in band.basis.frequencies if k in wanted or -k in wanted]
+    measured = centred.basis
+    low = [k for k in measured.frequencies if k in wanted or -k in wanted]
     basis = real_basis([DC, *low], measurements.projector)
-    kept = np.flatnonzero(np.isin(band.basis.index, [band.basis.frequencies.index(k) for k in low]))
+    kept = np.flatnonzero(np.isin(measured.index, [measured.frequencies.index(k) for k in low]))
     share_of_white = _share_of_white(measurements).astype(np.float32)
     xp = namespace(rows.near)
     white, share, places = (
         beside(values, rows.near)
         for values in (measurements.responses[..., dc_place(measurements)], share_of_white, kept)
     )
-    direct = xp.clip(rows.shared[..., 1], min=0.0) * whole.lit[:, None]
-    rest = white - share * rows.shared[..., 0] - direct - xp.sum(rows.near, axis=-1)
+    direct = xp.clip(rows.amplitudes[..., 1], min=0.0) * pixels.lit[:, None]
+    rest = white - share * rows.amplitudes[..., 0] - direct - xp.sum(rows.near, axis=-1)
     far_range = xp.concat([rest[..., None], rows.far[..., places]], axis=-1)
-    drawn = band_of(basis, near.offsets(problem.window)).put(lambda one: beside(one, rows.near))
-    windows = _positive(problem, rows.near, far_range, drawn)
+    of_far = centred_basis(basis, window_offsets(problem.window))
+    of_far = of_far.put(lambda one: beside(one, rows.near))
+    windows = _positive(problem, rows.near, far_range, of_far)
     shape = (*measurements.camera, measurements.channels)
-    # What differs from the neighbours' mean is weak because a camera pixel's own photos are in
-    # that mean: the first turn's kind and strength tell the error (docs/decisions/0011).
+    # Later sweeps estimate small differences from a mean that a camera pixel's own photos are part
+    # of: the first sweep's prior component and scale fit the error (docs/decisions/0011).
     first = rows.choices[0]
     return Transport(
         projector=measurements.projector,
-        correspondence=fetch(whole.correspondence)
+        correspondence=fetch(pixels.correspondence)
         .reshape(*measurements.camera, 2)
         .astype(np.float32),
         direct=fetch(direct).reshape(shape),
@@ -59,40 +60,45 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
         posterior=Posterior(
-            kinds=(*LIT, *UNLIT),
-            frequencies=band.basis.frequencies,
+            prior_components=(*LIT_COMPONENTS, *UNLIT_COMPONENTS),
+            frequencies=measured.frequencies,
             multiplicity=fetch(problem.model.multiplicity),
-            kind=fetch(first.kind).astype(np.uint8).reshape(measurements.camera),
-            strength=fetch(first.strength).reshape(measurements.camera),
-            white=fetch(whole.white).reshape(shape),
-            offset_noise=fetch(whole.offset_noise).reshape(shape),
+            prior_component=fetch(first.prior_component)
+            .astype(np.uint8)
+            .reshape(measurements.camera),
+            prior_scale=fetch(first.prior_scale).reshape(measurements.camera),
+            white=fetch(pixels.white).reshape(shape),
+            offset_noise=fetch(pixels.offset_noise).reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),
             share_of_white=share_of_white.reshape(shape),
         ),
     )
 
 
-def _positive(problem: Problem, windows: Floats, far_range: Floats, band: Band) -> Floats:
+def _positive(
+    problem: Problem, windows: Floats, far_range: Floats, centred: CentredBasis
+) -> Floats:
     """Raise window entries to where n and f together are not negative, white kept."""
-    apart = np.abs(near.offsets(problem.window)).max(axis=1) > 1
-    inside = near.inside(problem.whole.centres, problem.window, problem.measurements.projector)
+    away = away_from_q(problem.window**2)
+    inside = near.inside(problem.pixels.centres, problem.window, problem.measurements.projector)
     xp = namespace(windows)
-    free = inside & beside(apart, windows) & problem.whole.lit[:, None]
+    free = inside & beside(away, windows) & problem.pixels.lit[:, None]
     found: Floats = xp.empty_like(windows)
-    weights = beside(band.basis.weights.astype(np.float32), windows)
+    weights = beside(centred.basis.weights.astype(np.float32), windows)
 
     def work(block: slice) -> None:
-        turned = band.recentre(far_range[block] * weights, problem.whole.centres[block])
-        least = -product(turned, band.on_window)
+        coefficients = far_range[block] * weights
+        recentred = centred.recentre(coefficients, problem.pixels.centres[block])
+        least = -product(recentred, centred.on_window)
         mine = xp.broadcast_to(free[block, None], least.shape)
         found[block] = raise_to(windows[block], least, mine)
 
-    side_by_side(work, blocks(len(windows), BLOCK))
+    side_by_side(work, blocks(len(windows), BATCH_PIXELS))
     return found
 
 
 def _share_of_white(measurements: Measurements) -> Floats:
-    """How much of the references' error o is, on average, white's own error.
+    """Return the mean share of the references' error o that is white's own error.
 
     o = -(e_w + e_k) and white's is e_w - e_k for errors e_w of white and e_k of black.
     """

@@ -1,7 +1,8 @@
-"""The joint estimate: direct, near and far in one model, each camera pixel by its own kind.
+"""The joint estimate: direct, near and far in one model, each camera pixel with a prior of its own.
 
-First every camera pixel chooses a kind and a strength by its own photos and takes the posterior
-mean. Then, in turns, each starts from what its neighbours expect and estimates what differs.
+In the first sweep every camera pixel chooses a prior component and scale by its own photos and
+takes the posterior mean. Later sweeps start from what is expected from its neighbours and estimate
+the difference.
 """
 
 from collections.abc import Callable
@@ -12,19 +13,19 @@ import numpy as np
 from nearfar.arrays import Floats, Size, beside, namespace
 from nearfar.devices import Device
 from nearfar.estimate.joint.assemble import assemble
-from nearfar.estimate.joint.nuisance import KEPT
-from nearfar.estimate.joint.problem import Choice, Problem, Rows, lay_out
-from nearfar.estimate.joint.turn import take_turn
+from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
+from nearfar.estimate.joint.problem import ComponentChoice, Problem, Rows, lay_out
+from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport.model import Transport
 
-# Kinds of camera pixels, one choice for each turn.
-Choices = tuple[Choice, ...]
-# Turns: one alone, the rest with the neighbours.
-TURNS = 3
-# q moves by no more than this in one turn, and stays where it was rounded to.
-FURTHEST = 0.25
-HALF = 0.499
+# Prior components and scales of camera pixels, one choice for each sweep.
+Choices = tuple[ComponentChoice, ...]
+# Sweeps: one by each camera pixel's own photos alone, the rest with its neighbours.
+SWEEPS = 3
+# q moves by no more projector pixels than this in one sweep, and stays where it was rounded to.
+LARGEST_SHIFT = 0.25
+LARGEST_FROM_CENTRE = 0.499
 
 
 def estimate_jointly(
@@ -33,8 +34,8 @@ def estimate_jointly(
     window: int,
     far: Size,
     *,
-    turns: int = TURNS,
-    kept: Choices = (),
+    sweeps: int = SWEEPS,
+    chosen: Choices = (),
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Transport:
@@ -48,13 +49,13 @@ def estimate_jointly(
         q as (y, x), NaN where there is no direct light. The transport's own is rounded where it
         is nearly whole, and else moved by the little that the photos ask for.
     window : int
-        W: near-range light lies within, however much less far it reaches.
+        W, an upper bound of how far near-range light reaches.
     far : Size
         Far band: f is kept at its measured frequencies.
-    turns : int
-        One alone, the rest with the neighbours.
-    kept : Choices
-        Kinds of camera pixels from a look at some of the photos, by `choose_kinds`.
+    sweeps : int
+        The first by each camera pixel's own photos alone, the rest with its neighbours.
+    chosen : Choices
+        Prior components and scales that `choose_components` chose by some of the photos.
     device : {"cpu", "cuda", "torch"}
         Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
         processor.
@@ -72,10 +73,10 @@ def estimate_jointly(
     """
     report = progress or (lambda _share: None)
     problem = lay_out(measurements, correspondence, window, device)
-    return assemble(*_take_turns(problem, turns, kept, report), far)
+    return assemble(*_sweep(problem, sweeps, chosen, report), far)
 
 
-def choose_kinds(
+def choose_components(
     measurements: Measurements,
     correspondence: Floats,
     window: int,
@@ -83,47 +84,51 @@ def choose_kinds(
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Choices:
-    """Choose what kind each camera pixel is by some photos, for an estimate from more of them.
+    """Choose each camera pixel's prior component by some photos, to estimate from more of them.
 
     Parameters and errors are those of `estimate_jointly`.
 
     Returns
     -------
     Choices
-        One for each turn.
+        One for each sweep.
     """
     report = progress or (lambda _share: None)
     problem = lay_out(measurements, correspondence, window, device)
-    _, rows = _take_turns(problem, TURNS, (), report)
+    _, rows = _sweep(problem, SWEEPS, (), report)
     return rows.choices
 
 
-def _take_turns(
-    problem: Problem, turns: int, kept: Choices, progress: Callable[[float], None]
+def _sweep(
+    problem: Problem, sweeps: int, chosen: Choices, progress: Callable[[float], None]
 ) -> tuple[Problem, Rows]:
+    """Sweep so many times, q moved after each."""
     rows = None
-    for turn, settled in zip_longest(range(turns), kept[:turns]):
+    for number, choice in zip_longest(range(sweeps), chosen[:sweeps]):
 
-        def report(share: float, turn: int = turn) -> None:
-            progress((turn + share) / turns)
+        def report(share: float, number: int = number) -> None:
+            progress((number + share) / sweeps)
 
-        rows = take_turn(problem, rows, report, settled)
-        whole = problem.whole._replace(correspondence=_moved(problem, rows))
-        problem = problem._replace(whole=whole)
+        rows = sweep_once(problem, rows, report, choice)
+        pixels = problem.pixels._replace(correspondence=_moved(problem, rows))
+        problem = problem._replace(pixels=pixels)
     assert rows is not None
     return problem, rows
 
 
 def _moved(problem: Problem, rows: Rows) -> Floats:
     """Move q by what it was found to be off, but no further than its rounding allows."""
-    xp = namespace(rows.shared)
-    shared = xp.astype(rows.shared, xp.float64)
-    direct = shared[..., 1]
+    xp = namespace(rows.amplitudes)
+    amplitudes = xp.astype(rows.amplitudes, xp.float64)
+    direct = amplitudes[..., 1]
     energy = xp.clip(xp.sum(direct**2, axis=1), min=float(np.finfo(np.float32).tiny))
-    off = xp.sum(shared[..., 2:KEPT] * direct[..., None], axis=1) / energy[:, None]
-    off = xp.where((xp.sum(direct, axis=1) > 0)[:, None], xp.clip(off, -FURTHEST, FURTHEST), 0.0)
-    whole, centres = problem.whole, xp.astype(problem.whole.centres, xp.float64)
-    last = beside(np.array(problem.measurements.projector) - 1.0, shared)
-    lowest, highest = xp.clip(centres - HALF, min=0.0), xp.minimum(centres + HALF, last)
-    moved: Floats = xp.maximum(xp.minimum(whole.correspondence + off, highest), lowest)
+    shifts = amplitudes[..., 2:COMMON_AMPLITUDES]
+    off = xp.sum(shifts * direct[..., None], axis=1) / energy[:, None]
+    within = xp.clip(off, -LARGEST_SHIFT, LARGEST_SHIFT)
+    off = xp.where((xp.sum(direct, axis=1) > 0)[:, None], within, 0.0)
+    pixels, centres = problem.pixels, xp.astype(problem.pixels.centres, xp.float64)
+    last = beside(np.array(problem.measurements.projector) - 1.0, amplitudes)
+    lowest = xp.clip(centres - LARGEST_FROM_CENTRE, min=0.0)
+    highest = xp.minimum(centres + LARGEST_FROM_CENTRE, last)
+    moved: Floats = xp.maximum(xp.minimum(pixels.correspondence + off, highest), lowest)
     return moved

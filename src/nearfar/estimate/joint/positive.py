@@ -1,4 +1,4 @@
-"""Transport is never negative: window entries are moved no further than that asks.
+"""Transport is never negative: window entries are changed no further than that asks.
 
 Where n and f together would be below 0 at a window entry, n is raised to what f lacks, and all
 other entries give as much as the window gained (the Euclidean projection on a simplex; Michelot,
@@ -10,8 +10,8 @@ Index convention: arrays are (n, channels, W^2).
 
 from nearfar.arrays import Booleans, Floats, namespace
 
-# The active set shrinks at every turn; this many are never needed for windows that were measured.
-TURNS = 60
+# The active set shrinks at every iteration; measured windows have settled well before this many.
+MAXIMUM_ITERATIONS = 60
 
 
 def raise_to(values: Floats, least: Floats, free: Booleans) -> Floats:
@@ -26,14 +26,14 @@ def raise_to(values: Floats, least: Floats, free: Booleans) -> Floats:
     Returns
     -------
     ndarray, shape (..., E), float32
-        Unchanged where the sum is too small for it.
+        Unchanged where the sum is too small for that.
     """
     xp = namespace(values)
     above = xp.astype(xp.where(free, values - least, 0.0), xp.float64)
     total = xp.sum(above, axis=-1, keepdims=True)
     active = free & (above > 0)
     taken = xp.zeros_like(total)
-    for _ in range(TURNS):
+    for _ in range(MAXIMUM_ITERATIONS):
         count = xp.clip(xp.sum(xp.astype(active, xp.float64), axis=-1, keepdims=True), min=1.0)
         taken = (xp.sum(above * active, axis=-1, keepdims=True) - total) / count
         smaller = active & (above > taken)

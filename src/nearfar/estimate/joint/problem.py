@@ -1,8 +1,9 @@
-"""What all turns of the joint estimate share: the responses in order, q, and the kinds.
+"""What all sweeps of the joint estimate share: the responses in order, q, and the priors.
 
 Index convention: arrays are (C, channels, ...); r runs over real responses, w over window entries.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -11,86 +12,87 @@ import numpy as np
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.devices import Device, mover
 from nearfar.errors import InputError
-from nearfar.estimate.joint.edges import seen_beside
-from nearfar.estimate.joint.evidence import Kinds, screened
-from nearfar.estimate.joint.pixels import (
-    EXACT,
-    Whole,
+from nearfar.estimate.joint.batch import (
+    RELATIVE_NOISE_FLOOR,
+    AllPixels,
     offset_noise,
-    scale_of,
+    white_scale,
 )
-from nearfar.estimate.joint.prior import build_prior
-from nearfar.estimate.matrices import Band, band_of
+from nearfar.estimate.joint.evidence import PriorSet, prior_set
+from nearfar.estimate.joint.spikes import expected_spikes
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.photometry.measurements import Measurements
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
+from nearfar.priors.responses import response_prior
 from nearfar.transport import near
-from nearfar.transport.kinds import LIT, UNLIT, Kind
 
-# Direct light this close to a whole projector pixel is taken to be all that pixel's: noise moves q
-# by as much, and a footprint of 10 % too much beside q cost 1.5 dB under a random light. What
-# really lies beside it, kinds with spread find.
-WHOLE = 0.1
+# q this close to a whole projector pixel is rounded to it: noise moves q by as much, and a
+# footprint of 10 % too much beside q cost 1.5 dB under a random light. Direct light that really
+# lies beside it is found by prior components with spread.
+WHOLE_PIXEL_DISTANCE = 0.1
 
 
-class Choice(NamedTuple):
-    """What kind each camera pixel is taken to be in one turn.
+class ComponentChoice(NamedTuple):
+    """The prior component and scale of each camera pixel in one sweep.
 
     Attributes
     ----------
-    kind : ndarray of int, shape (C,)
-        Place in LIT + UNLIT.
-    strength : ndarray, shape (C,), float32
+    prior_component : ndarray of int, shape (C,)
+        Place in LIT_COMPONENTS + UNLIT_COMPONENTS.
+    prior_scale : ndarray, shape (C,), float32
         Share of white.
     """
 
-    kind: Integers
-    strength: Floats
+    prior_component: Integers
+    prior_scale: Floats
 
-    def of(self, chosen: Integers, first: int) -> "Choice":
-        """Return that of some camera pixels, kinds counted from `first`."""
-        return Choice(self.kind[chosen] - first, self.strength[chosen])
+    def of(self, selected: Integers, first: int) -> "ComponentChoice":
+        """Return those of some camera pixels, components counted from `first`."""
+        return ComponentChoice(self.prior_component[selected] - first, self.prior_scale[selected])
 
 
 class Rows(NamedTuple):
-    """Rows of all camera pixels, photo units."""
+    """Estimated rows of all camera pixels, photo units."""
 
-    shared: Floats  # o, d and d times what q is off by, (C, channels, 4)
+    amplitudes: Floats  # o, d and d times what q is off by, (C, channels, 4)
     near: Floats  # (C, channels, W^2)
     far: Floats  # (C, channels, R), as measured
     near_noise: Floats  # (C, channels)
-    choices: tuple[Choice, ...]  # of each turn so far
+    choices: tuple[ComponentChoice, ...]  # of each sweep so far
 
 
 class Model(NamedTuple):
-    """Kinds for a set of measured frequencies."""
+    """Priors for a set of measured frequencies."""
 
-    band: Band
+    centred: CentredBasis
     multiplicity: Floats
-    lit: Kinds
-    unlit: Kinds | None
+    lit: PriorSet
+    unlit: PriorSet | None
 
 
 class Problem(NamedTuple):
-    """What all turns share."""
+    """What all sweeps share."""
 
     measurements: Measurements
     model: Model
-    whole: Whole
+    pixels: AllPixels
     window: int
 
 
 def build_model(
     measured: RealBasis, multiplicity: Floats, window: int, device: Device, *, unlit: bool
 ) -> Model:
-    """Build the kinds for what is measured; the last few are kept, so that blocks share them.
+    """Build the priors for what is measured; the last few are kept, so that tiles share them.
 
     Parameters
     ----------
     measured : RealBasis
         DC among it.
     multiplicity : ndarray, shape (R,)
-        How often each answer is.
+        How often each response is measured.
     window : int
     device : {"cpu", "cuda", "torch"}
     unlit : bool
@@ -108,17 +110,16 @@ def build_model(
             "these measurements lack white, or all but white: plan with --photos, or --near and "
             "--far."
         )
-    # Pairs of a cosine and a sine side by side, those that answer no sine at the end.
+    # Pairs of a cosine and a sine side by side, those without a sine at the end.
     frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
     places = measured.places(frequencies)
-    plain = band_of(real_basis(frequencies, measured.projector), near.offsets(window))
-    band = Band(plain.basis, places, plain.on_window, plain.on_corners)
-    shown = (tuple(frequencies), measured.projector, window, tuple(multiplicity[places].tolist()))
+    centred = replace(_centred(tuple(frequencies), measured.projector, window), places=places)
+    key = (tuple(frequencies), measured.projector, window, tuple(multiplicity[places].tolist()))
     return Model(
-        band.put(move),
+        centred.put(move),
         move(multiplicity[places]),
-        _kinds(LIT, *shown, device),
-        _kinds(UNLIT, *shown, device) if unlit else None,
+        _prior_set(LIT_COMPONENTS, *key, device),
+        _prior_set(UNLIT_COMPONENTS, *key, device) if unlit else None,
     )
 
 
@@ -141,40 +142,44 @@ def lay_out(
         As `build_model`.
     """
     rounded = np.rint(correspondence)
-    close = np.abs(correspondence - rounded) < WHOLE
+    close = np.abs(correspondence - rounded) < WHOLE_PIXEL_DISTANCE
     correspondence = np.where(close, rounded, correspondence).astype(np.float64)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
     model = build_model(
         measurements.basis, measurements.multiplicity, window, device, unlit=not lit.all()
     )
-    white = scale_of(measurements)
-    whole = Whole(
-        responses=measurements.responses[..., model.band.places],
+    white = white_scale(measurements)
+    pixels = AllPixels(
+        responses=measurements.responses[..., model.centred.places],
         correspondence=correspondence.reshape(-1, 2),
         centres=near.centre(correspondence, measurements.projector),
         lit=lit,
-        noise=np.maximum(measurements.noise, EXACT * white),
+        noise=np.maximum(measurements.noise, RELATIVE_NOISE_FLOOR * white),
         offset_noise=offset_noise(measurements),
         white=white,
-        likely=seen_beside(correspondence, window),
+        spike_expected=expected_spikes(correspondence, window),
     )
-    whole = Whole._make(map(mover(device), whole))
-    return Problem(measurements, model, whole, window)
+    pixels = AllPixels._make(map(mover(device), pixels))
+    return Problem(measurements, model, pixels, window)
 
 
-# Blocks of camera rows share them, those of lit and of unlit camera pixels; those for a look at
-# some of the photos, and for all.
+def _centred(frequencies: tuple[Frequency, ...], projector: Size, window: int) -> CentredBasis:
+    return centred_basis(real_basis(frequencies, projector), window_offsets(window))
+
+
+# Tiles of camera rows share them: those of lit and of unlit camera pixels, for the first photos of
+# a capture that goes on and for all of them.
 @lru_cache(maxsize=4)
-def _kinds(
-    kinds: tuple[Kind, ...],
+def _prior_set(
+    prior_components: tuple[PriorComponent, ...],
     frequencies: tuple[Frequency, ...],
     projector: Size,
     window: int,
     multiplicity: tuple[float, ...],
     device: Device,
-) -> Kinds:
-    """Build the kinds for a set of measured frequencies and how often each was measured."""
-    band = band_of(real_basis(frequencies, projector), near.offsets(window))
+) -> PriorSet:
+    """Build the priors for a set of measured frequencies and how often each was measured."""
+    centred = _centred(frequencies, projector, window)
     measured = np.array(multiplicity, dtype=np.float32)
-    priors = tuple(build_prior(kind, band, measured) for kind in kinds)
-    return screened(priors, band, measured).put(mover(device))
+    priors = tuple(response_prior(one, centred, measured) for one in prior_components)
+    return prior_set(priors, centred, measured).put(mover(device))

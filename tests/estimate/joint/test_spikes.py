@@ -4,7 +4,7 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.joint.edges import seen_beside
+from nearfar.estimate.joint.spikes import expected_spikes
 from tests.estimate.joint.draws import (
     FAR,
     PROJECTOR,
@@ -22,7 +22,7 @@ def test_direct_light_of_a_second_surface_is_found():
     rows[second, 0, 6 * PROJECTOR.width + 12] += 0.2
     measurements = measured(rows, chosen_frequencies(140), noise=1e-3)
     q = centres.astype(np.float32)[None]
-    found = estimate_jointly(measurements, q, WINDOW, FAR, turns=1)
+    found = estimate_jointly(measurements, q, WINDOW, FAR, sweeps=1)
     entry = found.near[0, :, 0, 0, 4]
     np.testing.assert_allclose(entry[second], 0.2, atol=0.01)
     assert np.abs(entry[~second]).max() < 0.01
@@ -33,18 +33,18 @@ def test_less_evidence_will_do_where_a_neighbour_sees_the_second_surface():
     q = np.zeros((3, 10, 2))
     q[..., 0] = 8.0
     q[..., 1] = np.where(np.arange(10) < 5, 6.0, 10.0)
-    likely = seen_beside(q, 9).reshape(3, 10, 9, 9)
-    assert not likely[:, :4].any()
-    assert not likely[:, 6:].any()
+    spike_expected = expected_spikes(q, 9).reshape(3, 10, 9, 9)
+    assert not spike_expected[:, :4].any()
+    assert not spike_expected[:, 6:].any()
     around = np.zeros((9, 9), dtype=bool)
     around[3:6, 7:9] = True
-    np.testing.assert_array_equal(likely[1, 4], around)
-    np.testing.assert_array_equal(likely[1, 5], around[:, ::-1])
+    np.testing.assert_array_equal(spike_expected[1, 4], around)
+    np.testing.assert_array_equal(spike_expected[1, 5], around[:, ::-1])
     # Too far for the window, or of camera pixels without direct light: nothing.
     q[:, 5:, 1] = 15.0
-    assert not seen_beside(q, 9).any()
+    assert not expected_spikes(q, 9).any()
     q[:, 5:] = np.nan
-    assert not seen_beside(q, 9).any()
+    assert not expected_spikes(q, 9).any()
 
 
 def test_a_faint_second_surface_is_believed_beside_its_edge_alone():
@@ -59,7 +59,7 @@ def test_a_faint_second_surface_is_believed_beside_its_edge_alone():
     left = (q[..., 1] == 7.0).ravel()
     rows[left, 0, 8 * PROJECTOR.width + 11] = faint
     measurements = measured(rows, chosen_frequencies(140), noise=0.06, camera=camera)
-    found = estimate_jointly(measurements, q, 9, FAR, turns=1)
+    found = estimate_jointly(measurements, q, 9, FAR, sweeps=1)
     entry = found.near[:, :, 0, 4, 8]
     beside, inner = entry[:, 4], entry[:, :3]
     assert np.mean(beside > 0.5 * faint) > 0.7
@@ -68,4 +68,4 @@ def test_a_faint_second_surface_is_believed_beside_its_edge_alone():
 
 def test_steps_of_a_camera_that_is_as_fine_are_no_other_surface():
     y, x = np.meshgrid(np.arange(6.0), np.arange(7.0), indexing="ij")
-    assert not seen_beside(np.stack([y, x], axis=-1), 5).any()
+    assert not expected_spikes(np.stack([y, x], axis=-1), 5).any()

@@ -8,31 +8,32 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
-from nearfar.estimate.joint import estimate_jointly, posterior
-from nearfar.estimate.joint.nuisance import OFF
-from nearfar.estimate.joint.posterior import ErrorBars
-from nearfar.estimate.matrices import band_of
+from nearfar.estimate.joint import error_bars, estimate_jointly
+from nearfar.estimate.joint.error_bars import ErrorBars
+from nearfar.estimate.joint.nuisance import common_precision
+from nearfar.illumination.centred_basis import centred_basis, window_offsets
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.pictures import standard_lights
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.plan.choose import choose_frequencies
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.covariance import far_variance, near_covariance, spectral_density
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
-from nearfar.transport.kinds import Kind, far_power, near_covariance, power_at
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.workflow.acquire import hold
 
 PROJECTOR = Size(12, 16)
 WINDOW = 5
-KIND = Kind(1.5, 8.0, 2.0)
+COMPONENT = PriorComponent(1.5, 8.0, 2.0)
 NOISE, OFFSET, LIGHT, SHARE = 2e-3, 1e-3, 1.5e-3, 0.4
-STRENGTH, WHITE = 0.05, 0.8
+SCALE, WHITE = 0.05, 0.8
 
 
 def _transport(centres, lit=True):
@@ -54,17 +55,22 @@ def _transport(centres, lit=True):
         black=np.zeros(shape, np.float32),
         noise=np.full(shape, NOISE, np.float32),
         posterior=Posterior(
-            kinds=(Kind(0.0, 1.0, 1.0), KIND),
+            prior_components=(PriorComponent(0.0, 1.0, 1.0), COMPONENT),
             frequencies=measured,
             multiplicity=np.random.default_rng(0).integers(1, 4, count).astype(np.float32),
-            kind=np.ones(shape[:2], np.uint8),
-            strength=np.full(shape[:2], STRENGTH, np.float32),
+            prior_component=np.ones(shape[:2], np.uint8),
+            prior_scale=np.full(shape[:2], SCALE, np.float32),
             white=np.full(shape, WHITE, np.float32),
             offset_noise=np.full(shape, OFFSET, np.float32),
             light_noise=np.full(shape, LIGHT, np.float32),
             share_of_white=np.full(shape, SHARE, np.float32),
         ),
     )
+
+
+def _prior_variance():
+    """Prior variance of o, d and the shifts of q."""
+    return 1.0 / common_precision(np.array([[WHITE]]), np.array([[OFFSET]]))[0, 0]
 
 
 def _dense(transport, c, ask):
@@ -75,20 +81,20 @@ def _dense(transport, c, ask):
     posterior = transport.posterior
     basis = real_basis(posterior.frequencies, PROJECTOR)
     centre = transport.correspondence[0, c].astype(int)
-    band = band_of(basis, near.offsets(WINDOW) + centre)
-    s = STRENGTH * WHITE
+    centred = centred_basis(basis, window_offsets(WINDOW) + centre)
+    s = SCALE * WHITE
     ones = np.ones((basis.count, 1))
     direct = basis.patterns[:, [centre[0] * PROJECTOR.width + centre[1]]]
     responses = np.concatenate(
-        [ones, 0 * ones, direct, band.on_window, np.eye(basis.count)], axis=1
+        [ones, 0 * ones, direct, centred.on_window, np.eye(basis.count)], axis=1
     ).astype(np.float64)
     prior = np.zeros((responses.shape[1], responses.shape[1]))
     prior[0, 0] = OFFSET**2
     prior[1, 1] = LIGHT**2 - (SHARE * OFFSET) ** 2
-    prior[2, 2] = (4 * WHITE) ** 2
+    prior[2, 2] = _prior_variance()[1]
     end = 3 + WINDOW**2
-    prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
-    prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
+    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW)
+    prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
     noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
     posterior = prior - gain @ responses @ prior
@@ -131,9 +137,9 @@ def test_what_the_transport_does_not_hold_adds_its_expected_power():
     spectrum = np.abs(np.fft.fft2(light)) ** 2
     cycles = [np.fft.fftfreq(side) * side for side in PROJECTOR]
     radius = np.hypot(cycles[0][:, None], cycles[1])
-    unseen = power_at(radius, KIND) * spectrum
+    unseen = spectral_density(radius, COMPONENT) * spectrum
     unseen[(np.abs(cycles[0])[:, None] <= 1) & (np.abs(cycles[1]) <= 1)] = 0.0
-    extra = (STRENGTH * WHITE) ** 2 * unseen.sum() / PROJECTOR.pixels**2
+    extra = (SCALE * WHITE) ** 2 * unseen.sum() / PROJECTOR.pixels**2
     expected = np.hypot(_dense(transport, 0, _weights(transport, 0, light)), np.sqrt(extra))
     assert ErrorBars(transport).picture(light)[0, 0] == pytest.approx(expected, rel=2e-3)
 
@@ -149,7 +155,7 @@ def test_entries_are_as_uncertain_as_dense_algebra_says():
     at = 6 * PROJECTOR.width + 8
     assert rows.direct[0, 0, at] == pytest.approx(bars.direct()[0, 0, 0])
     assert np.count_nonzero(rows.direct) == 1
-    for entry, (y, x) in enumerate(near.offsets(WINDOW)):
+    for entry, (y, x) in enumerate(window_offsets(WINDOW)):
         one = np.zeros(count)
         one[3 + entry] = 1.0
         place = (6 + y) * PROJECTOR.width + 8 + x
@@ -176,7 +182,7 @@ def test_entries_are_the_same_line_by_line_and_some_at_a_time(lit, monkeypatch):
         for whole, *parts in zip(rows, *lines, strict=True):
             np.testing.assert_allclose(np.concatenate(parts, axis=1), whole[pixel], rtol=1e-4)
     for entries in (1, 3 * PROJECTOR.width):
-        monkeypatch.setattr(posterior, "ENTRIES", entries)
+        monkeypatch.setattr(error_bars, "ENTRIES_AT_ONCE", entries)
         for whole, again in zip(rows, bars.component_rows(slice(0, 2)), strict=True):
             np.testing.assert_allclose(again, whole, rtol=1e-4)
 
@@ -244,15 +250,15 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     basis = real_basis(posterior.frequencies, PROJECTOR)
     at = 6 * PROJECTOR.width + 8
     one, other = basis.patterns[:, at], basis.patterns[:, at + 1]
-    band = band_of(basis, near.offsets(WINDOW) + np.array([6, 8]))
+    centred = centred_basis(basis, window_offsets(WINDOW) + np.array([6, 8]))
     own = np.stack([np.ones(basis.count), (1 - part) * one + part * other, other - one], axis=1)
-    responses = np.concatenate([own, band.on_window, np.eye(basis.count)], axis=1).astype(float)
+    responses = np.concatenate([own, centred.on_window, np.eye(basis.count)], axis=1).astype(float)
     end = 3 + WINDOW**2
-    s = STRENGTH * WHITE
+    s = SCALE * WHITE
     prior = np.zeros((responses.shape[1], responses.shape[1]))
-    prior[:3, :3] = np.diag([OFFSET**2, (4 * WHITE) ** 2, (OFF * WHITE) ** 2])
-    prior[3:end, 3:end] = s**2 * near_covariance(KIND, WINDOW)
-    prior[end:, end:] = s**2 * np.diag(far_power(basis, KIND))
+    prior[:3, :3] = np.diag(_prior_variance()[:3])
+    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW)
+    prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
     noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
     posterior = prior - gain @ responses @ prior
@@ -264,7 +270,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     own_of_white = LIGHT**2 - (SHARE * OFFSET) ** 2
     spectrum = np.abs(np.fft.fft2(light)) ** 2
     cycles = [np.fft.fftfreq(side) * side for side in PROJECTOR]
-    unseen = power_at(np.hypot(cycles[0][:, None], cycles[1]), KIND) * spectrum
+    unseen = spectral_density(np.hypot(cycles[0][:, None], cycles[1]), COMPONENT) * spectrum
     unseen[(np.abs(cycles[0])[:, None] <= 1) & (np.abs(cycles[1]) <= 1)] = 0.0
     variance = ask @ posterior @ ask + light.mean() ** 2 * own_of_white
     variance += s**2 * unseen.sum() / PROJECTOR.pixels**2

@@ -1,0 +1,205 @@
+"""The posterior mean where the projector's border clips the window: entries beyond it are zero.
+
+f and noise together have a diagonal covariance s^2 S + sigma^2 / m = sigma^2 D, so the window can
+be solved for by itself: with n = diag(deviation) z, z has the precision
+
+    Lambda = (smooth + diag(independent))^-1 / ratio + diag(deviation) B^T D^-1 B diag(deviation)
+
+over the entries inside, ratio = (s / sigma)^2 and B the patterns over the window. Camera pixels
+whose windows are clipped alike, of one prior component and of ratios that are close, share one
+factor of Lambda; prior scales are tried in steps of 2, so a ratio rounded to the nearest power of
+2 is as good.
+
+Index convention: arrays are (n, channels, ...); r runs over real responses, w over window entries
+inside, g over y and the amplitudes of `nuisance`; m over pairs of a camera pixel and a channel.
+"""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from array_api_compat import device
+
+from nearfar.arrays import Booleans, Floats, Integers, beside, fetch, namespace, product
+from nearfar.estimate.joint import nuisance
+from nearfar.estimate.joint.batch import PixelBatch
+from nearfar.estimate.joint.solve import PosteriorMean, near_noise
+from nearfar.illumination.centred_basis import CentredBasis
+from nearfar.priors.covariance import CORRELATION_LENGTH, smooth_covariance
+from nearfar.priors.responses import VARIANCE_RATIOS, ResponsePrior
+
+
+def rounded_ratio(ratio: Floats) -> Floats:
+    """Round variance ratios to the nearest power of 2, so that camera pixels share them."""
+    xp = namespace(ratio)
+    within = xp.clip(ratio, float(VARIANCE_RATIOS[0]), float(VARIANCE_RATIOS[-1]))
+    power: Floats = 2.0 ** xp.round(xp.log2(within))
+    return power
+
+
+def solve_clipped(
+    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, centred: CentredBasis
+) -> PosteriorMean:
+    """Estimate camera pixels of one prior component and rounded ratios; see `solve_whole`."""
+    xp = namespace(batch.responses)
+    number, channels, count = batch.responses.shape
+    # m, how often each response was measured: the squares of a row add up to it.
+    multiplicity = xp.sum(xp.astype(prior.eigenvectors, xp.float64) ** 2, axis=1)
+    far_variance, deviation = (
+        beside(values, batch.responses) for values in (prior.far_variance, prior.factors.deviation)
+    )
+    columns = nuisance.columns(batch, centred)
+    precision = nuisance.prior_precision(batch)
+    patterns = xp.astype(centred.on_window, xp.float64) * deviation
+    clippings = _clippings(fetch(batch.inside))
+
+    def empty(*shape: int, dtype: Any = None) -> Any:
+        return xp.empty(shape, dtype=dtype or xp.float32, device=device(batch.responses))
+
+    amplitudes = empty(*precision.shape, dtype=xp.float64)
+    near = empty(number, channels, len(deviation))
+    far, residual = empty(number, channels, count), empty(number, channels, count)
+    ratio_of_pair = fetch(ratio)
+    for value in np.unique(ratio_of_pair):
+        weight = 1.0 / (float(value) * far_variance + 1.0 / multiplicity)
+        of, channel = np.nonzero(ratio_of_pair == value)
+        c, i = beside(of, precision), beside(channel, precision)
+        y = xp.astype(xp.concat([batch.responses[c, i, None], columns[c]], axis=1), xp.float64)
+        weighted = y * weight
+        right = product(weighted, patterns)
+        solved = _solved(right, clippings, of, prior, float(value), weight, centred)
+        products = y @ xp.permute_dims(weighted, (0, 2, 1))
+        products -= right @ xp.permute_dims(solved, (0, 2, 1))
+        variance = xp.astype(batch.noise[c, i], xp.float64)[:, None] ** 2
+        products /= variance[..., None]
+        amplitudes[c, i] = nuisance.solve(products[:, 1:, 1:], products[:, 1:, 0], precision[c, i])
+        # y less the columns times their amplitudes.
+        factors = xp.concat([xp.ones_like(amplitudes[c, i][:, :1]), -amplitudes[c, i]], axis=1)
+        window = (factors[:, None] @ solved)[:, 0]
+        rest = ((factors[:, None] @ y)[:, 0] - window @ patterns.T) * weight
+        near[c, i] = xp.astype(window * deviation, xp.float32)
+        far[c, i] = xp.astype(rest * (float(value) * far_variance), xp.float32)
+        residual[c, i] = xp.astype(rest / variance, xp.float32)
+    return PosteriorMean(
+        amplitudes=nuisance.in_full(amplitudes, batch),
+        near=near,
+        far=far,
+        near_noise=near_noise(batch, prior, ratio),
+        score=product(residual, centred.on_window),
+    )
+
+
+class _Clippings(NamedTuple):
+    """What the border leaves of the windows of camera pixels.
+
+    Attributes
+    ----------
+    rows, columns : list of slice
+        Of the window, for each way in which some are clipped.
+    way : ndarray of int, shape (n,)
+        The way of each camera pixel.
+    """
+
+    rows: list[slice]
+    columns: list[slice]
+    way: Integers
+
+
+def _clippings(inside: Booleans) -> _Clippings:
+    """Find the rectangles that the entries inside make, (n, W^2)."""
+    side = round(np.sqrt(inside.shape[1]))
+    square = inside.reshape(-1, side, side)
+    sides: list[Booleans] = [np.any(square, axis=axis) for axis in (2, 1)]
+    ends = np.stack(
+        [end for on in sides for end in (on.argmax(axis=1), side - on[:, ::-1].argmax(axis=1))],
+        axis=1,
+    )
+    found, way = np.unique(ends, axis=0, return_inverse=True)
+    rows = [slice(int(top), int(bottom)) for top, bottom, _, _ in found]
+    columns = [slice(int(first), int(last)) for _, _, first, last in found]
+    return _Clippings(rows, columns, way.ravel())
+
+
+def _solved(
+    right: Floats,
+    clippings: _Clippings,
+    of: Integers,
+    prior: ResponsePrior,
+    ratio: float,
+    weight: Floats,
+    centred: CentredBasis,
+) -> Floats:
+    """Return Lambda^-1 times vectors (m, 1 + G, W^2) of camera pixels `of`, 0 beyond the border."""
+    xp = namespace(right)
+    side = round(np.sqrt(right.shape[-1]))
+    deviation = beside(prior.factors.deviation, right)
+    scaled = _information(centred, weight) * deviation * deviation[:, None]
+    entries = scaled.reshape((side, side, side, side))
+    places = np.arange(side * side).reshape(side, side)
+    solved: Floats = xp.zeros_like(right)
+    way = clippings.way[of]
+    for one in np.unique(way):
+        rows, columns = clippings.rows[one], clippings.columns[one]
+        inner = places[rows, columns].ravel()
+        alike = beside(np.flatnonzero(way == one)[:, None, None], right)
+        numbers = beside(np.arange(right.shape[1])[:, None], right)
+        at = (alike, numbers, beside(inner, right))
+        precision = _smooth_precision(prior, places[rows, columns]) / ratio
+        matrix = entries[rows, columns, rows, columns].reshape((len(inner), len(inner)))
+        matrix = matrix + beside(precision, right)
+        found = xp.linalg.solve(matrix, right[at].reshape((-1, len(inner))).T).T
+        solved[at] = found.reshape((len(alike), right.shape[1], len(inner)))
+    return solved
+
+
+def _information(centred: CentredBasis, weight: Floats) -> Floats:
+    """Return the information matrix B^T D^-1 B, (W^2, W^2).
+
+    A cosine and its sine of one weight add up to the cosine of the difference of two entries, so
+    there is one number for each difference.
+    """
+    xp = namespace(weight)
+    cosine = np.flatnonzero(~centred.basis.is_sine)
+    parts = np.diff(np.append(cosine, centred.basis.count))
+    weights = fetch(weight)
+    information: Floats
+    if not np.allclose(weights[cosine], weights[cosine + parts - 1], rtol=1e-6):
+        patterns = xp.astype(centred.on_window, xp.float64)
+        information = (patterns.T * weight) @ patterns
+        return information
+    window = round(np.sqrt(centred.on_window.shape[1]))
+    side = np.arange(1 - window, window)
+    waves = [np.exp(2j * np.pi * centred.basis.cycles[:, axis, None] * side) for axis in (0, 1)]
+    of_difference = np.real((waves[0].T * weights[cosine]) @ waves[1])
+    # [y, x, y', x'] is of_difference[y - y', x - x'], counted from the middle.
+    apart = np.subtract.outer(np.arange(window), np.arange(window)) + window - 1
+    table = of_difference[apart[:, None, :, None], apart[None, :, None, :]]
+    information = beside(table.reshape(window**2, window**2), weight)
+    return information
+
+
+def _smooth_precision(prior: ResponsePrior, places: Integers) -> Floats:
+    """Return (smooth + diag(independent))^-1 over the entries at `places`, a rectangle."""
+    independent = prior.factors.independent[places.ravel()]
+    everywhere = float(prior.factors.independent.min())
+    found = _inverse_of_smooth(CORRELATION_LENGTH, *places.shape, everywhere).copy()
+    # Entries around q may have more of their own: a correction of a few ranks.
+    more = np.flatnonzero(independent > everywhere)
+    if len(more):
+        columns = found[:, more]
+        small = np.diag(1.0 / (independent[more] - everywhere)) + columns[more]
+        found -= columns @ np.linalg.solve(small, columns.T)
+    return found
+
+
+@lru_cache(maxsize=128)
+def _inverse_of_smooth(length: float, height: int, width: int, independent: float) -> Floats:
+    """Return (smooth + independent)^-1 over a rectangle, by the eigenvectors of its sides."""
+    sides = [np.linalg.eigh(smooth_covariance(length, side)) for side in (height, width)]
+    (eigenvalues_y, vectors_y), (eigenvalues_x, vectors_x) = sides
+    if independent == 0:
+        inverses = ((vectors / eigenvalues) @ vectors.T for eigenvalues, vectors in sides)
+        return np.asarray(np.kron(*inverses))
+    vectors = np.kron(vectors_y, vectors_x)
+    eigenvalues = np.kron(eigenvalues_y, eigenvalues_x) + independent
+    return np.asarray((vectors / eigenvalues) @ vectors.T)

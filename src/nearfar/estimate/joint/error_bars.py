@@ -1,0 +1,390 @@
+"""Error bars: the posterior standard deviation of D, of entries of N and F, and of pictures.
+
+All of them are linear functionals h_o o + h_d d + h_n.n + h_f.f of a camera pixel's row, f's DC
+being what d and n leave of white. Given the prior component, o, d and q, the posterior is a
+Gaussian in the prior's eigenvectors; o, d and q add their own uncertainty.
+
+Index convention: arrays are (n, channels, ...), n camera pixels or functionals of one of them; r
+runs over real responses, w over window entries, i over eigenvectors, g over o, d and shifts of q.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.errors import InputError
+from nearfar.estimate.joint import nuisance
+from nearfar.estimate.joint.batch import RELATIVE_NOISE_FLOOR, responses_of_direct
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
+from nearfar.illumination.frequencies import DC
+from nearfar.illumination.real_basis import real_basis
+from nearfar.priors.covariance import spectral_density
+from nearfar.priors.responses import ResponsePrior, response_prior
+from nearfar.transport import near
+from nearfar.transport.direct import footprint, footprint_weights
+from nearfar.transport.model import Components, Transport
+from nearfar.transport.posterior import Posterior
+
+# Camera pixels of a batch.
+BATCH_PIXELS = 2048
+# Entries of a row whose variance is computed at once.
+ENTRIES_AT_ONCE = 2**14
+
+
+class _Functionals(NamedTuple):
+    """Linear functionals of rows: one of each camera pixel, or all of one camera pixel.
+
+    Attributes
+    ----------
+    white : ndarray, shape (n,)
+        Weight h of white.
+    direct : ndarray, shape (n, 3)
+        h of d, and of d times what q is off down and across.
+    near : ndarray, shape (n, W^2) or (1, W^2)
+        One for all of them where they are of one camera pixel.
+    far : ndarray, shape (n, R)
+        Re-centred.
+    truncated : ndarray, shape (components,) or (components, n)
+        Variance of the part of f that the transport does not hold, at unit prior scale, for each
+        prior component.
+    """
+
+    white: Floats
+    direct: Floats
+    near: Floats
+    far: Floats
+    truncated: Floats
+
+
+class _PixelState(NamedTuple):
+    """The posterior's state at camera pixels, the transport's own units."""
+
+    columns: Floats  # (n, R, 4), of o, d and shifts
+    precision: Floats  # (n, channels, 4), of the same before any photo
+    noise: Floats  # (n, channels)
+    scale: Floats  # prior scale s in photo units, (n, channels)
+    white_variance: Floats  # of white's error given o, (n, channels)
+    share_of_white: Floats  # (n, channels)
+    prior_component: Integers  # (n,)
+
+    def only(self, selected: Integers) -> "_PixelState":
+        return _PixelState._make(values[selected] for values in self)
+
+
+class ErrorBars:
+    """Posterior standard deviations of a transport.
+
+    They cover the photos' noise and what was never measured, for rows as the prior components of
+    `nearfar.priors` expect them and q as it was found. Those of components are of the model's
+    split (d at q, n in the window, f in the band), not of the physical one.
+
+    Parameters
+    ----------
+    transport : Transport
+        From a joint estimate.
+
+    Raises
+    ------
+    InputError
+        If the transport was not estimated jointly.
+
+    Examples
+    --------
+    >>> bars = nearfar.ErrorBars(transport)
+    >>> bars.picture(light).shape  # the standard deviation of `transport @ light`
+    (8, 8)
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        if transport.posterior is None:
+            raise InputError(
+                "this transport holds no error bars: reconstruct the capture with --method joint."
+            )
+        self._transport = transport
+        self._posterior: Posterior = transport.posterior
+        basis = real_basis(self._posterior.frequencies, transport.projector)
+        self._centred: CentredBasis = centred_basis(basis, window_offsets(transport.window))
+        self._priors: dict[int, ResponsePrior] = {}
+        self._where = footprint(transport.correspondence, transport.projector)
+        self._centres = near.centre(transport.correspondence, transport.projector)
+        kept = set(transport.far_basis.frequencies)
+        self._is_held = np.array([basis.frequencies[i] in kept for i in basis.index])
+
+    def picture(
+        self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+    ) -> Floats:
+        """Return the standard deviation of a relit picture.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        direct, near, far : float
+            Gains, as `Transport.relight` takes them.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+            Photo units.
+        """
+        transport = self._transport
+        lights = transport.lights(light)
+        number, channels = transport.camera.pixels, transport.channels
+        found = np.empty((number, channels), dtype=np.float32)
+        for place, flat in enumerate(lights):
+            truncated = self._truncated(flat) * far**2
+            for block in blocks(number, BATCH_PIXELS):
+                functionals = self._of_light(block, flat, truncated, (direct, near, far))
+                deviation = np.sqrt(self._variance(block, functionals))
+                if len(lights) == 1:
+                    found[block] = deviation
+                else:
+                    found[block, place] = deviation[:, place]
+        return transport.picture(found)
+
+    def direct(self) -> Floats:
+        """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light."""
+        transport = self._transport
+        found = np.empty((transport.camera.pixels, transport.channels), dtype=np.float32)
+        for block in blocks(len(found), BATCH_PIXELS):
+            found[block] = np.sqrt(self._variance(block, self._of_direct(len(found[block]))))
+        found *= transport.lit.reshape(-1, 1)
+        return found.reshape(*transport.camera, transport.channels)
+
+    def component_rows(self, pixels: slice) -> Components:
+        """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
+
+        N and F are the model's: n in the window, f at the frequencies of the far band that the
+        transport holds. Some milliseconds for each thousand projector pixels and camera pixel.
+        """
+        selected = range(*pixels.indices(self._transport.camera.pixels))
+        shape = (0, self._transport.channels, self._transport.projector.pixels)
+        rows = [self._on(c, slice(0, self._transport.projector.height)) for c in selected]
+        if not rows:
+            return Components(*(np.zeros(shape, dtype=np.float32) for _ in Components._fields))
+        return Components(*(np.stack(part) for part in zip(*rows, strict=True)))
+
+    def along(self, pixel: int, line: int) -> Components:
+        """Return standard deviations of one camera pixel along one row of the projector.
+
+        Parameters
+        ----------
+        pixel : int
+            Of the camera, row by row.
+        line : int
+            Row of the projector.
+
+        Returns
+        -------
+        Components
+            Each (channels, Px); as `component_rows`.
+
+        Raises
+        ------
+        InputError
+            If there is no such pixel, or no such row.
+        """
+        camera, projector = self._transport.camera, self._transport.projector
+        if not 0 <= pixel < camera.pixels:
+            raise InputError(
+                f"the camera of {camera} has no pixel {pixel}: choose one that it has."
+            )
+        if not 0 <= line < projector.height:
+            raise InputError(
+                f"the projector of {projector} has no row {line}: choose one that it has."
+            )
+        return self._on(pixel, slice(line, line + 1))
+
+    def _on(self, c: int, lines: slice) -> Components:
+        """Return those of one camera pixel on some projector rows, each (channels, lines * Px)."""
+        transport, one = self._transport, slice(c, c + 1)
+        width = transport.projector.width
+        first, last = lines.start * width, lines.stop * width
+        inside = near.inside(self._centres[one], transport.window, transport.projector)[0]
+        d = np.zeros((transport.channels, last - first), dtype=np.float32)
+        n, f = np.zeros_like(d), np.empty_like(d)
+        if transport.lit.ravel()[c]:
+            deviation = np.sqrt(self._variance(one, self._of_direct(1)))[0]
+            corners, weights = self._where.pixels[c], self._where.weights[c]
+            here = (corners >= first) & (corners < last)
+            np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
+            places = near.places_on(self._centres[one], transport.window, transport.projector)[0]
+            entries = np.flatnonzero(inside & (places >= first) & (places < last))
+            variance = self._variance(one, self._of_entries(entries))
+            n[:, places[entries] - first] = np.sqrt(variance).T
+        for some in blocks(lines.stop - lines.start, max(1, ENTRIES_AT_ONCE // width)):
+            on_grid = slice(lines.start + some.start, lines.start + some.stop)
+            variance = self._variance(one, self._of_far(one, inside, on_grid))
+            f[:, some.start * width : some.stop * width] = np.sqrt(variance).T
+        return Components(d, n, f)
+
+    def _of_direct(self, number: int) -> _Functionals:
+        """Return the functional d of so many camera pixels."""
+        return _Functionals(
+            np.zeros(number),
+            np.broadcast_to([1.0, 0.0, 0.0], (number, 3)),
+            np.zeros((number, self._transport.window**2), dtype=np.float32),
+            np.zeros((number, self._centred.basis.count), dtype=np.float32),
+            np.zeros(len(self._posterior.prior_components)),
+        )
+
+    def _of_entries(self, entries: Integers) -> _Functionals:
+        """Return the functionals that are window entries of one camera pixel."""
+        return _Functionals(
+            np.zeros(len(entries)),
+            np.zeros((len(entries), 3)),
+            np.eye(self._transport.window**2, dtype=np.float32)[entries],
+            np.zeros((len(entries), self._centred.basis.count), dtype=np.float32),
+            np.zeros(len(self._posterior.prior_components)),
+        )
+
+    def _of_far(self, one: slice, inside: Booleans, lines: slice) -> _Functionals:
+        """Return the entries of one camera pixel's row of F on some rows of the projector."""
+        centred, total = self._centred, self._transport.projector.pixels
+        lit = float(self._transport.lit.ravel()[one][0])
+        drawn = centred.basis.patterns_on(lines).T
+        patterns = (drawn * centred.basis.weights * self._is_held).astype(np.float32)
+        number = len(patterns)
+        centre = np.broadcast_to(self._centres[one], (number, 2))
+        return _Functionals(
+            np.full(number, 1.0 / total),
+            np.broadcast_to([-lit / total, 0.0, 0.0], (number, 3)),
+            -lit / total * inside[None].astype(np.float32),
+            centred.recentre(patterns[:, None], centre)[:, 0],
+            np.zeros(len(self._posterior.prior_components)),
+        )
+
+    def _of_light(
+        self, block: slice, light: Floats, truncated: Floats, gains: tuple[float, float, float]
+    ) -> _Functionals:
+        """Return the functional that is the picture under a light (P,)."""
+        transport, centred = self._transport, self._centred
+        gain_direct, gain_near, gain_far = gains
+        projector, centres = transport.projector, self._centres[block]
+        q = transport.correspondence.reshape(-1, 2)[block]
+        mean = gain_far * float(light.mean())
+        in_window = near.look_up(light.reshape(projector), centres, transport.window, projector)
+        inside = near.inside(centres, transport.window, projector)
+        overlap = (gain_far * centred.basis.analyse(light) * self._is_held).astype(np.float32)
+        overlaps = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
+        lit = transport.lit.ravel()[block]
+        direct = gain_direct * responses_of_direct(q, light[None], projector)[..., 0]
+        direct[:, 0] -= mean * lit
+        return _Functionals(
+            np.full(len(centres), mean),
+            direct,
+            (lit[:, None] * (gain_near * in_window - mean * inside)).astype(np.float32),
+            centred.recentre(overlaps, centres)[:, 0],
+            truncated,
+        )
+
+    def _truncated(self, light: Floats) -> Floats:
+        """Return the variance of what the transport does not hold of f, under a light (P,).
+
+        At unit prior scale, for each prior component: shape (components,).
+        """
+        transport = self._transport
+        projector = transport.projector
+        spectrum = np.abs(np.fft.fft2(light.reshape(projector).astype(np.float64))) ** 2
+        held = (DC, *(k for k in transport.far_basis.frequencies if k != DC))
+        for k in held:
+            y, x = (round(part * side) for part, side in zip(k, projector, strict=True))
+            spectrum[y % projector.height, x % projector.width] = 0.0
+            spectrum[-y % projector.height, -x % projector.width] = 0.0
+        cycles = [np.fft.fftfreq(side) * side for side in projector]
+        radius = np.hypot(cycles[0][:, None], cycles[1])
+        total = [
+            np.sum(spectral_density(radius, one) * spectrum)
+            for one in self._posterior.prior_components
+        ]
+        return np.array(total) / projector.pixels**2
+
+    def _state(self, block: slice) -> _PixelState:
+        """Gather the posterior's state at camera pixels."""
+        transport, posterior, centred = self._transport, self._posterior, self._centred
+        channels = transport.channels
+        white = posterior.white.reshape(-1, channels)[block]
+        centres = self._centres[block]
+        q = transport.correspondence.reshape(-1, 2)[block]
+        direct = footprint_weights(q, centres) @ centred.on_footprint.T
+        ones = centred.recentre(np.ones_like(direct[:, :1]), centres)
+        offset_noise = posterior.offset_noise.reshape(-1, channels)[block]
+        share_of_white = posterior.share_of_white.reshape(-1, channels)[block]
+        light_noise = posterior.light_noise.reshape(-1, channels)[block]
+        noise = transport.noise.reshape(-1, channels)[block]
+        return _PixelState(
+            np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
+            nuisance.common_precision(white, offset_noise),
+            np.maximum(noise, RELATIVE_NOISE_FLOOR * white),
+            posterior.prior_scale.ravel()[block, None] * white,
+            np.maximum(light_noise**2 - (share_of_white * offset_noise) ** 2, 0.0),
+            share_of_white,
+            posterior.prior_component.ravel()[block].astype(np.int64),
+        )
+
+    def _variance(self, block: slice, functionals: _Functionals) -> Floats:
+        """Return posterior variances, (n, channels), of each pixel's or of one pixel's many."""
+        state = self._state(block)
+        if len(state.prior_component) == 1:
+            (place,) = state.prior_component
+            its = functionals._replace(truncated=functionals.truncated[place])
+            return _posterior_variance(self._prior(int(place)), state, its)
+        found = np.empty((len(functionals.white), self._transport.channels))
+        for place in np.unique(state.prior_component):
+            rows = np.flatnonzero(state.prior_component == place)
+            theirs = _Functionals._make(
+                (*(part[rows] for part in functionals[:-1]), functionals.truncated[place])
+            )
+            found[rows] = _posterior_variance(self._prior(int(place)), state.only(rows), theirs)
+        return found
+
+    def _prior(self, place: int) -> ResponsePrior:
+        if place not in self._priors:
+            self._priors[place] = response_prior(
+                self._posterior.prior_components[place],
+                self._centred,
+                self._posterior.multiplicity,
+            )
+        return self._priors[place]
+
+
+def _posterior_variance(
+    prior: ResponsePrior, state: _PixelState, functionals: _Functionals
+) -> Floats:
+    """Return posterior variances for one prior component, (n, channels).
+
+    The state is of one camera pixel for each functional, or of one for all of them.
+    """
+    squared = (state.scale.astype(np.float64) ** 2)[..., None]
+    weight = 1.0 / (squared * prior.eigenvalues + state.noise.astype(np.float64)[..., None] ** 2)
+    covariance = functionals.near @ prior.to_near.T + functionals.far @ prior.to_far.T
+    # Of each functional with the eigenvectors' weights, at unit prior scale.
+    covariance = covariance[:, None]
+    before = (
+        np.einsum("nw,nw->n", functionals.near @ prior.covariance, functionals.near)
+        + functionals.far.astype(np.float64) ** 2 @ prior.far_variance
+        + functionals.truncated
+    )
+    given = squared[..., 0] * (before[:, None] - np.sum(squared * weight * covariance**2, axis=-1))
+    columns = np.matmul(state.columns.transpose(0, 2, 1), prior.eigenvectors)[:, None]
+    weighted = columns * weight[:, :, None]
+    normal = np.matmul(weighted, columns.transpose(0, 1, 3, 2))
+    # Weights of o through white's error, of d and the shifts through direct light.
+    shape = given.shape
+    own = np.stack(
+        [
+            -state.share_of_white * functionals.white[:, None],
+            *(np.broadcast_to(functionals.direct[:, None, part], shape) for part in range(3)),
+        ],
+        axis=-1,
+    )
+    # Less those through n and f, whose means depend on o, d and q.
+    gradient = own - np.matmul(weighted, (squared * covariance)[..., None])[..., 0]
+    solved = nuisance.solve(
+        np.broadcast_to(normal, (*gradient.shape, nuisance.COMMON_AMPLITUDES)),
+        gradient,
+        np.broadcast_to(state.precision, gradient.shape),
+    )
+    variance = given + np.sum(gradient * solved, axis=-1)
+    variance += functionals.white[:, None] ** 2 * state.white_variance
+    return np.asarray(np.maximum(variance, 0.0))

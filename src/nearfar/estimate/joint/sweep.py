@@ -1,0 +1,257 @@
+"""One sweep of the joint estimate over all camera pixels.
+
+The first takes each camera pixel alone; later ones start from what is expected from its neighbours
+and estimate the difference.
+
+Index convention: arrays are (C, channels, ...); r runs over real responses, w over window entries.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from array_api_compat import device
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
+from nearfar.estimate.joint.batch import AllPixels, PixelBatch, gather
+from nearfar.estimate.joint.clipped import rounded_ratio, solve_clipped
+from nearfar.estimate.joint.evidence import PriorSet, most_probable
+from nearfar.estimate.joint.neighbours import expect_each, expect_together
+from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
+from nearfar.estimate.joint.problem import ComponentChoice, Problem, Rows
+from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
+from nearfar.estimate.joint.spikes import (
+    LEAST_GAIN,
+    MAXIMUM_SPIKES,
+    likeliest_spike,
+    with_spike,
+)
+from nearfar.illumination.centred_basis import CentredBasis
+from nearfar.parallel import side_by_side
+from nearfar.priors.fitted import LIT_COMPONENTS
+from nearfar.priors.responses import ResponsePrior
+from nearfar.transport import near
+from nearfar.transport.direct import footprint, look_up_each
+
+# Camera pixels of a batch; and of one whose windows the border clips.
+BATCH_PIXELS = 2048
+CLIPPED_BATCH_PIXELS = 512
+
+
+class _Start(NamedTuple):
+    """What a sweep but the first starts from."""
+
+    before: Rows
+    expected: Rows  # from the neighbours
+    of_quantisation: Callable[[slice | NDArray[np.int64]], Floats]  # see `_of_quantisation`
+
+
+def sweep_once(
+    problem: Problem,
+    before: Rows | None,
+    report: Callable[[float], None],
+    chosen: ComponentChoice | None = None,
+) -> Rows:
+    """Estimate every camera pixel once.
+
+    Parameters
+    ----------
+    problem : Problem
+    before : Rows, optional
+        Of the sweep before; none in the first.
+    report : callable
+        Called with the share done.
+    chosen : ComponentChoice, optional
+        Prior components that need not be chosen any more.
+    """
+    pixels, model = problem.pixels, problem.model
+    centred, projector = model.centred, problem.measurements.projector
+    xp, count = namespace(pixels.responses), len(pixels.responses)
+    rows = _empty_rows(problem, before)
+    choice = rows.choices[-1]
+    start = None
+    if before is not None:
+        start = _Start(before, _expected(problem, before), _of_quantisation(problem))
+    clipped = pixels.lit & ~xp.all(near.inside(pixels.centres, problem.window, projector), axis=1)
+
+    def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
+        rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
+        rows.near[selected] = found.near
+        rows.far[selected] = centred.uncentre(found.far, batch.centres)
+        rows.near_noise[selected] = found.near_noise
+
+    done = [0]
+
+    def choose(block: slice) -> None:
+        """Choose prior components, and estimate the camera pixels whose windows are whole."""
+        batch = gather(pixels, block, centred, projector, _explained(problem, start, block))
+        for lit, first, candidates in (
+            (True, 0, model.lit),
+            (False, len(LIT_COMPONENTS), model.unlit),
+        ):
+            (mine,) = xp.nonzero(batch.lit == lit)
+            if not len(mine) or candidates is None:
+                continue
+            given = chosen and chosen.of(block.start + mine, first)
+            component, scale = _choose(batch.only(mine), candidates, given)
+            choice.prior_component[block.start + mine] = component + first
+            choice.prior_scale[block.start + mine] = scale
+            whole = ~clipped[block.start + mine]
+            for place in np.unique(fetch(component[whole])).tolist():
+                (alike,) = xp.nonzero(whole & (component == place))
+                some = batch.only(mine[alike])
+                ratio = variance_ratio(some, scale[alike])
+                put(
+                    block.start + mine[alike],
+                    some,
+                    _with_spikes(some, candidates.priors[place], ratio, solve_whole, centred),
+                )
+        done[0] += block.stop - block.start
+        report(done[0] / count)
+
+    def estimate_clipped(part: NDArray[np.int64]) -> None:
+        """Estimate camera pixels of one prior component whose windows the border clips."""
+        selected = beside(part, pixels.responses)
+        batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
+        prior = model.lit.priors[int(choice.prior_component[selected[0]])]
+        ratio = rounded_ratio(variance_ratio(batch, choice.prior_scale[selected]))
+        put(selected, batch, _with_spikes(batch, prior, ratio, solve_clipped, centred))
+
+    side_by_side(choose, blocks(count, BATCH_PIXELS))
+    side_by_side(estimate_clipped, _clipped_alike(pixels, choice.prior_component, clipped))
+    if start is None:
+        return rows
+    return rows._replace(near=rows.near + start.expected.near, far=rows.far + start.expected.far)
+
+
+def _explained(
+    problem: Problem, start: _Start | None, selected: slice | NDArray[np.int64]
+) -> Floats | None:
+    """Return the responses that are expected, and direct light's to the quantisation error."""
+    if start is None:
+        return None
+    centred = problem.model.centred
+    responses = product(start.expected.near[selected], centred.on_window.T)
+    responses = centred.uncentre(responses, problem.pixels.centres[selected])
+    responses += start.expected.far[selected]
+    direct = start.before.amplitudes[selected, :, 1, None]
+    responses += direct * start.of_quantisation(selected)[:, None]
+    return responses
+
+
+def _empty_rows(problem: Problem, before: Rows | None) -> Rows:
+    """Make room for what a sweep finds, behind the choices of the sweeps before."""
+    responses = problem.pixels.responses
+    xp, (number, channels, count) = namespace(responses), responses.shape
+
+    def zeros(*shape: int, dtype: Any = xp.float32) -> Any:
+        return xp.zeros(shape, dtype=dtype, device=device(responses))
+
+    return Rows(
+        zeros(number, channels, COMMON_AMPLITUDES),
+        zeros(number, channels, problem.window**2),
+        zeros(number, channels, count),
+        zeros(number, channels),
+        (
+            *(before.choices if before is not None else ()),
+            ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),
+        ),
+    )
+
+
+def _choose(
+    batch: PixelBatch, candidates: PriorSet, given: ComponentChoice | None
+) -> tuple[Integers, Floats]:
+    """Choose prior components, places among the candidates, where they are not given."""
+    if given is None:
+        component, scale, _ = most_probable(batch, candidates)
+        return component, namespace(scale).astype(scale, namespace(scale).float32)
+    xp = namespace(given.prior_component)
+    # Given for lit camera pixels where there is no direct light now, or the reverse.
+    absent = (given.prior_component < 0) | (given.prior_component >= len(candidates.priors))
+    (left,) = xp.nonzero(absent)
+    if len(left):
+        component, scale = _choose(batch.only(left), candidates, None)
+        given.prior_component[left], given.prior_scale[left] = component, scale
+    return given
+
+
+def _clipped_alike(
+    pixels: AllPixels, component: Integers, clipped: Booleans
+) -> Iterator[NDArray[np.int64]]:
+    """Yield batches of one prior component; windows that are clipped alike stand together."""
+    (selected,) = np.nonzero(fetch(clipped))
+    centres, component = fetch(pixels.centres)[selected], fetch(component)
+    order = selected[np.lexsort((centres[:, 1], centres[:, 0], component[selected]))]
+    for group in np.split(order, np.flatnonzero(np.diff(component[order])) + 1):
+        for part in blocks(len(group), CLIPPED_BATCH_PIXELS):
+            yield group[part]
+
+
+def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
+    """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
+    # A row for each projector pixel, so that what a camera pixel reads lies side by side.
+    errors = problem.measurements.quantisation_error[problem.model.centred.places]
+    where = footprint(fetch(problem.pixels.correspondence), problem.measurements.projector)
+    error, places, shares = (
+        beside(np.ascontiguousarray(values), problem.pixels.responses)
+        for values in (errors.T, where.pixels, where.weights)
+    )
+
+    return lambda selected: look_up_each(error, places[selected], shares[selected])
+
+
+def _with_spikes(
+    batch: PixelBatch,
+    prior: ResponsePrior,
+    ratio: Floats,
+    solve: Callable[[PixelBatch, ResponsePrior, Floats, CentredBasis], PosteriorMean],
+    centred: CentredBasis,
+) -> PosteriorMean:
+    """Estimate camera pixels of one prior component; spikes are part of their windows."""
+    mean = solve(batch, prior, ratio, centred)
+    xp, here = namespace(mean.near), device(mean.near)
+    number = xp.arange(len(ratio), device=here)
+    found = mean
+    for _ in range(MAXIMUM_SPIKES if bool(xp.any(batch.lit)) else 0):
+        entry, gain = likeliest_spike(batch, prior, ratio, found)
+        (accepted,) = xp.nonzero(gain > LEAST_GAIN)
+        if not len(accepted):
+            break
+        number, ratio = number[accepted], ratio[accepted]
+        batch = with_spike(batch.only(accepted), entry[accepted])
+        found = solve(batch, prior, ratio, centred)
+        windows = xp.asarray(found.near, copy=True)
+        each, channel = (xp.arange(count, device=here) for count in windows.shape[:2])
+        for spike in range(batch.spikes.shape[1]):
+            at = (each[:, None], channel, batch.spikes[:, spike, None])
+            windows[at] += found.amplitudes[..., COMMON_AMPLITUDES + spike]
+        mean.near[number] = windows
+        mean.far[number] = found.far
+        mean.amplitudes[number] = found.amplitudes[..., :COMMON_AMPLITUDES]
+    return mean
+
+
+def _expected(problem: Problem, rows: Rows) -> Rows:
+    """Return what is expected of each camera pixel from its neighbours."""
+    pixels, measurements = problem.pixels, problem.measurements
+    camera, channels = measurements.camera, measurements.channels
+    xp, shape = namespace(rows.near), (*camera, channels)
+    white = pixels.white.reshape((*shape, 1))
+    tiny = float(np.finfo(np.float32).tiny) ** 0.5
+    noise = beside(measurements.noise.reshape(shape), rows.near)
+    variance = xp.clip((noise / white[..., 0]) ** 2, min=tiny)
+    far = expect_each(rows.far.reshape((*shape, -1)) / white, variance, problem.model.multiplicity)
+    windows = expect_together(
+        rows.near.reshape((*shape, -1)) / white,
+        rows.near_noise.reshape(shape) / white[..., 0] ** 2,
+        pixels.lit.reshape(camera),
+    )
+    inside = near.inside(pixels.centres, problem.window, measurements.projector)
+    windows *= white
+    far *= white
+    return rows._replace(
+        near=windows.reshape(rows.near.shape) * inside[:, None],
+        far=far.reshape(rows.far.shape),
+    )

@@ -1,0 +1,1 @@
+"""What rows of a transport are expected to be before any photo."""

@@ -1,0 +1,38 @@
+"""One Gaussian prior of a row of the transport, of few numbers.
+
+A bare wall, wax and a crease differ by orders of magnitude, and no single Gaussian holds them all.
+The prior is therefore a choice among components: which one a camera pixel has, and at which scale,
+is chosen by its own photos (their evidence).
+"""
+
+from typing import NamedTuple
+
+
+class PriorComponent(NamedTuple):
+    """A zero-mean Gaussian prior of a row t, less direct light, about q.
+
+    Everything is at unit prior scale: the standard deviation of near-range light at q is 1.
+
+    Attributes
+    ----------
+    near_reach : float
+        Projector pixels over which the standard deviation of near-range light falls by a factor e;
+        0 for no near-range light.
+    far_deviation : float
+        Standard deviation of far-range light's response to DC.
+    far_decay : float
+        Cycles per pattern grid over which the standard deviation of far-range light's responses
+        falls by a factor e.
+    direct_spread : float
+        Standard deviation of direct light outside its 2 x 2 footprint: independent on each of the
+        3 x 3 projector pixels around q.
+    roughness : float
+        Standard deviation of the part of a window entry that is independent of its neighbours,
+        over that of the smooth part.
+    """
+
+    near_reach: float
+    far_deviation: float
+    far_decay: float
+    direct_spread: float = 0.0
+    roughness: float = 0.0

@@ -1,0 +1,87 @@
+"""Covariances of a prior component: of window entries, and of far-range light's responses.
+
+Index convention: r runs over real responses, w over window entries.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.illumination.centred_basis import window_offsets
+from nearfar.illumination.real_basis import RealBasis
+from nearfar.priors.component import PriorComponent
+
+# Length, in projector pixels, over which neighbouring window entries are correlated.
+CORRELATION_LENGTH = 1.0
+# Floor of far-range light's spectral density, as a share of that at DC: sharp shadows have light
+# at every frequency.
+SPECTRAL_DENSITY_FLOOR = 1e-6
+
+
+def spectral_density(cycles: Floats, prior_component: PriorComponent) -> Floats:
+    """Return the mean square |b_k| of f at unit prior scale.
+
+    Parameters
+    ----------
+    cycles : ndarray
+        Distance of k from DC, in cycles per pattern grid.
+    """
+    falling = np.exp(-2 * cycles / prior_component.far_decay)
+    return np.asarray(prior_component.far_deviation**2 * (falling + SPECTRAL_DENSITY_FLOOR))
+
+
+def far_variance(basis: RealBasis, prior_component: PriorComponent) -> Floats:
+    """Return the variance of each real response of f at unit prior scale, shape (R,), float64.
+
+    The spectral density of a pair +-k is shared by its cosine and its sine.
+    """
+    cycles = basis.cycles * np.array(basis.projector)
+    density = spectral_density(np.hypot(cycles[:, 0], cycles[:, 1]), prior_component)
+    own = np.array([k.is_own_negative for k in basis.frequencies])
+    return np.asarray((density * np.where(own, 1.0, 0.5))[basis.index])
+
+
+class NearCovariance(NamedTuple):
+    """C = diag(deviation) (smooth + diag(independent)) diag(deviation) over window entries.
+
+    Attributes
+    ----------
+    deviation : ndarray, shape (W^2,), float64
+    smooth : ndarray, shape (W, W), float64
+        Along one axis: over the window it is the Kronecker product with itself.
+    independent : ndarray, shape (W^2,), float64
+    """
+
+    deviation: Floats
+    smooth: Floats
+    independent: Floats
+
+
+def smooth_covariance(length: float, entries: int) -> Floats:
+    """Return exp(-(i - j)^2 / (2 length^2)) along one axis, shape (entries, entries), float64."""
+    side = np.arange(entries)
+    return np.asarray(np.exp(-((side[:, None] - side) ** 2) / (2 * length**2)))
+
+
+def near_covariance_factors(prior_component: PriorComponent, window: int) -> NearCovariance:
+    """Return the factors of the covariance C of window entries at unit prior scale.
+
+    All are 0 where the component has no near-range light.
+    """
+    offsets = window_offsets(window).astype(np.float64)
+    smooth = smooth_covariance(CORRELATION_LENGTH, window)
+    if prior_component.near_reach == 0:
+        nothing = np.zeros(len(offsets))
+        return NearCovariance(nothing, smooth, nothing)
+    deviation = np.exp(-np.hypot(offsets[:, 0], offsets[:, 1]) / prior_component.near_reach)
+    around = np.abs(offsets).max(axis=1) <= 1
+    spread = (prior_component.direct_spread / deviation) ** 2 * around
+    return NearCovariance(deviation, smooth, spread + prior_component.roughness**2)
+
+
+def near_covariance(prior_component: PriorComponent, window: int) -> Floats:
+    """Return the covariance C of window entries at unit prior scale, (W^2, W^2), float64."""
+    deviation, smooth, independent = near_covariance_factors(prior_component, window)
+    middle = np.kron(smooth, smooth) + np.diag(independent)
+    return np.asarray(deviation[:, None] * middle * deviation)

@@ -1,0 +1,83 @@
+"""What was fitted to the simulated scenes: prior components, their scales, and typical scenes.
+
+`benchmarks/refit_priors.py` fits them again and prints how far they move.
+"""
+
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.typical import typical_scenes
+
+# Components of camera pixels with direct light. All but the last three were chosen one by one out
+# of 240 (near reach 0.8 to 6 pixels, far decay 0.7 to 8 cycles, six far deviations, with and
+# without spread of direct light), each time the one that raised the evidence of camera pixels of
+# cornell, cornell-aside, wedge and corner most (docs/decisions/0010). They stand in that order.
+LIT_COMPONENTS = (
+    PriorComponent(6.0, 256.0, 1.5),
+    PriorComponent(6.0, 16.0, 3.0),
+    PriorComponent(1.3, 1.0, 3.0),
+    PriorComponent(0.8, 64.0, 1.5),
+    PriorComponent(0.8, 64.0, 3.0),
+    PriorComponent(6.0, 64.0, 1.5),
+    PriorComponent(1.3, 256.0, 1.5),
+    PriorComponent(6.0, 64.0, 3.0),
+    PriorComponent(3.5, 16.0, 1.5),
+    PriorComponent(6.0, 64.0, 8.0),
+    PriorComponent(2.2, 16.0, 1.5, 3.0),
+    PriorComponent(0.8, 256.0, 3.0),
+    PriorComponent(1.3, 1.0, 1.5),
+    PriorComponent(0.8, 256.0, 0.7),
+    PriorComponent(2.2, 16.0, 1.5),
+    PriorComponent(6.0, 16.0, 8.0),
+    PriorComponent(2.2, 16.0, 0.7, 3.0),
+    PriorComponent(3.5, 4.0, 3.0),
+    PriorComponent(0.8, 1.0, 3.0),
+    PriorComponent(3.5, 16.0, 3.0),
+    # Windows without any smoothness, added by hand: none of the scenes has them, but photos that
+    # measure every entry must be able to ask for them.
+    PriorComponent(6.0, 1.0, 3.0, roughness=1.0),
+    PriorComponent(6.0, 16.0, 3.0, roughness=1.0),
+    PriorComponent(6.0, 64.0, 8.0, roughness=1.0),
+)
+# Components of camera pixels without direct light: far-range light alone.
+UNLIT_COMPONENTS = tuple(PriorComponent(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0))
+# Prior scales that are tried: standard deviations of near-range light at q, as shares of the
+# camera pixel's white.
+PRIOR_SCALES = tuple(2e-4 * 2.0**step for step in range(11))
+
+# What the planner plans for (docs/decisions/0012): camera pixels of the box, the wedge and the
+# corner together, and of the corner alone. Its creases are few, but what they send from wall to
+# wall decides how well pictures come out there. Each row is a component, its prior scale, and its
+# share of either scene.
+TYPICAL_SCENES = typical_scenes(
+    (1.0, 0.1),
+    (PriorComponent(1.3, 256.0, 1.5), 0.0005, (0.22, 0.0)),
+    (PriorComponent(0.8, 256.0, 0.7), 0.0006, (0.18, 0.0)),
+    (PriorComponent(0.8, 256.0, 3.0), 0.0005, (0.1, 0.0)),
+    (PriorComponent(0.8, 64.0, 1.5), 0.0016, (0.1, 0.0)),
+    (PriorComponent(6.0, 256.0, 1.5), 0.0004, (0.1, 0.0)),
+    (PriorComponent(6.0, 64.0, 3.0), 0.0016, (0.09, 0.0)),
+    (PriorComponent(6.0, 64.0, 8.0), 0.001, (0.05, 0.0)),
+    (PriorComponent(3.5, 16.0, 1.5), 0.005, (0.06, 0.0)),
+    (PriorComponent(1.3, 1.0, 3.0), 0.05, (0.05, 0.0)),
+    (PriorComponent(2.2, 16.0, 1.5, 3.0), 0.006, (0.05, 0.0)),
+    (PriorComponent(0.8, 1.0, 3.0), 0.069, (0.0, 0.004)),
+    (PriorComponent(0.8, 256.0, 0.7), 0.00062, (0.0, 0.191)),
+    (PriorComponent(1.3, 256.0, 1.5), 0.0016, (0.0, 0.055)),
+    (PriorComponent(1.3, 256.0, 1.5), 0.00049, (0.0, 0.345)),
+    (PriorComponent(0.8, 256.0, 0.7), 0.002, (0.0, 0.023)),
+    (PriorComponent(6.0, 256.0, 1.5), 0.0024, (0.0, 0.003)),
+    (PriorComponent(0.8, 256.0, 3.0), 0.00057, (0.0, 0.09)),
+    (PriorComponent(0.8, 256.0, 3.0), 0.0016, (0.0, 0.013)),
+    (PriorComponent(6.0, 64.0, 1.5), 0.0019, (0.0, 0.01)),
+    (PriorComponent(6.0, 256.0, 1.5), 0.00044, (0.0, 0.031)),
+    (PriorComponent(2.2, 16.0, 0.7, 3.0), 0.01, (0.0, 0.006)),
+    (PriorComponent(0.8, 64.0, 1.5), 0.0019, (0.0, 0.047)),
+    (PriorComponent(0.8, 64.0, 3.0), 0.00046, (0.0, 0.023)),
+    (PriorComponent(2.2, 16.0, 1.5), 0.0074, (0.0, 0.003)),
+    (PriorComponent(0.8, 64.0, 1.5), 0.00069, (0.0, 0.034)),
+    (PriorComponent(6.0, 64.0, 8.0), 0.0016, (0.0, 0.031)),
+    (PriorComponent(0.8, 64.0, 3.0), 0.0025, (0.0, 0.021)),
+    (PriorComponent(6.0, 64.0, 3.0), 0.0026, (0.0, 0.014)),
+    (PriorComponent(3.5, 16.0, 1.5), 0.0067, (0.0, 0.013)),
+    (PriorComponent(2.2, 16.0, 1.5, 3.0), 0.0096, (0.0, 0.009)),
+    (PriorComponent(6.0, 16.0, 3.0), 0.0023, (0.0, 0.004)),
+)

@@ -14,8 +14,7 @@ from nearfar.photometry.drift_removal import remove_drift
 from nearfar.photometry.measure import measure, measured_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.noise import fit_noise, mean_of_few
-from nearfar.plan import paper_plan, with_references
-from nearfar.plan.model import Sinusoid
+from nearfar.plan import Sinusoid, paper_plan, with_references
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from tests.conftest import QUIET

@@ -12,7 +12,7 @@ from nearfar.capture.store import Capture
 from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import full_scale_of_file, list_pictures, read_picture
-from nearfar.plan.model import GrayCode, Picture, Plan, Stripe
+from nearfar.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -110,17 +110,7 @@ def _listed(folder: Path, list_file: Path) -> list[Path]:
 
 def pairing(plan: Plan, index: int, path: Path) -> Pairing:
     """Say in words which pattern a photo is taken to show."""
-    pattern = plan.patterns[index]
-    if isinstance(pattern, Stripe):
-        return Pairing(index, f"{pattern.kind} {pattern.index}", path)
-    if isinstance(pattern, GrayCode):
-        inverse = ", inverse" if pattern.inverse else ""
-        return Pairing(index, f"{pattern.kind}, bit {pattern.bit}{inverse}", path)
-    if isinstance(pattern, Picture):
-        return Pairing(index, f"picture {pattern.seed} to check by", path)
-    fy, fx = pattern.frequency
-    inverse = ", inverse" if getattr(pattern, "inverse", False) else ""
-    return Pairing(index, f"{pattern.kind} of frequency ({fy}, {fx}){inverse}", path)
+    return Pairing(index, plan.patterns[index].description, path)
 
 
 def import_photos(

@@ -22,7 +22,7 @@ from nearfar.files import (
 )
 from nearfar.illumination.frequencies import DC
 from nearfar.markup import card, picture
-from nearfar.plan.model import Plan, Sinusoid, parse_plan
+from nearfar.plan import Plan, Sinusoid, parse_plan
 
 # Bytes of a chunk at most: rows of a large camera are read without the rest of it.
 CHUNK_BYTES = 2**22

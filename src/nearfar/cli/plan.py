@@ -14,7 +14,7 @@ from nearfar.errors import InputError
 from nearfar.progress import counting, progress_bar
 
 if TYPE_CHECKING:
-    from nearfar.plan.paper import Correspondence, Offset
+    from nearfar.plan.paper import Offset
     from nearfar.priors.typical import TypicalScenes
 
 
@@ -52,9 +52,9 @@ def plan(
     correspondence: Annotated[
         str | None,
         choice(
-            "nearfar.plan.paper:Correspondence",
-            help="Photos of black stripes or of Gray code, the patterns' own phase, or none. By "
-            "default stripes with --far, else phase.",
+            "nearfar.plan:CORRESPONDENCE_METHODS",
+            help="Photos of black stripes or of Gray code, the patterns' own phase, or none; or a "
+            "method of another package. By default stripes with --far, else phase.",
         ),
     ] = None,
     look: Annotated[
@@ -107,7 +107,7 @@ def plan(
             far,
             dropped=drop,
             offset=cast("Offset", offset or "inverse"),
-            correspondence=cast("Correspondence", correspondence or "stripes"),
+            correspondence=correspondence or "stripes",
         )
     if output is not None:
         from nearfar.files import new_output

@@ -1,6 +1,12 @@
 """Which projector pixel lights each camera pixel directly."""
 
 from nearfar.correspondence.gray import correspond_by_gray_code, has_gray_code
+from nearfar.correspondence.methods import (
+    CorrespondenceMethod,
+    find_correspondence,
+    method_named,
+    method_of,
+)
 from nearfar.correspondence.phase import correspond_by_phase
 from nearfar.correspondence.photographed import correspond_by_photos, has_correspondence_photos
 from nearfar.correspondence.result import (
@@ -14,15 +20,19 @@ from nearfar.correspondence.stripes import correspond_by_stripes, has_stripes
 
 __all__ = [
     "Correspondence",
+    "CorrespondenceMethod",
     "correspond_by_gray_code",
     "correspond_by_phase",
     "correspond_by_photos",
     "correspond_by_stripes",
+    "find_correspondence",
     "given_correspondence",
     "has_correspondence_photos",
     "has_gray_code",
     "has_stripes",
     "joined",
+    "method_named",
+    "method_of",
     "onto_projector",
     "read_correspondence",
 ]

@@ -18,9 +18,11 @@ import numpy as np
 from scipy.special import ndtr
 
 from nearfar.arrays import Booleans, Floats, Integers, Size
+from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
+from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.noise import fit_noise
 from nearfar.photometry.photos import Photos, size_of_rows
 from nearfar.plan import GrayCode, Plan
@@ -44,6 +46,16 @@ class GrayAxis(NamedTuple):
     # Least difference of a bit that matters.
     contrast: Floats
     inside: Booleans
+
+
+def gray_code(projector: Size) -> tuple[GrayCode, ...]:
+    """Return the Gray code of the rows, then of the columns, each bit beside its inverse."""
+    return tuple(
+        GrayCode(kind=kind, bit=bit, inverse=inverse)
+        for kind, side in (("gray rows", projector.height), ("gray columns", projector.width))
+        for bit in range(gray_bits(side))
+        for inverse in (False, True)
+    )
 
 
 def has_gray_code(plan: Plan) -> bool:
@@ -186,3 +198,15 @@ def _place_of(gray: Booleans) -> Integers:
     binary = np.logical_xor.accumulate(gray[::-1], axis=0)[::-1]
     place: Integers = np.sum(binary * (1 << np.arange(len(gray)))[:, None], axis=0)
     return place
+
+
+def _find(
+    photos: Photos,
+    rows: slice,
+    measure: Callable[[], Measurements],
+    progress: Callable[[int], None] | None = None,
+) -> Correspondence:
+    return correspond_by_gray_code(photos, rows, progress)
+
+
+GRAY_CODE = CorrespondenceMethod(patterns=gray_code, serves=has_gray_code, find=_find)

@@ -15,6 +15,7 @@ Index convention: c runs over camera pixels, r over real responses, k over frequ
 frequencies of one fy, o and i over the offsets of a footprint.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.correspondence.ambiguity import require_settled
 from nearfar.correspondence.background import SEARCH, SHARP, STRONG, Background
+from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.orientation import turned_round
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
@@ -30,6 +32,7 @@ from nearfar.illumination.frequencies import DC
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
+from nearfar.photometry.photos import Photos
 
 # Values of the score that are held at once.
 HELD = 2**22
@@ -322,3 +325,17 @@ def _nonnegative(
             left -= (value - entries[o]) * gram[o]
             entries[o] = value
     return entries, left
+
+
+def _find(
+    photos: Photos,
+    rows: slice,
+    measure: Callable[[], Measurements],
+    progress: Callable[[int], None] | None = None,
+) -> Correspondence:
+    return correspond_by_phase(measure())
+
+
+# Every plan has sinusoids, and whether they settle q shows when they are measured. Which way round
+# surfaces are seen depends on the row beside.
+PHASE = CorrespondenceMethod(serves=lambda _plan: True, find=_find, rows_beside=1)

@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from nearfar.arrays import Floats, Integers
+from nearfar.arrays import Floats, Integers, Size
+from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
+from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import BATCH, Photos, size_of_rows
 from nearfar.plan import Plan, Stripe
 
@@ -42,10 +44,20 @@ class _Axis(NamedTuple):
     share: Floats
 
 
+def stripes(projector: Size) -> tuple[Stripe, ...]:
+    """Return a black stripe on each row, then on each column: Py + Px patterns (section 5.1)."""
+    return (
+        *(Stripe(kind="black row", index=y) for y in range(projector.height)),
+        *(Stripe(kind="black column", index=x) for x in range(projector.width)),
+    )
+
+
 def has_stripes(plan: Plan) -> bool:
-    """Tell whether a plan holds stripes on both axes."""
-    kinds = {pattern.kind for pattern in plan.patterns if isinstance(pattern, Stripe)}
-    return kinds == {"black row", "black column"}
+    """Return whether a plan holds a stripe on every row and every column."""
+    return all(
+        _numbers(plan, kind).keys() == set(range(side))
+        for kind, side in zip(("black row", "black column"), plan.projector, strict=True)
+    )
 
 
 def correspond_by_stripes(
@@ -104,15 +116,20 @@ def correspond_by_stripes(
 
 
 def _axis(photos: Photos, kind: str, rows: slice, progress: Callable[[int], None] | None) -> _Axis:
-    numbers = {
-        pattern.index: i
-        for i, pattern in enumerate(photos.plan.patterns)
-        if isinstance(pattern, Stripe) and pattern.kind == kind
-    }
+    numbers = _numbers(photos.plan, kind)
     taken, white = _marginal(photos, [numbers[s] for s in sorted(numbers)], rows)
     if progress is not None:
         progress(len(numbers))
     return _peak(taken, white)
+
+
+def _numbers(plan: Plan, kind: str) -> dict[int, int]:
+    """Photo numbers by row or column."""
+    return {
+        pattern.index: i
+        for i, pattern in enumerate(plan.patterns)
+        if isinstance(pattern, Stripe) and pattern.kind == kind
+    }
 
 
 def _marginal(photos: Photos, numbers: Sequence[int], rows: slice) -> tuple[Floats, Floats]:
@@ -169,3 +186,15 @@ def _peak(taken: Floats, white: Floats) -> _Axis:
         deviations=first / deviation,
         share=total / np.maximum(white, 1e-12),
     )
+
+
+def _find(
+    photos: Photos,
+    rows: slice,
+    measure: Callable[[], Measurements],
+    progress: Callable[[int], None] | None = None,
+) -> Correspondence:
+    return correspond_by_stripes(photos, rows, progress)
+
+
+STRIPES = CorrespondenceMethod(patterns=stripes, serves=has_stripes, find=_find)

@@ -19,8 +19,7 @@ from nearfar.faults.records import (
 )
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.photometry.modulation import TOO_MANY, TOO_MUCH, of_pair, share_above_one
-from nearfar.plan import Plan
-from nearfar.plan.model import Sinusoid
+from nearfar.plan import Plan, Sinusoid
 
 # A photo is faulty with more than this share of its values at full scale.
 SATURATED_SHARE_OF_VALUES = 1e-3

@@ -14,7 +14,7 @@ from nearfar.illumination.frequencies import representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
-from nearfar.plan.model import Exponential
+from nearfar.plan.patterns import Exponential
 
 # Camera pixels at once.
 BLOCK = 512

@@ -1,12 +1,16 @@
 """What to project, and why."""
 
 from nearfar.plan.choose import choose_plan
-from nearfar.plan.model import GrayCode, Plan, Sinusoid, Stripe, parse_plan, read_plan
+from nearfar.plan.correspondence import CORRESPONDENCE_METHODS
+from nearfar.plan.model import Plan, parse_plan, read_plan
 from nearfar.plan.paper import paper_plan
+from nearfar.plan.patterns import GrayCode, Pattern, Sinusoid, Stripe
 from nearfar.plan.references import with_references
 
 __all__ = [
+    "CORRESPONDENCE_METHODS",
     "GrayCode",
+    "Pattern",
     "Plan",
     "Sinusoid",
     "Stripe",

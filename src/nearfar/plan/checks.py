@@ -4,7 +4,8 @@ from collections import Counter
 
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, Frequency
-from nearfar.plan.model import GrayCode, Pattern, Picture, Plan, Sinusoid, Stripe
+from nearfar.plan.model import Plan
+from nearfar.plan.patterns import Pattern, Picture, Sinusoid
 
 # Not those that `nearfar evaluate` relights under.
 SEEDS = (101, 102, 103)
@@ -20,10 +21,11 @@ def with_checks(plan: Plan) -> Plan:
     PlanError
         If the plan is not one whose first photos can be estimated from.
     """
-    if plan.offset != "reference" or plan.correspondence in {"stripes", "gray"}:
+    if plan.offset != "reference" or plan.counts["correspondence"]:
         raise PlanError(
-            "a plan of inverse pairs, stripes or Gray code tells nothing before its last photo, so "
-            "there is nothing to check on the way: make the plan with --photos."
+            "a plan of inverse pairs, or with photos of its own for correspondence such as stripes "
+            "or Gray code, can be estimated from only after its last photo, so that there is "
+            "nothing to check on the way: make the plan with --photos."
         )
     start = next(i for i, pattern in enumerate(plan.patterns) if not is_reference(pattern))
     checks = tuple(Picture(seed=seed) for _ in range(TIMES) for seed in SEEDS)
@@ -52,7 +54,7 @@ def ends(plan: Plan) -> list[int]:
     have just been shown for the second time or later; or every pattern has its inverse, white
     among them.
     """
-    own = [i for i, p in enumerate(plan.patterns) if isinstance(p, Stripe | GrayCode)]
+    own = [i for i, p in enumerate(plan.patterns) if p.purpose == "correspondence"]
     first, last = (own[0], own[-1]) if own else (0, -1)
     return [end for end in _ends_of(plan) if end <= first or end > last]
 

@@ -32,8 +32,9 @@ from nearfar.illumination.frequencies import (
     wrap,
 )
 from nearfar.illumination.real_basis import real_basis
-from nearfar.plan.model import Plan, Purpose
+from nearfar.plan.model import Plan
 from nearfar.plan.paper import LARGEST, sinusoids
+from nearfar.plan.patterns import Purpose
 from nearfar.plan.references import FEWEST, with_references
 from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.priors.fitted import TYPICAL_SCENES

@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -9,115 +10,46 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     PlainSerializer,
+    SerializeAsAny,
     ValidationError,
+    ValidationInfo,
+    field_validator,
     model_validator,
 )
+from pydantic_core import PydanticCustomError
 
 from nearfar.arrays import AnyPath, Size, as_size
 from nearfar.errors import MissingFileError, PlanError, UnreadableFileError
-from nearfar.illumination import patterns
-from nearfar.illumination.frequencies import (
-    Frequency,
-    frequency_from_text,
-    frequency_to_text,
+from nearfar.plan.correspondence import CORRESPONDENCE_METHODS, pattern_types_of
+from nearfar.plan.patterns import (
+    OWN_PATTERNS,
+    Exponential,
+    Frozen,
+    Pattern,
+    Purpose,
+    kinds_of,
+    pattern_reader,
 )
-from nearfar.illumination.pictures import natural_picture
 
 # Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by,
 # version 3 Gray code; all of an earlier version is of the next as well.
 FORMAT_VERSION = 3
 READABLE = (1, 2, 3)
 
-Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check"]
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
 
 
-FrequencyField = Annotated[
-    Frequency,
-    BeforeValidator(frequency_from_text),
-    PlainSerializer(frequency_to_text),
-]
 SizeField = Annotated[Size, BeforeValidator(as_size), PlainSerializer(list)]
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+# Type of the errors of what another package has to bring.
+NOT_INSTALLED = "not_installed"
 
 
-class Sinusoid(_Frozen):
-    """A cosine or sine with offset, or the inverse of one."""
-
-    kind: Literal["cosine", "sine"]
-    frequency: FrequencyField
-    inverse: bool = False
-    purpose: Purpose
-
-    def draw(self, size: Size) -> NDArray[np.uint8]:
-        """Draw the 8-bit pattern, shape (Py, Px)."""
-        shape = patterns.cosine if self.kind == "cosine" else patterns.sine
-        shown = patterns.quantise(shape(self.frequency, size))
-        return patterns.invert(shown) if self.inverse else shown
-
-
-class Exponential(_Frozen):
-    """exp(-j 2 pi k.p): the theory's pattern, for simulation only."""
-
-    kind: Literal["exponential"] = "exponential"
-    frequency: FrequencyField
-    purpose: Purpose
-
-
-class Stripe(_Frozen):
-    """One black row or column on white, for correspondence."""
-
-    kind: Literal["black row", "black column"]
-    index: int = Field(ge=0)
-    purpose: Purpose = "correspondence"
-
-    def draw(self, size: Size) -> NDArray[np.uint8]:
-        """Draw the 8-bit pattern, shape (Py, Px)."""
-        shape = patterns.black_row if self.kind == "black row" else patterns.black_column
-        return patterns.quantise(shape(self.index, size))
-
-
-class GrayCode(_Frozen):
-    """One bit of the Gray code of all rows or columns, or its inverse, for correspondence."""
-
-    kind: Literal["gray rows", "gray columns"]
-    bit: int = Field(ge=0)
-    inverse: bool = False
-    purpose: Purpose = "correspondence"
-
-    def draw(self, size: Size) -> NDArray[np.uint8]:
-        """Draw the 8-bit pattern, shape (Py, Px)."""
-        shape = patterns.gray_rows if self.kind == "gray rows" else patterns.gray_columns
-        shown = patterns.quantise(shape(self.bit, size))
-        return patterns.invert(shown) if self.inverse else shown
-
-
-class Picture(_Frozen):
-    """A natural picture that no estimate sees, to check relighting by."""
-
-    kind: Literal["picture"] = "picture"
-    seed: int = Field(ge=0)
-    purpose: Literal["check"] = "check"
-
-    def draw(self, size: Size) -> NDArray[np.uint8]:
-        """Draw the 8-bit pattern, shape (Py, Px)."""
-        return patterns.quantise(natural_picture(size, self.seed).astype(np.float64))
-
-
-Pattern = Annotated[
-    Sinusoid | Exponential | Stripe | GrayCode | Picture, Field(discriminator="kind")
-]
-
-
-class Plan(_Frozen):
+class Plan(Frozen):
     """What to project: one pattern for each photo, in the order to shoot.
 
     A pattern may stand in it several times: its photos are averaged.
@@ -133,9 +65,11 @@ class Plan(_Frozen):
     offset : {"inverse", "reference", "none"}
         Inverse pairs, whites and blacks at intervals for all, or none (complex patterns, for
         simulation).
-    correspondence : {"stripes", "gray", "phase", "none"}
-        Photos of stripes or of Gray code, the phase of the transport's own photos, or none at all.
-    patterns : tuple of Sinusoid, Exponential, Stripe, GrayCode or Picture
+    correspondence : str
+        Name of a method of `nearfar.plan.correspondence.CORRESPONDENCE_METHODS`: photos of
+        "stripes" or of "gray" code, the "phase" of the transport's own photos, "none" at all, or
+        a method that another package adds.
+    patterns : tuple of Pattern
 
     Examples
     --------
@@ -154,20 +88,42 @@ class Plan(_Frozen):
     far: SizeField
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
-    correspondence: Literal["stripes", "gray", "phase", "none"]
-    patterns: tuple[Pattern, ...]
+    correspondence: str
+    patterns: tuple[SerializeAsAny[Pattern], ...]
+
+    @field_validator("correspondence")
+    @classmethod
+    def _correspondence_is_installed(cls, name: str) -> str:
+        if name not in CORRESPONDENCE_METHODS:
+            raise PydanticCustomError(
+                NOT_INSTALLED,
+                "needs the correspondence method {name}, which is not installed: install the "
+                "package that adds it, or make the plan with one of {known}",
+                {"name": repr(name), "known": ", ".join(CORRESPONDENCE_METHODS)},
+            )
+        return name
+
+    @field_validator("patterns", mode="before")
+    @classmethod
+    def _patterns_are_of_known_kinds(cls, values: Any, info: ValidationInfo) -> Any:
+        unknown = _kinds_in(values) - _OWN_KINDS
+        # The methods of nearfar are not loaded for patterns that nearfar has anyway.
+        method = info.data.get("correspondence")
+        added = pattern_types_of(method) if unknown and method is not None else ()
+        if unknown := unknown.difference(*map(kinds_of, added)):
+            raise PydanticCustomError(
+                NOT_INSTALLED,
+                "has patterns of the kind {kind}, which neither nearfar nor its correspondence "
+                "method has: install the package that adds that kind, or make the plan again with "
+                "'nearfar plan -o'",
+                {"kind": repr(min(unknown))},
+            )
+        return pattern_reader(added).validate_python(values)
 
     @model_validator(mode="after")
     def _patterns_lie_on_the_projector(self) -> "Plan":
         for pattern in self.patterns:
-            if isinstance(pattern, GrayCode):
-                side = self.projector[0 if pattern.kind == "gray rows" else 1]
-                if pattern.bit >= patterns.gray_bits(side):
-                    raise ValueError(f"{pattern.kind} have no bit {pattern.bit} on the projector")
-            if isinstance(pattern, Stripe):
-                rows = pattern.kind == "black row"
-                if pattern.index >= (self.projector.height if rows else self.projector.width):
-                    raise ValueError(f"{pattern.kind} {pattern.index} is outside the projector")
+            pattern.require_place_on(self.projector)
         return self
 
     @cached_property
@@ -219,7 +175,6 @@ class Plan(_Frozen):
         pattern = self.patterns[index]
         if isinstance(pattern, Exponential):
             self.require_real("draw")
-            raise PlanError(f"pattern {index} of the plan is complex and cannot be drawn.")
         return pattern.draw(self.projector)
 
     def __repr__(self) -> str:
@@ -248,6 +203,18 @@ class Plan(_Frozen):
         lines = ",\n".join(f"    {json.dumps(pattern)}" for pattern in data.pop("patterns"))
         head = ",\n".join(f"  {json.dumps(key)}: {json.dumps(data[key])}" for key in data)
         return f'{{\n{head},\n  "patterns": [\n{lines}\n  ]\n}}\n'
+
+
+_OWN_KINDS = frozenset[str]().union(*map(kinds_of, OWN_PATTERNS))
+
+
+def _kinds_in(values: Any) -> frozenset[str]:
+    """Return the kinds of patterns, or of their JSON, that have one."""
+    kinds = (
+        value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
+        for value in (values if isinstance(values, list | tuple) else ())
+    )
+    return frozenset(kind for kind in kinds if isinstance(kind, str))
 
 
 def parse_plan(text: str, *, source: str = "plan") -> Plan:
@@ -283,6 +250,8 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
         return Plan.model_validate(data | {"version": FORMAT_VERSION})
     except ValidationError as error:
         first = error.errors()[0]
+        if first["type"] == NOT_INSTALLED:
+            raise UnreadableFileError(f"{source} {first['msg']}.") from None
         where = ".".join(str(part) for part in first["loc"]) or "plan"
         raise UnreadableFileError(
             f"{source} is a damaged plan: {where}: {first['msg']}; make it again with "

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Literal
 
-from nearfar.arrays import AnySize, Size, as_size
+from nearfar.arrays import AnySize, as_size
 from nearfar.checks import as_count
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import (
@@ -15,15 +15,15 @@ from nearfar.illumination.frequencies import (
     near_frequencies,
     representatives,
 )
-from nearfar.illumination.patterns import gray_bits
-from nearfar.plan.model import Exponential, GrayCode, Plan, Purpose, Sinusoid, Stripe
+from nearfar.plan.correspondence import CORRESPONDENCE_METHODS
+from nearfar.plan.model import Plan
+from nearfar.plan.patterns import Exponential, Purpose, Sinusoid
 from nearfar.plan.references import with_references
 
 # No projector has a longer side.
 LARGEST = 16384
 
 Offset = Literal["inverse", "reference", "none"]
-Correspondence = Literal["stripes", "gray", "phase", "none"]
 
 
 def paper_plan(
@@ -33,7 +33,7 @@ def paper_plan(
     *,
     dropped: AnySize | None = None,
     offset: Offset = "inverse",
-    correspondence: Correspondence = "stripes",
+    correspondence: str = "stripes",
 ) -> Plan:
     """Plan the patterns of the paper.
 
@@ -51,9 +51,10 @@ def paper_plan(
     offset : {"inverse", "reference", "none"}
         Each pattern with its inverse; each once, with whites and blacks at intervals to take the
         offset out; or the theory's complex patterns (simulation only).
-    correspondence : {"stripes", "gray", "phase", "none"}
-        Stripes take photos of their own, Py + Px, and Gray code with its inverse 2 log2 Py +
-        2 log2 Px.
+    correspondence : str
+        Name of a correspondence method: "stripes", "gray", "phase", "none", or one that another
+        package adds. Stripes take photos of their own, Py + Px, and Gray code with its inverse
+        2 log2 Py + 2 log2 Px.
 
     Returns
     -------
@@ -67,7 +68,9 @@ def paper_plan(
         If the projector has a side over `LARGEST`, if W or the far band is larger than it, or if
         the dropped block is even or larger than W.
     InputError
-        If a size or W is not made of whole numbers.
+        If a size or W is not made of whole numbers, or there is no such correspondence method.
+    ExtensionError
+        If the package that adds the correspondence method cannot be loaded.
 
     Examples
     --------
@@ -77,6 +80,7 @@ def paper_plan(
     """
     projector, far = as_size(projector, "projector"), as_size(far, "far band")
     window = as_count(window, "window")
+    method = CORRESPONDENCE_METHODS[correspondence]
     if max(projector) > LARGEST:
         raise PlanError(
             f"a projector of {projector} has a side over {LARGEST}: give the pattern grid, of "
@@ -107,7 +111,7 @@ def paper_plan(
         *shown([CHECKERBOARD], "direct"),
         *shown(far_frequencies(far, projector), "far"),
         *shown(near_frequencies(window, dropped), "near"),
-        *_OF_CORRESPONDENCE[correspondence](projector),
+        *method.patterns(projector),
     )
     return Plan(
         projector=projector,
@@ -149,30 +153,4 @@ _SHAPES: dict[
     "inverse": _inverse_pairs,
     "reference": sinusoids,
     "none": _exponentials,
-}
-
-
-def stripes(projector: Size) -> tuple[Stripe, ...]:
-    """Return a black stripe on each row, then on each column: Py + Px patterns (section 5.1)."""
-    return (
-        *(Stripe(kind="black row", index=y) for y in range(projector.height)),
-        *(Stripe(kind="black column", index=x) for x in range(projector.width)),
-    )
-
-
-def gray_code(projector: Size) -> tuple[GrayCode, ...]:
-    """Return the Gray code of the rows, then of the columns, each bit beside its inverse."""
-    return tuple(
-        GrayCode(kind=kind, bit=bit, inverse=inverse)
-        for kind, side in (("gray rows", projector.height), ("gray columns", projector.width))
-        for bit in range(gray_bits(side))
-        for inverse in (False, True)
-    )
-
-
-_OF_CORRESPONDENCE: dict[Correspondence, Callable[[Size], tuple[Stripe | GrayCode, ...]]] = {
-    "stripes": stripes,
-    "gray": gray_code,
-    "phase": lambda _projector: (),
-    "none": lambda _projector: (),
 }

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC
-from nearfar.plan.model import Pattern, Purpose, Sinusoid
+from nearfar.plan.patterns import Pattern, Purpose, Sinusoid
 
 # Other photos from one white and black to the next.
 INTERVAL = 18

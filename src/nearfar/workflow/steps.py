@@ -5,7 +5,6 @@ step takes the whole camera at once and returns what the next one needs.
 """
 
 from dataclasses import replace
-from typing import Literal
 
 from threadpoolctl import threadpool_limits
 
@@ -13,11 +12,8 @@ from nearfar.arrays import AnySize, as_size
 from nearfar.capture import Capture
 from nearfar.correspondence import (
     Correspondence,
-    correspond_by_gray_code,
-    correspond_by_phase,
-    correspond_by_stripes,
-    has_correspondence_photos,
-    has_stripes,
+    method_named,
+    method_of,
 )
 from nearfar.devices import Device
 from nearfar.errors import InputError
@@ -30,8 +26,6 @@ from nearfar.progress import Report, counting, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.workflow.blocks import brightest_white, without_drift
 from nearfar.workflow.methods import Method
-
-CorrespondenceMethod = Literal["stripes", "gray", "phase"]
 
 
 def measure(capture: Capture, *, progress: Report | None = None) -> Measurements:
@@ -74,7 +68,7 @@ def measure(capture: Capture, *, progress: Report | None = None) -> Measurements
 def correspond(
     capture: Capture,
     *,
-    method: CorrespondenceMethod | None = None,
+    method: str | None = None,
     measurements: Measurements | None = None,
     progress: Report | None = None,
 ) -> Correspondence:
@@ -83,9 +77,10 @@ def correspond(
     Parameters
     ----------
     capture : Capture
-    method : {"stripes", "gray", "phase"}, optional
-        By photos of stripes or of Gray code, or by the phase of the photos of transport. By
-        default the photos that the plan has for it, or else the phase.
+    method : str, optional
+        "stripes", "gray" or "phase": by photos of stripes or of Gray code, or by the phase of the
+        photos of transport; or a method that another package adds. By default the one that the
+        plan was made for.
     measurements : Measurements, optional
         The capture's, which the phase is read from; measured here if left out.
     progress : callable, optional
@@ -108,20 +103,16 @@ def correspond(
     64
     """
     report, plan = progress or ignore_progress, capture.plan
-    if method is None and has_correspondence_photos(plan):
-        method = "stripes" if has_stripes(plan) else "gray"
-    if method in {None, "phase"}:
-        found = measurements or measure(capture, progress=report)
-        with threadpool_limits(1, "blas"):
-            return correspond_by_phase(found)
-    if method not in {"stripes", "gray"}:
-        raise InputError(
-            f"there is no correspondence method {method!r}: choose stripes, gray or phase."
-        )
+    chosen = method_of(plan) if method is None else method_named(method)
     photos = without_drift(capture, report)
-    decode = correspond_by_stripes if method == "stripes" else correspond_by_gray_code
-    count = sum(pattern.purpose == "correspondence" for pattern in plan.patterns)
-    return decode(photos, progress=counting(report, "correspondence", count))
+    count = max(1, plan.counts["correspondence"])
+    with threadpool_limits(1, "blas"):
+        return chosen.find(
+            photos,
+            slice(0, photos.camera.height),
+            lambda: measurements or measure(capture, progress=report),
+            counting(report, "correspondence", count),
+        )
 
 
 def estimate_transport(

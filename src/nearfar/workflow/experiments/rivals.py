@@ -10,7 +10,7 @@ from nearfar.baselines.compressive import reconstruct_compressive
 from nearfar.baselines.random_patterns import answer_in_theory, bernoulli_patterns
 from nearfar.illumination.frequencies import representatives
 from nearfar.illumination.real_basis import real_basis
-from nearfar.plan.model import Exponential
+from nearfar.plan.patterns import Exponential
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.evaluate import percentiles, snr, snr_of_rows
 from nearfar.workflow.experiments.acquired import Report, thin

@@ -1,0 +1,220 @@
+"""Patterns as data: what a photo of a plan shows, and what for."""
+
+from abc import ABC, abstractmethod
+from functools import cache
+from typing import Annotated, Any, Literal, Union
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    model_serializer,
+)
+
+from nearfar.arrays import Size
+from nearfar.errors import PlanError
+from nearfar.illumination import patterns
+from nearfar.illumination.frequencies import Frequency, frequency_from_text, frequency_to_text
+from nearfar.illumination.pictures import natural_picture
+
+Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check"]
+
+FrequencyField = Annotated[
+    Frequency,
+    BeforeValidator(frequency_from_text),
+    PlainSerializer(frequency_to_text),
+]
+
+
+class Frozen(BaseModel):
+    """Data that never changes and refuses keys that it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+class Pattern(Frozen, ABC):
+    """What one photo shows.
+
+    A kind of pattern is a subclass: it narrows `kind` to a literal of its own, by which it is found
+    again in a file, adds what `draw` needs, and gives `purpose` a default.
+
+    Attributes
+    ----------
+    kind : str
+    purpose : {"direct", "near", "far", "reference", "correspondence", "check"}
+    """
+
+    kind: str
+    purpose: Purpose
+
+    @abstractmethod
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return self.kind
+
+    def require_place_on(self, projector: Size) -> None:
+        """Refuse a pattern that does not fit a projector; one that fits any does nothing.
+
+        Raises
+        ------
+        ValueError
+        """
+
+    @model_serializer(mode="wrap")
+    def _purpose_last(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # The order in which plan files have always had the keys.
+        data: dict[str, Any] = handler(self)
+        purpose = data.pop("purpose")
+        return {**data, "purpose": purpose}
+
+
+class Sinusoid(Pattern):
+    """A cosine or sine with offset, or the inverse of one."""
+
+    kind: Literal["cosine", "sine"]
+    frequency: FrequencyField
+    inverse: bool = False
+    purpose: Purpose
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return f"{_with_frequency(self.kind, self.frequency)}{', inverse' if self.inverse else ''}"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        shape = patterns.cosine if self.kind == "cosine" else patterns.sine
+        drawn = patterns.quantise(shape(self.frequency, size))
+        return patterns.invert(drawn) if self.inverse else drawn
+
+
+class Exponential(Pattern):
+    """exp(-j 2 pi k.p): the theory's pattern, for simulation only."""
+
+    kind: Literal["exponential"] = "exponential"
+    frequency: FrequencyField
+    purpose: Purpose
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return _with_frequency(self.kind, self.frequency)
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Refuse: no projector can display complex values.
+
+        Raises
+        ------
+        PlanError
+        """
+        raise PlanError(
+            f"the {self.description} is complex and cannot be drawn on a projector of {size}."
+        )
+
+
+class Stripe(Pattern):
+    """One black row or column on white, for correspondence."""
+
+    kind: Literal["black row", "black column"]
+    index: int = Field(ge=0)
+    purpose: Purpose = "correspondence"
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return f"{self.kind} {self.index}"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        shape = patterns.black_row if self.kind == "black row" else patterns.black_column
+        return patterns.quantise(shape(self.index, size))
+
+    def require_place_on(self, projector: Size) -> None:
+        """Refuse a row or column that the projector does not have.
+
+        Raises
+        ------
+        ValueError
+        """
+        if self.index >= projector[0 if self.kind == "black row" else 1]:
+            raise ValueError(f"{self.description} is outside the projector")
+
+
+class GrayCode(Pattern):
+    """One bit of the Gray code of all rows or columns, or its inverse, for correspondence."""
+
+    kind: Literal["gray rows", "gray columns"]
+    bit: int = Field(ge=0)
+    inverse: bool = False
+    purpose: Purpose = "correspondence"
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return f"{self.kind}, bit {self.bit}{', inverse' if self.inverse else ''}"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        shape = patterns.gray_rows if self.kind == "gray rows" else patterns.gray_columns
+        drawn = patterns.quantise(shape(self.bit, size))
+        return patterns.invert(drawn) if self.inverse else drawn
+
+    def require_place_on(self, projector: Size) -> None:
+        """Refuse a bit that no row or column number of the projector has.
+
+        Raises
+        ------
+        ValueError
+        """
+        if self.bit >= patterns.gray_bits(projector[0 if self.kind == "gray rows" else 1]):
+            raise ValueError(f"{self.kind} have no bit {self.bit} on the projector")
+
+
+class Picture(Pattern):
+    """A natural picture that no estimate sees, to check relighting by."""
+
+    kind: Literal["picture"] = "picture"
+    seed: int = Field(ge=0)
+    purpose: Literal["check"] = "check"
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return f"picture {self.seed} to check by"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        return patterns.quantise(natural_picture(size, self.seed).astype(np.float64))
+
+
+OWN_PATTERNS: tuple[type[Pattern], ...] = (Sinusoid, Exponential, Stripe, GrayCode, Picture)
+
+
+def kinds_of(pattern: type[Pattern]) -> frozenset[str]:
+    """Return the kinds that a subclass of `Pattern` stands for."""
+    return frozenset(getattr(pattern.model_fields["kind"].annotation, "__args__", ()))
+
+
+@cache
+def pattern_reader(added: tuple[type[Pattern], ...]) -> TypeAdapter[tuple[Pattern, ...]]:
+    """Return what validates patterns: nearfar's own, and those of some more kinds."""
+    # Made at run time, so that no type checker follows it.
+    union: Any = Union
+    annotated: Any = Annotated
+    sequence: Any = tuple
+    kind = annotated[union[(*OWN_PATTERNS, *added)], Field(discriminator="kind")]
+    return TypeAdapter(sequence[kind, ...])
+
+
+def _with_frequency(kind: str, frequency: Frequency) -> str:
+    return f"{kind} of frequency ({frequency.fy}, {frequency.fx})"

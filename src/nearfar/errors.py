@@ -3,6 +3,11 @@
 Every fault a user can cause or meet is a `NearfarError` joined with the standard type that a
 Python programmer would expect, so that ``except FileNotFoundError`` keeps working. A message
 names the thing, says what is wrong with it, and gives the cure, in one sentence.
+
+A message speaks to Python: a parameter is named in backticks, as `window`, an argument as
+`offset='inverse'`, a call as `acquire(resume=True)`, and no message names an option of the command
+line. The command line prints its own options instead, ``--near``, ``--offset inverse`` and
+``acquire --resume``; see `nearfar.cli.flags`.
 """
 
 

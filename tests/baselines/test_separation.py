@@ -139,15 +139,15 @@ def test_sinusoids_have_these_values(period, shifts):
 @pytest.mark.parametrize(
     ("draw", "words"),
     [
-        (lambda: checkerboards(PROJECTOR, 0), "--side 0"),
+        (lambda: checkerboards(PROJECTOR, 0), "`side=0`"),
         (lambda: checkerboards(PROJECTOR, 7), "1 to 6"),
-        (lambda: checkerboards(PROJECTOR, 2, 3), "--step 3"),
-        (lambda: checkerboards(PROJECTOR, 2, 0), "--step 0"),
+        (lambda: checkerboards(PROJECTOR, 2, 3), "`step=3`"),
+        (lambda: checkerboards(PROJECTOR, 2, 0), "`step=0`"),
         (lambda: count_checkerboards(0), "squares of 0"),
         (lambda: checkerboards(Size(1, 40), 1), "1x40"),
-        (lambda: sinusoids(PROJECTOR, 1), "--period 1"),
+        (lambda: sinusoids(PROJECTOR, 1), "`period=1`"),
         (lambda: sinusoids(PROJECTOR, 13), "2 to 12"),
-        (lambda: sinusoids(PROJECTOR, 3, 2), "--shifts 2"),
+        (lambda: sinusoids(PROJECTOR, 3, 2), "`shifts=2`"),
     ],
 )
 def test_patterns_that_cannot_be(draw, words):

@@ -190,10 +190,10 @@ def test_a_dark_projector_keeps_nothing(rig, tmp_path):
 def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_path):
     first = acquire(PLAN, tmp_path / "c.zarr", replace(rig, seed=9))
     before = first.photos[:]
-    with pytest.raises(KeptInterrupt, match="--resume --force goes on"):
+    with pytest.raises(KeptInterrupt, match="`resume=True, force=True` goes on"):
         acquire(PLAN, tmp_path / "c.zarr", rig, enough=_stop_after(20), force=True)
     np.testing.assert_array_equal(open_capture(tmp_path / "c.zarr").photos[:], before)
-    with pytest.raises(ExistingOutputError, match="--force"):
+    with pytest.raises(ExistingOutputError, match="`force=True`"):
         acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
     told = []
     acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, force=True, progress=told.append)
@@ -204,8 +204,8 @@ def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_p
 def test_the_same_plan_with_other_options_is_named(rig, tmp_path):
     checked = with_checks(PLAN)
     for before, now, word in (
-        (PLAN, checked, "leave out --until"),
-        (checked, PLAN, "give --until"),
+        (PLAN, checked, r"leave out `with_checks\(plan\)`"),
+        (checked, PLAN, r"give `with_checks\(plan\)`"),
     ):
         path = tmp_path / f"{len(before.patterns)}.zarr"
         with pytest.raises(KeptInterrupt):
@@ -259,7 +259,7 @@ def test_a_full_disk_costs_no_photo(rig, undisturbed, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(stores, "_write_durably", full)
-        with pytest.raises(StorageError, match=r"disk is full.*; 25 of .* are kept.*--resume"):
+        with pytest.raises(StorageError, match=r"disk is full.*; 25 of .* are kept.*`resume=True`"):
             acquire(PLAN, tmp_path / "c.zarr", rig)
     _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
@@ -277,7 +277,9 @@ def test_another_plan_or_rig_is_refused_and_nothing_is_lost(rig, undisturbed, tm
 
 def test_what_is_there_is_replaced_by_force_alone(rig, undisturbed, tmp_path):
     _stopped(rig, tmp_path / "c.zarr", 12)
-    with pytest.raises(ExistingOutputError, match=r"c\.zarr\.unfinished.*--resume.*--force"):
+    with pytest.raises(
+        ExistingOutputError, match=r"c\.zarr\.unfinished.*`resume=True`.*`force=True`"
+    ):
         acquire(PLAN, tmp_path / "c.zarr", rig)
     told = []
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, force=True, progress=told.append)
@@ -289,7 +291,7 @@ def test_what_is_there_is_replaced_by_force_alone(rig, undisturbed, tmp_path):
 
 def test_what_is_not_finished_is_no_capture_yet(rig, tmp_path):
     _stopped(rig, tmp_path / "c.zarr", 12)
-    with pytest.raises(UnreadableFileError, match=r"not finished.*--resume"):
+    with pytest.raises(UnreadableFileError, match=r"not finished.*`acquire.resume=True.`"):
         open_capture(tmp_path / "c.zarr.unfinished")
 
 
@@ -302,7 +304,7 @@ def test_two_at_once_are_refused(rig, undisturbed, tmp_path):
         for options in ({"resume": True}, {"force": True}, {"resume": True, "force": True}):
             with pytest.raises(ExistingOutputError, match="another nearfar is at work"):
                 acquire(PLAN, path, rig, **options)
-        with pytest.raises(ExistingOutputError, match="--resume"):
+        with pytest.raises(ExistingOutputError, match="`resume=True`"):
             acquire(PLAN, path, rig)
         refused.append(number)
         return False

@@ -107,7 +107,7 @@ def test_rows_correspond_on_their_own(shoot):
 
 def test_a_plan_without_stripes_is_told(shoot):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
-    with pytest.raises(InputError, match=r"--correspondence Q\.npy"):
+    with pytest.raises(InputError, match="give the correspondence with `correspondence`"):
         correspond_by_stripes(shoot(plan, _world(Size(3, 3))))
 
 

@@ -343,7 +343,7 @@ def test_a_light_has_the_size_of_the_projector(tmp_path: Path) -> None:
         read_light(path, Size(5, 4))
     path = write(tmp_path, "a.npy", npy_bytes(np.full((4, 5), -0.01)))
     assert read_light(path, Size(4, 5)).min() < 0
-    with pytest.raises(InputError, match="leave out --srgb"):
+    with pytest.raises(InputError, match="leave out `srgb`"):
         read_light(path, Size(4, 5), srgb=True)
 
 

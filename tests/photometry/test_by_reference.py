@@ -233,7 +233,7 @@ def _without(chosen):
     ],
 )
 def test_references_that_are_missing_are_told(small_world, shoot, plan, message):
-    with pytest.raises(InputError, match=message + ".*--offset reference"):
+    with pytest.raises(InputError, match=message + ".*`offset='reference'`"):
         measured_frequencies(plan)
     with pytest.raises(InputError, match=message):
         measure(shoot(plan, small_world))

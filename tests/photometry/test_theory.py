@@ -45,8 +45,8 @@ def test_a_transport_that_obeys_the_model_is_recovered():
 
 def test_plans_that_are_shot_and_other_projectors_are_refused():
     world = model_transport(Size(12, 20), Size(3, 4), window=5, far=Size(3, 3))
-    with pytest.raises(PlanError, match="--offset none"):
+    with pytest.raises(PlanError, match="`offset='none'`"):
         measure_in_theory(paper_plan(world.projector, 5, Size(3, 3)), world)
     other = paper_plan(Size(20, 12), 5, Size(3, 3), offset="none")
-    with pytest.raises(InputError, match="--projector 12x20"):
+    with pytest.raises(InputError, match=r"`projector=\(12, 20\)`"):
         measure_in_theory(other, world)

@@ -144,7 +144,7 @@ def test_the_plan_follows_what_was_looked_at():
 def test_a_look_without_prior_components_is_refused():
     look = replace(_quick_look(LIT_COMPONENTS[0], 0.01), posterior=None)
     for ask in (typical_of, noise_of):
-        with pytest.raises(InputError, match="--method joint"):
+        with pytest.raises(InputError, match="`method='joint'`"):
             ask(look)
 
 

@@ -174,13 +174,13 @@ def test_what_does_not_fit_is_refused(arguments, message):
 
 @pytest.mark.parametrize("dropped", [Size(2, 3), Size(3, 4), Size(7, 7)])
 def test_a_block_that_is_not_around_dc_is_refused(dropped):
-    with pytest.raises(PlanError, match="--drop"):
+    with pytest.raises(PlanError, match="`dropped="):
         paper_plan(Size(16, 16), 5, Size(3, 3), dropped=dropped)
 
 
 def test_complex_patterns_cannot_be_drawn():
     plan = paper_plan(Size(8, 8), 3, Size(3, 3), offset="none")
-    with pytest.raises(PlanError, match="--offset inverse"):
+    with pytest.raises(PlanError, match="`offset='inverse'`"):
         plan.draw(0)
 
 

@@ -193,5 +193,5 @@ def test_no_rig_of_that_name(tmp_path):
 
 def test_a_rig_of_another_projector_is_refused(tmp_path):
     _stored(tmp_path)
-    with pytest.raises(InputError, match="--projector 12x14"):
+    with pytest.raises(InputError, match=r"`projector=\(12, 14\)`"):
         open_rig(str(tmp_path / "exact.zarr"), Size(14, 12))

@@ -184,7 +184,7 @@ def test_rows_are_read_in_blocks(tmp_path, generator, size):
 
 def test_nothing_is_overwritten_without_force(stored, generator):
     before = load_transport(stored)
-    with pytest.raises(ExistingOutputError, match="--force"):
+    with pytest.raises(ExistingOutputError, match="`force=True`"):
         save_transport(_transport(generator), stored)
     np.testing.assert_array_equal(load_transport(stored).near, before.near)
     save_transport(before.with_gains(near=2.0), stored, force=True)

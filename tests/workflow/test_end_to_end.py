@@ -285,7 +285,7 @@ def test_a_plan_by_reference_that_lacks_photos_is_refused(tmp_path, world):
 
 
 def test_a_rig_of_another_size_is_refused(tmp_path, world):
-    with pytest.raises(InputError, match="--projector 24x30"):
+    with pytest.raises(InputError, match=r"`projector=\(24, 30\)`"):
         acquire(paper_plan(Size(30, 24), 7, Size(3, 3)), tmp_path / "c.zarr", _rig(world))
     assert list(tmp_path.iterdir()) == []
 

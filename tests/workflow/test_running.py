@@ -150,7 +150,7 @@ def test_a_plan_may_end_whenever_white_and_black_come_by(side, photos):
 def test_a_plan_of_pairs_or_stripes_is_refused():
     for offset, by in (("inverse", "none"), ("reference", "stripes")):
         plan = paper_plan(Size(16, 20), 5, Size(3, 3), offset=offset, correspondence=by)
-        with pytest.raises(PlanError, match="--photos"):
+        with pytest.raises(PlanError, match="`photos`"):
             with_checks(plan)
 
 

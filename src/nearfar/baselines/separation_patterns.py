@@ -56,7 +56,7 @@ def checkerboards(projector: Size, side: int = SIDE, step: int | None = None) ->
     step = default_step(side) if step is None else step
     if side < 1 or 2 * side > min(projector):
         raise InputError(
-            f"--side {side} does not fit a projector of {projector}, which holds squares of 1 to "
+            f"`side={side}` does not fit a projector of {projector}, which holds squares of 1 to "
             f"{min(projector) // 2} pixels: choose one of these."
         )
     offsets = _offsets(side, step)
@@ -79,7 +79,7 @@ def count_checkerboards(side: int = SIDE, step: int | None = None) -> int:
 def _offsets(side: int, step: int) -> range:
     if side < 1 or not 1 <= step <= side:
         raise InputError(
-            f"--step {step} does not suit squares of {side} pixels: choose squares of 1 pixel or "
+            f"`step={step}` does not suit squares of {side} pixels: choose squares of 1 pixel or "
             f"more and a step of 1 pixel to a whole square."
         )
     return range(0, side, step)
@@ -109,7 +109,7 @@ def sinusoids(projector: Size, period: int = PERIOD, shifts: int = SHIFTS) -> ND
     """
     if not 2 <= period <= min(projector):
         raise InputError(
-            f"--period {period} does not fit a projector of {projector}: choose a period of 2 to "
+            f"`period={period}` does not fit a projector of {projector}: choose a period of 2 to "
             f"{min(projector)} pixels."
         )
     count = count_sinusoids(shifts) // 2
@@ -137,6 +137,6 @@ def count_sinusoids(shifts: int = SHIFTS) -> int:
     """
     if shifts < 3:
         raise InputError(
-            f"--shifts {shifts} cannot tell offset and amplitude apart: choose 3 or more."
+            f"`shifts={shifts}` cannot tell offset and amplitude apart: choose 3 or more."
         )
     return 2 * shifts

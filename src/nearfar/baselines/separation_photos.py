@@ -172,7 +172,7 @@ def read_to_separate(
     if black_level is not None and (black is not None or ends_in_black):
         raise InputError(
             f"{black or paths[-1]}, the photo under black, holds the black level already: leave "
-            f"out --black-level, or give a photo of ambient light."
+            f"out `black_level`, or give a photo of ambient light."
         )
     if dark is not None:
         paths = [*paths, dark]

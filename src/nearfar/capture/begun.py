@@ -70,9 +70,13 @@ def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
 
     if of_transport(before) and of_transport(before) == of_transport(now):
         checked = len(shown(before)) > len(of_transport(before))
-        cure = "give --until with --resume" if checked else "leave out --until"
-        return f"{folder} was begun {'with' if checked else 'without'} --until: {cure}."
-    return f"{folder} was begun with another plan: give that one, or begin anew with --force."
+        if checked:
+            return (
+                f"{folder} was begun with `with_checks(plan)`: give `with_checks(plan)` with "
+                f"`resume=True`."
+            )
+        return f"{folder} was begun without `with_checks(plan)`: leave out `with_checks(plan)`."
+    return f"{folder} was begun with another plan: give that one, or begin anew with `force=True`."
 
 
 def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwise: str) -> None:

@@ -79,7 +79,7 @@ def pair(plan: Plan, folder: Path, list_file: Path | None = None) -> list[Path]:
 def _hint(folder: Path, photos: Sequence[Path]) -> str:
     endings = Counter(p.suffix.lower() for p in folder.iterdir() if p not in photos and p.suffix)
     if photos or not endings:
-        return ", or name them with --list"
+        return ", or name them with `list_file`"
     (ending, number), *_ = endings.most_common(1)
     return f" as PNG, TIFF, EXR or NPY (the folder has {number} files that end in {ending})"
 

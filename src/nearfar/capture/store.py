@@ -169,7 +169,7 @@ def open_capture(path: AnyPath) -> Capture:
     plan = parse_plan(json.dumps(attributes.get("plan")), source=f"the plan in {path}")
     if path.suffix == UNFINISHED:
         raise UnreadableFileError(
-            f"{path} is a capture that was not finished: go on with it by acquire --resume."
+            f"{path} is a capture that was not finished: go on with it by `acquire(resume=True)`."
         )
     photos = open_array(group, "photos")
     times, saturated = read_array(group, "time"), read_array(group, "saturated")

@@ -257,11 +257,11 @@ class CaptureWriter:
         ended = json.loads(self._plan.first(self.taken).to_json())
         if before.get("plan") not in (now["plan"], ended):
             raise InputError(other_plan(folder, before.get("plan"), now["plan"]))
-        require_same_rig(folder, before.get("rig"), now["rig"], "begin anew with --force")
+        require_same_rig(folder, before.get("rig"), now["rig"], "begin anew with `force=True`")
         photos, scale = open_array(group, "photos"), before.get("full_scale")
         many = self.taken > min(photos.shape[0], len(self._plan.patterns))
         if many or not is_positive(scale):
-            raise UnreadableFileError(f"{folder} is damaged: begin anew with --force.")
+            raise UnreadableFileError(f"{folder} is damaged: begin anew with `force=True`.")
         self._scale = float(scale)
         self._means[: self.taken] = [taken.mean for taken in self._taken]
         if self._taken:

@@ -27,7 +27,7 @@ def check(
         Size | None,
         typer.Option(parser=size, metavar="HxW", help="Near frequencies left out; as in plan."),
     ] = None,
-    output: Annotated[
+    page: Annotated[
         Path | None,
         typer.Option("--html", help="Write a page with maps here.", metavar="FILE.html"),
     ] = None,
@@ -46,18 +46,18 @@ def check(
     from nearfar.workflow.check import SAMPLE, check_model, numbers_of
     from nearfar.workflow.conditioning import condition_near
 
-    if output is not None:
-        keep_for_page(output, transport, force=force)
+    if page is not None:
+        keep_for_page(page, transport, force=force)
     with progress_bar("checking", quiet=quiet) as report:
         world = load_world(transport, None, None)
         plan = paper_plan(world.projector, near, far, dropped=drop, correspondence="none")
-        sample = SAMPLE if output is None else world.camera.pixels
+        sample = SAMPLE if page is None else world.camera.pixels
         found = check_model(
             world, near, far, sample=sample, progress=lambda share: report("rows", share)
         )
         condition = condition_near(world.projector, near, plan.dropped)
-        if output is not None:
-            with new_output(output, force=force) as partial:
+        if page is not None:
+            with new_output(page, force=force) as partial:
                 text = check_page(transport.name, found, condition, world.camera)
                 partial.write_text(text, encoding="utf-8")
     if as_json:

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 import typer
 
+from nearfar.cli.flags import with_flags
 from nearfar.cli.saying import warn
 from nearfar.errors import KeptInterrupt, NearfarError
 
@@ -28,7 +29,7 @@ def faults_in_sentences() -> Iterator[None]:
         # At exit it would be too late to say that a disk or a pipe took nothing.
         sys.stdout.flush()
     except NearfarError as error:
-        _fail(str(error))
+        _fail(with_flags(str(error)))
     except KeyboardInterrupt as stopped:
         _interrupted(stopped)
     except BrokenPipeError:
@@ -97,7 +98,7 @@ def stopped_cleanly() -> Iterator[None]:
 def _interrupted(stopped: KeyboardInterrupt | None = None) -> NoReturn:
     status = 128 + (_stops[-1] if _stops else signal.SIGINT)
     what = "interrupted: nothing half-written was left behind."
-    _fail(str(stopped) if isinstance(stopped, KeptInterrupt) else what, status=status)
+    _fail(with_flags(str(stopped)) if isinstance(stopped, KeptInterrupt) else what, status=status)
 
 
 def _discard_stdout() -> None:

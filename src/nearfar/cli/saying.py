@@ -4,6 +4,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nearfar.cli.flags import with_flags
+
 if TYPE_CHECKING:
     from nearfar.capture import Capture
 
@@ -15,8 +17,8 @@ def say(text: str, *, quiet: bool = False) -> None:
 
 
 def warn(text: str) -> None:
-    """Print a warning on stderr."""
-    print(f"warning: {text}", file=sys.stderr)
+    """Print a warning on stderr, the Python in it as options; see `nearfar.cli.flags`."""
+    print(f"warning: {with_flags(text)}", file=sys.stderr)
 
 
 def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:

@@ -93,7 +93,7 @@ def correspond_by_gray_code(
     if not has_gray_code(plan):
         raise InputError(
             "the plan of this capture has no Gray code: give the correspondence with "
-            "--correspondence Q.npy, or plan with --correspondence gray."
+            "`correspondence`, or plan with `correspondence='gray'`."
         )
     rows = slice(0, photos.camera.height) if rows is None else rows
     camera = size_of_rows(photos, rows)

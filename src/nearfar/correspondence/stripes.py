@@ -87,7 +87,7 @@ def correspond_by_stripes(
     if not has_stripes(plan):
         raise InputError(
             "the plan of this capture has no stripes: give the correspondence with "
-            "--correspondence Q.npy, or plan with --correspondence stripes."
+            "`correspondence`, or plan with `correspondence='stripes'`."
         )
     rows = slice(0, photos.camera.height) if rows is None else rows
     camera = size_of_rows(photos, rows)

@@ -194,7 +194,7 @@ def read_light(path: Path, projector: Size, *, srgb: bool = False) -> NDArray[np
             f"resize it to {projector}."
         )
     if srgb and pixels.dtype.kind == "f":
-        raise InputError(f"{path} holds floats, which are linear light: leave out --srgb.")
+        raise InputError(f"{path} holds floats, which are linear light: leave out `srgb`.")
     light = pixels.astype(np.float32) / np.float32(full_scale_of(pixels.dtype))
     return from_srgb(light) if srgb else light
 

@@ -65,7 +65,7 @@ def new_output(
     force : bool
         Replace what is there.
     replaceable : callable
-        Says of an existing folder whether `force` may replace it, so that ``--force ~`` costs
+        Says of an existing folder whether `force` may replace it, so that replacing ``~`` costs
         nobody their home. By default an empty folder or a Zarr of nearfar's.
 
     Yields
@@ -147,10 +147,12 @@ def checked_target(path: Path, *, force: bool, replaceable: Callable[[Path], boo
                 f"{path} is neither a file nor a folder and is left alone: choose another name."
             )
         if not force:
-            raise ExistingOutputError(f"{path} exists already: choose another name or add --force.")
+            raise ExistingOutputError(
+                f"{path} exists already: choose another name or add `force=True`."
+            )
         if stat.S_ISDIR(mode) and not replaceable(target):
             raise ExistingOutputError(
-                f"{path} is a folder that nearfar did not write, so --force leaves it alone: "
+                f"{path} is a folder that nearfar did not write, so `force=True` leaves it alone: "
                 f"choose another name, or remove the folder yourself."
             )
     return target

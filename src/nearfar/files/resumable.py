@@ -85,13 +85,14 @@ def _checked(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
     unfinished = target.with_name(f"{target.name}{UNFINISHED}")
     if resume and not unfinished.is_dir():
         raise MissingFileError(
-            f"{unfinished} is not there, so there is nothing to go on with: leave out --resume."
+            f"{unfinished} is not there, so there is nothing to go on with: leave out "
+            f"`resume=True`."
         )
     if not resume and unfinished.exists():
         if not force:
             raise ExistingOutputError(
-                f"{unfinished} holds what was not finished: go on with it by --resume, or begin "
-                f"anew by --force."
+                f"{unfinished} holds what was not finished: go on with it by `resume=True`, or "
+                f"begin anew by `force=True`."
             )
         checked_target(unfinished, force=True, replaceable=_is_begun)
     return target, unfinished

@@ -39,8 +39,8 @@ def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
     largest = min(native.height // projector.height, native.width // projector.width)
     if largest < (scale or 1):
         raise InputError(
-            f"a pattern of {projector} at --scale {scale or 1} does not fit on --native {native}: "
-            f"choose a larger frame or a smaller scale."
+            f"a pattern of {projector} at `scale={scale or 1}` does not fit on "
+            f"`native={tuple(native)}`: choose a larger frame or a smaller scale."
         )
     return Shown(native, scale or largest)
 

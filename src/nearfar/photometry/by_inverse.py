@@ -68,7 +68,7 @@ def find_pairs(plan: Plan) -> list[Pair]:
         if len(partners) != len(numbers):
             raise InputError(
                 f"the plan shows pattern {numbers[0]} without its inverse, and measurements are "
-                f"made of inverse pairs: plan with --offset inverse."
+                f"made of inverse pairs: plan with `offset='inverse'`."
             )
         if not inverse:
             pairs += [

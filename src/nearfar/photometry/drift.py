@@ -66,9 +66,9 @@ def find_references(plan: Plan) -> References:
     )
     if min(map(len, found)) < FEWEST:
         raise InputError(
-            f"the plan shows white {len(found.whites)} and black {len(found.blacks)} times, which "
-            f"tells neither noise nor drift: plan again with --offset reference, which shows each "
-            f"at least {FEWEST} times."
+            f"the plan shows white {len(found.whites)} and black {len(found.blacks)} times, "
+            f"which tells neither noise nor drift: plan again with `offset='reference'`, "
+            f"which shows each at least {FEWEST} times."
         )
     return found
 

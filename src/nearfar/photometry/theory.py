@@ -68,13 +68,13 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
     frequencies = [p.frequency for p in plan.patterns if isinstance(p, Exponential)]
     if plan.offset != "none" or not frequencies:
         raise PlanError(
-            f"a plan with --offset {plan.offset} has real patterns, which are shot, not measured "
-            f"in theory: make the plan with --offset none."
+            f"a plan with `offset='{plan.offset}'` has real patterns, which are shot, not measured "
+            f"in theory: make the plan with `offset='none'`."
         )
     if plan.projector != transport.projector:
         raise InputError(
             f"the plan is for a projector of {plan.projector}, the transport has "
-            f"{transport.projector}: make the plan with --projector {transport.projector}."
+            f"{transport.projector}: make the plan with `projector={tuple(transport.projector)}`."
         )
     basis = real_basis(representatives(frequencies), plan.projector)
     # Sums over thousands of pixels: in float64, so that exact recovery stays exact.

@@ -25,7 +25,7 @@ def with_checks(plan: Plan) -> Plan:
         raise PlanError(
             "a plan of inverse pairs, or with photos of its own for correspondence such as stripes "
             "or Gray code, can be estimated from only after its last photo, so that there is "
-            "nothing to check on the way: make the plan with --photos."
+            "nothing to check on the way: make the plan with `photos`."
         )
     start = next(i for i, pattern in enumerate(plan.patterns) if not is_reference(pattern))
     checks = tuple(Picture(seed=seed) for _ in range(TIMES) for seed in SEEDS)

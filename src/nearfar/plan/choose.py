@@ -139,8 +139,8 @@ def choose_plan(
     noise = as_number(noise, "noise")
     if photos < FEWEST_PHOTOS:
         raise PlanError(
-            f"{photos} photos are too few to settle correspondence and light: plan with --photos "
-            f"{FEWEST_PHOTOS} or more."
+            f"{photos} photos are too few to settle correspondence and light: plan with "
+            f"`photos={FEWEST_PHOTOS}` or more."
         )
     if min(projector) < SMALLEST_SIDE or max(projector) > LARGEST:
         raise PlanError(
@@ -150,7 +150,7 @@ def choose_plan(
     window = default_window(projector) if window is None else window
     if not 1 <= window <= min(projector):
         raise PlanError(
-            f"W = {window} does not fit a projector of {projector}: choose --near between 1 and "
+            f"W = {window} does not fit a projector of {projector}: choose `window` between 1 and "
             f"{min(projector)}."
         )
     choice = choose_frequencies(

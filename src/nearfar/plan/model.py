@@ -166,8 +166,8 @@ class Plan(Frozen):
         """
         if self.offset == "none":
             raise PlanError(
-                f"a plan with --offset none has complex patterns, which no projector can show, "
-                f"so there is nothing to {what}: make the plan with --offset inverse."
+                f"a plan with `offset='none'` has complex patterns, which no projector can show, "
+                f"so there is nothing to {what}: make the plan with `offset='inverse'`."
             )
 
     def draw(self, index: int) -> NDArray[np.uint8]:

@@ -88,12 +88,12 @@ def paper_plan(
         )
     if not 1 <= window <= min(projector):
         raise PlanError(
-            f"W = {window} does not fit a projector of {projector}: choose --near between 1 and "
+            f"W = {window} does not fit a projector of {projector}: choose `window` between 1 and "
             f"{min(projector)}."
         )
     if far.height > projector.height or far.width > projector.width:
         raise PlanError(
-            f"the far band {far} is larger than the projector {projector}: choose --far at most "
+            f"the far band {far} is larger than the projector {projector}: choose `far` at most "
             f"{projector}."
         )
     dropped = (
@@ -103,8 +103,8 @@ def paper_plan(
     )
     if dropped.height % 2 == 0 or dropped.width % 2 == 0 or max(dropped) > window:
         raise PlanError(
-            f"--drop {dropped} is not a block of near frequencies around DC: both sides must be "
-            f"odd, from 1 to W = {window}."
+            f"`dropped={tuple(dropped)}` is not a block of near frequencies around DC: both "
+            f"sides must be odd, from 1 to W = {window}."
         )
     shown = _SHAPES[offset]
     patterns = (

@@ -74,6 +74,6 @@ def _posterior_of(transport: "Transport") -> "Posterior":
     if transport.posterior is None:
         raise InputError(
             "this transport holds no prior components to plan for: reconstruct the quick look with "
-            "--method joint."
+            "`method='joint'`."
         )
     return transport.posterior

@@ -1,6 +1,7 @@
 """Self-contained HTML pages: pictures inside, no script, nothing fetched."""
 
 import base64
+import re
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -90,8 +91,9 @@ def colour_map(values: Floats, low: float, high: float, unit: str, caption: str)
 
 
 def listed(sentences: list[str]) -> str:
-    """Return a list of sentences."""
-    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    """Return a list of sentences; what they have in backticks is code."""
+    shown = (re.sub("`([^`]+)`", r"<code>\1</code>", escape(sentence)) for sentence in sentences)
+    items = "".join(f"<li>{sentence}</li>" for sentence in shown)
     return f'<ul class="told">{items}</ul>'
 
 

@@ -130,7 +130,7 @@ def _listen(place: Place) -> socket.socket:
             ) from None
         raise InputError(
             f"port {place.port} at {place.host} cannot be served on ({error.strerror}): give "
-            f"another by --port, or 0 for any that is free."
+            f"another by `port`, or 0 for any that is free."
         ) from None
     return listening
 

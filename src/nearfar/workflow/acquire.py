@@ -160,7 +160,9 @@ def shoot_again(
     capture = open_capture(path)
     if capture.plan.patterns != plan.patterns[: len(capture.plan.patterns)]:
         raise InputError(f"{path} is of another plan: give that one.")
-    require_same_rig(Path(path), capture.rig, rig.describe(), "take them all anew with --force")
+    require_same_rig(
+        Path(path), capture.rig, rig.describe(), "take them all anew with `force=True`"
+    )
     known = [number for number in numbers if 0 <= number < len(plan.patterns)]
     # Those that follow one another at a time, so that the rig calls them by their numbers.
     runs = _runs(known)
@@ -206,7 +208,7 @@ class _Kept:
         return self._resume or not useless
 
     def __str__(self) -> str:
-        again = "--resume --force" if self._path.exists() else "--resume"
+        again = "`resume=True, force=True`" if self._path.exists() else "`resume=True`"
         return (
             f"{self.photos} of {self._count} photos are kept in {self.folder}, and {again} goes on "
             f"with them"
@@ -236,7 +238,7 @@ def _require(plan: Plan, rig: Rig) -> None:
     if rig.projector != plan.projector:
         raise InputError(
             f"the plan is for a projector of {plan.projector}, the rig has {rig.projector}: make "
-            f"the plan with --projector {rig.projector}."
+            f"the plan with `projector={tuple(rig.projector)}`."
         )
 
 

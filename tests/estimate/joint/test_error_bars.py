@@ -280,7 +280,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
 
 def test_a_transport_without_posterior_says_so():
     transport = replace(_transport(np.array([[6, 8]])), posterior=None)
-    with pytest.raises(InputError, match="--method joint"):
+    with pytest.raises(InputError, match="`method='joint'`"):
         ErrorBars(transport)
     assert _transport(np.array([[6, 8]])).with_gains(near=2.0).posterior is None
 

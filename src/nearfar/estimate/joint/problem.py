@@ -107,8 +107,8 @@ def build_model(
     frequencies = [k for k in measured.frequencies if k != DC]
     if len(frequencies) == len(measured.frequencies) or not frequencies:
         raise InputError(
-            "these measurements lack white, or all but white: plan with --photos, or --near and "
-            "--far."
+            "these measurements lack white, or all but white: plan with `photos`, or `window` and "
+            "`far`."
         )
     # Pairs of a cosine and a sine side by side, those without a sine at the end.
     frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)

@@ -64,7 +64,7 @@ def open_simulated_rig(
     if world.projector != projector:
         raise InputError(
             f"{name} has a projector of {world.projector}, the plan one of {projector}: make the "
-            f"plan with --projector {world.projector}."
+            f"plan with `projector={tuple(world.projector)}`."
         )
     rendered = world if isinstance(world, RenderedWorld) else None
     return SimulatedRig(

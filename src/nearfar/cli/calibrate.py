@@ -1,14 +1,9 @@
 """``nearfar calibrate``."""
 
-from typing import TYPE_CHECKING
-
 from nearfar.cli.options import Force, Quiet, RigFile
 from nearfar.cli.saying import say, warn
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
-
-if TYPE_CHECKING:
-    from nearfar.workflow.calibrate import Findings
 
 
 def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
@@ -19,7 +14,11 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
     Example: nearfar calibrate rig.toml
     """
     from nearfar.files import check_output
-    from nearfar.report.calibration import is_calibration, write_calibration
+    from nearfar.report.calibration import (
+        describe_calibration,
+        is_calibration,
+        write_calibration,
+    )
     from nearfar.rigs.calibration import calibration_folder
     from nearfar.rigs.opening import open_rig_to_calibrate
     from nearfar.rigs.tables import RealTable, read_rig_table
@@ -41,24 +40,5 @@ def calibrate(rig: RigFile, force: Force = False, quiet: Quiet = False) -> None:
     write_calibration(folder, found, force=force)
     for note in found.notes:
         warn(note)
-    say(_told(found), quiet=quiet)
+    say(describe_calibration(found), quiet=quiet)
     say(f"calibration and plots written to {folder}", quiet=quiet)
-
-
-def _told(found: "Findings") -> str:
-    """Say in lines what a calibration found."""
-    known = found.calibration
-    half = sum(row[0] < 0.5 for row in known.response)
-    lines = [
-        f"half of white's light at level {half} of 255; straightened to "
-        f"{known.residual:.2%} of white",
-        f"red, green and blue together: {1 + known.superposition:.1%} of white",
-        f"camera: black level {known.black:.4g}, {known.gain:.4g} levels an electron, read noise "
-        f"{known.read:.3g} levels",
-        f"light under black: {known.ambient:.2%} of full scale",
-    ]
-    if known.exposure is not None:
-        lines.append(f"exposure {known.exposure:.4g} s")
-    if known.linearity is not None:
-        lines.append(f"camera linear to {known.linearity:.2%} of full scale")
-    return "\n".join(lines)

@@ -25,10 +25,9 @@ def convert(
 
     Example: nearfar convert transport.zarr T.npy
     """
-    import numpy as np
-
-    from nearfar.files import check_output, new_output
+    from nearfar.files import check_output, write_array
     from nearfar.transport.store import load_transport
+    from nearfar.workflow.convert import dense_array
 
     if output.suffix.lower() != ".npy":
         raise InputError(f"{output} does not end in .npy: choose a name that does.")
@@ -36,16 +35,8 @@ def convert(
     check_output(output, force=force)
     with progress_bar("converting", quiet=quiet):
         opened = load_transport(transport)
-        if correspondence:
-            array, what = opened.correspondence, "correspondence"
-        else:
-            array, what = np.moveaxis(opened.dense(), 1, 2), "dense transport"
-            array = array[..., 0] if opened.channels == 1 else array
-        array = np.ascontiguousarray(array)
-        with new_output(output, force=force) as partial, partial.open("wb") as file:
-            header = np.lib.format.header_data_from_array_1_0(array)
-            np.lib.format.write_array_header_1_0(file, header)
-            # numpy's own writing does not tell a full disk from other faults.
-            file.write(array.data)
+        array = opened.correspondence if correspondence else dense_array(opened)
+        write_array(output, array, force=force)
+    what = "correspondence" if correspondence else "dense transport"
     shape = " x ".join(map(str, array.shape))
     say(f"{what}, {shape} {array.dtype}, written to {output}", quiet=quiet)

@@ -1,14 +1,10 @@
 """``nearfar preview``."""
 
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from nearfar.cli.options import Browser, Port, Quiet, RigFile
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
-
-if TYPE_CHECKING:
-    pass
 
 
 def preview(

@@ -56,17 +56,10 @@ def relight(
 
     Example: nearfar relight transport.zarr light.png relit.exr --srgb --gain near=2
     """
-    import numpy as np
-
-    from nearfar.estimate.joint import ErrorBars
-    from nearfar.files import (
-        check_output,
-        check_picture_ending,
-        read_light,
-        write_picture,
-    )
+    from nearfar.files import check_output, check_picture_ending, read_light, write_picture
     from nearfar.transport.colour import as_channels_see
     from nearfar.transport.store import open_transport
+    from nearfar.workflow.relight import error_bars_of_stored, relight_stored
 
     gains = _gains(gain or [])
     check_picture_ending(output)
@@ -74,12 +67,9 @@ def relight(
     check_output(output, force=force)
     with progress_bar("relighting", quiet=quiet):
         opened = open_transport(transport)
-        shown = read_light(light, opened.projector, srgb=srgb)
-        shown = as_channels_see(shown, opened.channels, opened.provenance)
-        parts = []
-        for rows in opened.blocks():
-            relit = ErrorBars(rows).picture if error_bars else rows.relight
-            parts.append(relit(shown, **gains).astype(np.float32))
-        write_picture(output, np.concatenate(parts), force=force)
+        projected = read_light(light, opened.projector, srgb=srgb)
+        projected = as_channels_see(projected, opened.channels, opened.provenance)
+        make = error_bars_of_stored if error_bars else relight_stored
+        write_picture(output, make(opened, projected, gains), force=force)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"
     say(f"{what} of {opened.camera} written to {output}", quiet=quiet)

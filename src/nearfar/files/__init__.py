@@ -1,6 +1,6 @@
 """Files: pictures, Zarr stores, and outputs that appear whole or not at all."""
 
-from nearfar.files.arrays import read_arrays
+from nearfar.files.arrays import read_arrays, write_array
 from nearfar.files.codecs import encode_png
 from nearfar.files.colour import from_srgb, luminance, to_srgb
 from nearfar.files.images import (
@@ -60,5 +60,6 @@ __all__ = [
     "require_finite",
     "resumable_output",
     "to_srgb",
+    "write_array",
     "write_picture",
 ]

@@ -10,6 +10,31 @@ from numpy.typing import NDArray
 
 from nearfar.errors import MissingFileError, UnreadableFileError
 from nearfar.files.codecs import DAMAGE
+from nearfar.files.output import new_output
+
+
+def write_array(path: Path, array: NDArray[Any], *, force: bool = False) -> None:
+    """Write an .npy, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    array : ndarray
+        Of numbers.
+    force : bool
+        Replace a file that is there.
+
+    Raises
+    ------
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`.
+    """
+    array = np.ascontiguousarray(array)
+    with new_output(path, force=force) as partial, partial.open("wb") as file:
+        header = np.lib.format.header_data_from_array_1_0(array)
+        np.lib.format.write_array_header_1_0(file, header)
+        # NumPy's own writing does not tell a full disk from other faults.
+        file.write(array.data)
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:

@@ -40,6 +40,34 @@ def write_calibration(folder: Path, found: Findings, *, force: bool = False) -> 
         save(camera, partial, "camera")
 
 
+def describe_calibration(found: Findings) -> str:
+    """Return in lines what a calibration found.
+
+    Parameters
+    ----------
+    found : Findings
+
+    Returns
+    -------
+    str
+    """
+    known = found.calibration
+    half = sum(row[0] < 0.5 for row in known.response)
+    lines = [
+        f"half of white's light at level {half} of 255; straightened to "
+        f"{known.residual:.2%} of white",
+        f"red, green and blue together: {1 + known.superposition:.1%} of white",
+        f"camera: black level {known.black:.4g}, {known.gain:.4g} levels an electron, read noise "
+        f"{known.read:.3g} levels",
+        f"light under black: {known.ambient:.2%} of full scale",
+    ]
+    if known.exposure is not None:
+        lines.append(f"exposure {known.exposure:.4g} s")
+    if known.linearity is not None:
+        lines.append(f"camera linear to {known.linearity:.2%} of full scale")
+    return "\n".join(lines)
+
+
 def is_calibration(folder: Path) -> bool:
     """Tell whether a folder may be replaced by a calibration: it is one, or empty."""
     try:

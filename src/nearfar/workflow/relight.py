@@ -1,0 +1,43 @@
+"""Relight a transport that is in a file, some rows of the camera at a time."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.estimate.joint import ErrorBars
+from nearfar.transport.store import StoredTransport
+
+
+def relight_stored(stored: StoredTransport, light: Floats, gains: Mapping[str, float]) -> Floats:
+    """Relight the scene, as `nearfar.Transport.relight` does.
+
+    Parameters
+    ----------
+    stored : StoredTransport
+    light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        As `nearfar.Transport.relight` takes it.
+    gains : mapping of str to float
+        Gain of each component, ``"direct"``, ``"near"`` or ``"far"``; 1 where left out.
+
+    Returns
+    -------
+    ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+        In photo units.
+    """
+    parts = (rows.relight(light, **gains) for rows in stored.blocks())
+    return np.concatenate([part.astype(np.float32, copy=False) for part in parts])
+
+
+def error_bars_of_stored(
+    stored: StoredTransport, light: Floats, gains: Mapping[str, float]
+) -> Floats:
+    """Return the standard deviation of what `relight_stored` returns; see `nearfar.ErrorBars`.
+
+    Raises
+    ------
+    InputError
+        If the transport holds no error bars.
+    """
+    parts = (ErrorBars(rows).picture(light, **gains) for rows in stored.blocks())
+    return np.concatenate([part.astype(np.float32, copy=False) for part in parts])

@@ -19,6 +19,7 @@ from nearfar.cli.flags import flags, in_flags, with_flags
         ("resume=True, force=True", "--resume --force"),
         ("acquire(resume=True)", "acquire --resume"),
         ("with_checks(plan)", "--until"),
+        ("shoot_again(numbers=range(2, 6))", "--reshoot 2-5"),
     ],
 )
 def test_what_python_is_on_the_command_line(code: str, options: str):

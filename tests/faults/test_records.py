@@ -60,10 +60,10 @@ def test_photos_that_may_be_spoilt_are_named():
     change = LightChange("ambient", 0.1)
     text = str(LightChanged(change, 29, 34))
     assert "ambient light changed by +10.0% of white, after photo 29" in text
-    assert text.endswith("--reshoot 30-34.")
+    assert text.endswith("by `shoot_again(numbers=range(30, 35))`.")
     text = str(LightChanged(LightChange("any", -0.03), None, 3))
     assert "before the first comparison" in text
-    assert text.endswith("--reshoot 0-3.")
+    assert text.endswith("by `shoot_again(numbers=range(0, 4))`.")
     assert "before photo 8: see" in str(LightChangedBefore(change, 8))
 
 

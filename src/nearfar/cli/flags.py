@@ -16,9 +16,9 @@ from typer.models import OptionInfo
 from nearfar.cli.commands import COMMANDS
 
 # Options that have another name than the parameter that they set in the library.
-OTHER_NAMES = {"window": "--near", "dropped": "--drop"}
-# Calls that are an option on the command line; others are the command of their name.
-CALLS = {"with_checks": "--until"}
+OTHER_NAMES = {"window": "--near", "dropped": "--drop", "numbers": "--reshoot"}
+# Calls that are options on the command line; others are the command of their name.
+CALLS = {"with_checks": ["--until"], "shoot_again": []}
 CODE = re.compile(r"`([^`]+)`")
 
 
@@ -81,22 +81,33 @@ def _flag(name: str, option: OptionInfo) -> str:
 
 def _call(function: str, arguments: list[ast.keyword]) -> str | None:
     """Write a call's arguments as options, behind its command or in place of it."""
-    words = [] if function == "_" else [CALLS.get(function, function)]
+    words = [] if function == "_" else list(CALLS.get(function, [function]))
     for argument in arguments:
         flag = flags().get(argument.arg or "")
         if flag is None:
             return None
-        try:
-            value = ast.literal_eval(argument.value)
-        except ValueError:
+        value = _value(argument.value)
+        if value is None:
             return None
         words += [flag] if value is True else [flag, _written(flag, value)]
     return " ".join(words) if words else None
 
 
+def _value(code: ast.expr) -> object:
+    """Return what a literal, or a range of literals, is; None for other code."""
+    try:
+        if isinstance(code, ast.Call) and ast.unparse(code.func) == "range":
+            return range(*map(ast.literal_eval, code.args))
+        return ast.literal_eval(code)
+    except (ValueError, TypeError):
+        return None
+
+
 def _written(flag: str, value: object) -> str:
-    """Write a value as the command line takes it: sizes as HxW, memory in GB."""
+    """Write a value as the command line takes it: sizes as HxW, memory in GB, ranges as 2-5."""
     match value:
+        case range():
+            return f"{value.start}-{value.stop - 1}"
         case (int(height), int(width)):
             return f"{height}x{width}"
         case int() | float() if flag == "--memory":

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Quiet
 from nearfar.cli.saying import say
 
@@ -25,4 +26,5 @@ def info(
     """
     from nearfar.report.contents import describe
 
-    say(describe(path), quiet=quiet)
+    # Alarms that a capture keeps speak to Python.
+    say(with_flags(describe(path)), quiet=quiet)

@@ -172,8 +172,8 @@ class LightChanged:
         since = f"after photo {self.last_good}" if known else "before the first comparison"
         first = self.last_good + 1 if self.last_good is not None else 0
         return (
-            f"{self.change}, {since} and up to photo {self.last}: shoot them again by --reshoot "
-            f"{first}-{self.last}."
+            f"{self.change}, {since} and up to photo {self.last}: shoot them again by "
+            f"`shoot_again(numbers=range({first}, {self.last + 1}))`."
         )
 
 
@@ -222,7 +222,7 @@ class LightChangedWhileStopped:
         return (
             f"photo {self.photo}, of {self.pattern}, is {self.share:+.1%} of white off that of "
             f"before the capture was gone on with: lamp, exposure or ambient light are others; see "
-            f"that they are as they were, or begin anew with --force."
+            f"that they are as they were, or begin anew with `force=True`."
         )
 
 
@@ -279,7 +279,7 @@ class RoundedToHalf:
     def __str__(self) -> str:
         return (
             f"float16 strays from the windows and bands by {self.share_of_noise:.2g} of their "
-            f"noise: reconstruct again without --half if that matters."
+            f"noise: reconstruct again without `half` if that matters."
         )
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from nearfar.errors import ExtensionError, InputError
 from nearfar.registry import Registry
+from tests.packages import write_package
 
 OWN = {"pi": "math:pi", "absent": "nearfar.no_such_module:VALUE"}
 
@@ -17,12 +18,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
     def installed(package: str, module: str, entries: dict[str, str]) -> None:
         folder = tmp_path / package
-        info = folder / f"{package}-1.0.dist-info"
-        info.mkdir(parents=True)
-        (folder / f"{package}.py").write_text(module)
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        lines = [f"{name} = {value}" for name, value in entries.items()]
-        (info / "entry_points.txt").write_text("\n".join(["[nearfar.numbers]", *lines, ""]))
+        write_package(folder, package, module, "nearfar.numbers", entries)
         monkeypatch.syspath_prepend(str(folder))
 
     yield installed

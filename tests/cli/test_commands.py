@@ -13,6 +13,7 @@ import pytest
 
 from nearfar.cli.commands import COMMANDS
 from tests.cli.conftest import check_done, run_nearfar
+from tests.packages import write_package
 
 LONGEST_BODY = 60
 MODULE = '''
@@ -46,20 +47,11 @@ ENTRIES = {
 }
 
 
-def _install(folder: Path, package: str, entries: dict[str, str]) -> None:
-    info = folder / f"{package}-1.0.dist-info"
-    info.mkdir()
-    (folder / f"{package}.py").write_text(MODULE)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    lines = [f"{name} = {reference}" for name, reference in entries.items()]
-    (info / "entry_points.txt").write_text("\n".join(["[nearfar.commands]", *lines, ""]))
-
-
 @pytest.fixture(scope="module")
 def added(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a package that adds commands, one of which works."""
     folder = tmp_path_factory.mktemp("site")
-    _install(folder, "added_commands", ENTRIES)
+    write_package(folder, "added_commands", MODULE, "nearfar.commands", ENTRIES)
     return folder
 
 
@@ -108,7 +100,8 @@ def test_the_help_lists_added_commands_and_keeps_the_own(added: Path):
 
 
 def test_a_command_of_a_name_that_is_taken_is_left_out_with_a_warning(tmp_path: Path):
-    _install(tmp_path, "added_commands", {"plan": "added_commands:greet"})
+    taken = {"plan": "added_commands:greet"}
+    write_package(tmp_path, "added_commands", MODULE, "nearfar.commands", taken)
     ran = _run(tmp_path, "--help")
     assert ran.returncode == 0
     assert ran.stderr == (

@@ -1,6 +1,5 @@
 """Scenes of other packages: found by entry points, computed, kept, and refused where they fail."""
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -12,8 +11,10 @@ from nearfar.arrays import Size
 from nearfar.errors import ExtensionError
 from nearfar.scenes import SCENES, build, sizes
 from nearfar.scenes.cache import cache_folder, cached_scene
+from tests.packages import forget_packages, write_package
 
 PACKAGE = "striped"
+ENTRIES = {"my/stripes": f"{PACKAGE}:STRIPES", "stubborn": f"{PACKAGE}:STUBBORN"}
 MODULE = """
 import numpy as np
 from nearfar import ExactTransport, Size
@@ -45,34 +46,17 @@ STUBBORN = SceneDescription(
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Return a function that installs one version of a package, in place of an earlier one."""
     folder = tmp_path / "site"
-    folder.mkdir()
     monkeypatch.setenv("NEARFAR_CACHE", str(tmp_path / "cache"))
     monkeypatch.syspath_prepend(str(folder))
-
-    def forget() -> None:
-        sys.modules.pop(PACKAGE, None)
-        SCENES.__dict__.pop("_added", None)
-        for name in [name for name in SCENES._loaded if name not in SCENES.own]:
-            del SCENES._loaded[name]
+    # Python compares times in whole seconds, and would read what it compiled of another version.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def installed(version: str = "1.0", module: str = MODULE) -> None:
-        forget()
-        for old in folder.glob("*.dist-info"):
-            shutil.rmtree(old)
-        info = folder / f"{PACKAGE}-{version}.dist-info"
-        info.mkdir()
-        (folder / f"{PACKAGE}.py").write_text(module)
-        # Python compares times in whole seconds, and would read what it compiled before.
-        monkeypatch.setattr(sys, "dont_write_bytecode", True)
-        (info / "METADATA").write_text(
-            f"Metadata-Version: 2.1\nName: {PACKAGE}\nVersion: {version}\n"
-        )
-        (info / "entry_points.txt").write_text(
-            f"[nearfar.scenes]\nmy/stripes = {PACKAGE}:STRIPES\nstubborn = {PACKAGE}:STUBBORN\n"
-        )
+        forget_packages(SCENES, PACKAGE)
+        write_package(folder, PACKAGE, module, "nearfar.scenes", ENTRIES, version)
 
     yield installed
-    forget()
+    forget_packages(SCENES, PACKAGE)
 
 
 def computed() -> list[tuple[Size, Size]]:

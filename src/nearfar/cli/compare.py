@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -17,6 +18,12 @@ from nearfar.cli.options import (
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 from nearfar.scenes import SCENES
+from nearfar.workflow.rivals import RIVALS
+
+
+def method_names(start: str) -> list[str]:
+    """Names of methods that begin so, for shells to complete."""
+    return [name for name in RIVALS if name.startswith(start)]
 
 
 def compare(
@@ -38,7 +45,8 @@ def compare(
     method: Annotated[
         list[str] | None,
         typer.Option(
-            help="joint, paper, CLT, Hadamard or 'brute force'; all by default; may be repeated.",
+            help=f"{', '.join(map(quote, RIVALS))}; all by default; may be repeated.",
+            autocompletion=method_names,
             metavar="NAME",
         ),
     ] = None,
@@ -59,7 +67,6 @@ def compare(
     from nearfar.report.comparison import INDEX, is_comparison, winners, write_comparison
     from nearfar.scenes.cache import cached_scene
     from nearfar.transport.exact_store import load_exact
-    from nearfar.workflow.compare import METHODS
     from nearfar.workflow.compare import compare as run
 
     if output is not None:
@@ -70,7 +77,7 @@ def compare(
             truth = cached_scene(scene, projector, camera, progress=report)
         else:
             truth = load_exact(Path(scene), projector=projector, camera=camera)
-        found = run(truth, budgets, methods=method or METHODS, window=near, progress=report)
+        found = run(truth, budgets, methods=method, window=near, progress=report)
         if output is not None:
             write_comparison(output, found, force=force)
     if as_json:

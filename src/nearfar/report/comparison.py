@@ -4,7 +4,6 @@ import json
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,27 +12,14 @@ from nearfar.files import new_output
 from nearfar.markup import numbers
 from nearfar.report.figures.style import new_figure, save, styled
 from nearfar.report.page import page
-from nearfar.workflow.compare import METHODS, Comparison, Trial
+from nearfar.workflow.compare import Comparison, Trial
+from nearfar.workflow.rivals import RIVALS
 
 INDEX = "index.html"
 PLOT = "comparison"
 DATA = "comparison.json"
 # The title, by which a page of a comparison is told from others.
 MARK = "nearfar: methods compared"
-LINES: dict[str, dict[str, Any]] = {
-    "joint": {"color": "#1f4e9c", "marker": "o", "linestyle": "-"},
-    "paper": {"color": "#111111", "marker": "s", "linestyle": "--"},
-    "CLT": {"color": "#c2561a", "marker": "^", "linestyle": "-."},
-    "Hadamard": {"color": "#3f9e74", "marker": "D", "linestyle": ":"},
-    "brute force": {"color": "#8a6fb0", "marker": "v", "linestyle": ":"},
-}
-NAMES = {
-    "joint": "joint, no stripes",
-    "paper": "the paper's",
-    "CLT": "compressive (CLT)",
-    "Hadamard": "Hadamard",
-    "brute force": "brute force",
-}
 # What lies below is no picture any more.
 LOWEST = 10.0
 # Ticks closer than this factor are one.
@@ -87,12 +73,13 @@ def draw(found: Comparison) -> Figure:
 
 
 def _draw_lines(axes: Axes, trials: Sequence[Trial]) -> None:
-    for method in METHODS:
+    for method in RIVALS:
         # Where each photo is exposed alike, the total exposure is their number.
         mine = sorted((t.exposure, t.pictures) for t in trials if t.method == method)
         if mine:
             places, values = zip(*mine, strict=True)
-            axes.plot(places, values, label=NAMES[method], markersize=3.5, **LINES[method])
+            rival = RIVALS[method]
+            axes.plot(places, values, label=rival.title, markersize=3.5, **rival.line)
     axes.set_xscale("log")
     axes.set_xticks(_apart(sorted({trial.budget for trial in trials})))
     axes.xaxis.set_major_formatter("{x:g}")
@@ -116,19 +103,20 @@ def winners(trials: Sequence[Trial]) -> list[str]:
     for budget in sorted({trial.budget for trial in trials}):
         mine = (trial for trial in trials if trial.budget == budget)
         best, *others = sorted(mine, key=lambda trial: trial.pictures, reverse=True)
-        text = f"{budget}: {NAMES[best.method]} {best.pictures:.1f} dB"
+        text = f"{budget}: {RIVALS[best.method].title} {best.pictures:.1f} dB"
         if others:
-            text += f", then {NAMES[others[0].method]} {others[0].pictures:.1f} dB"
+            text += f", then {RIVALS[others[0].method].title} {others[0].pictures:.1f} dB"
         lines.append(text)
     return lines
 
 
 def rows(trials: Sequence[Trial]) -> list[list[str]]:
     """Return rows of a table, in the order of methods and photos."""
-    order = sorted(trials, key=lambda t: (METHODS.index(t.method), t.photos, t.exposure))
+    methods = list(RIVALS)
+    order = sorted(trials, key=lambda t: (methods.index(t.method), t.photos, t.exposure))
     return [
         [
-            NAMES[trial.method],
+            RIVALS[trial.method].title,
             f"{trial.photos}",
             f"{trial.exposure:.0f}",
             *(f"{value:.1f}" for value in (trial.pictures, trial.white, trial.random)),

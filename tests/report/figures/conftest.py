@@ -9,8 +9,8 @@ from nearfar.arrays import Size
 from nearfar.illumination.pictures import landscape, penguin
 from nearfar.report.figures import run
 from nearfar.workflow.experiments.acquired import Acquisition, acquire_scene
+from nearfar.workflow.experiments.compressive import acquire_compressively
 from nearfar.workflow.experiments.in_theory import Theory, acquire_in_theory
-from nearfar.workflow.experiments.rivals import acquire_compressively
 from nearfar.workflow.experiments.scan_line import components_along_a_line
 
 BOX = Acquisition("cornell", Size(16, 16), 5, Size(3, 3), penguin, 0.6)

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from nearfar.workflow.experiments.acquired import BOX, CORNER, Report, acquire_scene
+from nearfar.workflow.experiments.compressive import acquire_compressively
 from nearfar.workflow.experiments.data import Data
 from nearfar.workflow.experiments.in_theory import WEDGE, acquire_in_theory
-from nearfar.workflow.experiments.rivals import acquire_compressively
 from nearfar.workflow.experiments.scan_line import components_along_a_line
 
 EXPERIMENTS: Mapping[str, Callable[[Report], Data]] = {

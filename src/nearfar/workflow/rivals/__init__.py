@@ -1,0 +1,21 @@
+"""Rival methods of measuring light transport, which `nearfar.workflow.compare` runs side by side.
+
+A rival is one file, which holds a `nearfar.workflow.rivals.rival.Rival`, and one line of `RIVALS`.
+"""
+
+from nearfar.registry import Registry
+from nearfar.workflow.rivals.rival import Rival
+
+# In the order of tables and plots.
+RIVALS: Registry[Rival] = Registry(
+    "method",
+    "nearfar.rivals",
+    {
+        "joint": "nearfar.workflow.rivals.joint:JOINT",
+        "paper": "nearfar.workflow.rivals.paper:PAPER",
+        "CLT": "nearfar.workflow.rivals.compressive:COMPRESSIVE",
+        "Hadamard": "nearfar.workflow.rivals.hadamard:HADAMARD",
+        "brute force": "nearfar.workflow.rivals.brute_force:BRUTE_FORCE",
+    },
+    Rival,
+)

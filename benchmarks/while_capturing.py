@@ -57,7 +57,7 @@ def main() -> None:
                 Path(folder, "again.zarr"),
                 one_by_one(source, seconds),
                 full_scale=scale,
-                enough=estimate,
+                observers=[estimate],
             )
             last = time.perf_counter()
             (part,) = estimate.finish(capture)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.capture import open_capture, white_and_black
+from nearfar.capture import open_capture, white_and_black, write_capture
 from nearfar.capture.begun import LOG
 from nearfar.errors import (
     ExistingOutputError,
@@ -31,6 +31,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
+from tests.observers import EndsWhere
 from tests.worlds import model_transport
 
 PROJECTOR = Size(16, 20)
@@ -50,17 +51,16 @@ def undisturbed(rig, tmp_path_factory):
 
 
 def _stop_after(count, reason=KeyboardInterrupt):
-    def enough(number, _photo):
+    def stop(number, _photo):
         if number + 1 == count:
             raise reason
-        return False
 
-    return enough
+    return EndsWhere(stop)
 
 
 def _stopped(rig, path, count, plan=PLAN, resume=False):
     with pytest.raises(KeptInterrupt, match=f"^interrupted; {count} of {COUNT} photos are kept"):
-        acquire(plan, path, rig, enough=_stop_after(count), resume=resume)
+        acquire(plan, path, rig, observers=[_stop_after(count)], resume=resume)
 
 
 def _check_same(capture, other):
@@ -137,7 +137,7 @@ def test_every_photo_is_told_to_who_decides(rig, tmp_path):
         heard.append((number, photo.shape))
         return number == 29
 
-    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, enough=hear)
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, observers=[EndsWhere(hear)])
     assert heard == [(number, (8, 9, 2)) for number in range(30)]
     assert len(capture.plan.patterns) == 30
 
@@ -147,12 +147,20 @@ def test_a_capture_does_not_end_before_the_photos_that_are_there(rig, tmp_path):
     _stopped(rig, tmp_path / "c.zarr", 25)
     ends = {20, 40}
     capture = acquire(
-        PLAN, tmp_path / "c.zarr", rig, resume=True, enough=lambda n, _photo: n + 1 in ends
+        PLAN,
+        tmp_path / "c.zarr",
+        rig,
+        resume=True,
+        observers=[EndsWhere(lambda n, _photo: n + 1 in ends)],
     )
     assert len(capture.plan.patterns) == 40
     _stopped(rig, tmp_path / "d.zarr", 25)
     capture = acquire(
-        PLAN, tmp_path / "d.zarr", rig, resume=True, enough=lambda n, _photo: n + 1 == 25
+        PLAN,
+        tmp_path / "d.zarr",
+        rig,
+        resume=True,
+        observers=[EndsWhere(lambda n, _photo: n + 1 == 25)],
     )
     assert len(capture.plan.patterns) == 25
 
@@ -191,7 +199,7 @@ def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_p
     first = acquire(PLAN, tmp_path / "c.zarr", replace(rig, seed=9))
     before = first.photos[:]
     with pytest.raises(KeptInterrupt, match="`resume=True, force=True` goes on"):
-        acquire(PLAN, tmp_path / "c.zarr", rig, enough=_stop_after(20), force=True)
+        acquire(PLAN, tmp_path / "c.zarr", rig, observers=[_stop_after(20)], force=True)
     np.testing.assert_array_equal(open_capture(tmp_path / "c.zarr").photos[:], before)
     with pytest.raises(ExistingOutputError, match="`force=True`"):
         acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
@@ -209,7 +217,7 @@ def test_the_same_plan_with_other_options_is_named(rig, tmp_path):
     ):
         path = tmp_path / f"{len(before.patterns)}.zarr"
         with pytest.raises(KeptInterrupt):
-            acquire(before, path, rig, enough=_stop_after(12))
+            acquire(before, path, rig, observers=[_stop_after(12)])
         with pytest.raises(InputError, match=word):
             acquire(now, path, rig, resume=True)
 
@@ -219,7 +227,7 @@ def test_a_link_is_followed_and_the_folder_named(rig, tmp_path):
     link, real = tmp_path / "link.zarr", tmp_path / "else" / "real.zarr"
     link.symlink_to(real)
     with pytest.raises(KeptInterrupt, match=str(tmp_path / "else" / "real.zarr.unfinished")):
-        acquire(PLAN, link, rig, enough=_stop_after(12))
+        acquire(PLAN, link, rig, observers=[_stop_after(12)])
     capture = acquire(PLAN, link, rig, resume=True)
     assert real.is_dir()
     assert not (real / LOG).exists()
@@ -238,7 +246,7 @@ def test_what_was_whole_but_for_its_name_is_not_shot_again(
 
     with monkeypatch.context() as patch, pytest.raises(KeptInterrupt):
         patch.setattr(output, "move_into_place", gone)
-        acquire(PLAN, tmp_path / "c.zarr", rig, enough=enough)
+        acquire(PLAN, tmp_path / "c.zarr", rig, observers=[EndsWhere(enough)])
     told = []
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
     assert told == []
@@ -309,7 +317,7 @@ def test_two_at_once_are_refused(rig, undisturbed, tmp_path):
         refused.append(number)
         return False
 
-    _check_same(acquire(PLAN, path, rig, resume=True, enough=also), undisturbed)
+    _check_same(acquire(PLAN, path, rig, resume=True, observers=[EndsWhere(also)]), undisturbed)
     assert len(refused) == COUNT
 
 
@@ -338,7 +346,7 @@ def test_a_torn_line_does_not_spoil_the_next(rig, undisturbed, tmp_path):
     log = tmp_path / "c.zarr.unfinished" / LOG
     for photos in (20, 40):
         with pytest.raises(KeptInterrupt):
-            acquire(PLAN, path, rig, enough=_stop_after(photos), resume=log.exists())
+            acquire(PLAN, path, rig, observers=[_stop_after(photos)], resume=log.exists())
         log.write_bytes(log.read_bytes()[:-5])
     # What was noted after the torn line is still known: one photo is taken again, not twenty.
     taken = []
@@ -380,3 +388,38 @@ def test_kill_9_at_twenty_moments_costs_nothing(tmp_path):
     assert one.plan == other.plan
     assert list((tmp_path / "k").iterdir()) == [killed]
     assert not list(killed.rglob("*.partial"))
+
+
+def test_observers_all_hear_of_every_photo_and_any_of_them_ends_the_capture(rig, tmp_path):
+    heard = []
+
+    class Hears:
+        def after_photo(self, number, _photo):
+            heard.append(number)
+
+    at_20, at_30 = (EndsWhere(lambda number, _photo, n=n: number + 1 == n) for n in (20, 30))
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, observers=[at_30, at_20, Hears()])
+    assert len(capture.plan.patterns) == 20
+    assert heard == list(range(20))
+
+
+def test_a_predicate_and_told_of_before_still_work_and_warn(rig, tmp_path):
+    def enough(number, _photo):
+        return number + 1 == 20
+
+    told = []
+    dark = replace(rig, exposure=3 * rig.exposure)
+    with (
+        pytest.warns(DeprecationWarning, match=r"enough of nearfar\.acquire") as predicate,
+        pytest.warns(DeprecationWarning, match=r"told of nearfar\.acquire"),
+    ):
+        capture = acquire(PLAN, tmp_path / "c.zarr", dark, enough=enough, told=told.append)
+    assert predicate[0].filename == __file__
+    assert len(capture.plan.patterns) == 20
+    assert tuple(told) == capture.alarms
+    photos = capture.photos[:]
+    with pytest.warns(DeprecationWarning, match=r"enough of nearfar\.write_capture"):
+        again = write_capture(
+            PLAN, tmp_path / "d.zarr", photos, full_scale=capture.full_scale, enough=enough
+        )
+    np.testing.assert_array_equal(again.photos[:], photos)

@@ -12,6 +12,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
+from tests.observers import EndsWhere
 from tests.worlds import model_transport
 
 PAPER = paper_plan(Size(16, 20), 5, Size(3, 3))
@@ -35,7 +36,7 @@ def _rig(world, gamma=1.0, exposure=0.5):
 )
 def test_a_fault_is_told_once_and_remembered(small_world, tmp_path, plan, fault, words):
     told = []
-    acquire(plan, tmp_path / "c.zarr", _rig(small_world, **fault), told=told.append)
+    acquire(plan, tmp_path / "c.zarr", _rig(small_world, **fault), on_alarm=told.append)
     assert open_capture(tmp_path / "c.zarr").alarms == tuple(told)
     assert len(told) == (words is not None)
     assert words is None or words in told[0]
@@ -50,8 +51,8 @@ def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, 
 
     rig, told = _rig(small_world, gamma=2.2), []
     with pytest.raises(KeptInterrupt):
-        acquire(plan, tmp_path / "c.zarr", rig, enough=stop)
-    acquire(plan, tmp_path / "c.zarr", rig, resume=True, told=told.append)
+        acquire(plan, tmp_path / "c.zarr", rig, observers=[EndsWhere(stop)])
+    acquire(plan, tmp_path / "c.zarr", rig, resume=True, on_alarm=told.append)
     assert any("which no linear response does" in alarm for alarm in told)
 
 
@@ -64,10 +65,10 @@ def test_light_that_changed_meanwhile_is_told(small_world, tmp_path):
     for exposure, warned in ((0.5, 0), (0.45, 1)):
         path = tmp_path / f"{exposure}.zarr"
         with pytest.raises(KeptInterrupt):
-            acquire(CHOSEN, path, _rig(small_world), enough=stop)
+            acquire(CHOSEN, path, _rig(small_world), observers=[EndsWhere(stop)])
         # A lamp that is darker now, of which the rig knows nothing.
         rig, told = _Darker(_rig(small_world), exposure / 0.5), []
-        acquire(CHOSEN, path, rig, resume=True, told=told.append)
+        acquire(CHOSEN, path, rig, resume=True, on_alarm=told.append)
         assert len(told) == warned
         assert all("before the capture was gone on with" in alarm for alarm in told)
 
@@ -89,5 +90,5 @@ def test_noise_alone_is_no_alarm(tmp_path):
     dim = SimulatedCamera(full_well=500.0)
     rig = SimulatedRig(world, "test", SimulatedProjector(), dim, 0.5, 0)
     told = []
-    acquire(CHOSEN, tmp_path / "c.zarr", rig, told=told.append)
+    acquire(CHOSEN, tmp_path / "c.zarr", rig, on_alarm=told.append)
     assert told == [], np.array(told)

@@ -23,6 +23,7 @@ from nearfar.workflow.acquire import acquire, hold
 from nearfar.workflow.estimating import RunningEstimate
 from nearfar.workflow.evaluate import relighting_snr
 from nearfar.workflow.reconstruct import reconstruct
+from tests.observers import EndsWhere
 from tests.workflow.memory import memory_for
 from tests.worlds import model_transport
 
@@ -48,11 +49,10 @@ def rig(scene):
 class Patient(RunningEstimate):
     """Waits for what is done beside the capture, as slow photos would."""
 
-    def __call__(self, number, photo):
-        found = super().__call__(number, photo)
+    def after_photo(self, number, photo):
+        super().after_photo(number, photo)
         if self._under_way is not None:
             self._under_way.exception()
-        return found
 
     def _fits(self, taken):
         # The photo after one that is not the last is always slow enough.
@@ -61,7 +61,7 @@ class Patient(RunningEstimate):
 
 def _follow(plan, rig, path):
     with Patient(plan, rig.full_scale) as estimate:
-        capture = acquire(plan, path, rig, enough=estimate)
+        capture = acquire(plan, path, rig, observers=[estimate])
         (part,) = estimate.finish(capture)
     return part, estimate, capture
 
@@ -120,7 +120,7 @@ def test_photos_that_do_not_fit_are_read_again_in_blocks(rig, tmp_path):
     plan = PLANS["reference"]
     memory = memory_for(9, plan, SIZE, "joint")
     with Patient(plan, rig.full_scale, memory=memory) as estimate:
-        capture = acquire(plan, tmp_path / "c.zarr", rig, enough=estimate)
+        capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
         parts = list(estimate.finish(capture))
     assert estimate.held is None
     assert len(parts) > 1
@@ -134,7 +134,7 @@ def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
         pytest.raises(InputError, match="--memory"),
         RunningEstimate(PLANS["reference"], rig.full_scale, memory=10**6) as estimate,
     ):
-        acquire(PLANS["reference"], tmp_path / "c.zarr", rig, enough=estimate)
+        acquire(PLANS["reference"], tmp_path / "c.zarr", rig, observers=[estimate])
     assert list(tmp_path.iterdir()) == []
 
 
@@ -143,7 +143,10 @@ def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path
     end = next(end for end in ends(plan) if end > 0.6 * len(plan.patterns))
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(
-            plan, tmp_path / "c.zarr", rig, enough=lambda n, p: estimate(n, p) or n + 1 == end
+            plan,
+            tmp_path / "c.zarr",
+            rig,
+            observers=[estimate, EndsWhere(lambda n, _photo: n + 1 == end)],
         )
         (part,) = estimate.finish(capture)
     assert len(capture.plan.patterns) == end
@@ -180,7 +183,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
     monkeypatch.setattr(estimating, "choose_components", faulty)
     plan = PLANS["reference"]
     with Patient(plan, rig.full_scale) as estimate:
-        capture = acquire(plan, tmp_path / "c.zarr", rig, enough=estimate)
+        capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
         assert len(capture.plan.patterns) == len(plan.patterns)
         with pytest.raises(RuntimeError, match="out of memory"):
             list(estimate.finish(capture))
@@ -197,21 +200,16 @@ def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
 
     monkeypatch.setattr(estimating, "choose_components", endless)
 
-    def stop(_number, _photo):
-        if begun.is_set():
+    def stop(number, _photo):
+        if number > 80 and begun.wait(10):
             raise KeyboardInterrupt
-        return False
 
     with (
         pytest.raises(KeyboardInterrupt),
         RunningEstimate(PLANS["reference"], rig.full_scale) as estimate,
     ):
-        acquire(
-            PLANS["reference"],
-            tmp_path / "c.zarr",
-            rig,
-            enough=lambda n, p: estimate(n, p) or (n > 80 and begun.wait(10) and stop(n, p)),
-        )
+        observers = [estimate, EndsWhere(stop)]
+        acquire(PLANS["reference"], tmp_path / "c.zarr", rig, observers=observers)
     assert begun.is_set()
     assert [path.name for path in tmp_path.iterdir()] == ["c.zarr.unfinished"]
     assert threading.active_count() <= before + 1
@@ -221,7 +219,7 @@ def test_photos_that_cannot_be_measured_are_kept(rig, tmp_path):
     # White stands at full scale everywhere, which the references tell.
     bright = replace(rig, exposure=1e3)
     with Patient(PLANS["reference"], rig.full_scale) as estimate:
-        capture = acquire(PLANS["reference"], tmp_path / "c.zarr", bright, enough=estimate)
+        capture = acquire(PLANS["reference"], tmp_path / "c.zarr", bright, observers=[estimate])
         with pytest.raises(InputError, match="full scale"):
             list(estimate.finish(capture))
     assert estimate.chosen_by == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.capture import open_capture
+from nearfar.capture import Verdict, open_capture
 from nearfar.errors import InputError, PlanError
 from nearfar.plan import choose_plan, paper_plan, parse_plan
 from nearfar.plan.checks import SEEDS, TIMES, check_photos, ends, is_reference, with_checks
@@ -34,7 +34,7 @@ def _run(scene, path, photos, target, **camera):
     rig = _rig(scene, **camera)
     told = []
     check = RunningCheck(plan, target, rig.full_scale, told.append)
-    capture = acquire(plan, path, rig, enough=check)
+    capture = acquire(plan, path, rig, observers=[check])
     return plan, capture, told
 
 
@@ -99,8 +99,9 @@ def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_no
     shown = (plan.draw(i) for i in range(len(plan.patterns)))
     for number, photo in enumerate(rig.shoot(shown)):
         failed = told and number < len(plan.patterns)
-        assert not check(number, np.zeros_like(photo) if failed else photo)
-    assert told[0].fault == ""
+        verdict = check.after_photo(number, np.zeros_like(photo) if failed else photo)
+        assert verdict is Verdict.CONTINUE
+    assert told[0].fault is None
     assert told[-1].fault.endswith(".")
     assert told[-1].photos == len(plan.patterns)
 

@@ -19,6 +19,7 @@ from nearfar.capture.checks import (
     check_photo,
     check_white_and_black,
 )
+from nearfar.capture.observing import CaptureObserver, is_enough, with_predicate
 from nearfar.capture.store import (
     CHUNK_BYTES,
     FORMAT_VERSION,
@@ -295,6 +296,7 @@ def write_capture(
     names: Sequence[str] | None = None,
     force: bool = False,
     progress: Callable[[int], None] | None = None,
+    observers: Sequence[CaptureObserver] = (),
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
 ) -> Capture:
     """Write photos that are there, one for each pattern of a plan; whole or not at all.
@@ -313,9 +315,12 @@ def write_capture(
         Replace a capture that is there.
     progress : callable, optional
         Told the number of photos written after each.
+    observers : sequence of CaptureObserver
+        Each hears of every photo; where one says that it is enough, the capture ends there, and
+        its plan with it.
     enough : callable, optional
-        Told each photo's number and the photo, (Cy, Cx, channels); where it says so, the capture
-        ends there, and its plan with it.
+        .. deprecated:: 0.1
+            Use `observers`.
 
     Returns
     -------
@@ -339,6 +344,7 @@ def write_capture(
     >>> nearfar.write_capture(plan, "own.zarr", photos, full_scale=1.0)
     <nearfar capture: 52 photos of 8x8, own.zarr>
     """
+    observers = with_predicate(observers, enough, "nearfar.write_capture")
     path = Path(path)
     count = len(plan.patterns)
     with new_output(path, force=force) as partial:
@@ -351,7 +357,7 @@ def write_capture(
             photo = writer.add(next(remaining, None))
             if progress is not None:
                 progress(writer.taken)
-            ended = enough is not None and enough(writer.taken - 1, photo)
+            ended = is_enough(observers, writer.taken - 1, photo)
         if not ended:
             check_count(count, count, more=next(remaining, None) is not None)
         writer.finish()

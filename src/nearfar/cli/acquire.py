@@ -142,7 +142,6 @@ def acquire(
             estimate = stack.enter_context(
                 RunningEstimate(made, opened.full_scale, memory=available, device=device or "cpu")
             )
-        told = [each for each in (estimate, check) if each is not None]
         taken = shoot(
             made,
             output,
@@ -150,9 +149,8 @@ def acquire(
             resume=resume,
             force=force,
             progress=counting(report, "photos", len(made.patterns)),
-            # The estimate hears of every photo, for it never says that they are enough.
-            enough=lambda number, photo: any(each(number, photo) for each in told),
-            told=warn,
+            observers=[each for each in (estimate, check) if each is not None],
+            on_alarm=warn,
         )
         say_captured(taken, output, quiet=quiet)
         if estimate is not None and transport is not None:
@@ -227,7 +225,7 @@ def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool)
 
 
 def _tell(standing: "Standing", *, quiet: bool) -> None:
-    if standing.fault:
+    if standing.fault is not None:
         text = standing.fault
     elif standing.snr > 0:
         text = f"{standing.snr:.1f} dB under pictures to check by"
@@ -240,7 +238,7 @@ def _say_what_limits(standing: "Standing", target: float, *, quiet: bool) -> Non
     if standing.snr >= target:
         say(f"{target:g} dB is reached after {standing.photos} photos", quiet=quiet)
         return
-    if standing.fault:
+    if standing.fault is not None:
         warn(f"{target:g} dB could not be checked to the end: {standing.fault}")
         return
     warn(

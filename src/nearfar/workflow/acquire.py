@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
 from nearfar.capture.begun import LOG, count_photos, require_same_rig
+from nearfar.capture.observing import CaptureObserver, is_enough, with_predicate
 from nearfar.capture.replacing import replace_photos
+from nearfar.deprecation import warn_of
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.faults.while_capturing import FaultsWhileCapturing
 from nearfar.files import resumable_output
@@ -27,6 +29,8 @@ def acquire(
     resume: bool = False,
     force: bool = False,
     progress: Callable[[int], None] | None = None,
+    observers: Sequence[CaptureObserver] = (),
+    on_alarm: Callable[[str], None] | None = None,
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
     told: Callable[[str], None] | None = None,
 ) -> Capture:
@@ -48,12 +52,15 @@ def acquire(
         Replace a capture that is there, and without `resume` what was not finished.
     progress : callable, optional
         Told the number of photos taken after each.
-    enough : callable, optional
-        Told each photo's number and the photo, those that were there too; where it says so, no
-        more are taken.
-    told : callable, optional
-        Called with each alarm that the photos give, a sentence; those of the rig are its own to
-        tell. The capture remembers both.
+    observers : sequence of CaptureObserver
+        Each hears of every photo, of those that were there too; where one says that it is enough,
+        no more are taken.
+    on_alarm : callable, optional
+        Called with each alarm that the photos give, a sentence; a rig passes on its own. The
+        capture remembers both.
+    enough, told : callable, optional
+        .. deprecated:: 0.1
+            Use `observers` and `on_alarm`.
 
     Returns
     -------
@@ -81,8 +88,11 @@ def acquire(
     """
     path = Path(path)
     _require(plan, rig)
+    observers = with_predicate(observers, enough, "nearfar.acquire")
+    if told is not None:
+        warn_of("told of nearfar.acquire", "give on_alarm")
+        on_alarm = on_alarm or told
     kept = _Kept(path, len(plan.patterns), resume=resume)
-    tell = told or (lambda _alarm: None)
     try:
         with resumable_output(path, kept.worth, resume=resume, force=force) as folder:
             writer = _writer(folder, plan, rig, resume=resume)
@@ -92,9 +102,9 @@ def acquire(
             finder.recall(writer.read, taken)
             alarms: list[str] = []
             for number in range(taken):
-                answer = enough is not None and enough(number, writer.read(number))
+                enough_now = is_enough(observers, number, writer.read(number))
                 # Only the last may end it: photos are not taken back.
-                ended = ended or (answer and number + 1 == taken)
+                ended = ended or (enough_now and number + 1 == taken)
             photos = iter(()) if ended else _photos(plan, rig, taken)
             while not ended:
                 photo = next(photos, None)
@@ -103,11 +113,12 @@ def acquire(
                 photo = writer.add(photo, rig.conditions(), alarms)
                 # Of a photo that is good and kept: what it tells is noted with the next.
                 alarms = [str(fault) for fault in finder.examine(writer.taken - 1, photo)]
-                for alarm in alarms:
-                    tell(alarm)
+                if on_alarm is not None:
+                    for alarm in alarms:
+                        on_alarm(alarm)
                 if progress is not None:
                     progress(writer.taken)
-                ended = (enough is not None and enough(writer.taken - 1, photo)) or writer.ended
+                ended = is_enough(observers, writer.taken - 1, photo) or writer.ended
             writer.finish(alarms)
     except KeyboardInterrupt as error:
         if not kept.photos:

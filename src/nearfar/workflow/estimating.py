@@ -124,8 +124,8 @@ class RunningEstimate:
     ) -> None:
         self._end()
 
-    def __call__(self, number: int, photo: NDArray[Any]) -> bool:
-        """Take in a photo, (Cy, Cx, channels); it is never the one to end a capture.
+    def after_photo(self, number: int, photo: NDArray[Any]) -> None:
+        """Take in a photo, (Cy, Cx, channels).
 
         Raises
         ------
@@ -135,14 +135,13 @@ class RunningEstimate:
         if number == 0:
             self.held = self._room_for(photo)
         if self.held is None:
-            return False
+            return
         self.held.photos[number] = photo
         self._times.append(time.monotonic())
         self._taken = taken = number + 1
         self._take_choice()
         if self._under_way is None and taken in self._ends and self._is_time(taken):
             self._under_way = self._beside.submit(self._choose, taken)
-        return False
 
     def finish(self, capture: Capture, progress: Progress | None = None) -> Iterator[Part]:
         """Reconstruct the capture that was followed; see `nearfar.reconstruct`.

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers, blocks
+from nearfar.capture import Verdict
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
 from nearfar.estimate.joint import ErrorBars, estimate_jointly
@@ -58,14 +59,14 @@ class Standing(NamedTuple):
     limit : {"noise", "model", "photos"}
         What most of the error comes from: the noise of the photos, light that the model does not
         hold, or frequencies that were not measured yet.
-    fault : str
-        Why nothing could be told of the photos so far, a sentence; else nothing.
+    fault : str or None
+        Why the photos so far could not be judged, a sentence.
     """
 
     photos: int
     snr: float
     limit: Limit
-    fault: str = ""
+    fault: str | None = None
 
 
 class RunningCheck:
@@ -79,7 +80,7 @@ class RunningCheck:
         SNR_b in dB at which it is enough.
     full_scale : float
         Value of full scale of the photos.
-    told : callable, optional
+    on_standing : callable, optional
         Called with each `Standing`.
     """
 
@@ -88,23 +89,23 @@ class RunningCheck:
         plan: Plan,
         target: float,
         full_scale: float,
-        told: Callable[[Standing], None] | None = None,
+        on_standing: Callable[[Standing], None] | None = None,
     ) -> None:
         self.standing: Standing | None = None
         self._plan, self._target, self._full_scale = plan, target, full_scale
-        self._told = told or (lambda _standing: None)
+        self._on_standing = on_standing
         self._photos: list[NDArray[Any]] = []
         self._rows: Integers = np.zeros(0, dtype=np.int64)
         self._ends = set(ends(plan))
         self._next = FEWEST + sum(map(len, check_photos(plan).values()))
 
-    def __call__(self, number: int, photo: NDArray[Any]) -> bool:
-        """Take in a photo, (Cy, Cx, channels); tell whether the capture is good enough now.
+    def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict:
+        """Take in a photo, (Cy, Cx, channels); it is enough once the target is reached.
 
         Raises
         ------
         InputError
-            If the photos of the first look cannot be measured. Later faults are told in the
+            If the photos cannot be measured when they are first judged. Later faults are in the
             standing: no photo is given up for them.
         """
         if not self._photos:
@@ -113,17 +114,18 @@ class RunningCheck:
         taken = number + 1
         last = taken == len(self._plan.patterns)
         if taken not in self._ends or (taken < self._next and not last):
-            return False
+            return Verdict.CONTINUE
         try:
             self.standing = self._look(taken)
         except InputError as error:
             if self.standing is None:
                 raise
             self.standing = Standing(taken, -HIGHEST, "photos", str(error))
-        self._told(self.standing)
+        if self._on_standing is not None:
+            self._on_standing(self.standing)
         missing = self._target - self.standing.snr
         self._next = int(taken * 2 ** (np.clip(missing, 0.0, FARTHEST) / FASTEST))
-        return missing <= 0
+        return Verdict.ENOUGH if missing <= 0 else Verdict.CONTINUE
 
     def _look(self, taken: int) -> Standing:
         held = PhotosInMemory(self._plan.first(taken), np.stack(self._photos), self._full_scale)

@@ -1,0 +1,79 @@
+"""What follows a capture photo by photo, and may end it."""
+
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from nearfar.deprecation import warn_of
+
+
+class Verdict(Enum):
+    """Whether a capture is to go on."""
+
+    CONTINUE = "continue"
+    ENOUGH = "enough"
+
+
+class CaptureObserver(Protocol):
+    """Hears of every photo of a capture, in order."""
+
+    def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict | None:
+        """Take in a photo.
+
+        Parameters
+        ----------
+        number : int
+            Its number in the plan.
+        photo : array, shape (Cy, Cx, channels)
+            Raw levels. It is on the disk already.
+
+        Returns
+        -------
+        Verdict or None
+            ``Verdict.ENOUGH`` ends the capture with this photo; an observer that never ends one
+            returns None.
+        """
+        ...
+
+
+def is_enough(observers: Sequence[CaptureObserver], number: int, photo: NDArray[Any]) -> bool:
+    """Pass a photo to every observer; return whether any of them ends the capture."""
+    verdicts = [observer.after_photo(number, photo) for observer in observers]
+    return Verdict.ENOUGH in verdicts
+
+
+class _Predicate:
+    """An observer that ends a capture where a function returns true."""
+
+    def __init__(self, predicate: Callable[[int, NDArray[Any]], bool]) -> None:
+        self._predicate = predicate
+
+    def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict:
+        return Verdict.ENOUGH if self._predicate(number, photo) else Verdict.CONTINUE
+
+
+def with_predicate(
+    observers: Sequence[CaptureObserver],
+    enough: Callable[[int, NDArray[Any]], bool] | None,
+    function: str,
+) -> Sequence[CaptureObserver]:
+    """Add what was given as `enough` of before to the observers, with a warning.
+
+    Parameters
+    ----------
+    observers : sequence of CaptureObserver
+    enough : callable, optional
+        Returns whether the capture ends with a photo, by its number and the photo.
+    function : str
+        The public function that took it.
+    """
+    if enough is None:
+        return observers
+    warn_of(
+        f"enough of {function}",
+        "give observers, whose method after_photo returns a nearfar.capture.Verdict",
+        stacklevel=4,
+    )
+    return [*observers, _Predicate(enough)]

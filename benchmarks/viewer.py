@@ -18,9 +18,9 @@ from playwright.sync_api import sync_playwright
 from websockets.sync.client import connect
 
 from nearfar import Size, save_transport
-from nearfar.viewer.serving import Place
+from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.server import ListeningAddress
 from nearfar.viewer.view import run_view
-from nearfar.viewer.viewed import ViewedTransport
 from reconstruction import FAR, PROJECTOR, WINDOW, random_transport
 
 SECONDS = 5
@@ -38,7 +38,7 @@ LIGHTS = {
 # The mouse goes round in the light, once for each time that the screen is drawn.
 DRAG = """seconds => new Promise(done => {
   const light = document.getElementById('light'), box = light.getBoundingClientRect();
-  const count = () => JSON.parse(document.body.dataset.shown).pictures;
+  const count = () => JSON.parse(document.body.dataset.frame).count;
   light.setPointerCapture = () => {};
   const tell = (kind, turn) => light.dispatchEvent(new PointerEvent(kind, { bubbles: true,
     pointerId: 1, clientX: box.left + box.width * (0.5 + 0.3 * Math.cos(turn)),
@@ -83,9 +83,11 @@ def main() -> None:
         addresses.append(address)
         told.set()
 
-    viewed = ViewedTransport(path)
+    transport = InteractiveTransport(path)
     threading.Thread(
-        target=run_view, args=(viewed, Place("127.0.0.1", 0), started, ended), daemon=True
+        target=run_view,
+        args=(transport, ListeningAddress("127.0.0.1", 0), started, ended),
+        daemon=True,
     ).start()
     told.wait()
     (address,) = addresses

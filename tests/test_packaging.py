@@ -33,7 +33,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert {name for name in names if ".dist-info/" not in name} == expected
-    assert "nearfar/viewer/page/main.js" in names
+    assert "nearfar/viewer/pages/view/main.js" in names
     assert "nearfar/py.typed" in names
     assert any(name.endswith("licenses/LICENSE") for name in names)
 
@@ -69,8 +69,9 @@ def test_what_is_installed_runs_by_itself(built, kind, tmp_path):
     assert run("-m", "nearfar", "--version").startswith("nearfar 0.")
     run("-m", "nearfar", "plan", "--projector", "16x16", "--photos", "30", "-o", "plan.json")
     assert "30 photos" in run("-m", "nearfar", "info", "plan.json")
-    page = "from nearfar.viewer.payloads import read_asset; print(len(read_asset('main.js')))"
-    assert int(run("-c", page)) > 5000
+    program = "from nearfar.viewer.assets import read_page; print(*read_page('view'))"
+    source = ROOT / "src" / "nearfar" / "viewer" / "pages" / "view"
+    assert set(run("-c", program).split()) == {path.name for path in source.iterdir()}
 
 
 def _completed(shell, words):

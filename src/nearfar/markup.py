@@ -1,4 +1,4 @@
-"""Scraps of HTML that stand on their own: pictures inside, nothing fetched, no script."""
+"""Fragments of HTML that need no other files: pictures are embedded, and there are no scripts."""
 
 import base64
 from html import escape
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats
 from nearfar.files import encode_png, to_srgb
 
-# Dark blue to yellow by way of teal, of even steps in lightness: read in grey as in colour.
+# From dark blue over teal to yellow, in even steps of lightness, so that it reads the same in grey.
 SCALE = np.array(
     [[38, 20, 72], [52, 70, 140], [36, 120, 148], [50, 168, 130], [138, 205, 88], [248, 228, 60]],
     dtype=np.float64,
@@ -23,7 +23,7 @@ def picture(image: Floats, description: str) -> str:
     ----------
     image : ndarray, shape (y, x) or (y, x, 3)
     description : str
-        For those who cannot see it.
+        Alternative text.
     """
     return embedded(np.rint(255 * to_srgb(np.clip(image, 0, 1))).astype(np.uint8), description)
 
@@ -35,12 +35,12 @@ def embedded(pixels: NDArray[np.uint8], description: str) -> str:
 
 
 def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
-    """Colour values between `low` and `high`, uint8 (y, x, 3); grey where there is none (NaN)."""
+    """Map values from `low` to `high` to the colours of `SCALE`, uint8 (y, x, 3); NaN to grey."""
     share = np.clip((np.nan_to_num(values, nan=low) - low) / max(high - low, 1e-12), 0, 1)
-    place = share * (len(SCALE) - 1)
-    below = np.minimum(place.astype(np.int64), len(SCALE) - 2)
-    part = (place - below)[..., None]
-    colours = SCALE[below] * (1 - part) + SCALE[below + 1] * part
+    position = share * (len(SCALE) - 1)
+    below = np.minimum(position.astype(np.int64), len(SCALE) - 2)
+    fraction = (position - below)[..., None]
+    colours = SCALE[below] * (1 - fraction) + SCALE[below + 1] * fraction
     colours[~np.isfinite(values)] = 128
     return np.asarray(np.rint(colours).astype(np.uint8))
 
@@ -55,7 +55,7 @@ def numbers(head: list[str], rows: list[list[str]]) -> str:
 
 
 def card(title: str, rows: list[tuple[str, str]], images: list[tuple[str, str]]) -> str:
-    """Return what a notebook shows of something: facts, and small pictures under their names.
+    """Return the card that a notebook displays for an object: facts and small pictures.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ def card(title: str, rows: list[tuple[str, str]], images: list[tuple[str, str]])
         for name, value in rows
     )
     large = '<img style="width:100%;image-rendering:pixelated;border:1px solid #8888" '
-    shown = "".join(
+    figures = "".join(
         f'<figure style="margin:0;width:140px">{one.replace("<img ", large)}'
         f'<figcaption style="font-size:.85em;opacity:.75">{escape(name)}</figcaption></figure>'
         for name, one in images
     )
     return (
         f"<div><b>{escape(title)}</b><table>{facts}</table>"
-        f'<div style="display:flex;flex-wrap:wrap;gap:.8em;margin-top:.5em">{shown}</div></div>'
+        f'<div style="display:flex;flex-wrap:wrap;gap:.8em;margin-top:.5em">{figures}</div></div>'
     )

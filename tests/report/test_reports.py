@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.files import write_picture
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.report.maps import maps_of
-from nearfar.report.reconstruction import PIXELS, reconstruction_page
+from nearfar.report.reconstruction import MAXIMUM_DISPLAYED_PIXELS, reconstruction_page
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -140,10 +140,12 @@ def test_a_report_replaces_no_other_file_of_the_command(made, tmp_path, report, 
 def test_a_large_camera_is_thinned_out(made, monkeypatch):
     from nearfar.capture import open_capture
 
-    monkeypatch.setattr("nearfar.report.reconstruction.PIXELS", CAMERA.pixels // 3)
+    monkeypatch.setattr(
+        "nearfar.report.reconstruction.MAXIMUM_DISPLAYED_PIXELS", CAMERA.pixels // 3
+    )
     page = reconstruction_page(open_transport(made / "t.zarr"), open_capture(made / "capture.zarr"))
     assert "One row and column of the camera in 2 is shown" in page
-    assert CAMERA.pixels < PIXELS
+    assert CAMERA.pixels < MAXIMUM_DISPLAYED_PIXELS
 
 
 @pytest.mark.parametrize("channels", [1, 2])

@@ -1,4 +1,4 @@
-"""Asking a viewer's server, as its page does."""
+"""Requests to a viewer's server, as its page sends them."""
 
 import json
 import struct
@@ -17,56 +17,56 @@ TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2"}
 
 def unpack(data):
     (length,) = struct.unpack_from("<I", data)
-    words = json.loads(data[4 : 4 + length])
+    header = json.loads(data[4 : 4 + length])
     at, arrays = 4 + length, []
     assert at % 8 == 0
-    for told in words["arrays"]:
-        kind = np.dtype(TYPES[told["type"]])
-        count = int(np.prod(told["shape"]))
-        arrays.append(np.frombuffer(data, kind, count, at).reshape(told["shape"]))
-        at += -(-count * kind.itemsize // 8) * 8
-    return words, arrays
+    for array in header["arrays"]:
+        dtype = np.dtype(TYPES[array["type"]])
+        count = int(np.prod(array["shape"]))
+        arrays.append(np.frombuffer(data, dtype, count, at).reshape(array["shape"]))
+        at += -(-count * dtype.itemsize // 8) * 8
+    return header, arrays
 
 
-def message(light, **words):
+def message(light, **header):
     """Pack a light as the page does: levels of one channel or three."""
     levels = np.rint(65535 * light.reshape(*light.shape[:2], -1)).astype(np.uint16)
-    text = json.dumps({"number": 1, "shape": levels.shape, **words}).encode()
+    text = json.dumps({"number": 1, "shape": levels.shape, **header}).encode()
     text += b" " * (-(4 + len(text)) % 8)
     return struct.pack("<I", len(text)) + text + levels.tobytes()
 
 
 def ask(address, path, body=None, **headers):
     request = urllib.request.Request(address + path, data=body, headers=headers)
-    with urllib.request.urlopen(request, timeout=30) as answer:
-        return answer.read()
+    with urllib.request.urlopen(request, timeout=30) as response:
+        return response.read()
 
 
 def refused(address, path, body=None, **headers):
-    """Ask for what is refused; gives the status and what is said."""
+    """Send a request that is refused; return the status and the body."""
     with pytest.raises(urllib.error.HTTPError) as error:
         ask(address, path, body, **headers)
-    said = error.value.read().decode()
+    text = error.value.read().decode()
     error.value.close()
-    return error.value.code, said
+    return error.value.code, text
 
 
 def socket_of(address, **options):
     return connect(address.replace("http", "ws") + "/relight", max_size=None, **options)
 
 
-def picture(socket):
-    """Receive the parts of a picture, in photo units."""
-    told, (halves,) = unpack(socket.recv(timeout=30))
-    return told, halves.astype(np.float32) / told["scale"]
+def frame(socket):
+    """Receive a frame; return its header and its parts in photo units."""
+    header, (halves,) = unpack(socket.recv(timeout=30))
+    return header, halves.astype(np.float32) / header["scale"]
 
 
-def relit(address, light, **words):
+def relit(address, light, **header):
     """Let the server relight until its picture is exact."""
     with socket_of(address) as socket:
-        socket.send(message(light, **words))
+        socket.send(message(light, **header))
         while True:
-            told, parts = picture(socket)
-            assert told["number"] == 1
-            if told["exact"]:
-                return told, parts
+            got, parts = frame(socket)
+            assert got["number"] == 1
+            if got["exact"]:
+                return got, parts

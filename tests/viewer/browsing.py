@@ -11,7 +11,7 @@ from tests.viewer.asking import PROJECTOR
 
 
 def pictures(page):
-    return json.loads(page.evaluate("document.body.dataset.shown || '{}'"))
+    return json.loads(page.evaluate("document.body.dataset.frame || '{}'"))
 
 
 def settled(page):

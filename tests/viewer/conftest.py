@@ -20,9 +20,9 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.model import Transport
 from nearfar.transport.store import load_transport, save_transport
-from nearfar.viewer.serving import Place
+from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.server import ListeningAddress
 from nearfar.viewer.view import run_view
-from nearfar.viewer.viewed import ViewedTransport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruct import reconstruct
 from tests.rigs.displays import need
@@ -30,7 +30,7 @@ from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import settled
 from tests.worlds import model_transport
 
-ANYWHERE = Place("127.0.0.1", 0)
+ANYWHERE = ListeningAddress("127.0.0.1", 0)
 
 
 @pytest.fixture(scope="session")
@@ -58,7 +58,9 @@ def transport(stored: Path) -> Transport:
 
 
 @contextmanager
-def served_view(viewed: ViewedTransport, place: Place = ANYWHERE) -> Iterator[str]:
+def served_view(
+    transport: InteractiveTransport, listening: ListeningAddress = ANYWHERE
+) -> Iterator[str]:
     """Serve a page; gives its address."""
     ended, addresses = threading.Event(), []
     there = threading.Event()
@@ -67,7 +69,9 @@ def served_view(viewed: ViewedTransport, place: Place = ANYWHERE) -> Iterator[st
         addresses.append(address)
         there.set()
 
-    thread = threading.Thread(target=run_view, args=(viewed, place, started, ended), daemon=True)
+    thread = threading.Thread(
+        target=run_view, args=(transport, listening, started, ended), daemon=True
+    )
     thread.start()
     assert there.wait(20)
     try:
@@ -80,7 +84,7 @@ def served_view(viewed: ViewedTransport, place: Place = ANYWHERE) -> Iterator[st
 
 @pytest.fixture(scope="session")
 def address(stored: Path) -> Iterator[str]:
-    with served_view(ViewedTransport(stored)) as here:
+    with served_view(InteractiveTransport(stored)) as here:
         yield here
 
 
@@ -89,8 +93,10 @@ def serve_it(stored: Path) -> Iterator[Callable[..., str]]:
     """Serve it in other ways: with little memory, with all quick copies coarse, elsewhere."""
     with ExitStack() as stack:
 
-        def serve(place: Place = ANYWHERE, memory: int = 10**9) -> str:
-            return stack.enter_context(served_view(ViewedTransport(stored, memory=memory), place))
+        def serve(listening: ListeningAddress = ANYWHERE, memory: int = 10**9) -> str:
+            return stack.enter_context(
+                served_view(InteractiveTransport(stored, memory=memory), listening)
+            )
 
         yield serve
 

@@ -7,9 +7,9 @@ from contextlib import ExitStack, suppress
 
 import pytest
 
-from nearfar.viewer import serving
-from nearfar.viewer.connections import WAITING
-from nearfar.viewer.serving import Place, serve
+from nearfar.viewer import server
+from nearfar.viewer.connections import MAXIMUM_WAITING_CONNECTIONS as WAITING
+from nearfar.viewer.server import ListeningAddress, serve
 
 # More than the system keeps for who does not read, where it keeps so little.
 LONG, KEPT = 300_000, 2048
@@ -24,7 +24,7 @@ async def _answer(scope, receive, send):
 
 @pytest.fixture
 def address():
-    with serve(_answer, Place("127.0.0.1", 0)) as address:
+    with serve(_answer, ListeningAddress("127.0.0.1", 0)) as address:
         yield address
 
 
@@ -56,13 +56,13 @@ def test_all_who_ask_at_once_are_answered(address):
 def keeping_little(monkeypatch):
     """The system keeps little of what a server sends."""
 
-    def listen(place):
-        listening = listen_as_it_does(place)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KEPT)
-        return listening
+    def listen(listening):
+        listener = listen_as_it_does(listening)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KEPT)
+        return listener
 
-    listen_as_it_does = serving._listen
-    monkeypatch.setattr(serving, "_listen", listen)
+    listen_as_it_does = server._listen
+    monkeypatch.setattr(server, "_listen", listen)
 
 
 @pytest.mark.parametrize("times", [1, 3])

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import websockets.exceptions
 
-from nearfar.viewer import view, viewed
-from nearfar.viewer.serving import Place
-from nearfar.viewer.viewed import ViewedTransport
+from nearfar.viewer import application, interactive, uploads
+from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.server import ListeningAddress
 from tests.viewer.asking import PROJECTOR, ask, message, refused, relit, socket_of
 from tests.viewer.conftest import served_view
 
@@ -79,7 +79,7 @@ def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
                 closed += 1
             except TimeoutError:
                 pass
-        assert closed >= 300 - 2 * view.PAGES
+        assert closed >= 300 - 2 * application.MAXIMUM_SESSIONS
         first.send(message(lights["random"]))
         first.recv(timeout=30)
     # Those that went made room.
@@ -110,7 +110,7 @@ def test_hundreds_of_connections_that_say_nothing_or_do_not_end_keep_nobody_out(
 
 
 def test_what_does_not_arrive_in_time_gets_a_sentence(serve_it, monkeypatch):
-    monkeypatch.setattr(view, "SENDING", 0.3)
+    monkeypatch.setattr(uploads, "UPLOAD_TIMEOUT_SECONDS", 0.3)
     address = serve_it()
     head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n\r\n"
     with ExitStack() as stack:
@@ -139,7 +139,8 @@ def test_a_page_that_goes_while_it_sends_is_no_fault(serve_it, capfd):
         "/../view.py",
         "/..%2fview.py",
         "/%2e%2e/view.py",
-        "/page/main.js",
+        "/pages/view/main.js",
+        "/view/main.js",
         "//etc/passwd",
         "/main.py",
         "/main.js%00.py",
@@ -196,7 +197,7 @@ def test_a_page_from_elsewhere_is_kept_out(address):
 
 
 def test_elsewhere_a_token_is_asked_for(serve_it):
-    address = serve_it(Place("0.0.0.0", 0))
+    address = serve_it(ListeningAddress("0.0.0.0", 0))
     base, _, token = address.partition("/?token=")
     assert len(token) >= 40
     assert refused(base, "/scene")[0] == 403
@@ -233,8 +234,8 @@ def test_elsewhere_a_token_is_asked_for(serve_it):
 def test_a_transport_that_is_damaged_while_it_is_shown_is_told(stored, tmp_path, monkeypatch):
     path = tmp_path / "t.zarr"
     shutil.copytree(stored, path)
-    monkeypatch.setattr(viewed, "QUICK", 60_000)
-    with served_view(ViewedTransport(path, memory=1)) as address:
+    monkeypatch.setattr(interactive, "MAXIMUM_COARSE_BYTES", 60_000)
+    with served_view(InteractiveTransport(path, memory=1)) as address:
         for chunk in (path / "near").glob("c*"):
             chunk.unlink()
         with socket_of(address) as socket:

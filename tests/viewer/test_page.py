@@ -10,7 +10,7 @@ import pytest
 from nearfar.files import from_srgb, read_light, to_srgb
 from nearfar.files.codecs import decode_png, encode_png
 from nearfar.illumination.pictures import natural_picture
-from nearfar.viewer import viewed
+from nearfar.viewer import interactive
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, slide, tone
 
@@ -139,11 +139,11 @@ def test_it_is_readable_by_day_and_night_and_on_a_phone(
 ):
     page = open_page(address, {"pixel": [10, 10], "map": "error"}, color_scheme=scheme)
     page.set_viewport_size({"width": width, "height": 844})
-    page.wait_for_selector("#map-told:has-text('grey')")
+    page.wait_for_selector("#map-caption:has-text('grey')")
     back = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (sum(map(int, re.findall(r"\d+", back)[:3])) < 200) == (scheme == "dark")
-    texts = "h1, #about, #told, [data-kind=spot], [data-kind=stripe], .card p, .card small, output"
-    for selector in f"{texts}, figcaption, .k-far, .k-near, .keys".split(", "):
+    texts = "h1, #about, #frame-status, [data-kind=spot], [data-kind=stripe], .card p, .card small"
+    for selector in f"{texts}, output, figcaption, .k-far, .k-near, .keys".split(", "):
         assert contrast(page, selector) >= 4.5, selector
     if width == 390:
         # Light and scene on one screen.
@@ -189,30 +189,30 @@ def test_it_is_used_by_the_keyboard(open_page, address, tmp_path):
 
 
 def test_a_server_that_went_is_told_and_comes_back(open_page, stored, browser):
-    from nearfar.viewer.serving import Place
-    from nearfar.viewer.viewed import ViewedTransport
+    from nearfar.viewer.interactive import InteractiveTransport
+    from nearfar.viewer.server import ListeningAddress
     from tests.viewer.conftest import served_view
 
     context = browser.new_context()
-    with served_view(ViewedTransport(stored)) as address:
+    with served_view(InteractiveTransport(stored)) as address:
         page = context.new_page()
         page.goto(address)
         settled(page)
     page.wait_for_selector("#fault:has-text('does not answer')")
     page.click("[data-kind=white]")
     port = int(address.rsplit(":", 1)[1])
-    with served_view(ViewedTransport(stored), Place("127.0.0.1", port)):
-        count = pictures(page)["pictures"]
+    with served_view(InteractiveTransport(stored), ListeningAddress("127.0.0.1", port)):
+        count = pictures(page)["count"]
         end = time.monotonic() + 30
-        while pictures(page)["pictures"] == count and time.monotonic() < end:
+        while pictures(page)["count"] == count and time.monotonic() < end:
             time.sleep(0.1)
-        assert pictures(page)["pictures"] > count
+        assert pictures(page)["count"] > count
         assert page.inner_text("#fault") == ""
     context.close()
 
 
 def test_large_scenes_are_coarse_while_dragged(open_page, serve_it, monkeypatch, transport):
-    monkeypatch.setattr(viewed, "QUICK", 60_000)
+    monkeypatch.setattr(interactive, "MAXIMUM_COARSE_BYTES", 60_000)
     page = open_page(serve_it(memory=10**5), {"kind": "white"})
     white = transport @ np.ones(PROJECTOR, np.float32)
     assert np.abs(seen(page) - tone(white)).max() <= 1

@@ -1,4 +1,4 @@
-"""The preview: its numbers, its server, and a browser's wishes, before a table."""
+"""The preview of a simulated table rig: its statistics, its server, and what a browser sets."""
 
 import json
 import re
@@ -15,28 +15,33 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.rigs.real.rig import RealRig
+from nearfar.viewer.photo_statistics import (
+    HISTOGRAM_BINS,
+    SATURATED_COLOUR,
+    encode_for_display,
+    photo_statistics,
+)
 from nearfar.viewer.preview import run_preview
-from nearfar.viewer.sight import BINS, MARK, look, picture
 from tests.absent import said_without
 from tests.cli.conftest import run_nearfar
 from tests.rigs.displays import need
 from tests.rigs.table import TableCamera, TableScreen
 
 
-def test_what_is_told_of_a_photo():
+def test_the_statistics_of_a_photo():
     photo = np.zeros((40, 60, 3), dtype=np.uint16)
     photo[:, :30] = (100, 200, 300)
     photo[:4] = 1023
-    seen = look(photo, 1023.0)
-    assert [len(channel) for channel in seen.histogram] == [BINS] * 3
+    seen = photo_statistics(photo, 1023.0)
+    assert [len(channel) for channel in seen.histogram] == [HISTOGRAM_BINS] * 3
     assert all(sum(channel) == 40 * 60 for channel in seen.histogram)
     assert seen.histogram[0][-1] == 4 * 60
     assert seen.saturated == pytest.approx(0.1)
     assert seen.brightest == 1.0
     assert seen.mean == pytest.approx(photo.mean() / 1023)
-    shown = imagecodecs.jpeg8_decode(picture(photo, 1023.0))
+    shown = imagecodecs.jpeg8_decode(encode_for_display(photo, 1023.0))
     assert shown.shape == (40, 60, 3)
-    assert np.abs(shown[1, 30].astype(int) - MARK).max() < 40
+    assert np.abs(shown[1, 30].astype(int) - SATURATED_COLOUR).max() < 40
 
 
 def test_the_sharper_picture_has_the_larger_focus():
@@ -45,17 +50,20 @@ def test_the_sharper_picture_has_the_larger_focus():
     generator = np.random.default_rng(0)
     sharp = generator.uniform(0, 4000, (80, 100, 1))
     focus = [
-        look(ndimage.gaussian_filter(sharp, (s, s, 0)), 4095.0).focus for s in (0, 0.5, 1, 2, 4)
+        photo_statistics(ndimage.gaussian_filter(sharp, (s, s, 0)), 4095.0).focus
+        for s in (0, 0.5, 1, 2, 4)
     ]
     assert focus == sorted(focus, reverse=True)
     assert focus[0] > 10 * focus[-1]
     # The light's level does not matter.
-    assert look(sharp / 8, 4095.0).focus == pytest.approx(focus[0], rel=1e-4)
-    assert look(np.zeros((4, 4, 1), np.uint8), 255.0).focus == 0.0
+    assert photo_statistics(sharp / 8, 4095.0).focus == pytest.approx(focus[0], rel=1e-4)
+    assert photo_statistics(np.zeros((4, 4, 1), np.uint8), 255.0).focus == 0.0
 
 
 def test_a_large_photo_is_shown_smaller():
-    shown = imagecodecs.jpeg8_decode(picture(np.zeros((2000, 3000, 1), np.uint16), 65535.0))
+    shown = imagecodecs.jpeg8_decode(
+        encode_for_display(np.zeros((2000, 3000, 1), np.uint16), 65535.0)
+    )
     assert shown.shape == (500, 750, 3)
 
 
@@ -109,7 +117,7 @@ def served():
     ask.address = addresses[0]
     yield camera, ask, until
     if thread.is_alive():
-        ask("/wish", {"stop": True})
+        ask("/settings", {"stop": True})
         thread.join(timeout=10)
     assert not thread.is_alive()
     assert faults == []
@@ -124,15 +132,15 @@ def test_a_browser_sees_and_asks(served):
     assert "https://" not in page
     white = until(lambda state: state.get("pattern") == "white")
     assert white["saturated"] == 0
-    black = [ask("/wish", {"pattern": "black"}), until(lambda s: s["pattern"] == "black")][1]
+    black = [ask("/settings", {"pattern": "black"}), until(lambda s: s["pattern"] == "black")][1]
     assert black["mean"] < white["mean"] / 5
     number = black["number"]
     until(lambda state: state["number"] > number + 3)
     assert imagecodecs.jpeg8_decode(ask("/photo.jpg")).shape == (24, 32, 3)
-    ask("/wish", {"pattern": "white", "exposure": 0.5})
+    ask("/settings", {"pattern": "white", "exposure": 0.5})
     bright = until(lambda state: state["exposure"] == 0.5 and state["saturated"] > 0.9)
     assert bright["brightest"] == 1.0
-    ask("/wish", {"automatic": True})
+    ask("/settings", {"automatic": True})
     until(lambda state: 0.5 < state["brightest"] < 0.95 and state["saturated"] == 0)
 
 
@@ -158,7 +166,7 @@ def test_a_real_browser_shows_it(served, tmp_path):
 
 def test_faults_are_said_and_it_goes_on(served):
     camera, ask, until = served
-    ask("/wish", {"exposure": 100.0})
+    ask("/settings", {"exposure": 100.0})
     until(lambda state: "cannot expose 100 s" in state["fault"])
     until(lambda state: state["fault"] == "")
     camera.from_now_on = "lost"
@@ -181,7 +189,7 @@ def test_faults_are_said_and_it_goes_on(served):
 def test_what_cannot_be_asked_is_refused(served, body, headers, status):
     _, ask, until = served
     with pytest.raises(urllib.error.HTTPError) as refused:
-        ask("/wish", body, **headers)
+        ask("/settings", body, **headers)
     assert refused.value.code == status
     refused.value.close()
     number = until(lambda state: True)["number"]
@@ -205,11 +213,13 @@ def test_a_port_that_is_taken_is_named():
 
 
 def test_without_its_packages_there_is_a_sentence():
-    program = "from nearfar.viewer.preview import _application, _Shared\n_application(_Shared())"
+    program = (
+        "from nearfar.viewer.preview import _application, _Exchange\n_application(_Exchange())"
+    )
     assert "pip install 'nearfar[viewer]'" in said_without("fastapi", program)
     program = (
-        "from nearfar.viewer.serving import Place, serve\n"
-        "with serve(None, Place('127.0.0.1', 0)):\n    pass"
+        "from nearfar.viewer.server import ListeningAddress, serve\n"
+        "with serve(None, ListeningAddress('127.0.0.1', 0)):\n    pass"
     )
     assert "pip install 'nearfar[viewer]'" in said_without("uvicorn", program)
 

@@ -1,4 +1,4 @@
-"""The viewer's server: its pictures, what it tells of pixels, and what it reads."""
+"""The viewer's server: its frames, pixels, maps, and the files that it reads."""
 
 import json
 import os
@@ -24,20 +24,20 @@ from nearfar.files import read_light, read_picture, write_picture
 from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
 from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
-from nearfar.viewer import view, viewed
-from nearfar.viewer.inspecting import inspect_row
+from nearfar.viewer import application, interactive
+from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.messages import pack, unpack_light
-from nearfar.viewer.payloads import answer_map
-from nearfar.viewer.serving import Place, serve
-from nearfar.viewer.viewed import ViewedTransport
+from nearfar.viewer.payloads import pack_map
+from nearfar.viewer.server import ListeningAddress, serve
+from nearfar.viewer.transport_row import transport_row
 from tests.absent import said_without
 from tests.cli.conftest import run_nearfar
 from tests.viewer.asking import (
     CAMERA,
     PROJECTOR,
     ask,
+    frame,
     message,
-    picture,
     refused,
     relit,
     socket_of,
@@ -51,8 +51,8 @@ from tests.worlds import model_transport
 
 @pytest.mark.parametrize("name", ["white", "black", "spot", "random", "coloured"])
 def test_pictures_are_those_of_the_transport(address, transport, lights, name):
-    told, parts = relit(address, lights[name])
-    assert (told["step"], told["exact"]) == (1, True)
+    header, parts = relit(address, lights[name])
+    assert (header["stride"], header["exact"]) == (1, True)
     expected = np.stack(transport.components(lights[name]))
     # Half precision keeps 11 digits; 65535 levels keep 16.
     np.testing.assert_allclose(parts, expected, rtol=1e-3, atol=2e-5)
@@ -74,27 +74,27 @@ def _thin(pictures, step):
 def test_a_large_scene_is_coarse_while_the_light_moves_and_exact_at_rest(
     serve_it, transport, lights, monkeypatch, memory
 ):
-    monkeypatch.setattr(viewed, "QUICK", 60_000)
-    monkeypatch.setattr(viewed, "STEADY", 50_000)
+    monkeypatch.setattr(interactive, "MAXIMUM_COARSE_BYTES", 60_000)
+    monkeypatch.setattr(interactive, "BLOCK_BYTES", 50_000)
     address = serve_it(memory=memory)
     expected = np.stack(transport.components(lights["random"]))
     with socket_of(address) as socket:
         socket.send(message(lights["random"]))
-        told, coarse = picture(socket)
-        assert not told["exact"]
-        step = told["step"]
+        header, coarse = frame(socket)
+        assert not header["exact"]
+        step = header["stride"]
         assert step > 1
         np.testing.assert_allclose(coarse, _thin(expected, step), rtol=1e-3, atol=2e-5)
-        told, exact = picture(socket)
-        assert (told["exact"], told["step"]) == (True, 1)
+        header, exact = frame(socket)
+        assert (header["exact"], header["stride"]) == (True, 1)
         np.testing.assert_allclose(exact, expected, rtol=1e-3, atol=2e-5)
 
 
 def test_larger_photos_than_a_page_shows_are_thinned_out(serve_it, transport, lights, monkeypatch):
-    monkeypatch.setattr(viewed, "SHOWN", CAMERA.pixels // 3)
-    monkeypatch.setattr(viewed, "STEADY", 50_000)
-    told, parts = relit(serve_it(), lights["random"])
-    assert told["step"] == 2
+    monkeypatch.setattr(interactive, "MAXIMUM_DISPLAYED_PIXELS", CAMERA.pixels // 3)
+    monkeypatch.setattr(interactive, "BLOCK_BYTES", 50_000)
+    header, parts = relit(serve_it(), lights["random"])
+    assert header["stride"] == 2
     expected = _thin(np.stack(transport.components(lights["random"])), 2)
     np.testing.assert_allclose(parts, expected, rtol=1e-3, atol=2e-5)
 
@@ -105,9 +105,9 @@ def test_lights_that_come_faster_than_pictures_do_not_queue(serve_it, transport,
             socket.send(message(lights["random"] * (number / 199), number=number))
         pictures = 0
         while True:
-            told, parts = picture(socket)
+            header, parts = frame(socket)
             pictures += 1
-            if told["number"] == 199:
+            if header["number"] == 199:
                 break
     assert pictures <= 199
     expected = np.stack(transport.components(lights["random"]))
@@ -138,17 +138,17 @@ def test_what_is_saved_is_what_the_command_line_relights(
 
 def test_a_camera_pixel_tells_its_row(address, transport):
     y, x = 17, 30
-    words, (window, far, window_error, far_error, spectrum) = unpack(
+    header, (window, far, window_error, far_error, spectrum) = unpack(
         ask(address, f"/row?y={y}&x={x}")
     )
     d, n, f = (part[0] for part in transport.component_rows(slice(y * 42 + x, y * 42 + x + 1)))
     np.testing.assert_allclose(window, (d + n).mean(axis=0).reshape(PROJECTOR), atol=1e-6)
     np.testing.assert_allclose(far, f.mean(axis=0).reshape(PROJECTOR), atol=1e-6)
-    assert words["q"] == pytest.approx(transport.correspondence[y, x].tolist())
-    assert words["floodlit"]["near"] == pytest.approx(n.mean(axis=0).sum(), abs=1e-5)
+    assert header["q"] == pytest.approx(transport.correspondence[y, x].tolist())
+    assert header["floodlit"]["near"] == pytest.approx(n.mean(axis=0).sum(), abs=1e-5)
     bars = ErrorBars(transport).component_rows(slice(y * 42 + x, y * 42 + x + 1))
     line = round(float(transport.correspondence[y, x, 0]))
-    assert words["line"] == line
+    assert header["line"] == line
     along = slice(line * PROJECTOR.width, (line + 1) * PROJECTOR.width)
     # Of the mean of three channels.
     expected = np.sqrt((bars.far[0] ** 2).sum(axis=0)) / 3
@@ -158,14 +158,14 @@ def test_a_camera_pixel_tells_its_row(address, transport):
     assert 1 < np.count_nonzero(window_error) <= transport.window
     assert spectrum.max() == 0
     assert np.unravel_index(spectrum.argmax(), PROJECTOR) == (10, 12)
-    assert words["k_far"][0] <= words["k_near"][0] <= 0.5
-    assert words["k_far"] == np.abs(transport.far_basis.cycles).max(axis=0).tolist()
+    assert header["k_far"][0] <= header["k_near"][0] <= 0.5
+    assert header["k_far"] == np.abs(transport.far_basis.cycles).max(axis=0).tolist()
 
 
 def test_a_camera_pixel_without_direct_light_says_so(address):
-    words, (window, *_) = unpack(ask(address, "/row?y=3&x=5"))
-    assert words["q"] is None
-    assert words["line"] == PROJECTOR.height // 2
+    header, (window, *_) = unpack(ask(address, "/row?y=3&x=5"))
+    assert header["q"] is None
+    assert header["line"] == PROJECTOR.height // 2
     assert not window.any()
 
 
@@ -181,10 +181,10 @@ def test_every_map_is_there(address, transport):
     assert set(names) >= {"row", "column", "confidence", "error", "near-share", "saturated"}
     found = {}
     for name in names:
-        words, (found[name],) = unpack(ask(address, f"/map/{name}"))
+        header, (found[name],) = unpack(ask(address, f"/map/{name}"))
         assert found[name].shape == CAMERA
-        assert words["low"] < words["high"]
-        assert words["title"]
+        assert header["low"] < header["high"]
+        assert header["title"]
     np.testing.assert_array_equal(found["row"], transport.correspondence[..., 0])
     np.testing.assert_array_equal(found["confidence"], transport.quality.confidence)
     parts = [part.sum(axis=-1) for part in transport.components(np.ones(PROJECTOR))]
@@ -197,14 +197,14 @@ def test_every_map_is_there(address, transport):
 
 def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
     save_transport(replace(transport, posterior=None, quality=None), tmp_path / "t.zarr")
-    with served_view(ViewedTransport(tmp_path / "t.zarr")) as address:
+    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
         about = json.loads(ask(address, "/scene"))
         names = [one["name"] for one in about["maps"]]
         assert "error" not in names
         assert "confidence" not in names
         unpack(ask(address, "/map/noise"))
-        words, (_, _, error, _, _) = unpack(ask(address, "/row?y=1&x=2"))
-        assert words["no_errors"] == "the joint estimate tells them"
+        header, (_, _, error, _, _) = unpack(ask(address, "/row?y=1&x=2"))
+        assert header["no_errors"] == "the joint estimate tells them"
         assert not error.any()
 
 
@@ -214,9 +214,9 @@ def test_pixels_are_answered_while_a_map_is_computed(serve_it, monkeypatch):
     def slow(maps, name):
         begun.set()
         assert over.wait(30)
-        return answer_map(maps, name)
+        return pack_map(maps, name)
 
-    monkeypatch.setattr(view, "answer_map", slow)
+    monkeypatch.setattr(application, "pack_map", slow)
     address = serve_it()
     with ThreadPoolExecutor() as asking:
         drawn = asking.submit(ask, address, "/map/error")
@@ -227,8 +227,8 @@ def test_pixels_are_answered_while_a_map_is_computed(serve_it, monkeypatch):
             assert not drawn.done()
         finally:
             over.set()
-        words, _ = unpack(drawn.result(30))
-        assert words["unit"] == "dB"
+        header, _ = unpack(drawn.result(30))
+        assert header["unit"] == "dB"
 
 
 # Files that a page sends
@@ -246,12 +246,12 @@ def test_lights_and_photos_of_other_formats_are_read(address, transport, lights,
         _, (levels,) = unpack(ask(address, f"/read/light?name={name}", data))
         np.testing.assert_allclose(levels / 65535, linear, atol=2e-5)
     photo = np.random.default_rng(1).random((*CAMERA, 3)).astype(np.float32)
-    words, (seen,) = unpack(ask(address, "/read/photo?name=p.npy", encode_npy(photo)))
-    seen = seen.astype(np.float32) / words["scale"]
+    header, (seen,) = unpack(ask(address, "/read/photo?name=p.npy", encode_npy(photo)))
+    seen = seen.astype(np.float32) / header["scale"]
     np.testing.assert_allclose(seen, photo - transport.black, atol=1e-3)
     eight = np.full((*CAMERA, 3), 188, np.uint8)
-    words, (seen,) = unpack(ask(address, "/read/photo?name=p.png", encode_png(eight)))
-    seen = seen.astype(np.float32) / words["scale"]
+    header, (seen,) = unpack(ask(address, "/read/photo?name=p.png", encode_png(eight)))
+    seen = seen.astype(np.float32) / header["scale"]
     # Of eight bits it is a picture for looking: 188 in sRGB is half of white.
     np.testing.assert_allclose(seen, 0.5, atol=0.01)
 
@@ -296,8 +296,8 @@ def test_files_that_cannot_be_used_get_a_sentence(address, kind, name, data, wor
 
 def test_a_message_comes_back_as_it_was_packed():
     arrays = [np.arange(5, dtype=np.uint16), np.ones((2, 3), np.float32), np.zeros(3, np.float16)]
-    words, found = unpack(pack({"é": 1.5}, *arrays))
-    assert words["é"] == 1.5
+    header, found = unpack(pack({"é": 1.5}, *arrays))
+    assert header["é"] == 1.5
     for array, other in zip(arrays, found, strict=True):
         np.testing.assert_array_equal(array, other)
 
@@ -306,20 +306,20 @@ def test_three_equal_channels_are_one():
     light = np.repeat(np.random.default_rng(0).random((*PROJECTOR, 1)), 3, axis=2)
     _, found = unpack_light(message(light), PROJECTOR)
     assert found.is_grey
-    np.testing.assert_allclose(found.whole(), light[..., 0], atol=1e-5)
+    np.testing.assert_allclose(found.as_array(), light[..., 0], atol=1e-5)
     _, found = unpack_light(message(light, colour=[1, 0.5, 0]), PROJECTOR)
-    np.testing.assert_allclose(found.whole(), light * [1, 0.5, 0], atol=1e-5)
+    np.testing.assert_allclose(found.as_array(), light * [1, 0.5, 0], atol=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("place", "words"),
+    ("listening", "words"),
     [
-        (Place("no.such.host.invalid", 0), "no address of this machine"),
-        (Place("8.8.8.8", 0), "cannot be served on"),
+        (ListeningAddress("no.such.host.invalid", 0), "no address of this machine"),
+        (ListeningAddress("8.8.8.8", 0), "cannot be served on"),
     ],
 )
-def test_places_that_cannot_be_served_at(place, words):
-    with pytest.raises(InputError, match=words), serve(None, place):
+def test_addresses_that_cannot_be_listened_at(listening, words):
+    with pytest.raises(InputError, match=words), serve(None, listening):
         pass
 
 
@@ -339,7 +339,7 @@ def test_what_is_no_transport_gets_a_sentence(tmp_path):
     assert ran.status == 1
     assert "is not there" in ran.err
     with pytest.raises(MissingFileError):
-        ViewedTransport(tmp_path / "none.zarr")
+        InteractiveTransport(tmp_path / "none.zarr")
 
 
 def test_without_its_packages_there_is_a_sentence():
@@ -357,7 +357,7 @@ def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypa
     import threading
 
     under, most, lock = 0, [], threading.Lock()
-    at_once = ViewedTransport.at_once
+    relight_coarsely = InteractiveTransport.relight_coarsely
 
     def counted(self, light):
         nonlocal under
@@ -366,12 +366,12 @@ def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypa
             most.append(under)
         time.sleep(0.05)
         try:
-            return at_once(self, light)
+            return relight_coarsely(self, light)
         finally:
             with lock:
                 under -= 1
 
-    monkeypatch.setattr(ViewedTransport, "at_once", counted)
+    monkeypatch.setattr(InteractiveTransport, "relight_coarsely", counted)
     address = serve_it()
     for _ in range(20):
         with socket_of(address) as socket:
@@ -383,12 +383,12 @@ def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypa
 def test_too_much_at_once_is_told_to_wait(serve_it, monkeypatch):
     from concurrent.futures import ThreadPoolExecutor
 
-    from nearfar.viewer import following, payloads
+    from nearfar.viewer import jobs, payloads
 
-    monkeypatch.setattr(following, "MOST", 2)
-    inspect = payloads.inspect_row
+    monkeypatch.setattr(jobs, "MAXIMUM_JOBS", 2)
+    row_of = payloads.transport_row
     monkeypatch.setattr(
-        payloads, "inspect_row", lambda *given: [time.sleep(0.5), inspect(*given)][1]
+        payloads, "transport_row", lambda *given: [time.sleep(0.5), row_of(*given)][1]
     )
     address = serve_it()
 
@@ -408,28 +408,28 @@ def test_too_much_at_once_is_told_to_wait(serve_it, monkeypatch):
 @pytest.mark.parametrize(("window", "k_near"), [(3, 1 / 3), (4, 0.5), (5, 0.4), (6, 0.5)])
 def test_the_highest_near_frequency_is_that_of_the_papers_plan(window, k_near):
     world = model_transport(Size(12, 12), Size(3, 5), window=window, far=Size(3, 3))
-    words = inspect_row(of_rows(world, slice(1, 2)), 2).words
-    assert words["k_near"] == pytest.approx([k_near, k_near])
-    assert words["k_far"] == pytest.approx([1 / 12, 1 / 12])
+    header = transport_row(of_rows(world, slice(1, 2)), 2).header
+    assert header["k_near"] == pytest.approx([k_near, k_near])
+    assert header["k_far"] == pytest.approx([1 / 12, 1 / 12])
 
 
 def test_a_projector_of_one_row_is_shown(tmp_path):
     world = model_transport(Size(1, 24), Size(3, 5), window=3, far=Size(1, 3), entries=0)
     save_transport(replace(world, near=np.zeros_like(world.near)), tmp_path / "row.zarr")
-    with served_view(ViewedTransport(tmp_path / "row.zarr")) as address:
-        words, _ = unpack(ask(address, "/map/row"))
-        assert words["low"] < words["high"]
-        words, (window, *_) = unpack(ask(address, "/row?y=1&x=2"))
+    with served_view(InteractiveTransport(tmp_path / "row.zarr")) as address:
+        header, _ = unpack(ask(address, "/map/row"))
+        assert header["low"] < header["high"]
+        header, (window, *_) = unpack(ask(address, "/row?y=1&x=2"))
         assert window.shape == (1, 24)
-        assert words["k_near"][0] == 0
-        assert words["k_far"][1] <= words["k_near"][1] <= 0.5
+        assert header["k_near"][0] == 0
+        assert header["k_far"][1] <= header["k_near"][1] <= 0.5
 
 
 def test_a_camera_of_one_or_four_channels_is_shown(tmp_path):
     for channels, colours in ((1, 1), (2, 1), (4, 3)):
         world = model_transport(Size(8, 9), Size(5, 7), window=3, far=Size(3, 3), channels=channels)
         save_transport(world, tmp_path / f"{channels}.zarr")
-        with served_view(ViewedTransport(tmp_path / f"{channels}.zarr")) as address:
+        with served_view(InteractiveTransport(tmp_path / f"{channels}.zarr")) as address:
             light = np.random.default_rng(0).random((8, 9))
             _, parts = relit(address, light)
             assert parts.shape == (3, 5, 7, colours)

@@ -11,7 +11,13 @@ from nearfar.baselines.brute_force import BruteForce
 from nearfar.baselines.reference import acquire_reference
 from nearfar.errors import InputError
 from nearfar.plan.choose import FEWEST_PHOTOS
-from nearfar.report.comparison import HEAD, comparison_page, is_comparison, rows, write_comparison
+from nearfar.report.comparison import (
+    TABLE_HEAD,
+    comparison_page,
+    is_comparison,
+    table_rows,
+    write_comparison,
+)
 from nearfar.report.comparison import winners as best_of
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -133,8 +139,8 @@ def test_the_page_holds_every_trial(found, tmp_path):
     data = json.loads((folder / "comparison.json").read_text())
     assert len(data["equal_photos"]) == len(found.equal_photos)
     text = comparison_page(found)
-    for row in rows(found.equal_photos) + rows(found.equal_exposure):
-        assert len(row) == len(HEAD)
+    for row in table_rows(found.equal_photos) + table_rows(found.equal_exposure):
+        assert len(row) == len(TABLE_HEAD)
         assert f"<td>{row[3]}</td>" in text
     (folder / "mine.txt").write_text("kept")
     assert not is_comparison(folder)

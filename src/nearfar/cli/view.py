@@ -37,22 +37,22 @@ def view(
     """
     import webbrowser
 
-    from nearfar.viewer.serving import Place
+    from nearfar.viewer.interactive import InteractiveTransport
+    from nearfar.viewer.server import ListeningAddress
     from nearfar.viewer.view import run_view
-    from nearfar.viewer.viewed import ViewedTransport
 
     available = parse_bytes(memory, name="--memory")
     with progress_bar("reading", quiet=quiet) as report:
-        viewed = ViewedTransport(
+        interactive = InteractiveTransport(
             transport, memory=available, progress=lambda share: report("reading", share)
         )
 
-    def started(address: str) -> None:
-        print(f"{transport} at {address}, Ctrl-C here ends it", flush=True)
+    def on_start(url: str) -> None:
+        print(f"{transport} at {url}, Ctrl-C here ends it", flush=True)
         if browser:
-            webbrowser.open(address)
+            webbrowser.open(url)
 
     # Ctrl-C is how it ends.
     with suppress(KeyboardInterrupt):
-        run_view(viewed, Place(host, port), started)
+        run_view(interactive, ListeningAddress(host, port), on_start)
     say("view ended", quiet=quiet)

@@ -1,1 +1,1 @@
-"""Pages to look at."""
+"""Reports: self-contained HTML pages, figures and tables."""

@@ -1,4 +1,4 @@
-"""A calibration on the disk: its numbers and its plots."""
+"""A calibration written to a folder: its numbers, and plots of the measurements behind them."""
 
 from pathlib import Path
 
@@ -11,20 +11,21 @@ from nearfar.report.figures.style import LINES, new_figure, save, styled
 from nearfar.rigs.calibration import NAME
 from nearfar.workflow.calibrate import Findings
 
-# Colours of red, green and blue that differ in lightness, too.
+# Label, colour and line style; the colours also differ in lightness, for prints in grey.
 PRIMARIES = (("red", "#8c1c13", "-"), ("green", "#3f9e74", "--"), ("blue", "#1f4e9c", "-."))
+INK = "#111111"
 
 
-def write_calibration(folder: Path, found: Findings, *, force: bool = False) -> None:
-    """Write calibration.json and plots of what it was read from, whole or not at all.
+def write_calibration(folder: Path, findings: Findings, *, force: bool = False) -> None:
+    """Write calibration.json and plots of the measurements behind it, completely or not at all.
 
     Parameters
     ----------
     folder : Path
-        To make.
-    found : Findings
+        Folder to create.
+    findings : Findings
     force : bool
-        Replace a calibration that is there.
+        Whether to replace an existing calibration.
 
     Raises
     ------
@@ -33,9 +34,11 @@ def write_calibration(folder: Path, found: Findings, *, force: bool = False) -> 
     """
     with new_output(folder, force=force, replaceable=is_calibration) as partial:
         partial.mkdir()
-        (partial / NAME).write_text(found.calibration.model_dump_json(indent=1), encoding="utf-8")
+        (partial / NAME).write_text(
+            findings.calibration.model_dump_json(indent=1), encoding="utf-8"
+        )
         with styled():
-            projector, camera = _projector(found), _camera(found)
+            projector, camera = _projector(findings), _camera(findings)
         save(projector, partial, "projector")
         save(camera, partial, "camera")
 
@@ -69,7 +72,7 @@ def describe_calibration(found: Findings) -> str:
 
 
 def is_calibration(folder: Path) -> bool:
-    """Tell whether a folder may be replaced by a calibration: it is one, or empty."""
+    """Return whether a folder may be replaced by a calibration: it is one, or it is empty."""
     try:
         names = {entry.name for entry in folder.iterdir()}
     except OSError:
@@ -77,54 +80,50 @@ def is_calibration(folder: Path) -> bool:
     return not names or NAME in names
 
 
-def _projector(found: Findings) -> Figure:
+def _projector(findings: Findings) -> Figure:
     figure = new_figure(2.6)
-    response, straight = figure.subplots(1, 2)
-    table = found.calibration.response_table()
-    same = bool((table == table[:, :1]).all())
-    lines = [("all primaries", "#111111", "-")] if same else PRIMARIES
+    response, residual = figure.subplots(1, 2)
+    table = findings.calibration.response_table()
+    is_grey = bool((table == table[:, :1]).all())
+    lines = [("all primaries", INK, "-")] if is_grey else PRIMARIES
     for i, (name, colour, style) in enumerate(lines):
         response.plot(table[:, i], color=colour, linestyle=style, label=name)
-    for channel in found.light.T:
-        response.plot(found.levels, channel, "o", markersize=2.5, color="#888888")
+    for channel in findings.light.T:
+        response.plot(findings.levels, channel, "o", markersize=2.5, color="#888888")
     response.set(xlabel="level", ylabel="light over white's", title="response and its ramp")
     response.legend()
-    level, light = found.checked.T
-    straight.axhline(0, color="#888888", linewidth=0.6)
-    straight.plot(255 * level, 100 * (light - level), "o-", markersize=3, **_ink())
-    straight.set(
+    level, light = findings.checked.T
+    residual.axhline(0, color="#888888", linewidth=0.6)
+    residual.plot(255 * level, 100 * (light - level), "o-", markersize=3, color=INK)
+    residual.set(
         xlabel="level", ylabel="error, % of white", title="the straightened ramp, less a line"
     )
-    _room(straight, 1.0)
+    _widen_y(residual, 1.0)
     return figure
 
 
-def _camera(found: Findings) -> Figure:
+def _camera(findings: Findings) -> Figure:
     figure = new_figure(2.6)
     line, noise = figure.subplots(1, 2)
-    if len(found.exposures):
-        seconds, levels = found.exposures.T
+    if len(findings.exposures):
+        seconds, levels = findings.exposures.T
         rate = np.polyfit(seconds, levels, 1)
-        line.plot(1e3 * seconds, levels, "o", markersize=3, color="#111111")
+        line.plot(1e3 * seconds, levels, "o", markersize=3, color=INK)
         span = np.array([0.0, seconds.max()])
         line.plot(1e3 * span, np.polyval(rate, span), **LINES["D"])
     else:
         line.text(0.5, 0.5, "the exposure cannot be set", ha="center", transform=line.transAxes)
     line.set(xlabel="exposure, ms", ylabel="mean level", title="the camera's own line")
-    means, variances = found.noise.T
+    means, variances = findings.noise.T
     noise.plot(means, variances, ".", markersize=2, color="#888888", label="pairs of photos")
     span = np.linspace(means.min(), means.max(), 50)
-    noise.plot(span, found.calibration.sensor.variance(span), **LINES["N"], label="fit")
+    noise.plot(span, findings.calibration.sensor.variance(span), **LINES["N"], label="fit")
     noise.set(xlabel="mean level", ylabel="variance, levels²", title="noise")
     noise.legend()
     return figure
 
 
-def _ink() -> dict[str, str]:
-    return {"color": "#111111"}
-
-
-def _room(axes: Axes, least: float) -> None:
-    """Let noise of next to nothing look like next to nothing."""
+def _widen_y(axes: Axes, half_range: float) -> None:
+    """Extend the y axis to at least +-`half_range`, so that small residuals look small."""
     low, high = axes.get_ylim()
-    axes.set_ylim(min(low, -least), max(high, least))
+    axes.set_ylim(min(low, -half_range), max(high, half_range))

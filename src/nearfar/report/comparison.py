@@ -18,24 +18,23 @@ from nearfar.workflow.rivals import RIVALS
 INDEX = "index.html"
 PLOT = "comparison"
 DATA = "comparison.json"
-# The title, by which a page of a comparison is told from others.
-MARK = "nearfar: methods compared"
-# What lies below is no picture any more.
-LOWEST = 10.0
-# Ticks closer than this factor are one.
-CLOSE = 1.25
+# Also what `is_comparison` recognises the page by.
+TITLE = "nearfar: methods compared"
+# In dB; with a lower SNR_b a relit picture is hardly recognisable.
+MINIMUM_PLOTTED_SNR = 10.0
+MINIMUM_TICK_RATIO = 1.25
 
 
 def is_comparison(folder: Path) -> bool:
-    """Tell whether a folder is a comparison and nothing else, or holds nothing at all."""
+    """Return whether a folder holds a comparison and nothing else, or nothing at all."""
     entries = list(folder.iterdir())
     ours = {INDEX, DATA, f"{PLOT}.pdf", f"{PLOT}.png"}
     if not all(entry.is_file() and entry.name in ours for entry in entries):
         return False
-    return not entries or MARK in (folder / INDEX).read_text(encoding="utf-8", errors="replace")
+    return not entries or TITLE in (folder / INDEX).read_text(encoding="utf-8", errors="replace")
 
 
-def write_comparison(output: Path, found: Comparison, *, force: bool = False) -> None:
+def write_comparison(output: Path, comparison: Comparison, *, force: bool = False) -> None:
     """Write a folder: ``index.html``, ``comparison.pdf``, ``.png`` and ``.json``.
 
     Raises
@@ -46,24 +45,24 @@ def write_comparison(output: Path, found: Comparison, *, force: bool = False) ->
     with new_output(output, force=force, replaceable=is_comparison) as partial:
         partial.mkdir()
         with styled():
-            figure = draw(found)
+            figure = draw(comparison)
         save(figure, partial, PLOT)
-        text = json.dumps(found.numbers(), indent=1, allow_nan=False)
+        text = json.dumps(comparison.numbers(), indent=1, allow_nan=False)
         (partial / DATA).write_text(text, encoding="utf-8")
-        (partial / INDEX).write_text(comparison_page(found), encoding="utf-8")
+        (partial / INDEX).write_text(comparison_page(comparison), encoding="utf-8")
 
 
-def draw(found: Comparison) -> Figure:
+def draw(comparison: Comparison) -> Figure:
     """Draw SNR_b under pictures against photos and against total exposure."""
     figure = new_figure(3.2)
     left, right = figure.subplots(1, 2, sharey=True)
     for axes, trials in (
-        (left, found.equal_photos),
-        (right, found.equal_exposure),
+        (left, comparison.equal_photos),
+        (right, comparison.equal_exposure),
     ):
         _draw_lines(axes, trials)
-    # Both share the axis, so it is cut when all is drawn.
-    left.set_ylim(bottom=max(LOWEST, left.get_ylim()[0]))
+    # After both plots, which share the axis, have set its limits.
+    left.set_ylim(bottom=max(MINIMUM_PLOTTED_SNR, left.get_ylim()[0]))
     left.set_xlabel("photos in all, each exposed alike")
     right.set_xlabel("total exposure, photos' worth")
     left.set_ylabel("SNR$_b$, mean over pictures, dB")
@@ -74,35 +73,35 @@ def draw(found: Comparison) -> Figure:
 
 def _draw_lines(axes: Axes, trials: Sequence[Trial]) -> None:
     for method in RIVALS:
-        # Where each photo is exposed alike, the total exposure is their number.
-        mine = sorted((t.exposure, t.pictures) for t in trials if t.method == method)
-        if mine:
-            places, values = zip(*mine, strict=True)
+        # With equal photos, the total exposure is the number of photos.
+        points = sorted((t.exposure, t.pictures) for t in trials if t.method == method)
+        if points:
+            exposures, values = zip(*points, strict=True)
             rival = RIVALS[method]
-            axes.plot(places, values, label=rival.title, markersize=3.5, **rival.line)
+            axes.plot(exposures, values, label=rival.title, markersize=3.5, **rival.line)
     axes.set_xscale("log")
-    axes.set_xticks(_apart(sorted({trial.budget for trial in trials})))
+    axes.set_xticks(_distinct_ticks(sorted({trial.budget for trial in trials})))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.minorticks_off()
     axes.tick_params(axis="x", rotation=45)
     axes.grid(linewidth=0.3, color="#cccccc")
 
 
-def _apart(places: Sequence[int]) -> list[int]:
-    """Leave out ticks that would be written over each other."""
+def _distinct_ticks(positions: Sequence[int]) -> list[int]:
+    """Leave out ticks whose labels would overlap."""
     kept: list[int] = []
-    for place in places:
-        if not kept or place > CLOSE * kept[-1]:
-            kept.append(place)
+    for position in positions:
+        if not kept or position > MINIMUM_TICK_RATIO * kept[-1]:
+            kept.append(position)
     return kept
 
 
 def winners(trials: Sequence[Trial]) -> list[str]:
-    """Say for each budget which method came out best, and by how much."""
+    """Return a line for each budget: the best method, the second best, and their SNR_b."""
     lines = []
     for budget in sorted({trial.budget for trial in trials}):
-        mine = (trial for trial in trials if trial.budget == budget)
-        best, *others = sorted(mine, key=lambda trial: trial.pictures, reverse=True)
+        rivals = (trial for trial in trials if trial.budget == budget)
+        best, *others = sorted(rivals, key=lambda trial: trial.pictures, reverse=True)
         text = f"{budget}: {RIVALS[best.method].title} {best.pictures:.1f} dB"
         if others:
             text += f", then {RIVALS[others[0].method].title} {others[0].pictures:.1f} dB"
@@ -110,8 +109,8 @@ def winners(trials: Sequence[Trial]) -> list[str]:
     return lines
 
 
-def rows(trials: Sequence[Trial]) -> list[list[str]]:
-    """Return rows of a table, in the order of methods and photos."""
+def table_rows(trials: Sequence[Trial]) -> list[list[str]]:
+    """Return the rows of a table, sorted by method and number of photos."""
     methods = list(RIVALS)
     order = sorted(trials, key=lambda t: (methods.index(t.method), t.photos, t.exposure))
     return [
@@ -125,10 +124,10 @@ def rows(trials: Sequence[Trial]) -> list[list[str]]:
     ]
 
 
-HEAD = ["method", "photos", "exposure", "pictures", "white", "random"]
+TABLE_HEAD = ["method", "photos", "exposure", "pictures", "white", "random"]
 
 
-def comparison_page(found: Comparison) -> str:
+def comparison_page(comparison: Comparison) -> str:
     """Return the page with the plot and the tables."""
     caption = (
         "Every method sees the same scene, camera and noise, and finds correspondence itself where "
@@ -137,21 +136,22 @@ def comparison_page(found: Comparison) -> str:
         "the true transport likes best."
     )
     body = [
-        f"<h1>Methods compared on {escape(found.scene)}</h1>",
-        f"<p>Projector {found.projector}, camera {found.camera}. SNR_b in dB: the mean over five "
-        f"pictures with the spectra of photographs, under white, and under a random pattern.</p>",
+        f"<h1>Methods compared on {escape(comparison.scene)}</h1>",
+        f"<p>Projector {comparison.projector}, camera {comparison.camera}. SNR_b in dB: the mean "
+        f"over five pictures with the spectra of photographs, under white, and under a random "
+        f"pattern.</p>",
         f'<figure class="sheet"><img src="{PLOT}.png" alt="SNR against photos and exposure">'
         f'<figcaption>{caption} <a href="{PLOT}.pdf">PDF</a>, <a href="{DATA}">data</a>.'
         f"</figcaption></figure>",
     ]
     for title, text, trials in (
-        ("Equal photos", "Each photo is exposed alike.", found.equal_photos),
+        ("Equal photos", "Each photo is exposed alike.", comparison.equal_photos),
         (
             "Equal total exposure",
             "Exposure in photos' worth: a method of many photos exposes each for less, one of few "
             "for longer, its well as much deeper.",
-            found.equal_exposure,
+            comparison.equal_exposure,
         ),
     ):
-        body += [f"<h2>{title}</h2>", f"<p>{text}</p>", numbers(HEAD, rows(trials))]
-    return page(MARK, "\n".join(body))
+        body += [f"<h2>{title}</h2>", f"<p>{text}</p>", numbers(TABLE_HEAD, table_rows(trials))]
+    return page(TITLE, "\n".join(body))

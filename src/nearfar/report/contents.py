@@ -1,4 +1,4 @@
-"""What a file or a folder holds, in lines."""
+"""Descriptions of files and folders, for ``nearfar info``."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ from nearfar.transport.store import load_transport
 
 
 def describe(path: Path) -> str:
-    """Return in lines what a file or a folder holds.
+    """Return a description of a file or a folder, in lines.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ def describe(path: Path) -> str:
     Raises
     ------
     MissingFileError
-        If nothing is there.
+        If there is no such file or folder.
     UnreadableFileError
-        If it is nothing of these, or damaged.
+        If it is of another kind, or damaged.
     NearfarError
-        As what reads such a file.
+        As the reader of its kind.
     """
     if not path.exists():
         raise MissingFileError(f"{path} is not there: check the name.")
@@ -111,13 +111,13 @@ def _describe_capture(path: Path) -> str:
             f"{capture.saturated_share:.3%} saturated",
             describe_plan(capture.plan),
             f"rig: {json.dumps(capture.rig)}",
-            *_describe_taking(capture),
+            *_describe_acquisition(capture),
         ]
     )
 
 
-def _describe_taking(capture: Capture) -> list[str]:
-    """Say how long it took, what changed from photo to photo, and what went wrong."""
+def _describe_acquisition(capture: Capture) -> list[str]:
+    """Describe the duration, the conditions that changed between photos, and the alarms."""
     lines = [f"taken in {capture.times.max() - capture.times.min():.0f} s"]
     for name, values in capture.conditions.items():
         known = [value for value in values if value is not None]

@@ -1,4 +1,4 @@
-"""The demo: plan, noisy capture, correspondence, reconstruction, relighting, a page."""
+"""The demo: a plan, a noisy capture, its reconstruction, an evaluation, and a report."""
 
 import json
 import time
@@ -11,7 +11,7 @@ from nearfar.arrays import Size
 from nearfar.files import new_output
 from nearfar.illumination.pictures import natural_picture, penguin, white
 from nearfar.plan import paper_plan
-from nearfar.report.demonstration import demonstration_page
+from nearfar.report.demo_page import demo_page
 from nearfar.rigs.opening import open_rig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.store import save_transport
@@ -23,14 +23,14 @@ from nearfar.workflow.reconstruct import reconstruct
 SCENE = "cornell"
 PROJECTOR = Size(64, 64)
 WINDOW = 11
-FAR = Size(7, 7)
+FAR_BAND = Size(7, 7)
 
 PLAN, CAPTURE, TRANSPORT, REPORT = "plan.json", "capture.zarr", "transport.zarr", "report.html"
 NUMBERS = "numbers.json"
 
 
 def is_demo(folder: Path) -> bool:
-    """Tell whether a folder holds a demo's outputs and nothing else."""
+    """Return whether a folder holds a demo's outputs and nothing else."""
     names = {PLAN, CAPTURE, TRANSPORT, REPORT, NUMBERS}
     return all(entry.name in names for entry in folder.iterdir())
 
@@ -38,17 +38,17 @@ def is_demo(folder: Path) -> bool:
 def run_demo(
     output: Path, *, force: bool = False, progress: Callable[[str, float], None] | None = None
 ) -> dict[str, Any]:
-    """Run the whole job on the built-in Cornell scene and write its report.
+    """Run all steps on the built-in Cornell scene and write a report.
 
     Parameters
     ----------
     output : Path
-        Folder to make: the plan, the capture, the transport, ``report.html``, and the figures
+        Folder to create, for the plan, the capture, the transport, ``report.html``, and the figures
         as ``numbers.json``.
     force : bool
-        Replace the folder of an earlier demo.
+        Whether to replace the folder of an earlier demo.
     progress : callable, optional
-        Told what is being done and the share done.
+        Called with the name of a step and the share of it that is done.
 
     Returns
     -------
@@ -60,18 +60,18 @@ def run_demo(
     NearfarError
         As `nearfar.files.new_output`.
     """
-    report = progress or (lambda _what, _share: None)
+    report = progress or (lambda _step, _share: None)
     seconds: dict[str, float] = {}
 
     @contextmanager
-    def timed(what: str) -> Iterator[None]:
-        started = time.monotonic()
+    def timed(step: str) -> Iterator[None]:
+        start = time.monotonic()
         yield
-        seconds[what] = time.monotonic() - started
+        seconds[step] = time.monotonic() - start
 
     with new_output(output, force=force, replaceable=is_demo) as partial:
         partial.mkdir()
-        plan = paper_plan(PROJECTOR, WINDOW, FAR)
+        plan = paper_plan(PROJECTOR, WINDOW, FAR_BAND)
         (partial / PLAN).write_text(plan.to_json(), encoding="utf-8")
         with timed("scene"):
             truth = cached_scene(SCENE, PROJECTOR, progress=report)
@@ -93,8 +93,6 @@ def run_demo(
             "penguin": penguin(PROJECTOR),
             "leaves": natural_picture(PROJECTOR, 1, colour=True),
         }
-        text = demonstration_page(
-            plan, transport, truth, correspondence, lights, judgement, rows, seconds
-        )
+        text = demo_page(plan, transport, truth, correspondence, lights, judgement, rows, seconds)
         (partial / REPORT).write_text(text, encoding="utf-8")
     return judgement

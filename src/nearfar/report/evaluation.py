@@ -1,4 +1,4 @@
-"""The report of an evaluation: relit beside exact or photographed, and the figures."""
+"""The report of an evaluation: relit pictures beside known ones, and signal-to-noise ratios."""
 
 from collections.abc import Mapping
 from html import escape
@@ -14,8 +14,7 @@ from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import HIGHEST, Rows
 from nearfar.workflow.judge import Pair
 
-# Small differences are shown this much brighter.
-MAGNIFIED = 10
+DIFFERENCE_GAIN = 10
 
 
 def evaluation_page(
@@ -31,20 +30,20 @@ def evaluation_page(
     ----------
     transport : Transport
     source : str
-        What it was compared with.
+        Name of what it was compared with.
     judgement : mapping
-        As `nearfar.workflow.judge` gives it.
+        As `nearfar.workflow.judge` returns it.
     pairs : mapping of str to Pair
-        By the names of lights.
+        Relit and known picture under each light, by the light's name.
     rows : Rows, optional
-        Where all of the true transport is known.
+        SNR of each row; given if the true transport is known.
     """
-    found: Mapping[str, float] = judgement["snr_b"]
+    snr_b: Mapping[str, float] = judgement["snr_b"]
     ceiling = judgement.get("ceiling", {}).get("snr_b", {})
     if "snr_b_pictures" in judgement:
         cards = [(f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of natural pictures")]
     else:
-        cards = [(f"{judgement['snr_b_mean']:.1f} dB", f"SNR_b, mean of {len(found)} lights")]
+        cards = [(f"{judgement['snr_b_mean']:.1f} dB", f"SNR_b, mean of {len(snr_b)} lights")]
     if rows is not None:
         cards.append((f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"))
         cards.append(
@@ -53,28 +52,28 @@ def evaluation_page(
     head = ["light", "SNR_b", *(["ceiling of the model, no noise"] if ceiling else [])]
     table = [
         [name, f"{value:.1f} dB", *([f"{ceiling[name]:.1f} dB"] if ceiling else [])]
-        for name, value in found.items()
+        for name, value in snr_b.items()
     ]
     exposure = exposure_of(transport)
-    shown = [(name, _cells(name, pair, exposure)) for name, pair in pairs.items()]
-    columns = ["light", "relit", "known", f"difference × {MAGNIFIED}"]
+    gallery_rows = [(name, _cells(name, pair, exposure)) for name, pair in pairs.items()]
+    columns = ["light", "relit", "known", f"difference × {DIFFERENCE_GAIN}"]
     body = f"""
 <h1>How close the transport comes</h1>
 <p>Compared with {escape(source)}. SNR_b is 20 log10 of the known picture over the difference,
 SNR_t the same of a camera pixel's row of the transport.</p>
 {facts(cards)}
 <h2>Relit beside what is known</h2>
-{gallery(columns, shown)}
+{gallery(columns, gallery_rows)}
 <h2>Figures</h2>
 {numbers(head, table)}
 {_components(judgement)}
-{_of_rows(rows)}
+{_row_section(rows)}
 """
     return page("nearfar: evaluation", body)
 
 
 def _cells(name: str, pair: Pair, exposure: float) -> list[str]:
-    difference = MAGNIFIED * np.abs(pair.relit - pair.known)
+    difference = DIFFERENCE_GAIN * np.abs(pair.relit - pair.known)
     images = {"relit": pair.relit, "known": pair.known, "difference": difference}
     return [picture(pair.light, f"light: {name}")] + [
         picture(visible(exposure * image), f"{what} under {name}") for what, image in images.items()
@@ -97,7 +96,7 @@ def _decibels(value: float) -> str:
     return f"{value:.1f} dB" if value > -HIGHEST else "the scene has none"
 
 
-def _of_rows(rows: Rows | None) -> str:
+def _row_section(rows: Rows | None) -> str:
     if rows is None:
         return ""
     with styled():

@@ -13,7 +13,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import ErrorBars
 from nearfar.transport.model import Transport
 
-# What maps are called by people, by name.
+# Titles for readers, by name.
 TITLES = {
     "column": "projector column of q",
     "row": "projector row of q",
@@ -28,15 +28,15 @@ TITLES = {
 
 
 class Map(NamedTuple):
-    """A value for each camera pixel.
+    """A map with its scale.
 
     Attributes
     ----------
     title, unit : str
     low, high : float
-        Ends of its scale.
+        Ends of the colour scale.
     values : ndarray, shape (y, x), float32
-        NaN where there is none.
+        NaN where a camera pixel has no value.
     """
 
     title: str
@@ -47,36 +47,36 @@ class Map(NamedTuple):
 
 
 def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
-    """Return what can be mapped of a transport, by name; each is computed when it is called."""
+    """Return the maps that a transport has data for, by name, as functions that compute them."""
     height, width = transport.projector
     q = transport.correspondence
-    found: dict[str, Callable[[], Map]] = {
+    maps: dict[str, Callable[[], Map]] = {
         "column": lambda: Map(TITLES["column"], "px", 0, max(1, width - 1), q[..., 1]),
         "row": lambda: Map(TITLES["row"], "px", 0, max(1, height - 1), q[..., 0]),
     }
     quality = transport.quality
     if quality is not None:
-        found["confidence"] = lambda: Map(
+        maps["confidence"] = lambda: Map(
             TITLES["confidence"], "", 0, 1, quality.confidence.astype(np.float32)
         )
     if transport.posterior is not None:
-        found["error"] = lambda: _ratio(TITLES["error"], _floodlit(transport), _error(transport))
-        found["direct-error"] = lambda: _ratio(
+        maps["error"] = lambda: _ratio(TITLES["error"], _floodlit(transport), _error(transport))
+        maps["direct-error"] = lambda: _ratio(
             TITLES["direct-error"], transport.direct, ErrorBars(transport).direct()
         )
     else:
-        found["noise"] = lambda: _ratio(TITLES["noise"], _floodlit(transport), transport.noise)
-    found["near-share"] = lambda: _share(transport, 1, TITLES["near-share"])
-    found["far-share"] = lambda: _share(transport, 2, TITLES["far-share"])
+        maps["noise"] = lambda: _ratio(TITLES["noise"], _floodlit(transport), transport.noise)
+    maps["near-share"] = lambda: _share(transport, 1, TITLES["near-share"])
+    maps["far-share"] = lambda: _share(transport, 2, TITLES["far-share"])
     if quality is not None:
-        found["saturated"] = lambda: Map(
+        maps["saturated"] = lambda: Map(
             TITLES["saturated"], "", 0, 1, quality.saturated.astype(np.float32)
         )
-    return found
+    return maps
 
 
 def map_named(maps: Mapping[str, Callable[[], Map]], name: str) -> Map:
-    """Compute a map.
+    """Compute the map of a name.
 
     Raises
     ------
@@ -99,23 +99,23 @@ def _error(transport: Transport) -> Floats:
 
 
 def _ratio(title: str, values: Floats, errors: Floats) -> Map:
-    """Map a ratio of mean squares over channels, in dB."""
-    power, error = (np.mean(part.astype(np.float64) ** 2, axis=-1) for part in (values, errors))
+    """Return the map of the ratio of mean squares over channels, in dB."""
+    signal, error = (np.mean(part.astype(np.float64) ** 2, axis=-1) for part in (values, errors))
     with np.errstate(divide="ignore", invalid="ignore"):
-        decibels = (10 * np.log10(power / error)).astype(np.float32)
+        decibels = (10 * np.log10(signal / error)).astype(np.float32)
     decibels[~np.isfinite(decibels)] = np.nan
-    known = decibels[np.isfinite(decibels)]
-    low, high = np.percentile(known, [1, 99]) if known.size else (0.0, 1.0)
+    finite = decibels[np.isfinite(decibels)]
+    low, high = np.percentile(finite, [1, 99]) if finite.size else (0.0, 1.0)
     return Map(title, "dB", float(low), float(max(high, low + 1)), decibels)
 
 
-def _share(transport: Transport, which: int, title: str) -> Map:
+def _share(transport: Transport, component: int, title: str) -> Map:
     parts = transport.components(np.ones(transport.projector, dtype=np.float32))
     sums = np.stack([part.reshape(*transport.camera, -1).sum(axis=-1) for part in parts])
     with np.errstate(divide="ignore", invalid="ignore"):
         total = sums.sum(axis=0)
-        share = (100 * sums[which] / total).astype(np.float32)
+        share = (100 * sums[component] / total).astype(np.float32)
     share[(total <= 0) | ~np.isfinite(share)] = np.nan
-    known = share[np.isfinite(share)]
-    high = float(np.percentile(known, 99)) if known.size else 1.0
+    finite = share[np.isfinite(share)]
+    high = float(np.percentile(finite, 99)) if finite.size else 1.0
     return Map(title, "%", 0.0, float(np.clip(high, 1.0, 100.0)), share)

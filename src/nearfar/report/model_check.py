@@ -1,4 +1,4 @@
-"""Where the paper's model holds on a scene: a table, and a page with maps."""
+"""How well the paper's model holds on a scene: a table, and a page with maps."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +15,7 @@ HEAD = ("", "assumed", "measured")
 
 
 def check_rows(check: Mapping[str, Any]) -> list[list[str]]:
-    """Return what the model takes for granted beside what holds, from `numbers_of` a check."""
+    """Return table rows of what the model assumes and what `numbers_of` a check measured."""
     condition = check["condition"]
     far = "x".join(str(side) for side in check["far"])
     return [
@@ -56,25 +56,25 @@ def check_rows(check: Mapping[str, Any]) -> list[list[str]]:
 
 
 def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Size) -> str:
-    """Return a page on how far a scene keeps to the model.
+    """Return a page on how well the model holds on a scene.
 
     Parameters
     ----------
     name : str
-        Of the scene.
+        Name of the scene.
     check : ModelCheck
-        Its maps are shown where it looked at every camera pixel.
+        Its maps are drawn if it covers every camera pixel.
     condition : Conditioning
     camera : Size
     """
     shares = facts([(f"{share:.1%}", f"{part} light") for part, share in check.floodlit.items()])
     maps = ""
     if check.camera_pixels == camera.pixels:
-        shown = (
+        captioned = (
             (check.far_beyond_map, "far-range energy beyond k_far and outside the window"),
             (check.checkerboard_map, "N + F over D at the checkerboard"),
         )
-        maps = "".join(_map(values.reshape(camera), caption) for values, caption in shown)
+        maps = "".join(_map(values.reshape(camera), caption) for values, caption in captioned)
         maps = f'<h2>Where it does not</h2><div class="maps">{maps}</div>'
     body = f"""
 <h1>Where the model holds: {name}</h1>

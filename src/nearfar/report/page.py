@@ -13,7 +13,7 @@ from nearfar.files import new_output
 from nearfar.markup import SCALE, embedded, false_colour
 from nearfar.report.figures.style import DPI, styled
 
-# What the page's own colours are by day and by night; data-theme on the root overrules the browser.
+# Colours of the light and the dark theme; data-theme on the root overrides the browser's choice.
 _LIGHT = """--ink: #1d2129; --soft: #5b6472; --line: #dfe3e8; --back: #f7f8fa; --card: #ffffff;
   --edge: #8a93a0; --mark: #1f6ec9; --bad: #b3261e; --near: #c2561a; --far: #2f855f;
   color-scheme: light;"""
@@ -63,7 +63,7 @@ figure { margin: 0; }
 .sheet img { image-rendering: auto; background: #ffffff; }
 figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
 .scale { display: flex; justify-content: space-between; font-size: .75rem; color: var(--soft); }
-.told { max-width: 46rem; padding-left: 1.2rem; }
+.findings { max-width: 46rem; padding-left: 1.2rem; }
 .bar { height: 8px; border-radius: 4px; margin-top: .5rem; }
 """
 )
@@ -91,10 +91,10 @@ def colour_map(values: Floats, low: float, high: float, unit: str, caption: str)
 
 
 def listed(sentences: list[str]) -> str:
-    """Return a list of sentences; what they have in backticks is code."""
-    shown = (re.sub("`([^`]+)`", r"<code>\1</code>", escape(sentence)) for sentence in sentences)
-    items = "".join(f"<li>{sentence}</li>" for sentence in shown)
-    return f'<ul class="told">{items}</ul>'
+    """Return a list of sentences; text in backticks is set as code."""
+    marked = (re.sub("`([^`]+)`", r"<code>\1</code>", escape(sentence)) for sentence in sentences)
+    items = "".join(f"<li>{sentence}</li>" for sentence in marked)
+    return f'<ul class="findings">{items}</ul>'
 
 
 def gallery(columns: list[str], rows: list[tuple[str, list[str]]]) -> str:
@@ -110,7 +110,7 @@ def gallery(columns: list[str], rows: list[tuple[str, list[str]]]) -> str:
 
 
 def facts(pairs: list[tuple[str, str]]) -> str:
-    """Return cards, each a figure and what it is."""
+    """Return cards, each with a figure and what it means."""
     cards = "".join(
         f'<div class="fact"><b>{escape(value)}</b><span>{escape(name)}</span></div>'
         for value, name in pairs
@@ -119,7 +119,7 @@ def facts(pairs: list[tuple[str, str]]) -> str:
 
 
 def write_page(path: Path, text: str, *, force: bool = False) -> None:
-    """Write a page, whole or not at all.
+    """Write a page, completely or not at all.
 
     Raises
     ------
@@ -135,8 +135,8 @@ def plot(figure: Figure, description: str) -> str:
     data = BytesIO()
     with styled():
         figure.savefig(data, format="png", dpi=DPI, metadata={"Software": None})
-    shown = base64.b64encode(data.getvalue()).decode("ascii")
+    encoded = base64.b64encode(data.getvalue()).decode("ascii")
     return (
         f'<figure class="sheet"><img alt="{escape(description)}" '
-        f'src="data:image/png;base64,{shown}"></figure>'
+        f'src="data:image/png;base64,{encoded}"></figure>'
     )

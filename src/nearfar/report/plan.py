@@ -1,26 +1,26 @@
-"""What a plan holds, in lines."""
+"""Description of a plan."""
 
 from nearfar.plan import Plan
 
 
-def describe_plan(made: Plan) -> str:
-    """Return in lines what a plan holds: sizes, photos, and what brute force would take.
+def describe_plan(plan: Plan) -> str:
+    """Return a description of a plan, in lines: sizes, photos, and savings over brute force.
 
     Parameters
     ----------
-    made : Plan
+    plan : Plan
 
     Returns
     -------
     str
     """
-    counts = ", ".join(f"{count} {purpose}" for purpose, count in made.counts.items() if count)
+    counts = ", ".join(f"{count} {purpose}" for purpose, count in plan.counts.items() if count)
     return "\n".join(
         [
-            f"projector {made.projector}, W = {made.window}, far band {made.far}, "
-            f"near frequencies dropped {made.dropped}, offset {made.offset}",
-            f"{len(made.patterns)} photos: {counts}",
-            f"{made.transport_photos} photos of transport against {made.projector.pixels} by brute "
-            f"force: {made.savings:.2f} times fewer",
+            f"projector {plan.projector}, W = {plan.window}, far band {plan.far}, "
+            f"near frequencies dropped {plan.dropped}, offset {plan.offset}",
+            f"{len(plan.patterns)} photos: {counts}",
+            f"{plan.transport_photos} photos of transport against {plan.projector.pixels} by brute "
+            f"force: {plan.savings:.2f} times fewer",
         ]
     )

@@ -1,4 +1,4 @@
-"""The report of a reconstruction: pictures, maps, how sure it is, of what it was made."""
+"""The report of a reconstruction: pictures, maps, error bars, and its provenance."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -20,8 +20,8 @@ from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
 
-# Camera pixels of a report's pictures, at most.
-PIXELS = 2**17
+# Larger cameras are displayed at every second row and column, every third, and so on.
+MAXIMUM_DISPLAYED_PIXELS = 2**17
 PURPOSES = {
     "direct": "direct light: the checkerboard",
     "near": "near-range light",
@@ -38,23 +38,22 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
     Parameters
     ----------
     stored : StoredTransport
-        Large ones are shown by every second row and column, and so on.
     capture : Capture
-        That it was made from.
+        The capture that it was reconstructed from.
 
     Raises
     ------
     UnreadableFileError
         If the transport is damaged.
     """
-    step = int(np.ceil(np.sqrt(stored.camera.pixels / PIXELS)))
+    step = int(np.ceil(np.sqrt(stored.camera.pixels / MAXIMUM_DISPLAYED_PIXELS)))
     transport = stored.thinned(step)
     exposure = exposure_of(transport)
     maps = {name: compute() for name, compute in maps_of(transport).items()}
-    sure = maps.get("error", maps.get("noise"))
-    assert sure is not None
-    told = np.isfinite(sure.values)
-    median = f"{np.median(sure.values[told]):.1f} dB" if told.any() else "none"
+    snr = maps.get("error", maps.get("noise"))
+    assert snr is not None
+    finite = snr.values[np.isfinite(snr.values)]
+    median = f"{np.median(finite):.1f} dB" if finite.size else "none"
     plan = capture.plan
     cards = facts(
         [
@@ -66,7 +65,7 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
             (str(stored.camera), f"camera pixels, {counted(stored.channels, 'channel')}"),
             (str(stored.projector), "projector pixels"),
             (f"{transport.lit.mean():.1%}", "of camera pixels see direct light"),
-            (median, f"{sure.title}, median"),
+            (median, f"{snr.title}, median"),
         ]
     )
     faults = [*map(str, find_faults(capture, stored.provenance)), *capture.alarms]
@@ -80,14 +79,14 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
 {listed(faults) if faults else "<p>The photos give no cause for concern.</p>"}
 <h2>Relit, and taken apart</h2>
 <p>Direct light comes from one projector pixel, near-range light from the window around it,
-far-range light from everywhere. {_exposed(exposure)}</p>
+far-range light from everywhere. {_exposure_note(exposure)}</p>
 {gallery(["light", "direct", "near-range", "far-range", "relit"], _rows(transport, exposure))}
 <h2>Maps</h2>
 <p>Grey where there is no value: no direct light is seen there.</p>
 <div class="maps">{"".join(_map(each) for each in maps.values())}</div>
 <h2>How sure</h2>
-<p>{_sure(sure)}</p>
-{plot(_histogram(sure), "histogram of " + sure.title)}
+<p>{_explain(snr)}</p>
+{plot(_histogram(snr), "histogram of " + snr.title)}
 <h2>The plan</h2>
 {_plan_table(plan)}
 <h2>Where it comes from</h2>
@@ -97,12 +96,12 @@ far-range light from everywhere. {_exposed(exposure)}</p>
 
 
 def exposure_of(transport: Transport) -> float:
-    """Return the gain under which the floodlit picture is bright."""
+    """Return the gain, a power of 2, that makes the floodlit picture bright."""
     brightest = float(np.percentile(transport @ white(transport.projector), 99.5))
     return float(2.0 ** np.round(np.log2(0.9 / brightest))) if brightest > 0 else 1.0
 
 
-def _exposed(exposure: float) -> str:
+def _exposure_note(exposure: float) -> str:
     return "" if exposure == 1 else f"Pictures are shown {exposure:g} times as bright."
 
 
@@ -114,38 +113,38 @@ def _rows(transport: Transport, exposure: float) -> list[tuple[str, list[str]]]:
     rows = []
     for name, light in lights.items():
         parts = transport.components(light)
-        shown = [*(exposure * part for part in parts), exposure * sum(parts)]
-        what = ["direct", "near-range", "far-range", "relit"]
+        images = [*(exposure * part for part in parts), exposure * sum(parts)]
+        names = ["direct", "near-range", "far-range", "relit"]
         cells = [picture(light, f"light: {name}")]
-        for image, part in zip(shown, what, strict=True):
+        for image, part in zip(images, names, strict=True):
             cells.append(picture(visible(np.asarray(image)), f"{part} under {name}"))
         rows.append((name, cells))
     return rows
 
 
 def visible(image: Floats) -> Floats:
-    """Turn a picture of any number of channels into one of 1 or 3."""
+    """Reduce a picture of any number of channels to 1 or 3: the first three, or their mean."""
     if image.ndim == 2 or image.shape[2] == 3:
         return image
     return image[..., :3] if image.shape[2] > 3 else image.mean(axis=-1)
 
 
-def counted(number: int, what: str) -> str:
-    """Return a number of things in words."""
-    return f"{number} {what}{'s' * (number != 1)}"
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural unless it is 1."""
+    return f"{number} {noun}{'s' * (number != 1)}"
 
 
-def _sure(each: Map) -> str:
-    """Say what the histogram shows."""
-    if each.title.startswith("floodlit picture over its error"):
+def _explain(snr: Map) -> str:
+    """Return what the histogram shows, in words."""
+    if snr.title.startswith("floodlit picture over its error"):
         return (
             "Signal over one standard deviation, under white, of every camera pixel: 20 dB is an "
             "error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %. It is of relit pictures; how light is "
             "split into direct, near and far is less sure."
         )
     return (
-        "Light under white over the noise of one measurement. Error bars are told by the joint "
-        "estimate."
+        "Light under white over the noise of one measurement. Only the joint estimate has "
+        "error bars."
     )
 
 
@@ -171,17 +170,17 @@ def _plan_table(plan: Plan) -> str:
 
 
 def _provenance(stored: StoredTransport, capture: Capture) -> list[list[str]]:
-    known: Mapping[str, Any] = {"capture": str(capture.path), **stored.provenance}
-    rows = [[name, told] for name, told in _flat(known) if not name.startswith("plan")]
+    values: Mapping[str, Any] = {"capture": str(capture.path), **stored.provenance}
+    rows = [[name, value] for name, value in _flatten(values) if not name.startswith("plan")]
     seconds = capture.times.max() - capture.times.min() if len(capture.times) else 0.0
     return [*rows, ["taken in", f"{seconds:.0f} s"]]
 
 
-def _flat(values: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, str]]:
-    """Lay nested values out as names and texts."""
+def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield nested values as pairs of a full name and a text."""
     for name, value in values.items():
-        named = f"{within}{name}".replace("_", " ")
+        full_name = f"{prefix}{name}".replace("_", " ")
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{named}: ")
+            yield from _flatten(value, f"{full_name}: ")
         else:
-            yield named, value if isinstance(value, str) else json.dumps(value)
+            yield full_name, value if isinstance(value, str) else json.dumps(value)

@@ -1,1 +1,1 @@
-"""What is looked at in the browser."""
+"""Pages in the browser: the viewer of a transport, and the preview of a camera."""

@@ -1,4 +1,8 @@
-"""Connections that are waited for, for a request, its rest or a reader: the oldest give way."""
+"""HTTP connections that the server waits for: beyond a number of them, the oldest are closed.
+
+A server waits for a connection that has sent no request yet, or part of one, and for a client that
+does not read its response.
+"""
 
 import asyncio
 
@@ -7,38 +11,42 @@ from nearfar.packages import needed
 with needed(extra="viewer", what="a page in the browser"):
     from uvicorn.protocols.http.h11_impl import H11Protocol
 
-# Connections that are waited for at once, of the six or so that a browser opens.
-WAITING = 64
-# Seconds in which what was sent with a connection is read.
-READING = 0.1
+# A browser opens about six.
+MAXIMUM_WAITING_CONNECTIONS = 64
+# A request that is sent at once with the connection has been read by then.
+REQUEST_SECONDS = 0.1
 
 
 class Connection(H11Protocol):
-    """A connection that is given up when `WAITING` newer ones are waited for, as it is.
+    """A connection that is closed once `MAXIMUM_WAITING_CONNECTIONS` newer ones wait like it.
 
-    Whoever opens many and says nothing, never ends what it says, or does not read what it is
-    answered keeps nobody out.
+    So no client can keep others out by opening many connections and sending nothing, sending
+    requests without an end, or not reading the responses.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection, and soon give up those that are too many."""
+        """Accept the connection, and soon close those that are too many."""
         super().connection_made(transport)
-        self._waits_since = self.loop.time()
-        # What it asks may lie there already: it is read before this is called.
-        self.loop.call_later(READING, self._make_room)
+        self._waiting_since = self.loop.time()
+        # Later, so that a request that has arrived already is read first.
+        self.loop.call_later(REQUEST_SECONDS, self._close_oldest)
 
     def on_response_complete(self) -> None:
-        """Wait for the answer to be read, and for the next request."""
-        self._waits_since = self.loop.time()
+        """Wait for the client to read the response, and for its next request."""
+        self._waiting_since = self.loop.time()
         super().on_response_complete()
 
     @property
-    def _waits(self) -> bool:
-        asked = self.cycle is not None and not self.cycle.more_body
-        return not asked or self.cycle.response_complete or self.flow.write_paused
+    def _is_waiting(self) -> bool:
+        has_request = self.cycle is not None and not self.cycle.more_body
+        return not has_request or self.cycle.response_complete or self.flow.write_paused
 
-    def _make_room(self) -> None:
-        waiting = [one for one in self.connections if isinstance(one, Connection) and one._waits]
-        waiting.sort(key=lambda one: one._waits_since)
-        for one in waiting[:-WAITING]:
-            one.transport.abort()
+    def _close_oldest(self) -> None:
+        waiting = [
+            connection
+            for connection in self.connections
+            if isinstance(connection, Connection) and connection._is_waiting
+        ]
+        waiting.sort(key=lambda connection: connection._waiting_since)
+        for connection in waiting[:-MAXIMUM_WAITING_CONNECTIONS]:
+            connection.transport.abort()

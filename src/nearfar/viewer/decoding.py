@@ -1,7 +1,7 @@
-"""Pictures that a page sends: decoded in a process of their own, within bounds.
+"""Uploaded pictures: decoded in a process of their own, within bounds of memory and time.
 
-A few bytes can claim a picture of any size, and decoders of many formats have had faults: what
-goes wrong there ends that process and not the server.
+A few bytes can claim a picture of any size, and decoders of many formats have had faults: a crash
+ends that process and not the server.
 """
 
 import io
@@ -19,74 +19,88 @@ from nearfar.errors import InputError, NearfarError, UnreadableFileError
 from nearfar.files.codecs import encode_npy
 from nearfar.files.images import decode_picture
 
-# Bytes of a file, and of the process that decodes it.
-LARGEST = 2**28
-MEMORY = 3 * 2**30
-# Seconds that it may take.
-PATIENCE = 60
-# By exit status.
-FAULTS: dict[int, type[NearfarError]] = {1: UnreadableFileError, 2: InputError}
+MAXIMUM_FILE_BYTES = 2**28
+MAXIMUM_PROCESS_BYTES = 3 * 2**30
+DECODING_TIMEOUT_SECONDS = 60
+MAXIMUM_NAME_CHARACTERS = 80
+# Exit statuses of the process.
+STATUS_UNREADABLE, STATUS_WRONG_SIZE = 1, 2
+ERRORS: dict[int, type[NearfarError]] = {
+    STATUS_UNREADABLE: UnreadableFileError,
+    STATUS_WRONG_SIZE: InputError,
+}
 
 
-def decode_apart(data: bytes, name: str, size: Size) -> NDArray[Any]:
+def decode_in_process(data: bytes, name: str, size: Size) -> NDArray[Any]:
     """Decode a picture in a process of its own.
 
     Parameters
     ----------
     data : bytes
     name : str
-        Of the file, for the message and, of camera raw files, for the kind; never opened.
+        The file's name, for error messages, and for the format of camera raw files; no file of
+        this name is opened.
     size : Size
-        That the picture must have.
+        The size that the picture must have.
+
+    Returns
+    -------
+    ndarray, shape (y, x) or (y, x, channels)
+        In the file's own type.
 
     Raises
     ------
     InputError
-        If it is of another size.
+        If the picture has another size.
     UnreadableFileError
         If it is no picture, damaged, or takes too much memory or time.
     """
-    shown = PurePath(name.replace("\\", "/").replace("\0", "")).name[-80:] or "the file"
-    # -P: what lies in the current folder is not to be imported.
-    words = [shown, str(size.height), str(size.width)]
-    command = [sys.executable, "-P", "-m", "nearfar.viewer.decoding", *words]
+    base = PurePath(name.replace("\\", "/").replace("\0", "")).name[-MAXIMUM_NAME_CHARACTERS:]
+    base = base or "the file"
+    # -P keeps modules in the current folder from being imported.
+    arguments = [base, str(size.height), str(size.width)]
+    command = [sys.executable, "-P", "-m", "nearfar.viewer.decoding", *arguments]
     try:
         done = subprocess.run(
-            command, input=data, capture_output=True, timeout=PATIENCE, check=False
+            command,
+            input=data,
+            capture_output=True,
+            timeout=DECODING_TIMEOUT_SECONDS,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         raise UnreadableFileError(
-            f"{shown} was not read within {PATIENCE} s: send a smaller file."
+            f"{base} was not read within {DECODING_TIMEOUT_SECONDS} s: send a smaller file."
         ) from None
     if done.returncode == 0:
         pixels: NDArray[Any] = np.load(io.BytesIO(done.stdout), allow_pickle=False)
         return pixels
-    told = done.stderr.decode(errors="replace").strip().splitlines()
-    if done.returncode in FAULTS and told:
-        raise FAULTS[done.returncode](told[-1])
-    raise UnreadableFileError(f"{shown} cannot be decoded: it is damaged, or too large.")
+    lines = done.stderr.decode(errors="replace").strip().splitlines()
+    if done.returncode in ERRORS and lines:
+        raise ERRORS[done.returncode](lines[-1])
+    raise UnreadableFileError(f"{base} cannot be decoded: it is damaged, or too large.")
 
 
 def main(name: str, height: str, width: str) -> int:
-    """Decode standard input, and write it as an array to standard output."""
-    # Not everywhere: the rest works without.
+    """Decode the picture at standard input, write it as NPY, and return the exit status."""
+    # Windows has no limits of this kind.
     with suppress(ImportError):
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_AS, (MAXIMUM_PROCESS_BYTES, MAXIMUM_PROCESS_BYTES))
     try:
         pixels = decode_picture(sys.stdin.buffer.read(), Path(name))
-        found, wanted = Size(*pixels.shape[:2]), Size(int(height), int(width))
-        if found != wanted:
-            print(f"{name} is {found}, and {wanted} is needed: resize it.", file=sys.stderr)  # noqa: T201
-            return 2
+        size, required = Size(*pixels.shape[:2]), Size(int(height), int(width))
+        if size != required:
+            print(f"{name} is {size}, and {required} is needed: resize it.", file=sys.stderr)  # noqa: T201
+            return STATUS_WRONG_SIZE
         sys.stdout.buffer.write(encode_npy(pixels))
     except NearfarError as error:
         print(error, file=sys.stderr)  # noqa: T201
-        return 1
+        return STATUS_UNREADABLE
     except MemoryError:
         print(f"{name} is too large: make it smaller.", file=sys.stderr)  # noqa: T201
-        return 1
+        return STATUS_UNREADABLE
     return 0
 
 

@@ -1,8 +1,8 @@
-"""What a page and its server send each other: a few words in JSON, and numbers behind them.
+"""Binary messages between a page and its server: a JSON header, followed by arrays.
 
-A message is a 32-bit length, little endian, that many bytes of JSON, padded with spaces so that
-what follows begins at a multiple of 8 bytes, and the arrays, one behind the other, little endian,
-row by row.
+A message is the length of the header (32 bits, little endian), the header, padded with spaces so
+that the arrays begin at a multiple of 8 bytes, and the arrays one after the other, little endian,
+row-major, each padded to a multiple of 8 bytes.
 """
 
 import json
@@ -16,22 +16,22 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
 
-# Bytes of JSON that a page may send.
-WORDS = 2**14
+# For headers that a page sends.
+MAXIMUM_HEADER_BYTES = 2**14
 _LENGTH = struct.Struct("<I")
-_ALIGNED = 8
-# Full white of a light in a message.
-WHITE = 65535
+_ALIGNMENT_BYTES = 8
+# The level of full white in a light.
+WHITE_LEVEL = 65535
 
-# How a page names the kinds of numbers.
-_NAMES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2", "uint8": "|u1"}
+# Types of arrays by the names that headers give them.
+_TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2", "uint8": "|u1"}
 
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Gains(BaseModel):
-    """Gains of the components, as the page's sliders have them."""
+    """Gains of the components, within the range of the page's sliders."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
@@ -41,12 +41,14 @@ class Gains(BaseModel):
 
 
 class Light(NamedTuple):
-    """A light that a page sends: levels times a colour.
+    """A light that a page sends, as the product of levels and a colour.
 
     Attributes
     ----------
     levels : ndarray, shape (Py, Px) or (Py, Px, 3), float32
+        From 0 to 1.
     colour : ndarray, shape (3,), float32
+        Linear red, green and blue, from 0 to 1.
     """
 
     levels: Floats
@@ -54,30 +56,30 @@ class Light(NamedTuple):
 
     @property
     def is_grey(self) -> bool:
-        """Whether it has no colour."""
+        """Whether red, green and blue are equal everywhere."""
         return self.levels.ndim == 2 and bool((self.colour == self.colour[0]).all())
 
-    def whole(self) -> Floats:
-        """Return it as ``nearfar relight`` takes it, (Py, Px) or (Py, Px, 3)."""
+    def as_array(self) -> Floats:
+        """Return levels times colour, (Py, Px) or (Py, Px, 3)."""
         if self.is_grey:
             return np.asarray(self.levels * self.colour[0])
         levels: Floats = self.levels if self.levels.ndim == 3 else self.levels[..., None]
         return np.asarray(levels * self.colour)
 
 
-class Lit(BaseModel):
-    """What a page says of a light that it sends.
+class LightHeader(BaseModel):
+    """The header of a light that a page sends.
 
     Attributes
     ----------
     number : int
-        The answer carries it, for the page to know which light it is of.
+        Counts the lights of a page; a frame has the number of its light.
     shape : tuple of int
-        Of the levels: Py, Px, and 1 or 3.
+        Shape of the levels: Py, Px, and 1 or 3 channels.
     colour : tuple of float
-        Linear red, green and blue that the levels are of.
+        Linear red, green and blue, which the levels are multiplied by.
     gains : Gains
-        For a picture to be saved.
+        Used for pictures that are saved; pages apply the gains of live frames themselves.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
@@ -88,33 +90,33 @@ class Lit(BaseModel):
     gains: Gains = Gains()
 
 
-def pack(words: dict[str, Any], *arrays: NDArray[Any]) -> bytes:
-    """Lay words and arrays out as one message.
+def pack(header: dict[str, Any], *arrays: NDArray[Any]) -> bytes:
+    """Return a message of a header and arrays.
 
     Parameters
     ----------
-    words : dict
-        For JSON; what the arrays are is added as ``arrays``.
+    header : dict
+        Values that JSON has; the arrays' types and shapes are added as ``arrays``.
     arrays : ndarray
         float32, float16, uint16 or uint8.
     """
-    told = [{"type": array.dtype.name, "shape": list(array.shape)} for array in arrays]
-    text = json.dumps({**words, "arrays": told}, allow_nan=False).encode()
-    text += b" " * (-(_LENGTH.size + len(text)) % _ALIGNED)
+    descriptions = [{"type": array.dtype.name, "shape": list(array.shape)} for array in arrays]
+    text = json.dumps({**header, "arrays": descriptions}, allow_nan=False).encode()
+    text += b" " * (-(_LENGTH.size + len(text)) % _ALIGNMENT_BYTES)
     parts = [_LENGTH.pack(len(text)), text]
     for array in arrays:
-        data = np.ascontiguousarray(array, dtype=_NAMES[array.dtype.name]).tobytes()
-        parts += [data, b"\0" * (-len(data) % _ALIGNED)]
+        data = np.ascontiguousarray(array, dtype=_TYPES[array.dtype.name]).tobytes()
+        parts += [data, b"\0" * (-len(data) % _ALIGNMENT_BYTES)]
     return b"".join(parts)
 
 
-def largest_light(projector: Size) -> int:
-    """Return the bytes of the largest message that holds a light."""
-    return WORDS + 6 * projector.pixels
+def maximum_light_bytes(projector: Size) -> int:
+    """Return the size of the largest message that a light can take."""
+    return MAXIMUM_HEADER_BYTES + 6 * projector.pixels
 
 
-def unpack_light(message: bytes, projector: Size) -> tuple[Lit, Light]:
-    """Read a light that a page sends: uint16, `WHITE` for full white.
+def unpack_light(message: bytes, projector: Size) -> tuple[LightHeader, Light]:
+    """Read the message of a light: uint16 levels, `WHITE_LEVEL` for full white.
 
     Parameters
     ----------
@@ -123,35 +125,35 @@ def unpack_light(message: bytes, projector: Size) -> tuple[Lit, Light]:
 
     Returns
     -------
-    words : Lit
+    header : LightHeader
     light : Light
-        Its levels of one channel where those of three are the same.
+        With levels of one channel if the three channels of the message are equal.
 
     Raises
     ------
     InputError
-        If it is no such message.
+        If the message has another form, or the light another size.
     """
     if len(message) < _LENGTH.size:
         raise InputError("the message is cut short: send a light.")
     (length,) = _LENGTH.unpack_from(message)
     data = message[_LENGTH.size + length :]
-    if length > min(WORDS, len(message) - _LENGTH.size):
-        raise InputError(f"the message tells of {length} bytes of words: send a light.")
+    if length > min(MAXIMUM_HEADER_BYTES, len(message) - _LENGTH.size):
+        raise InputError(f"the message claims a header of {length} bytes: send a light.")
     try:
-        words = Lit.model_validate_json(message[_LENGTH.size : _LENGTH.size + length])
+        header = LightHeader.model_validate_json(message[_LENGTH.size : _LENGTH.size + length])
     except ValidationError as error:
         fault = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, fault["loc"]))
-        raise InputError(f"the message's words are wrong ({where}: {fault['msg']}).") from None
-    channels = words.shape[2]
-    if words.shape[:2] != projector or len(data) != 2 * channels * projector.pixels:
+        raise InputError(f"the message's header is wrong ({where}: {fault['msg']}).") from None
+    channels = header.shape[2]
+    if header.shape[:2] != projector or len(data) != 2 * channels * projector.pixels:
         raise InputError(
-            f"the light is {'x'.join(map(str, words.shape))} in {len(data)} bytes, the projector "
+            f"the light is {'x'.join(map(str, header.shape))} in {len(data)} bytes, the projector "
             f"{projector}: send {projector}x1 or x3 of 2 bytes each."
         )
-    levels = np.frombuffer(data, dtype="<u2").reshape(words.shape)
+    levels = np.frombuffer(data, dtype="<u2").reshape(header.shape)
     first = levels[..., :1]
-    one = bool((levels == first).all())
-    chosen = (levels[..., 0] if one else levels).astype(np.float32) / np.float32(WHITE)
-    return words, Light(chosen, np.array(words.colour, dtype=np.float32))
+    distinct = levels[..., 0] if bool((levels == first).all()) else levels
+    shares = distinct.astype(np.float32) / np.float32(WHITE_LEVEL)
+    return header, Light(shares, np.array(header.colour, dtype=np.float32))

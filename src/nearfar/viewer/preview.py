@@ -1,6 +1,7 @@
-"""``nearfar preview``: what the camera sees, live in the browser, to aim, focus and expose by."""
+"""``nearfar preview``: the camera's picture live in the browser, to set aim, focus and exposure."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -12,20 +13,22 @@ from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError
 from nearfar.packages import needed
 from nearfar.rigs.real.rig import RealRig
-from nearfar.viewer.preview_page import PAGE
-from nearfar.viewer.serving import HERE, Place, serve
-from nearfar.viewer.sight import look, picture
+from nearfar.viewer.assets import read_page, with_security_headers
+from nearfar.viewer.photo_statistics import encode_for_display, photo_statistics
+from nearfar.viewer.server import LOOPBACK, ListeningAddress, serve
 
-# Side of the squares that are focused on, in the projector's pixels.
-SQUARE = 16
-# Seconds between photos, so that a camera that is quick leaves the browser time.
-PAUSE = 0.05
+# The squares of the pattern to focus on, in projector pixels.
+SQUARE_SIDE = 16
+# Leaves time to the browser if the camera is quick.
+PAUSE_SECONDS = 0.05
+PAUSE_AFTER_FAULT_SECONDS = 1.0
 
 Pattern = Literal["white", "black", "grey", "squares"]
+LEVELS = {"white": 255, "black": 0, "grey": 128}
 
 
-class Wish(BaseModel):
-    """What the browser asks for; what is left out stays.
+class Settings(BaseModel):
+    """What the browser asks to change; settings that are left out stay.
 
     Attributes
     ----------
@@ -33,9 +36,9 @@ class Wish(BaseModel):
     exposure : float, optional
         Seconds.
     automatic : bool
-        Choose the exposure by what is shown now.
+        Whether to choose the exposure for the pattern that is projected.
     stop : bool
-        End the preview.
+        Whether to end the preview.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -47,28 +50,40 @@ class Wish(BaseModel):
 
 
 @dataclass
-class _Shared:
-    """What the camera's thread and the server's tell each other."""
+class _Exchange:
+    """Data that the camera's thread and the server's threads exchange.
+
+    Attributes
+    ----------
+    lock : Lock
+        Protects the rest.
+    jpeg : bytes
+        The newest photo.
+    state : dict
+        The newest photo's number and statistics, the rig's settings, and the newest fault.
+    settings : Settings
+        Changes that the camera's thread has not made yet.
+    """
 
     lock: threading.Lock = field(default_factory=threading.Lock)
     jpeg: bytes = b""
     state: dict[str, Any] = field(default_factory=lambda: {"number": 0, "fault": ""})
-    wish: Wish = field(default_factory=Wish)
+    settings: Settings = field(default_factory=Settings)
 
-    def ask(self, wish: Wish) -> None:
-        """Add a wish to those that wait."""
-        given = wish.model_dump(exclude_unset=True)
+    def request(self, settings: Settings) -> None:
+        """Add changes to those that wait."""
+        changes = settings.model_dump(exclude_unset=True)
         with self.lock:
-            self.wish = self.wish.model_copy(update=given)
+            self.settings = self.settings.model_copy(update=changes)
 
-    def take(self) -> Wish:
-        """Hand over the wishes that wait."""
+    def take_settings(self) -> Settings:
+        """Return the changes that wait, and forget them."""
         with self.lock:
-            wish, self.wish = self.wish, Wish()
-        return wish
+            settings, self.settings = self.settings, Settings()
+        return settings
 
-    def tell(self, jpeg: bytes | None, **state: Any) -> None:
-        """Give the browser a photo, or what is to be known."""
+    def publish(self, jpeg: bytes | None, **state: Any) -> None:
+        """Update the state, and the photo if there is a new one."""
         with self.lock:
             if jpeg is not None:
                 self.jpeg = jpeg
@@ -76,46 +91,45 @@ class _Shared:
             self.state = {**self.state, **state}
 
 
-def run_preview(rig: RealRig, port: int, started: Any = None) -> None:
-    """Show what the camera sees until the browser, Esc or an interrupt ends it.
+def run_preview(rig: RealRig, port: int, on_start: Callable[[str], object] | None = None) -> None:
+    """Show the camera's picture until the browser, Esc or an interrupt ends it.
 
     Parameters
     ----------
     rig : RealRig
-        Of one pattern pixel for each of the projector's.
+        With a pattern grid of the projector's own pixels.
     port : int
-        To serve on; 0 for any that is free. Only this machine is served.
-    started : callable, optional
-        Called with the address once it is served.
+        0 for any that is free. Only this machine is served.
+    on_start : callable, optional
+        Called with the URL to open.
 
     Raises
     ------
     MissingPackageError
         If the server's packages are not installed.
     InputError
-        If the port is taken.
+        If the server cannot listen on the port.
     KeyboardInterrupt
         If Esc was pressed.
     """
-    shared = _Shared()
-    with serve(_application(shared), Place(HERE, port)) as address:
-        if started is not None:
-            started(address)
+    exchange = _Exchange()
+    with serve(_application(exchange), ListeningAddress(LOOPBACK, port)) as url:
+        if on_start is not None:
+            on_start(url)
         pattern: Pattern = "white"
-        while not (wish := shared.take()).stop:
-            pattern = wish.pattern or pattern
-            frame = _draw(pattern, rig.projector)
+        while not (settings := exchange.take_settings()).stop:
+            pattern = settings.pattern or pattern
+            pixels = _draw(pattern, rig.projector)
             try:
-                fault = _expose(rig, frame, wish)
-                photo = rig.photograph(frame)
+                fault = _set_exposure(rig, pixels, settings)
+                photo = rig.photograph(pixels)
             except DeviceError as error:
-                shared.tell(None, fault=str(error))
-                rig.wait(1.0)
+                exchange.publish(None, fault=str(error))
+                rig.wait(PAUSE_AFTER_FAULT_SECONDS)
                 continue
-            full = rig.full_scale
-            shared.tell(
-                picture(photo, full),
-                **look(photo, full)._asdict(),
+            exchange.publish(
+                encode_for_display(photo, rig.full_scale),
+                **photo_statistics(photo, rig.full_scale)._asdict(),
                 fault=fault,
                 pattern=pattern,
                 exposure=rig.camera.exposure,
@@ -125,17 +139,17 @@ def run_preview(rig: RealRig, port: int, started: Any = None) -> None:
                 size=str(Size(*photo.shape[:2])),
                 channels=photo.shape[2],
             )
-            rig.wait(PAUSE)
+            rig.wait(PAUSE_SECONDS)
 
 
-def _expose(rig: RealRig, frame: NDArray[np.uint8], wish: Wish) -> str:
-    """Do what the wish says of the exposure; return why it cannot be done."""
+def _set_exposure(rig: RealRig, pixels: NDArray[np.uint8], settings: Settings) -> str:
+    """Set the exposure that the settings ask for; return why that failed, or an empty string."""
     try:
-        if wish.automatic:
-            rig.photograph(frame)
+        if settings.automatic:
+            rig.photograph(pixels)
             rig.camera.expose_for_light(rig.whole_refreshes)
-        elif wish.exposure is not None:
-            rig.camera.set_exposure(rig.whole_refreshes(wish.exposure))
+        elif settings.exposure is not None:
+            rig.camera.set_exposure(rig.whole_refreshes(settings.exposure))
     except (InputError, DeviceError) as error:
         return str(error)
     return ""
@@ -143,36 +157,44 @@ def _expose(rig: RealRig, frame: NDArray[np.uint8], wish: Wish) -> str:
 
 def _draw(pattern: Pattern, size: Size) -> NDArray[np.uint8]:
     if pattern != "squares":
-        return np.full(size, {"white": 255, "black": 0, "grey": 128}[pattern], dtype=np.uint8)
-    y, x = np.indices(size) // SQUARE
+        return np.full(size, LEVELS[pattern], dtype=np.uint8)
+    y, x = np.indices(size) // SQUARE_SIDE
     return (255 * ((x + y) % 2)).astype(np.uint8)
 
 
-def _application(shared: _Shared) -> Any:
+def _application(exchange: _Exchange) -> Any:
     with needed(extra="viewer", what="a page in the browser"):
         from fastapi import FastAPI
-        from fastapi.responses import HTMLResponse, Response
+        from fastapi.responses import Response
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-
-    @application.get("/")
-    def page() -> HTMLResponse:
-        return HTMLResponse(PAGE)
+    application.middleware("http")(with_security_headers)
+    assets = read_page("preview")
 
     @application.get("/state")
     def state() -> dict[str, Any]:
-        with shared.lock:
-            return dict(shared.state)
+        with exchange.lock:
+            return dict(exchange.state)
 
     @application.get("/photo.jpg")
     def photo() -> Response:
-        with shared.lock:
-            jpeg = shared.jpeg
-        missing = Response(status_code=404)
-        return Response(jpeg, media_type="image/jpeg") if jpeg else missing
+        with exchange.lock:
+            jpeg = exchange.jpeg
+        return Response(jpeg, media_type="image/jpeg") if jpeg else Response(status_code=404)
 
-    @application.post("/wish")
-    def wish(wanted: Wish) -> dict[str, bool]:
-        shared.ask(wanted)
-        return {"heard": True}
+    @application.post("/settings")
+    def settings(changes: Settings) -> dict[str, bool]:
+        exchange.request(changes)
+        return {"accepted": True}
+
+    @application.get("/{name}")
+    def asset(name: str) -> Response:
+        file = assets.get(name)
+        if file is None:
+            return Response("There is no such page.", 404, media_type="text/plain")
+        return Response(file.content, media_type=file.media_type)
+
+    @application.get("/")
+    def index() -> Response:
+        return asset("index.html")
 
     return application

@@ -16,9 +16,10 @@ from nearfar.report.figures.style import (
 )
 from nearfar.workflow.experiments.data import Data
 
-BRIGHTER = 4.0
-# What the paper finds at every frequency and camera pixel of its scene, dB.
-PAPER = 25.0
+# Of near- and far-range light.
+GAIN = 4.0
+# In dB: the lower bound that the paper states, over all frequencies and camera pixels of its scene.
+PAPER_SNR = 25.0
 
 
 def draw(data: Data) -> Figure:
@@ -26,7 +27,7 @@ def draw(data: Data) -> Figure:
     figure = new_figure(4.9)
     upper, lower = bands(figure, [2.35, 2.55])
     parts = {part: title for part, title in PARTS.items() if part != "light"}
-    draw_parts(upper, data, parts, "picture", BRIGHTER)
+    draw_parts(upper, data, parts, "picture", GAIN)
     left, right = lower.subplots(1, 2)
     size = data.numbers["projector"]
     _draw_map(left, data.arrays["snr_b"], extent=centred_extent(size))
@@ -45,13 +46,13 @@ def draw(data: Data) -> Figure:
 
 
 def _draw_map(axes: Axes, values: Floats, extent: Any = None) -> None:
-    # The far band is exact without noise: its SNR would take all the colours.
+    # Without noise the far band is exact: its SNR would take up the whole colour scale.
     high = float(np.percentile(values, 98))
-    image = axes.imshow(values, cmap=SEQUENTIAL, vmin=PAPER, vmax=high, extent=extent)
+    image = axes.imshow(values, cmap=SEQUENTIAL, vmin=PAPER_SNR, vmax=high, extent=extent)
     figure = axes.get_figure()
     assert figure is not None
     bar = figure.colorbar(image, ax=axes, shrink=0.82, extend="both")
-    bar.set_label(f"dB; the paper: at least {PAPER:g}")
+    bar.set_label(f"dB; the paper: at least {PAPER_SNR:g}")
 
 
 def _mark(axes: Axes, x: int, y: int, values: Floats) -> None:

@@ -13,8 +13,7 @@ LIGHTS = {
     "random": "random",
 }
 METHODS = {"sum": "this method", "CLT": "CLT"}
-# Errors are shown this much brighter.
-BRIGHTER = 50.0
+ERROR_GAIN = 50.0
 
 
 def draw(data: Data) -> Figure:
@@ -29,9 +28,9 @@ def draw(data: Data) -> Figure:
         for axes, error, method in zip(column[2::2], column[3::2], METHODS, strict=True):
             relit = data.arrays[f"{light}/{method}"]
             show_picture(axes, relit)
-            show_picture(error, BRIGHTER * np.abs(relit - data.arrays[f"{light}/exact"]))
+            show_picture(error, ERROR_GAIN * np.abs(relit - data.arrays[f"{light}/exact"]))
             note(error, f"SNR$_b$ {snr_b[method][light]:.1f} dB")
-    names = [name for label in METHODS.values() for name in (label, f"error × {BRIGHTER:g}")]
+    names = [name for label in METHODS.values() for name in (label, f"error × {ERROR_GAIN:g}")]
     for axes, label in zip(grid[:, 0], ("light", "exact", *names), strict=True):
         row_name(axes, label)
     return figure

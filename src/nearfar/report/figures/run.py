@@ -18,24 +18,24 @@ from nearfar.workflow.experiments.data import Data, kept, together, write_data
 from nearfar.workflow.experiments.paper import EXPERIMENTS
 
 INDEX = "index.html"
-# The title, by which a page of figures is told from others.
-MARK = "nearfar: figures of the paper"
-# Figures whose experiments the table is made of.
-OF_TABLE = ("2", "4", "5", "3", "6")
+# Also what `is_figures` recognises the page by.
+TITLE = "nearfar: figures of the paper"
+# Figures whose data the table needs.
+TABLE_FIGURES = ("2", "4", "5", "3", "6")
 
 
 def is_figures(folder: Path) -> bool:
-    """Tell whether a folder is one of figures and nothing else, or holds nothing at all."""
+    """Return whether a folder holds figures and nothing else, or nothing at all."""
     entries = list(folder.iterdir())
     ours = {f"figure-{name}{ending}" for name in SHEETS for ending in (".pdf", ".png", ".npz")}
     if not all(entry.is_file() and entry.name in {INDEX, *ours} for entry in entries):
         return False
     # A lone index.html may be anyone's.
-    return not entries or MARK in (folder / INDEX).read_text(encoding="utf-8", errors="replace")
+    return not entries or TITLE in (folder / INDEX).read_text(encoding="utf-8", errors="replace")
 
 
 def check_names(names: list[str]) -> list[str]:
-    """Return the figures that were asked for, in order; all where none was.
+    """Return the requested figures in order, or all if none is requested.
 
     Raises
     ------
@@ -63,15 +63,15 @@ def make_figures(
     Parameters
     ----------
     output : Path
-        Folder to make: ``figure-1.pdf``, ``.png`` and ``.npz`` and so on, and ``index.html``.
+        Folder to create: ``figure-1.pdf``, ``.png`` and ``.npz`` and so on, and ``index.html``.
     only : list of str, optional
         Names of `nearfar.report.figures.NAMES`; all by default.
     force : bool
-        Replace a folder of figures that is there.
+        Whether to replace an existing folder of figures.
     progress : callable, optional
-        Told what is being done and the share done.
+        Called with the name of a step and the share of it that is done.
     note : callable, optional
-        Told in a sentence why kept data are measured again.
+        Called with a sentence on why saved data are computed again.
 
     Returns
     -------
@@ -89,12 +89,12 @@ def make_figures(
     report = progress or (lambda _what, _share: None)
     say = note or (lambda _text: None)
     drawn = [name for name in chosen if name in SHEETS]
-    needed = drawn + [name for name in OF_TABLE if "table" in chosen and name not in drawn]
+    needed = drawn + [name for name in TABLE_FIGURES if "table" in chosen and name not in drawn]
     with new_output(output, force=force, replaceable=is_figures) as partial:
         partial.mkdir()
-        wanted = [one for name in sorted(needed) for one in SHEETS[name].experiments]
-        # Each is kept as soon as it is measured, so that it outlives an interrupt.
-        measured = {one: _measured(one, report, say) for one in dict.fromkeys(wanted)}
+        experiments = [one for name in sorted(needed) for one in SHEETS[name].experiments]
+        # Each experiment is saved as soon as it is done, so that an interrupt loses little.
+        measured = {one: _measured(one, report, say) for one in dict.fromkeys(experiments)}
         found = {
             name: together([measured[one] for one in SHEETS[name].experiments]) for name in needed
         }
@@ -107,10 +107,10 @@ def make_figures(
 
 
 def _measured(experiment: str, report: Report, note: Callable[[str], None]) -> Data:
-    def tell(what: str, share: float) -> None:
-        report(f"{experiment}: {what}", share)
+    def report_step(step: str, share: float) -> None:
+        report(f"{experiment}: {step}", share)
 
-    return kept(experiment, lambda: EXPERIMENTS[experiment](tell), note=note)
+    return kept(experiment, lambda: EXPERIMENTS[experiment](report_step), note=note)
 
 
 def _draw(folder: Path, name: str, data: Data) -> None:
@@ -118,7 +118,7 @@ def _draw(folder: Path, name: str, data: Data) -> None:
     with styled():
         figure = sheet.draw(data)
     save(figure, folder, f"figure-{name}")
-    write_data(folder / f"figure-{name}.npz", f"figure {name}", sheet.behind(data))
+    write_data(folder / f"figure-{name}.npz", f"figure {name}", sheet.data_of(data))
 
 
 def index_page(drawn: list[str], found: dict[str, Data], *, with_table: bool) -> str:
@@ -140,7 +140,7 @@ def index_page(drawn: list[str], found: dict[str, Data], *, with_table: bool) ->
         )
     if with_table:
         body += _tables(found)
-    return page(MARK, "\n".join(body))
+    return page(TITLE, "\n".join(body))
 
 
 def _tables(found: dict[str, Data]) -> list[str]:
@@ -156,6 +156,6 @@ def _tables(found: dict[str, Data]) -> list[str]:
         f"<p>Under figure 6's lights and over all camera pixels, {patterns} patterns each.</p>",
         numbers(beside, relighting_rows(found["6"])),
         "<h2>Where the model holds</h2>",
-        "<p>What the method takes for granted beside what holds on the box of figures 2 and 3.</p>",
+        "<p>What the method assumes, and what was measured on the box of figures 2 and 3.</p>",
         numbers(list(HEAD), check_rows(found["3"].numbers["check"])),
     ]

@@ -1,4 +1,4 @@
-"""What each figure is: its experiment, the arrays behind it, how it is drawn, and its caption."""
+"""The figures: each with its experiment, its arrays, a function that draws it, and a caption."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ class Sheet:
     ----------
     title : str
     experiments : tuple of str
-        Which of `nearfar.workflow.experiments.paper.EXPERIMENTS` it draws.
+        Names in `nearfar.workflow.experiments.paper.EXPERIMENTS`, for its data.
     draw : callable
     caption : callable
         Writes the caption from the data.
     arrays : tuple of str
-        Beginnings of the names of the arrays behind it; all where empty.
+        Prefixes of the names of the arrays that it draws; all arrays if empty.
     """
 
     title: str
@@ -32,8 +32,8 @@ class Sheet:
     caption: Callable[[Data], str]
     arrays: tuple[str, ...] = ()
 
-    def behind(self, data: Data) -> Data:
-        """Return the data behind the figure."""
+    def data_of(self, data: Data) -> Data:
+        """Return the part of an experiment's data that the figure draws."""
         chosen = {
             name: values
             for name, values in data.arrays.items()

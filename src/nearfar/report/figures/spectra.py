@@ -17,7 +17,7 @@ from nearfar.report.figures.style import (
 )
 from nearfar.workflow.experiments.data import Data
 
-BRIGHTER = {"N": 2.0, "F": 2.0}
+PICTURE_GAINS = {"N": 2.0, "F": 2.0}
 
 
 def draw(data: Data) -> Figure:
@@ -27,7 +27,7 @@ def draw(data: Data) -> Figure:
     grid = upper.subplots(2, 4)
     top = float(np.abs(data.arrays["T"]).max())
     for name, picture, matrix in zip("TDNF", grid[0], grid[1], strict=True):
-        gain = BRIGHTER.get(name, 1.0)
+        gain = PICTURE_GAINS.get(name, 1.0)
         show_picture(picture, gain * data.arrays[f"picture/{name}"])
         picture.set_title(COMPONENTS[name] + (f" × {gain:g}" if gain != 1 else ""))
         picture.axhline(data.numbers["line"], color="#ffd400", linewidth=1.0, linestyle="--")
@@ -56,14 +56,14 @@ def draw(data: Data) -> Figure:
 
 
 def _draw_rows(data: Data, axes: Any) -> None:
-    """Draw rows of both camera pixels, and their spectra with k_far and k_near."""
+    """Draw the rows of two camera pixels, and their spectra with k_far and k_near."""
     for number, c in enumerate(data.arrays["columns"], 1):
         row, spectrum = axes[number - 1], axes[number + 1]
         for name, label in COMPONENTS.items():
             values = data.arrays[name][int(c)]
             row.semilogy(np.maximum(values, 1e-9), label=label, **LINES[name])
-            size = np.abs(np.fft.rfft(data.arrays[f"{name}/along"][number - 1]))
-            spectrum.semilogy(np.maximum(size, 1e-9), **LINES[name])
+            amplitude = np.abs(np.fft.rfft(data.arrays[f"{name}/along"][number - 1]))
+            spectrum.semilogy(np.maximum(amplitude, 1e-9), **LINES[name])
         row.set_ylim(bottom=_floor(data.arrays["F"][int(c)]))
         row.set_title(f"(3) row of c$_{number}$")
         row.set_xlabel("projector pixel p")
@@ -106,7 +106,7 @@ def _draw_singular_values(data: Data, axes: Axes) -> None:
 
 
 def _draw_patterns(data: Data, axes: Axes) -> None:
-    """Draw where the plan's frequencies lie."""
+    """Draw the frequencies of the plan's patterns."""
     near, far = data.arrays["near"], data.arrays["far"]
     for name, k, marker, size, colour in (
         ("near-range", near, "o", 2.6, "#c2561a"),

@@ -1,6 +1,6 @@
-"""How the figures look: one style, colours that print in grey, no state shared with others' plots.
+"""The style of the figures, with colours that can be told apart in grey prints.
 
-Figures are made without pyplot, so that nothing of a user's own session changes.
+Figures are made without pyplot, so that a user's own plots and settings stay as they are.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,12 +17,12 @@ from matplotlib.typing import RcKeyType
 from nearfar.arrays import Floats
 from nearfar.files import to_srgb
 
-# Inches; a page's text is about this wide.
-WIDTH = 7.2
+# In inches: about the width of a page's text.
+FIGURE_WIDTH = 7.2
 DPI = 200
-# Of even steps in lightness: read in grey as in colour.
+# Perceptually uniform, so that it reads the same in grey.
 SEQUENTIAL = "viridis"
-# Dark to light on paper: small values vanish as in the paper's figures.
+# From black, so that small values vanish as in the paper's figures.
 MAGNITUDE = "magma"
 # Lines differ in lightness and in dashes.
 LINES: dict[str, dict[str, Any]] = {
@@ -54,7 +54,7 @@ _SETTINGS: dict[RcKeyType, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the project's style, from matplotlib's own defaults and not the user's."""
+    """Apply the project's style on top of matplotlib's defaults, ignoring the user's settings."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_SETTINGS)
@@ -63,27 +63,27 @@ def styled() -> Iterator[None]:
 
 def new_figure(height: float) -> Figure:
     """Return a figure of the page's width, `height` inches high."""
-    return Figure(figsize=(WIDTH, height))
+    return Figure(figsize=(FIGURE_WIDTH, height))
 
 
 def bands(figure: Figure, heights: Sequence[float]) -> list[SubFigure]:
-    """Cut a figure into bands across the page, of these heights in inches."""
+    """Divide a figure into bands across the page, of these heights in inches."""
     return list(np.ravel(np.asarray(figure.subfigures(len(heights), 1, height_ratios=heights))))
 
 
 def save(figure: Figure, folder: Path, name: str) -> None:
-    """Write NAME.pdf, vector, and NAME.png; the same figure gives the same bytes."""
+    """Write NAME.pdf and NAME.png; the same figure gives the same bytes."""
     with styled():
         figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None}, dpi=DPI)
         figure.savefig(folder / f"{name}.png", metadata={"Software": None}, dpi=DPI)
 
 
 def show_picture(axes: Axes, picture: Floats) -> None:
-    """Show linear light, clipped to [0, 1], as sRGB, without ticks."""
-    shown = to_srgb(np.clip(np.nan_to_num(picture), 0, 1))
-    if shown.ndim == 3 and shown.shape[2] == 1:
-        shown = shown[..., 0]
-    axes.imshow(shown, cmap="gray", vmin=0, vmax=1)
+    """Draw linear light, clipped to [0, 1], as sRGB, without ticks."""
+    encoded = to_srgb(np.clip(np.nan_to_num(picture), 0, 1))
+    if encoded.ndim == 3 and encoded.shape[2] == 1:
+        encoded = encoded[..., 0]
+    axes.imshow(encoded, cmap="gray", vmin=0, vmax=1)
     axes.set_xticks([])
     axes.set_yticks([])
 
@@ -99,13 +99,15 @@ def row_name(axes: Axes, text: str) -> None:
 
 
 def magnitude(axes: Axes, values: Floats, *, high: float, decades: float = 5.0) -> Any:
-    """Show |values| in log scale, `decades` below `high`; returns the image for a colour bar."""
-    shown = np.log10(np.maximum(np.abs(values), high * 10.0**-decades))
-    return axes.imshow(shown, cmap=MAGNITUDE, vmin=np.log10(high) - decades, vmax=np.log10(high))
+    """Draw |values| on a log scale that ends `decades` below `high`; return the image."""
+    logarithms = np.log10(np.maximum(np.abs(values), high * 10.0**-decades))
+    return axes.imshow(
+        logarithms, cmap=MAGNITUDE, vmin=np.log10(high) - decades, vmax=np.log10(high)
+    )
 
 
 def centred_extent(size: Sequence[int]) -> tuple[float, float, float, float]:
-    """Axes of a map over DFT frequencies with DC in the middle, ky downwards."""
+    """Return the extent of a map over DFT frequencies: DC in the middle, ky downwards."""
     height, width = size
     return (
         -(width // 2) - 0.5,

@@ -1,4 +1,4 @@
-"""The table: what the paper states and what was measured."""
+"""The table of what the paper states and what was measured."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,8 +20,8 @@ HEAD = (
 )
 
 
-# The paper's own figures, column by column; empty where it prints none.
-PAPER = {
+# The paper's values, column by column; empty where it prints none.
+PAPER_VALUES = {
     "2": ("1060", "about 31", "15.4", "", "", "", "", ""),
     "4": ("788", "", "20.8", "", "", "", "", ""),
     "5": ("423", "", "", "25 dB or more", "", "25 dB or more", "", ""),
@@ -34,12 +34,14 @@ NAMES = {
 
 
 def rows(found: Mapping[str, Data]) -> list[list[str]]:
-    """Return the table's lines: each experiment, and under it what the paper states."""
+    """Return the rows of the table: each experiment, and below it what the paper states."""
     lines: list[list[str]] = []
-    for figure in (name for name in PAPER if name in found):
+    for figure in (name for name in PAPER_VALUES if name in found):
         data = found[figure]
         lines.append([NAMES[figure], *_measured(data.numbers)])
-        lines.append(["as the paper states", *(stated or "not stated" for stated in PAPER[figure])])
+        lines.append(
+            ["as the paper states", *(stated or "not stated" for stated in PAPER_VALUES[figure])]
+        )
     return lines
 
 
@@ -61,7 +63,7 @@ def _measured(found: Mapping[str, Any]) -> list[str]:
 
 
 def relighting_rows(found: Data) -> list[list[str]]:
-    """Return a line for each of figure 6's lights: this method, CLT, and their difference."""
+    """Return a row for each of figure 6's lights: this method, CLT, and their difference."""
     ours, theirs = found.numbers, found.numbers["CLT"]
     pairs = [
         (f"SNR_b, {LIGHTS[light]}", value, theirs["snr_b"][light])

@@ -1,15 +1,15 @@
-// Maps in false colour, and lines.
+// Maps in false colour, spectra and profiles.
 
 export const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function colourOf(scale, share) {
-  const place = Math.min(1, Math.max(0, share)) * (scale.length - 1), below = Math.min(Math.floor(place), scale.length - 2);
-  return scale[below].map((v, c) => v + (place - below) * (scale[below + 1][c] - v));
+  const position = Math.min(1, Math.max(0, share)) * (scale.length - 1), below = Math.min(Math.floor(position), scale.length - 2);
+  return scale[below].map((v, c) => v + (position - below) * (scale[below + 1][c] - v));
 }
 
 export const gradient = scale => `linear-gradient(to right, ${scale.map(c => `rgb(${c})`).join(', ')})`;
 
-// Values (height, width) between low and high; grey where there is none.
+// Values (height, width) between low and high; grey where a value is not finite.
 export function drawMap(canvas, values, [height, width], low, high, scale) {
   Object.assign(canvas, { width, height });
   const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height);
@@ -22,30 +22,33 @@ export function drawMap(canvas, values, [height, width], low, high, scale) {
   pen.putImageData(image, 0, 0);
 }
 
-// Of nothing there is no logarithm: it is grey.
-const LEAST = 1e-12;
-export const logarithms = values => Float32Array.from(values, v => Math.abs(v) > LEAST ? Math.log10(Math.abs(v)) : NaN);
+// Smaller values count as zero.
+const FLOOR = 1e-12;
 
+// Magnitudes on a log scale, down to so many decades below the largest; grey where they are zero.
+// Returns the logarithm of the largest.
 export function drawLog(canvas, values, shape, scale, decades = 5) {
-  const shown = logarithms(values);
-  let high = Math.log10(LEAST);
-  for (const v of shown) if (v > high) high = v;
-  drawMap(canvas, shown, shape, high - decades, high, scale);
+  const logarithms = Float32Array.from(values, v => Math.abs(v) > FLOOR ? Math.log10(Math.abs(v)) : NaN);
+  let high = Math.log10(FLOOR);
+  for (const v of logarithms) if (v > high) high = v;
+  drawMap(canvas, logarithms, shape, high - decades, high, scale);
   return high;
 }
 
+// The square of values around a position, NaN beyond the border.
 export function crop(values, [height, width], [cy, cx], reach) {
-  const side = 2 * reach + 1, found = new Float32Array(side * side).fill(NaN);
+  const side = 2 * reach + 1, cropped = new Float32Array(side * side).fill(NaN);
   for (let y = 0; y < side; y++)
     for (let x = 0; x < side; x++) {
       const py = Math.round(cy) + y - reach, px = Math.round(cx) + x - reach;
-      if (py >= 0 && py < height && px >= 0 && px < width) found[y * side + x] = values[py * width + px];
+      if (py >= 0 && py < height && px >= 0 && px < width) cropped[y * side + x] = values[py * width + px];
     }
-  return { values: found, shape: [side, side] };
+  return { values: cropped, shape: [side, side] };
 }
 
-// A spectrum, enlarged so that frames and dots are fine, with DC in the middle.
-export function drawSpectrum(canvas, values, [height, width], words, scale) {
+// A spectrum in dB with DC in the middle, enlarged so that the frames of k_near and k_far and the dots
+// of measured frequencies are fine.
+export function drawSpectrum(canvas, values, [height, width], { measured, k_near: near, k_far: far }, scale) {
   const small = new OffscreenCanvas(width, height);
   const low = Math.max(-80, Math.min(-10, values.reduce((a, b) => Math.min(a, b), 0)));
   drawMap(small, values, [height, width], low, 0, scale);
@@ -56,13 +59,13 @@ export function drawSpectrum(canvas, values, [height, width], words, scale) {
   pen.drawImage(small, 0, 0, canvas.width, canvas.height);
   const at = (k, side) => (Math.floor(side / 2) + 0.5 + k * side) * large;
   pen.fillStyle = '#ffffffa0';
-  for (const [ky, kx] of words.measured)
+  for (const [ky, kx] of measured)
     for (const sign of [1, -1]) {
       pen.beginPath();
       pen.arc(at(sign * kx, width), at(sign * ky, height), 1.4, 0, 7);
       pen.fill();
     }
-  for (const [name, [ky, kx]] of [['--near', words.k_near], ['--far', words.k_far]]) {
+  for (const [name, [ky, kx]] of [['--near', near], ['--far', far]]) {
     pen.strokeStyle = css(name);
     pen.lineWidth = 2;
     const x = at(-kx, width) - large / 2, y = at(-ky, height) - large / 2;
@@ -70,17 +73,17 @@ export function drawSpectrum(canvas, values, [height, width], words, scale) {
   }
 }
 
-// Lines over the same places, log scale, each with a band of one deviation.
+// Lines over the same pixels on a log scale, each with a band of one standard deviation.
 export function drawProfile(canvas, lines, label) {
   const ratio = devicePixelRatio || 1, w = canvas.clientWidth || 600, h = 170;
   Object.assign(canvas, { width: w * ratio, height: h * ratio });
   canvas.style.height = h + 'px';
   const pen = canvas.getContext('2d', { willReadFrequently: true });
   pen.scale(ratio, ratio);
-  let high = -12;
-  for (const { values } of lines) for (const v of values) high = Math.max(high, Math.log10(Math.abs(v) + 1e-12));
+  let high = Math.log10(FLOOR);
+  for (const { values } of lines) for (const v of values) high = Math.max(high, Math.log10(Math.abs(v) + FLOOR));
   const top = Math.ceil(high), low = top - 6, left = 38, bottom = h - 20;
-  const y = v => bottom - (Math.max(low, Math.log10(Math.max(v, 1e-12))) - low) / (top - low) * (bottom - 6);
+  const y = v => bottom - (Math.max(low, Math.log10(Math.max(v, FLOOR))) - low) / (top - low) * (bottom - 6);
   pen.font = '11px system-ui';
   pen.fillStyle = css('--soft');
   pen.strokeStyle = css('--line');

@@ -14,11 +14,10 @@ from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import Rows
 
-# Small differences are shown this much brighter.
-MAGNIFIED = 20
+DIFFERENCE_GAIN = 20
 
 
-def demonstration_page(
+def demo_page(
     plan: Plan,
     transport: Transport,
     truth: ExactTransport,
@@ -34,38 +33,38 @@ def demonstration_page(
     ----------
     plan : Plan
     transport : Transport
-        What was reconstructed.
+        Reconstructed from the photos.
     truth : ExactTransport
-        The scene's.
+        Of the simulated scene.
     correspondence : Correspondence
     lights : mapping of str to ndarray
-        Lights to show, by name.
+        Lights to relight with, by name.
     judgement : mapping
-        As `nearfar.workflow.judge.judge_by_truth` gives it.
+        As `nearfar.workflow.judge.judge_by_truth` returns it.
     rows : Rows
     seconds : mapping of str to float
-        How long each step took.
+        Duration of each step, by name.
     """
-    found = judgement["snr_b"]
+    snr_b = judgement["snr_b"]
     cards = facts(
         [
             (str(plan.transport_photos), "photos of transport"),
             (f"{plan.savings:.1f}×", f"fewer than {plan.projector.pixels} by brute force"),
             (str(plan.counts["correspondence"]), "photos of stripes for correspondence"),
-            (f"{found['white']:.1f} dB", "SNR_b under floodlight"),
+            (f"{snr_b['white']:.1f} dB", "SNR_b under floodlight"),
             (f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of five pictures"),
             (f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"),
         ]
     )
     columns = ["light", "direct", "near-range", "far-range", "sum: relit", "photo (exact)"]
-    columns.append(f"difference × {MAGNIFIED}")
+    columns.append(f"difference × {DIFFERENCE_GAIN}")
     galleries = gallery(
         columns, [(name, _row(name, light, transport, truth)) for name, light in lights.items()]
     )
     ceiling = judgement["ceiling"]["snr_b"]
     table = numbers(
         ["light", "SNR_b", "ceiling of the model, no noise"],
-        [[name, f"{value:.1f} dB", f"{ceiling[name]:.1f} dB"] for name, value in found.items()],
+        [[name, f"{value:.1f} dB", f"{ceiling[name]:.1f} dB"] for name, value in snr_b.items()],
     )
     split = judgement["snr"]
     parts = numbers(
@@ -74,7 +73,7 @@ def demonstration_page(
             [name, *(f"{split[how][key]:.1f} dB" for how in ("floodlit", "physical", "model"))]
             for name, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
         ]
-        + [["all together", f"{found['white']:.1f} dB", f"{split['T']:.1f} dB", ""]],
+        + [["all together", f"{snr_b['white']:.1f} dB", f"{split['T']:.1f} dB", ""]],
     )
     times = ", ".join(f"{name} {value:.1f} s" for name, value in seconds.items())
     body = f"""
@@ -106,10 +105,12 @@ window of {plan.window} × {plan.window} and a far band of {plan.far} could do o
 def _row(name: str, light: Floats, transport: Transport, truth: ExactTransport) -> list[str]:
     parts = transport.components(light)
     relit, exact = parts.direct + parts.near + parts.far, truth @ light
-    difference = MAGNIFIED * np.abs(relit - exact)
-    shown = [light, parts.direct, 2 * parts.near, parts.far, relit, exact, difference]
-    what = ["light", "direct", "near-range", "far-range", "relit", "exact", "difference"]
-    return [picture(image, f"{part} under {name}") for image, part in zip(shown, what, strict=True)]
+    difference = DIFFERENCE_GAIN * np.abs(relit - exact)
+    images = [light, parts.direct, 2 * parts.near, parts.far, relit, exact, difference]
+    names = ["light", "direct", "near-range", "far-range", "relit", "exact", "difference"]
+    return [
+        picture(image, f"{part} under {name}") for image, part in zip(images, names, strict=True)
+    ]
 
 
 def _maps(transport: Transport, correspondence: Correspondence, rows: Rows) -> str:

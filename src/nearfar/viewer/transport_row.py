@@ -1,4 +1,4 @@
-"""What the page shows of one camera pixel.
+"""The row of the transport of one camera pixel, as the page plots it.
 
 Index convention: rows are over projector pixels [y, x]. Channels are averaged.
 """
@@ -14,27 +14,27 @@ from nearfar.transport import near
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import deviation_of_mean
 
-# Below this share of its largest value a row's spectrum is not told apart from nothing.
-LEAST = 1e-7
+# Spectra end at this fraction of their largest value (-140 dB).
+RELATIVE_SPECTRUM_FLOOR = 1e-7
 
 
-class Row(NamedTuple):
-    """What one camera pixel answers.
+class TransportRow(NamedTuple):
+    """The row of one camera pixel.
 
     Attributes
     ----------
-    words : dict
-        q, k_far, k_near and so on, for JSON.
+    header : dict
+        Scalars for JSON: q, confidence, k_far, k_near and so on.
     window, far : ndarray, shape (Py, Px), float32
         D + N, and F.
     window_error, far_error : ndarray, shape (Px,), float32
-        Standard deviations along the projector's row of q, which `words` names, for errors of
-        channels that are independent; 0 where the transport does not tell.
+        Standard deviations along the projector row of q (``line`` in the header), for errors that
+        are independent between channels; 0 if the transport has no posterior.
     spectrum : ndarray, shape (Py, Px), float32
-        |t^| over its largest value in dB, DC in the middle.
+        Magnitude of the row's Fourier transform in dB, 0 for the largest, DC in the middle.
     """
 
-    words: dict[str, Any]
+    header: dict[str, Any]
     window: Floats
     far: Floats
     window_error: Floats
@@ -42,15 +42,15 @@ class Row(NamedTuple):
     spectrum: Floats
 
 
-def inspect_row(transport: Transport, x: int) -> Row:
-    """Tell what a camera pixel answers to each projector pixel.
+def transport_row(transport: Transport, x: int) -> TransportRow:
+    """Return the row of one camera pixel, with its error bars and spectrum.
 
     Parameters
     ----------
     transport : Transport
-        Of one row of the camera.
+        Its camera has one row of pixels.
     x : int
-        Column of the camera.
+        Camera column.
     """
     pixel, projector = slice(x, x + 1), transport.projector
     d, n, f = (part[0].mean(axis=0) for part in transport.component_rows(pixel))
@@ -63,7 +63,7 @@ def inspect_row(transport: Transport, x: int) -> Row:
         errors[0] = deviation_of_mean(np.hypot(d_error, n_error))
         errors[1] = deviation_of_mean(f_error)
     quality = transport.quality
-    words: dict[str, Any] = {
+    header: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
         "line": line,
         "window": transport.window,
@@ -73,17 +73,18 @@ def inspect_row(transport: Transport, x: int) -> Row:
         "floodlit": {"direct": float(d.sum()), "near": float(n.sum()), "far": float(f.sum())},
         **_bands(transport),
     }
-    return Row(words, window, far, errors[0], errors[1], _spectrum(window + far))
+    return TransportRow(header, window, far, errors[0], errors[1], _spectrum(window + far))
 
 
 def _spectrum(row: Floats) -> Floats:
-    size = np.abs(np.fft.fftshift(np.fft.fft2(row)))
-    most = max(float(size.max()), float(np.finfo(np.float32).tiny))
-    return np.asarray(20 * np.log10(np.maximum(size / most, LEAST)), dtype=np.float32)
+    magnitude = np.abs(np.fft.fftshift(np.fft.fft2(row)))
+    largest = max(float(magnitude.max()), float(np.finfo(np.float32).tiny))
+    relative = np.maximum(magnitude / largest, RELATIVE_SPECTRUM_FLOOR)
+    return np.asarray(20 * np.log10(relative), dtype=np.float32)
 
 
 def _bands(transport: Transport) -> dict[str, Any]:
-    """Tell where far- and near-range light was measured, in cycles per projector pixel."""
+    """Return k_far, k_near and the measured frequencies, in cycles per projector pixel."""
     far = np.abs(transport.far_basis.cycles).max(axis=0, initial=0.0)
     if transport.posterior is not None:
         measured = [(float(k.fy), float(k.fx)) for k in transport.posterior.frequencies]
@@ -91,11 +92,12 @@ def _bands(transport: Transport) -> dict[str, Any]:
         side = Size(transport.window, transport.window)
         measured = [(float(k.fy), float(k.fx)) for k in grid(side, side)]
     beyond = [k for k in measured if abs(k[0]) > far[0] or abs(k[1]) > far[1]]
-    # The checkerboard is there for direct light; along a side of one pixel there is no frequency.
+    # Without the checkerboard, which measures direct light.
     of_near = [k for k in beyond if min(map(abs, k)) < 0.5] or [(float(far[0]), float(far[1]))]
-    there = np.array(transport.projector) > 1
+    # Along a side of one pixel there is no frequency but 0.
+    has_frequencies = np.array(transport.projector) > 1
     return {
         "k_far": far.tolist(),
-        "k_near": (np.abs(of_near).max(axis=0) * there).tolist(),
+        "k_near": (np.abs(of_near).max(axis=0) * has_frequencies).tolist(),
         "measured": [list(k) for k in measured],
     }

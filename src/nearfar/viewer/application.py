@@ -1,0 +1,162 @@
+"""The viewer's web application: its requests and their responses."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError, NearfarError
+from nearfar.files import encode_png
+from nearfar.packages import needed
+from nearfar.report.maps import maps_of
+from nearfar.viewer.assets import read_page, with_security_headers
+from nearfar.viewer.decoding import MAXIMUM_FILE_BYTES
+from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.jobs import BusyError, JobQueue
+from nearfar.viewer.live import run_session
+from nearfar.viewer.messages import WHITE_LEVEL, maximum_light_bytes, unpack_light
+from nearfar.viewer.payloads import (
+    FILE_READERS,
+    describe_scene,
+    encode_relit_exr,
+    pack_column,
+    pack_map,
+    pack_row,
+)
+from nearfar.viewer.uploads import read_body
+
+with needed(extra="viewer", what="a page in the browser"):
+    from fastapi import FastAPI, Request, WebSocket
+    from fastapi.responses import JSONResponse, Response
+
+MAXIMUM_SESSIONS = 8
+# WebSocket close code for a session too many.
+TRY_AGAIN_LATER = 1013
+MAXIMUM_NAME_CHARACTERS = 255
+
+
+class _Handlers:
+    """Handlers of the viewer's requests, one method for each path."""
+
+    def __init__(self, transport: InteractiveTransport) -> None:
+        self._transport = transport
+        # A light moves on while pixels are inspected, both while a map or an exact picture is
+        # computed, and all of them while a file is decoded.
+        self._relighting, self._pixels = JobQueue(), JobQueue()
+        self._whole_pictures, self._files = JobQueue(), JobQueue()
+        self._maps = maps_of(transport.coarse)
+        self._packed_maps: dict[str, bytes] = {}
+        self._assets = read_page("view")
+        self._maximum_light_bytes = maximum_light_bytes(transport.projector)
+        self._scene = describe_scene(transport, self._maps)
+        self._sessions = 0
+
+    async def asset(self, name: str) -> Response:
+        """Return a file of the page."""
+        asset = self._assets.get(name)
+        if asset is None:
+            return Response("There is no such page.", 404, media_type="text/plain")
+        return Response(asset.content, media_type=asset.media_type)
+
+    async def scene(self) -> dict[str, Any]:
+        """Return the sizes of the transport, its plan, and the maps there are."""
+        return self._scene
+
+    async def row(self, y: int, x: int) -> Response:
+        """Return the row of the transport of one camera pixel."""
+        _require_pixel("camera", self._transport.stored.camera, y, x)
+        return _bytes_response(await self._pixels.run(pack_row, self._transport, y, x))
+
+    async def column(self, y: int, x: int) -> Response:
+        """Return the column of the transport of one projector pixel."""
+        _require_pixel("projector", self._transport.projector, y, x)
+        return _bytes_response(await self._pixels.run(pack_column, self._transport, y, x))
+
+    async def map(self, name: str) -> Response:
+        """Return a map; it is computed once."""
+        if name not in self._packed_maps:
+            self._packed_maps[name] = await self._whole_pictures.run(pack_map, self._maps, name)
+        return _bytes_response(self._packed_maps[name])
+
+    async def picture(self, request: Request) -> Response:
+        """Return every camera pixel under the light of the request, as OpenEXR."""
+        body = await read_body(request, self._maximum_light_bytes)
+        header, light = unpack_light(body, self._transport.projector)
+        exr = await self._whole_pictures.run(encode_relit_exr, self._transport, light, header.gains)
+        return _bytes_response(exr, "image/x-exr")
+
+    async def light(self, request: Request) -> Response:
+        """Return the light of the request as a 16-bit PNG, linear, for ``nearfar relight``."""
+        body = await read_body(request, self._maximum_light_bytes)
+        _, light = unpack_light(body, self._transport.projector)
+        levels = np.rint(light.as_array() * np.float32(WHITE_LEVEL)).astype(np.uint16)
+        return _bytes_response(await self._pixels.run(encode_png, levels), "image/png")
+
+    async def read(self, kind: str, request: Request, name: str = "") -> Response:
+        """Return the pixels of an uploaded light or photo in a format that browsers lack."""
+        if kind not in FILE_READERS:
+            raise InputError(f"there is nothing to read as {kind!r}: send a light or a photo.")
+        data = await read_body(request, MAXIMUM_FILE_BYTES)
+        name = name[:MAXIMUM_NAME_CHARACTERS]
+        return _bytes_response(
+            await self._files.run(FILE_READERS[kind], self._transport, data, name)
+        )
+
+    async def relight(self, socket: WebSocket) -> None:
+        """Run a live session, unless `MAXIMUM_SESSIONS` run already."""
+        await socket.accept()
+        if self._sessions >= MAXIMUM_SESSIONS:
+            reason = f"{MAXIMUM_SESSIONS} pages are open: close one of them."
+            await socket.close(TRY_AGAIN_LATER, reason)
+            return
+        self._sessions += 1
+        try:
+            await run_session(self._transport, self._relighting, socket)
+        finally:
+            self._sessions -= 1
+
+
+def application(transport: InteractiveTransport) -> FastAPI:
+    """Return the ASGI application of a transport's page.
+
+    Raises
+    ------
+    MissingFileError
+        If the package was installed without the page.
+    """
+    handlers = _Handlers(transport)
+    routes = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    routes.exception_handler(NearfarError)(_error_response)
+    routes.middleware("http")(with_security_headers)
+    # Without a response model: the handlers return responses, not data to be validated.
+    for path, get in (
+        ("/scene", handlers.scene),
+        ("/row", handlers.row),
+        ("/column", handlers.column),
+        ("/map/{name}", handlers.map),
+        ("/{name}", handlers.asset),
+    ):
+        routes.get(path, response_model=None)(get)
+    routes.get("/", response_model=None)(partial(handlers.asset, "index.html"))
+    for path, post in (
+        ("/picture.exr", handlers.picture),
+        ("/light.png", handlers.light),
+        ("/read/{kind}", handlers.read),
+    ):
+        routes.post(path, response_model=None)(post)
+    routes.websocket("/relight")(handlers.relight)
+    return routes
+
+
+async def _error_response(_request: Request, error: Exception) -> Response:
+    return JSONResponse({"fault": str(error)}, 503 if isinstance(error, BusyError) else 400)
+
+
+def _bytes_response(content: bytes, media_type: str = "application/octet-stream") -> Response:
+    return Response(content, media_type=media_type)
+
+
+def _require_pixel(device: str, size: Size, y: int, x: int) -> None:
+    if not (0 <= y < size.height and 0 <= x < size.width):
+        raise InputError(f"({y}, {x}) is no pixel of the {device} of {size}: choose one that is.")

@@ -1,0 +1,232 @@
+"""A transport that is relit interactively: coarsely while the light moves, exactly once it rests.
+
+Index convention: camera pixels are [y, x]; parts of a frame are [component, y, x, colour], the
+components being direct, near and far. Frames have 1 colour or 3.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import AnyPath, Floats, Size, middles
+from nearfar.errors import InputError, NearfarError
+from nearfar.files import luminance
+from nearfar.transport.colour import as_channels_see
+from nearfar.transport.model import Transport
+from nearfar.transport.rows import FACTORS, of_pixels, stacked, thinned_blocks
+from nearfar.transport.store import StoredTransport, open_transport
+from nearfar.viewer.messages import Light
+
+# Factors of the coarse copy: relighting them takes some tens of milliseconds.
+MAXIMUM_COARSE_BYTES = 160 * 2**20
+# Factors of one block at rest: after each block a newer light may interrupt.
+BLOCK_BYTES = 64 * 2**20
+# Larger photos are displayed at every second row and column, every third, and so on.
+MAXIMUM_DISPLAYED_PIXELS = 2**22
+DEFAULT_MEMORY_BYTES = 2 * 10**9
+GREY, COLOUR = 1, 3
+# Values are scaled to about this for float16, which ends at 65504; small values keep more digits.
+FLOAT16_PEAK = 32768.0
+
+
+class StoppedError(NearfarError):
+    """The server has stopped during a computation."""
+
+
+class Frame(NamedTuple):
+    """The relit scene, taken apart, as a page displays it.
+
+    Attributes
+    ----------
+    parts : ndarray of float16, shape (3, y, x, colours)
+        Direct, near and far, in photo units times `scale`.
+    scale : float
+        A power of 2.
+    stride : int
+        Every how many rows and columns of the camera are there.
+    """
+
+    parts: NDArray[np.float16]
+    scale: float
+    stride: int
+
+
+class InteractiveTransport:
+    """A stored transport with a coarse copy in memory, and all of it if it fits.
+
+    Parameters
+    ----------
+    path : str or Path
+    memory : int
+        Bytes of factors that are kept in memory; a larger transport is read from the disk again
+        for each light at rest.
+    progress : callable, optional
+        Called with the share that has been read, from 0 to 1.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        As `nearfar.load_transport`.
+    """
+
+    def __init__(
+        self,
+        path: AnyPath,
+        *,
+        memory: int = DEFAULT_MEMORY_BYTES,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self.path = Path(path)
+        self.stored: StoredTransport = open_transport(path)
+        report = progress or (lambda _share: None)
+        size = self.stored.nbytes
+        camera = self.stored.camera
+        self.display_stride = int(np.ceil(np.sqrt(camera.pixels / MAXIMUM_DISPLAYED_PIXELS)))
+        stride = int(np.ceil(np.sqrt(size / MAXIMUM_COARSE_BYTES)))
+        self.coarse_stride = max(stride, self.display_stride)
+        self._stopped = threading.Event()
+        self._blocks_in_memory: list[Transport] | None = [] if size <= memory else None
+        coarse: list[Transport] = []
+        if self._blocks_in_memory is None:
+            # Only the rows of the coarse copy are read.
+            one_row, columns = middles(1, 1), middles(camera.width, self.coarse_stride)
+            for row in middles(camera.height, self.coarse_stride):
+                coarse.append(of_pixels(self.camera_row(int(row)), one_row, columns))
+                report(row / camera.height)
+        else:
+            rows = 0
+            for block in self.stored.blocks(BLOCK_BYTES):
+                self._blocks_in_memory.append(block)
+                rows += block.camera.height
+                report(rows / camera.height)
+            blocks = self._blocks_in_memory
+            coarse = list(thinned_blocks(blocks, camera.height, self.coarse_stride))
+        self.coarse = _join(coarse)
+
+    @property
+    def projector(self) -> Size:
+        """Size of the pattern grid."""
+        return self.stored.projector
+
+    @property
+    def colours(self) -> int:
+        """Colours of a frame: 3 if the camera has as many channels, else 1."""
+        return COLOUR if self.stored.channels >= COLOUR else GREY
+
+    @property
+    def is_coarse_exact(self) -> bool:
+        """Whether the coarse copy has every camera pixel that is displayed."""
+        return self.coarse_stride == self.display_stride
+
+    def relight_coarsely(self, light: Light) -> Frame:
+        """Relight the coarse copy."""
+        return _frame(self._parts(self.coarse, light), self.coarse_stride)
+
+    def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
+        """Relight every camera pixel that is displayed, block by block.
+
+        Yields
+        ------
+        Frame or None
+            None after each block, so that the caller may stop, and the frame at the end.
+        """
+        parts = []
+        blocks = self.blocks()
+        if self.display_stride > 1:
+            blocks = thinned_blocks(blocks, self.stored.camera.height, self.display_stride)
+        for block in blocks:
+            if block.camera.height:
+                parts.append(self._parts(block, light))
+            yield None
+        yield _frame(np.concatenate(parts, axis=1), self.display_stride)
+
+    def relight(self, light: Light, *, direct: float, near: float, far: float) -> Floats:
+        """Relight every camera pixel with gains of the components, as ``nearfar relight`` does.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+        """
+        channel_light = self._for_channels(light.as_array())
+        gains = {"direct": direct, "near": near, "far": far}
+        pictures = [
+            block.relight(channel_light, **gains).astype(np.float32) for block in self.blocks()
+        ]
+        return np.concatenate(pictures)
+
+    def camera_row(self, y: int) -> Transport:
+        """Read the transport of one row of camera pixels."""
+        return self.stored.rows(slice(y, y + 1))
+
+    def at_display_stride(self, picture: NDArray[Any]) -> NDArray[Any]:
+        """Return the rows and columns of a camera picture that are displayed."""
+        return picture[np.ix_(*(middles(side, self.display_stride) for side in picture.shape[:2]))]
+
+    def blocks(self) -> Iterator[Transport]:
+        """Iterate over blocks of camera rows, from memory or from the disk.
+
+        Raises
+        ------
+        StoppedError
+            After `stop`.
+        """
+        blocks = self._blocks_in_memory
+        for block in blocks if blocks is not None else self.stored.blocks(BLOCK_BYTES):
+            if self._stopped.is_set():
+                raise StoppedError("the page's server ends.")
+            yield block
+
+    def stop(self) -> None:
+        """End computations that are under way, when the server stops."""
+        self._stopped.set()
+
+    def to_colours(self, picture: Floats) -> Floats:
+        """Turn a picture (y, x, channels) into one of `colours` colours, (y, x, colours)."""
+        if self.colours == COLOUR:
+            return picture[..., :COLOUR]
+        return picture if picture.shape[-1] == 1 else picture.mean(axis=-1, keepdims=True)
+
+    def _for_channels(self, light: Floats) -> Floats:
+        """Return the light that each channel of the camera sees of a coloured light."""
+        try:
+            return as_channels_see(light, self.stored.channels, self.stored.provenance)
+        except InputError:
+            # Without a colour calibration the channels are not red, green and blue.
+            return luminance(light)
+
+    def _parts(self, transport: Transport, light: Light) -> Floats:
+        """Return direct, near and far under a light, (3, y, x, colours)."""
+        if light.is_grey or light.levels.ndim == 3:
+            channel_light = self._for_channels(light.as_array())
+            tint = np.ones(1, dtype=np.float32)
+        else:
+            # Relighting once, for all channels, takes a third of the time.
+            channel_light = light.levels
+            tint = np.ravel(self._for_channels(light.colour[None, None]))
+        components = transport.components(channel_light)
+        pictures = [part.reshape(*transport.camera, -1) * tint for part in components]
+        return np.stack([self.to_colours(picture) for picture in pictures])
+
+
+def to_float16(values: Floats) -> tuple[float, NDArray[np.float16]]:
+    """Return a power of 2, and the values multiplied by it in float16, none of which overflows."""
+    peak = float(np.abs(values).max(initial=0.0))
+    scale = 2.0 ** np.floor(np.log2(FLOAT16_PEAK / peak)) if peak > 0 else 1.0
+    return float(scale), (values * np.float32(scale)).astype(np.float16)
+
+
+def _frame(parts: Floats, stride: int) -> Frame:
+    scale, halves = to_float16(parts)
+    return Frame(halves, scale, stride)
+
+
+def _join(blocks: list[Transport]) -> Transport:
+    """Stack blocks of camera rows, with factors in float32, which is quicker to relight."""
+    whole = stacked(blocks)
+    factors = {name: getattr(whole, name).astype(np.float32, copy=False) for name in FACTORS}
+    return replace(whole, **factors)

@@ -1,0 +1,132 @@
+"""A live session: a page sends lights over a WebSocket, and frames of the relit scene come back.
+
+While the light moves, only the newest light is relit, coarsely if the scene is large; once it
+rests, exactly.
+"""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from nearfar.errors import InputError, NearfarError
+from nearfar.packages import needed
+from nearfar.viewer.interactive import Frame, InteractiveTransport
+from nearfar.viewer.jobs import JobQueue
+from nearfar.viewer.messages import Light, pack, unpack_light
+
+with needed(extra="viewer", what="a page in the browser"):
+    from starlette.websockets import WebSocket, WebSocketDisconnect
+
+# A light that has not changed for so long is at rest.
+REST_SECONDS = 0.12
+# WebSocket close codes: what the page sent is wrong, or the server failed.
+POLICY_VIOLATION, SERVER_ERROR = 1008, 1011
+# The protocol allows a close reason of 123 bytes.
+MAXIMUM_REASON_BYTES = 120
+
+R = TypeVar("R")
+
+
+@dataclass
+class _NewestLight:
+    """The newest light of one page; `arrived` is set until it is taken to be relit."""
+
+    arrived: asyncio.Event = field(default_factory=asyncio.Event)
+    number: int = 0
+    light: Light | None = None
+
+
+async def run_session(transport: InteractiveTransport, jobs: JobQueue, socket: WebSocket) -> None:
+    """Send frames for the lights that a page sends, until it disconnects.
+
+    An error closes the socket, with the error's message as the reason.
+
+    Parameters
+    ----------
+    transport : InteractiveTransport
+    jobs : JobQueue
+        Relights for all pages.
+    socket : WebSocket
+        Accepted already.
+    """
+    newest = _NewestLight()
+    tasks = [
+        asyncio.create_task(_receive_lights(transport, newest, socket)),
+        asyncio.create_task(_send_frames(transport, jobs, newest, socket)),
+    ]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    except WebSocketDisconnect:
+        pass
+    except NearfarError as error:
+        code = POLICY_VIOLATION if isinstance(error, InputError) else SERVER_ERROR
+        reason = str(error).encode()[:MAXIMUM_REASON_BYTES].decode(errors="ignore")
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await socket.close(code, reason)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _receive_lights(
+    transport: InteractiveTransport, newest: _NewestLight, socket: WebSocket
+) -> None:
+    """Receive lights; each replaces the one before, relit or not."""
+    while True:
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect
+        header, light = unpack_light(message.get("bytes") or b"", transport.projector)
+        newest.number, newest.light = header.number, light
+        newest.arrived.set()
+
+
+async def _send_frames(
+    transport: InteractiveTransport, jobs: JobQueue, newest: _NewestLight, socket: WebSocket
+) -> None:
+    """Send a coarse frame of each newest light, and an exact one once it rests."""
+    while True:
+        await newest.arrived.wait()
+        newest.arrived.clear()
+        number, light = newest.number, newest.light
+        assert light is not None
+        frame = await jobs.run(transport.relight_coarsely, light)
+        await socket.send_bytes(_pack_frame(number, frame, exact=transport.is_coarse_exact))
+        if transport.is_coarse_exact or await _arrives_within(newest, REST_SECONDS):
+            continue
+        steps = transport.relight_exactly(light)
+        while not newest.arrived.is_set():
+            try:
+                exact = await jobs.run(_next, steps)
+            except _ExhaustedError:
+                break
+            if exact is not None:
+                await socket.send_bytes(_pack_frame(number, exact, exact=True))
+
+
+def _pack_frame(number: int, frame: Frame, *, exact: bool) -> bytes:
+    header = {"number": number, "exact": exact, "stride": frame.stride, "scale": frame.scale}
+    return pack(header, frame.parts)
+
+
+class _ExhaustedError(Exception):
+    """An iterator has no more items; a thread cannot raise StopIteration into a coroutine."""
+
+
+def _next(iterator: Iterator[R]) -> R:
+    for item in iterator:
+        return item
+    raise _ExhaustedError
+
+
+async def _arrives_within(newest: _NewestLight, seconds: float) -> bool:
+    try:
+        await asyncio.wait_for(newest.arrived.wait(), seconds)
+    except TimeoutError:
+        return False
+    return True

@@ -1,0 +1,56 @@
+// The page's state in its address: only what differs from the initial state.
+
+import { KINDS } from './state.js';
+
+// Dropped pictures that take more than this are left out of the address.
+const MAXIMUM_PICTURE_CHARACTERS = 400000;
+const MAXIMUM_STROKES = 2000;
+const MAXIMUM_PICTURES = 100;
+const SAVING_DELAY_MILLISECONDS = 250;
+const COLOUR = /^#[0-9a-f]{6}$/i;
+const PNG_URL = /^data:image\/png;base64,[A-Za-z0-9+/]+=*$/;
+
+export function toAddress(state, initial) {
+  const changed = {};
+  for (const name of Object.keys(initial))
+    if (JSON.stringify(state[name]) !== JSON.stringify(initial[name])) changed[name] = state[name];
+  // Empty entries keep the index of the other pictures.
+  if (changed.pictures && JSON.stringify(changed.pictures).length > MAXIMUM_PICTURE_CHARACTERS)
+    changed.pictures = changed.pictures.map(() => '');
+  return Object.keys(changed).length ? '#' + encodeURIComponent(JSON.stringify(changed)) : '#';
+}
+
+// Anyone may have written the address: values of the wrong type or range are left out.
+export function fromAddress(hash, initial) {
+  let given = {};
+  try { given = JSON.parse(decodeURIComponent(hash.slice(1))) || {}; } catch { return { ...initial }; }
+  const state = { ...initial };
+  for (const [name, before] of Object.entries(initial)) {
+    const value = given[name];
+    if (value === undefined) continue;
+    if (typeof before === 'number' && Number.isFinite(value)) state[name] = value;
+    if (typeof before === 'string' && typeof value === 'string') state[name] = value;
+  }
+  if (!COLOUR.test(state.colour)) state.colour = initial.colour;
+  if (!KINDS.includes(state.kind)) state.kind = initial.kind;
+  for (const name of ['pixel', 'column'])
+    if (Array.isArray(given[name]) && given[name].length === 2 && given[name].every(Number.isInteger))
+      state[name] = given[name];
+  if (Array.isArray(given.strokes)) state.strokes = given.strokes.filter(isStroke).slice(0, MAXIMUM_STROKES);
+  if (Array.isArray(given.pictures))
+    state.pictures = given.pictures.slice(0, MAXIMUM_PICTURES).map(url => typeof url === 'string' && PNG_URL.test(url) ? url : '');
+  return state;
+}
+
+const isStroke = stroke => stroke && COLOUR.test(stroke.colour) && stroke.radius >= 0.5 && stroke.radius < 10000 &&
+  Array.isArray(stroke.points) && stroke.points.length > 1 && stroke.points.length % 2 === 0 &&
+  stroke.points.every(value => Number.isFinite(value) && Math.abs(value) < 20000);
+
+// A function that writes a state to the address once no newer one has followed for a while.
+export function createAddressWriter(initial) {
+  let timer = 0;
+  return state => {
+    clearTimeout(timer);
+    timer = setTimeout(() => history.replaceState(null, '', toAddress(state, initial)), SAVING_DELAY_MILLISECONDS);
+  };
+}

@@ -1,0 +1,80 @@
+// Buttons and sliders: they change the state, and show it.
+
+import { all, get, set } from './dom.js';
+import { canPlay } from './playback.js';
+import { PARTS } from './state.js';
+
+const UNITS = { radius: ' px', width: ' px', brush: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
+const TWO_DECIMALS = [...PARTS, 'gamma', 'soft'];
+
+// What the page is of, and how far its sliders go.
+export function describe(scene) {
+  const [height, width] = scene.projector, [rows, columns] = scene.camera, side = Math.max(height, width);
+  get('name').textContent = scene.name;
+  document.title = `${scene.name} · nearfar`;
+  get('about').textContent = `camera ${rows}x${columns}, ${scene.channels} channel${scene.channels > 1 ? 's' : ''}; ` +
+    `projector ${height}x${width}; W = ${scene.window}` +
+    (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
+  get('stage').style.setProperty('--aspect', columns / rows);
+  const maxima = { radius: side / 2, width: side, side: side / 2, cycles: side / 2, shift: side, brush: side / 4 };
+  for (const [name, value] of Object.entries(maxima)) slider(name).max = Math.max(1, value);
+}
+
+const slider = name => document.querySelector(`[data-of=${name}]`);
+const prefersDark = matchMedia('(prefers-color-scheme: dark)');
+const theme = state => state.theme || (prefersDark.matches ? 'dark' : 'light');
+
+// onTheme: the page's colours have changed; show: shows the controls again.
+export function bindControls({ store, scenePictures, playback, onTheme, show }) {
+  for (const button of all('[data-kind]')) button.onclick = () => store.update({ kind: button.dataset.kind });
+  for (const button of all('[data-solo]'))
+    button.onclick = () => store.update({ solo: store.state.solo === button.dataset.solo ? '' : button.dataset.solo });
+  for (const input of all('[data-of]')) input.oninput = () => store.update({ [input.dataset.of]: input.valueAsNumber });
+  get('colour').oninput = () => store.update({ colour: get('colour').value });
+  get('play').onclick = () => playback.toggle();
+  get('undo').onclick = () => store.update({ strokes: store.state.strokes.slice(0, -1) });
+  get('clear').onclick = () => store.update({ strokes: [] });
+  get('reset').onclick = () => store.update({ exposure: 0, gamma: 1, direct: 1, near: 1, far: 1, solo: '' });
+  get('expose').onclick = () => {
+    const exposure = scenePictures.exposure(store.state);
+    if (exposure !== null) store.update({ exposure });
+  };
+  get('keep').onclick = () => { if (scenePictures.keepAsReference(store.state)) store.update({ wipe: 50 }); };
+  get('forget').onclick = () => { scenePictures.removeReference(); store.update({}); };
+  get('theme').onclick = () => { store.update({ theme: theme(store.state) === 'dark' ? 'light' : 'dark' }); onTheme(); };
+  prefersDark.onchange = show;
+}
+
+export function showControls(state, { pictureCount, hasReference, isPlaying }) {
+  for (const button of all('[data-kind]')) set(button, 'ariaPressed', String(button.dataset.kind === state.kind));
+  for (const button of all('[data-solo]')) set(button, 'ariaPressed', String(button.dataset.solo === state.solo));
+  for (const part of all('[data-for]')) set(part, 'hidden', !part.dataset.for.split(' ').includes(state.kind));
+  set(slider('shown'), 'max', String(Math.max(0, pictureCount - 1)));
+  for (const input of all('[data-of]')) {
+    set(input, 'value', String(state[input.dataset.of]));
+    const output = input.parentElement.querySelector('output');
+    if (output) set(output, 'textContent', valueText(input.dataset.of, state, pictureCount));
+  }
+  set(get('colour'), 'value', state.colour);
+  set(get('maps'), 'value', state.map);
+  set(get('wiping'), 'hidden', !hasReference);
+  set(get('forget'), 'hidden', !hasReference);
+  set(document.documentElement.dataset, 'theme', theme(state));
+  set(get('theme'), 'textContent', theme(state) === 'dark' ? 'light page' : 'dark page');
+  set(get('play'), 'disabled', !isPlaying && !canPlay(state, pictureCount));
+  showHint(state, pictureCount);
+}
+
+function showHint(state, pictureCount) {
+  const isEmpty = state.kind === 'paint' && !state.strokes.length || state.kind === 'picture' && !pictureCount;
+  set(get('hint'), 'hidden', !isEmpty);
+  set(get('hint'), 'textContent', state.kind === 'paint' ? 'drag here to paint' : 'drop pictures here');
+}
+
+function valueText(name, state, pictureCount) {
+  const value = state[name];
+  if (name === 'exposure') return (value > 0 ? '+' : '') + value.toFixed(1) + ' EV';
+  if (name === 'cycles') return value + ' cycles';
+  if (name === 'shown') return `${pictureCount ? value + 1 : 0} of ${pictureCount}`;
+  return (TWO_DECIMALS.includes(name) ? value.toFixed(2) : +value.toFixed(1)) + (UNITS[name] || '');
+}

@@ -1,0 +1,49 @@
+// Keys: what they do depends on the element that has the focus.
+
+import { all, get, nearestPixel } from './dom.js';
+
+const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
+const SHIFT_PIXELS = 8;
+const SOLOS = { d: 'direct', n: 'near', f: 'far', a: '' };
+
+const moved = ([y, x], arrow, event) => {
+  const pixels = event.shiftKey ? SHIFT_PIXELS : 1;
+  return [y + pixels * arrow[0], x + pixels * arrow[1]];
+};
+
+export function bindKeyboard({ scene, store, inspector, playback }) {
+  addEventListener('keydown', event => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const focused = document.activeElement, arrow = ARROWS[event.key];
+    if ((arrow || event.key === 'Enter') && focused === get('light')) onLight(event, arrow);
+    else if ((arrow || event.key === 'Enter') && focused === get('picture')) onPicture(event, arrow);
+    else if (!['INPUT', 'SELECT'].includes(focused.tagName)) onPage(event, focused);
+  });
+
+  function onLight(event, arrow) {
+    const { state } = store;
+    if (!arrow) {
+      inspector.showColumn(...nearestPixel([state.y, state.x], scene.projector));
+      return;
+    }
+    event.preventDefault();
+    const [y, x] = nearestPixel(moved([state.y, state.x], arrow, event), scene.projector);
+    store.update({ y, x });
+  }
+
+  function onPicture(event, arrow) {
+    event.preventDefault();
+    const pixel = store.state.pixel || scene.camera.map(side => Math.floor(side / 2));
+    inspector.showRow(...nearestPixel(moved(pixel, arrow || [0, 0], event), scene.camera));
+  }
+
+  function onPage(event, focused) {
+    const kind = all('[data-kind]')[Number(event.key) - 1], solo = SOLOS[event.key];
+    if (kind) store.update({ kind: kind.dataset.kind });
+    else if (solo !== undefined) store.update({ solo });
+    else if (event.key === ' ' && focused.tagName !== 'BUTTON') {
+      event.preventDefault();
+      playback.toggle();
+    }
+  }
+}

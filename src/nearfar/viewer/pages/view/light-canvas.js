@@ -1,0 +1,90 @@
+// The light's own canvas: the light is drawn on it, and dragged or painted in it.
+
+import { get, nearestPixel, positionOn, showFault } from './dom.js';
+import { drawLight } from './picture.js';
+
+const CLICK_DISTANCE = 4;
+// Kinds that go where the pointer is.
+const PLACED = ['spot', 'stripe', 'pixel'];
+
+// Draws the light at most once for each frame of the screen, however often it changes.
+export class LightCanvas {
+  #light;
+  #store;
+  #onDrawn;
+  #request = 0;
+
+  constructor({ light, store, onDrawn }) {
+    this.#light = light;
+    this.#store = store;
+    this.#onDrawn = onDrawn;
+  }
+
+  get isPending() { return this.#request !== 0; }
+
+  draw() {
+    this.#light.draw(this.#store.state);
+    drawLight(get('light'), this.#light);
+  }
+
+  requestDraw() {
+    this.#request ||= requestAnimationFrame(() => {
+      this.#request = 0;
+      this.draw();
+      this.#onDrawn();
+    });
+  }
+}
+
+const roundToQuarter = value => Math.round(4 * value) / 4;
+
+// What a press of the pointer at [y, x] changes.
+function pressed(state, [y, x]) {
+  if (state.kind === 'paint')
+    return { strokes: [...state.strokes, { colour: state.colour, radius: state.brush, points: [x, y] }] };
+  return PLACED.includes(state.kind) ? { x, y } : null;
+}
+
+// What dragging changes, from where the pointer was pressed to [y, x]: the light is moved, or shifted.
+function dragged(state, press, [y, x], projector) {
+  if (PLACED.includes(state.kind)) return { x: roundToQuarter(x), y: roundToQuarter(y) };
+  const dy = y - press.position[0], dx = x - press.position[1];
+  if (state.kind === 'paint') return continuedStroke(state.strokes, [roundToQuarter(x), roundToQuarter(y)]);
+  if (state.kind === 'checkerboard') return { shift: Math.max(0, Math.round(press.shift - dx)) };
+  if (state.kind !== 'sinusoid') return null;
+  const angle = state.angle * Math.PI / 180, distance = dx * Math.sin(angle) + dy * Math.cos(angle);
+  const cycles = distance * state.cycles / Math.max(...projector);
+  return { phase: ((Math.round(press.phase + 360 * cycles) % 360) + 360) % 360 };
+}
+
+function continuedStroke(strokes, [x, y]) {
+  const stroke = strokes.at(-1);
+  if (!stroke || stroke.points.at(-2) === x && stroke.points.at(-1) === y) return null;
+  return { strokes: [...strokes.slice(0, -1), { ...stroke, points: [...stroke.points, x, y] }] };
+}
+
+// onPixel(y, x): a projector pixel was clicked.
+export function bindPointer({ store, projector, onPixel }) {
+  const canvas = get('light');
+  let press = null;
+  const update = changes => { if (changes) store.update(changes); };
+  canvas.onpointerdown = event => {
+    if (event.button || press) return;
+    canvas.setPointerCapture(event.pointerId);
+    const position = positionOn(event, projector), { phase, shift } = store.state;
+    press = { pointer: event.pointerId, client: [event.clientX, event.clientY], position, phase, shift };
+    showFault('');
+    update(pressed(store.state, position.map(roundToQuarter)));
+  };
+  canvas.onpointermove = event => {
+    if (press?.pointer === event.pointerId) update(dragged(store.state, press, positionOn(event, projector), projector));
+  };
+  canvas.onpointercancel = event => { if (press?.pointer === event.pointerId) press = null; };
+  canvas.onpointerup = event => {
+    if (press?.pointer !== event.pointerId) return;
+    const [x, y] = press.client, isClick = Math.hypot(event.clientX - x, event.clientY - y) < CLICK_DISTANCE;
+    press = null;
+    const { kind } = store.state;
+    if (isClick && kind !== 'paint' || kind === 'pixel') onPixel(...nearestPixel(positionOn(event, projector), projector));
+  };
+}

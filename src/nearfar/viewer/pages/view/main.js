@@ -1,0 +1,73 @@
+// Puts the page together; each part gets what it needs here, and knows nothing of the others.
+
+import { createAddressWriter, fromAddress } from './address.js';
+import { Connection } from './connection.js';
+import { bindControls, describe, showControls } from './controls.js';
+import { get, nearestPixel, positionOn, showFault } from './dom.js';
+import { bindFiles, restorePictures } from './files.js';
+import { Inspector } from './inspector.js';
+import { bindKeyboard } from './keyboard.js';
+import { LightCanvas, bindPointer } from './light-canvas.js';
+import { Light } from './light.js';
+import { Maps } from './maps.js';
+import { Playback } from './playback.js';
+import { request } from './protocol.js';
+import { bindSaving } from './saving.js';
+import { ScenePictures } from './scene-pictures.js';
+import { Store, changesLight, initialState } from './state.js';
+
+async function open() {
+  const scene = await (await request('scene')).json();
+  const initial = initialState(scene.projector), state = fromAddress(location.hash, initial);
+  const light = new Light(scene.projector);
+  const missing = await restorePictures(state.pictures, light);
+  state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
+
+  const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera);
+  const store = new Store(state, changes => {
+    if (changesLight(changes)) {
+      showFault('');
+      lightCanvas.requestDraw();
+    } else {
+      show();
+      scenePictures.draw(store.state);
+    }
+  });
+  const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store }), maps = new Maps({ scene, store });
+  const lightCanvas = new LightCanvas({ light, store, onDrawn: () => { show(); connection.lightChanged(); } });
+  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector };
+  function show() {
+    const { hasReference } = scenePictures, { isPlaying } = playback;
+    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying });
+    writeAddress(store.state);
+  }
+
+  describe(scene);
+  bind(page, show);
+  lightCanvas.draw();
+  show();
+  const connection = new Connection({
+    light: () => light,
+    onFrame: (header, parts, isNewest) => scenePictures.receive(header, parts, isNewest, store.state),
+    onFault: showFault,
+  });
+  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
+  if (state.pixel) inspector.showRow(...state.pixel);
+  if (state.column) inspector.showColumn(...state.column);
+  if (state.map) maps.show(state.map);
+}
+
+function bind(page, show) {
+  const { scene, store, inspector } = page;
+  bindControls({ ...page, onTheme: () => inspector.drawRow(), show });
+  bindPointer({ store, projector: scene.projector, onPixel: inspector.showColumn });
+  bindFiles(page);
+  bindSaving(page);
+  bindKeyboard(page);
+  for (const id of ['map', 'picture'])
+    get(id).onclick = event => inspector.showRow(...nearestPixel(positionOn(event, scene.camera), scene.camera));
+  addEventListener('resize', () => inspector.drawRow());
+  addEventListener('hashchange', () => location.reload());
+}
+
+open().catch(error => showFault(error.message));

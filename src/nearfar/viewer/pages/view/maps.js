@@ -1,0 +1,44 @@
+// Maps of the whole camera picture, in false colour.
+
+import { get, nearestPixel, positionOn, showingFaults } from './dom.js';
+import { drawMap, gradient } from './plots.js';
+import { requestMessage } from './protocol.js';
+
+export class Maps {
+  #scene;
+  #store;
+  #map = null;
+
+  constructor({ scene, store }) {
+    this.#scene = scene;
+    this.#store = store;
+    get('maps').append(new Option('choose a map', ''), ...scene.maps.map(({ name, title }) => new Option(title, name)));
+    get('map-bar').style.background = gradient(scene.scale);
+    get('maps').onchange = () => this.show(get('maps').value);
+    get('map').onpointermove = event => this.#showValue(event);
+  }
+
+  show = showingFaults(async name => {
+    this.#store.update({ map: name });
+    for (const id of ['map', 'map-bar']) get(id).hidden = !name;
+    for (const id of ['map-low', 'map-high', 'map-caption', 'map-value']) get(id).textContent = '';
+    if (!name) return;
+    get('map-caption').textContent = 'computing';
+    const { header, arrays: [values] } = await requestMessage(`map/${name}`)
+      .catch(error => { get('map-caption').textContent = ''; throw error; });
+    if (this.#store.state.map !== name) return;
+    this.#map = { ...values, unit: header.unit };
+    drawMap(get('map'), values.data, values.shape, header.low, header.high, this.#scene.scale);
+    const unit = header.unit && ' ' + header.unit;
+    get('map-low').textContent = +header.low.toPrecision(3) + unit;
+    get('map-high').textContent = +header.high.toPrecision(3) + unit;
+    get('map-caption').textContent = header.title + '; grey where there is none';
+  });
+
+  #showValue(event) {
+    if (!this.#map) return;
+    const { shape, data, unit } = this.#map, [y, x] = nearestPixel(positionOn(event, shape), shape);
+    const value = data[y * shape[1] + x];
+    get('map-value').textContent = Number.isFinite(value) ? +value.toPrecision(4) + ' ' + unit : 'none';
+  }
+}

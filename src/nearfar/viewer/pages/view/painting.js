@@ -1,0 +1,59 @@
+// What brush strokes paint on the projector's grid, in linear light.
+
+import { linearColour } from './colour.js';
+import { smooth } from './shapes.js';
+
+// How much of the paint below one dab of the brush covers.
+const OPACITY = 0.6;
+
+const extendsStroke = (stroke, before) =>
+  stroke?.colour === before.colour && stroke.radius === before.radius && stroke.points.length >= before.points.length &&
+  before.points.every((value, i) => stroke.points[i] === value);
+
+export class Painting {
+  #height;
+  #width;
+  #painted = [];
+
+  constructor(height, width) {
+    this.#height = height;
+    this.#width = width;
+    // Red, green and blue of each pixel, from 0 to 1.
+    this.values = new Float64Array(3 * height * width);
+  }
+
+  // Paints what was added since the last time, or all strokes if one is gone.
+  paint(strokes) {
+    const last = this.#painted.length - 1;
+    const onlyAdded = this.#painted.every((before, i) =>
+      strokes[i] === before || i === last && extendsStroke(strokes[i], before));
+    if (!onlyAdded) {
+      this.values.fill(0);
+      this.#painted = [];
+    }
+    for (let i = Math.max(0, this.#painted.length - 1); i < strokes.length; i++)
+      this.#continueStroke(strokes[i], this.#painted[i]?.points.length || 0);
+    this.#painted = [...strokes];
+  }
+
+  #continueStroke({ colour, radius, points }, painted) {
+    const rgb = linearColour(colour);
+    if (painted === 0) this.#dab(points[0], points[1], radius, rgb);
+    for (let i = Math.max(2, painted); i < points.length; i += 2) {
+      const [x0, y0, x1, y1] = points.slice(i - 2, i + 2);
+      const steps = Math.max(1, Math.ceil(Math.hypot(x1 - x0, y1 - y0) / (radius / 3)));
+      for (let n = 1; n <= steps; n++)
+        this.#dab(x0 + (x1 - x0) * n / steps, y0 + (y1 - y0) * n / steps, radius, rgb);
+    }
+  }
+
+  #dab(cx, cy, radius, rgb) {
+    const reach = Math.ceil(radius) + 1;
+    for (let y = Math.max(0, Math.floor(cy) - reach); y <= Math.min(this.#height - 1, Math.ceil(cy) + reach); y++)
+      for (let x = Math.max(0, Math.floor(cx) - reach); x <= Math.min(this.#width - 1, Math.ceil(cx) + reach); x++) {
+        const cover = OPACITY * smooth((radius + 0.5 - Math.hypot(x - cx, y - cy)) / (0.7 * radius + 0.5));
+        const i = 3 * (y * this.#width + x);
+        for (let c = 0; c < 3; c++) this.values[i + c] += cover * (rgb[c] - this.values[i + c]);
+      }
+  }
+}

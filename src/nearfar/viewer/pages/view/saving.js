@@ -1,0 +1,41 @@
+// Pictures and lights as files.
+
+import { get, showingFaults } from './dom.js';
+import { pack, request } from './protocol.js';
+import { gainsOf } from './state.js';
+
+const PATIENCE_MILLISECONDS = 60000;
+const POLLING_MILLISECONDS = 50;
+const REVOKING_DELAY_MILLISECONDS = 10000;
+
+function download(blob, name) {
+  const anchor = document.createElement('a');
+  anchor.href = URL.createObjectURL(blob);
+  anchor.download = name;
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(anchor.href), REVOKING_DELAY_MILLISECONDS);
+}
+
+// Saves the canvas as it is displayed, once it shows the exact picture of the newest light.
+async function savePng({ scenePictures, lightCanvas, playback }) {
+  const end = performance.now() + PATIENCE_MILLISECONDS;
+  while (!scenePictures.isFinal || lightCanvas.isPending) {
+    if (performance.now() > end || playback.isPlaying)
+      throw new Error('The exact picture is not there yet: let the light rest, and save again.');
+    await new Promise(resolve => { setTimeout(resolve, POLLING_MILLISECONDS); });
+  }
+  get('picture').toBlob(blob => download(blob, 'relit.png'), 'image/png');
+}
+
+// Saves what the server makes of the light.
+async function saveResponse(path, name, { store, light }) {
+  const [direct, near, far] = gainsOf(store.state), { levels, shape, colour } = light;
+  const response = await request(path, { method: 'POST', body: pack({ shape, colour, gains: { direct, near, far } }, levels) });
+  download(await response.blob(), name);
+}
+
+export function bindSaving(page) {
+  get('save-png').onclick = showingFaults(() => savePng(page));
+  get('save-exr').onclick = showingFaults(() => saveResponse('picture.exr', 'relit.exr', page));
+  get('save-light').onclick = showingFaults(() => saveResponse('light.png', 'light.png', page));
+}

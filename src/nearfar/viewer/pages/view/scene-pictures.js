@@ -1,0 +1,79 @@
+// The scene under the light, its three parts, and the reference beside it.
+
+import { get, set } from './dom.js';
+import { drawPicture, exposureFor, onePart, shrink, sumOfParts } from './picture.js';
+import { PARTS, gainsOf } from './state.js';
+
+const MAXIMUM_PIXELS_OF_A_PART = 65536;
+
+export class ScenePictures {
+  #camera;
+  #frame = null;
+  #reference = null;
+  #frameTimes = [];
+  #frameCount = 0;
+
+  constructor(camera) { this.#camera = camera; }
+
+  get hasReference() { return this.#reference !== null; }
+
+  // Whether the picture is exact.
+  get isExact() { return Boolean(this.#frame?.exact); }
+
+  // Whether it is, and of the newest light.
+  get isFinal() { return this.isExact && this.#frame.isNewest; }
+
+  receive(header, parts, isNewest, state) {
+    this.#frame = { exact: header.exact, isNewest, parts: { ...parts, scale: header.scale } };
+    this.#frameTimes = this.#frameTimes.filter(time => time > performance.now() - 1000);
+    this.#frameTimes.push(performance.now());
+    this.draw(state);
+    const rate = this.#frameTimes.length > 2 ? `${this.#frameTimes.length} pictures a second · ` : '';
+    const coarse = header.exact ? '' : 'while it moves: ';
+    set(get('frame-status'), 'textContent',
+      rate + coarse + (header.stride > 1 ? `one row and column in ${header.stride}` : 'every camera pixel'));
+    this.#frameCount += 1;
+    // For those who drive the page by a program.
+    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact: header.exact, newest: isNewest });
+  }
+
+  draw(state) {
+    if (!this.#frame) return;
+    drawPicture(get('picture'), this.#picture(state), state);
+    PARTS.forEach((name, i) =>
+      drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
+    this.#drawReference(state);
+    this.#markPixel(state.pixel);
+  }
+
+  // Compares with the picture as it is, if it is exact; returns whether it is.
+  keepAsReference(state) {
+    if (this.isExact) this.#reference = this.#picture(state);
+    return this.isExact;
+  }
+
+  compareWith(picture) { this.#reference = picture; }
+
+  removeReference() { this.#reference = null; }
+
+  // The exposure that suits the picture; null before there is one.
+  exposure(state) { return this.#frame && exposureFor(this.#picture(state)); }
+
+  #picture(state) { return sumOfParts(this.#frame.parts, gainsOf(state)); }
+
+  #drawReference(state) {
+    if (this.#reference) drawPicture(get('before'), this.#reference, state);
+    set(get('before'), 'hidden', !this.#reference);
+    set(get('edge'), 'hidden', !this.#reference);
+    set(get('before').style, 'clipPath', `inset(0px ${100 - state.wipe}% 0px 0px)`);
+    set(get('edge').style, 'left', `calc(${state.wipe}% - 1px)`);
+  }
+
+  #markPixel(pixel) {
+    const [height, width] = this.#camera;
+    set(get('mark'), 'hidden', !pixel);
+    if (!pixel) return;
+    set(get('mark').style, 'left', 100 * (pixel[1] + 0.5) / width + '%');
+    set(get('mark').style, 'top', 100 * (pixel[0] + 0.5) / height + '%');
+  }
+}

@@ -1,0 +1,30 @@
+// Lights that a formula gives: brightness at (x, y), from 0 to 1.
+
+export const clamp = value => value < 0 ? 0 : value > 1 ? 1 : value;
+export const smooth = value => { const t = clamp(value); return t * t * (3 - 2 * t); };
+
+const radians = degrees => degrees * Math.PI / 180;
+
+const SHAPES = {
+  white: () => () => 1,
+  spot: s => {
+    const inner = s.radius * (1 - s.soft), band = Math.max(2 * s.radius * s.soft, 1);
+    return (x, y) => smooth((inner + band - Math.hypot(x - s.x, y - s.y)) / band);
+  },
+  stripe: s => {
+    const normal = [Math.sin(radians(s.angle)), -Math.cos(radians(s.angle))];
+    return (x, y) => clamp(s.width / 2 + 0.5 - Math.abs((x - s.x) * normal[0] + (y - s.y) * normal[1]));
+  },
+  sinusoid: (s, height, width) => {
+    const k = 2 * Math.PI * s.cycles / Math.max(height, width), angle = radians(s.angle);
+    const kx = k * Math.sin(angle), ky = k * Math.cos(angle), phase = radians(s.phase);
+    return (x, y) => 0.5 + 0.5 * Math.cos(kx * x + ky * y - phase);
+  },
+  checkerboard: s => {
+    const side = Math.max(1, Math.round(s.side)), shift = Math.round(s.shift);
+    return (x, y) => (Math.floor((x + shift) / side) + Math.floor(y / side)) % 2 ? 0 : 1;
+  },
+  pixel: s => (x, y) => x === Math.round(s.x) && y === Math.round(s.y) ? 1 : 0,
+};
+
+export const shapeOf = (state, height, width) => SHAPES[state.kind](state, height, width);

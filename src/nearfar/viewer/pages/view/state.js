@@ -1,0 +1,42 @@
+// The page's state, all that its address keeps: replaced by every change, never changed in place.
+
+export const PARTS = ['direct', 'near', 'far'];
+export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
+
+// What a page opens with; the keys are those of the address.
+export function initialState([height, width]) {
+  const side = Math.min(height, width);
+  return Object.freeze({
+    kind: 'spot', x: (width - 1) / 2, y: (height - 1) / 2, radius: Math.max(1, Math.round(side / 4)), soft: 0.5,
+    angle: 90, width: Math.max(1, Math.round(side / 16)), cycles: 4, phase: 0, side: Math.max(1, Math.round(side / 16)),
+    shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, colour: '#ffffff', strokes: [], pictures: [],
+    direct: 1, near: 1, far: 1, solo: '', exposure: 0, gamma: 1, wipe: 50, map: '', pixel: null,
+    column: null, theme: '',
+  });
+}
+
+// Everything else changes the light.
+const DISPLAY_ONLY = [...PARTS, 'solo', 'exposure', 'gamma', 'wipe', 'map', 'pixel', 'column', 'theme', 'pictures'];
+
+export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));
+
+// Gains of direct, near and far, as they are shown: one alone, or all.
+export const gainsOf = state => PARTS.map(name => !state.solo || state.solo === name ? state[name] : 0);
+
+export class Store {
+  #state;
+  #onChange;
+
+  // onChange(changes) is called after each change.
+  constructor(state, onChange) {
+    this.#state = Object.freeze(state);
+    this.#onChange = onChange;
+  }
+
+  get state() { return this.#state; }
+
+  update(changes) {
+    this.#state = Object.freeze({ ...this.#state, ...changes });
+    this.#onChange(changes);
+  }
+}

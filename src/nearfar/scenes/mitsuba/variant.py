@@ -10,8 +10,10 @@ from nearfar.errors import InputError, MissingPackageError
 VECTORISED = "llvm_ad_rgb"
 SCALAR = "scalar_rgb"
 # Older ones crash or are not taken by Mitsuba.
-LEAST_LLVM = 16
+OLDEST_LLVM = 16
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
+# Shared libraries that Mitsuba's packages do not bring, and the Debian packages that do.
+DEBIAN_PACKAGES = {"libatomic.so.1": "libatomic1"}
 
 
 class Variant(NamedTuple):
@@ -30,7 +32,7 @@ def choose_variant() -> Variant:
     Raises
     ------
     MissingPackageError
-        If Mitsuba is not installed.
+        If Mitsuba is not installed, or a shared library that it needs.
     InputError
         If the variant set before is not one of linear RGB.
     """
@@ -38,11 +40,12 @@ def choose_variant() -> Variant:
     try:
         import drjit
         import mitsuba
-    except ImportError as error:
-        raise MissingPackageError(
-            f"Mitsuba scenes need the package mitsuba, which cannot be loaded ({error}): install "
-            f"it by pip install 'nearfar[mitsuba]'."
-        ) from None
+    except (ImportError, NameError) as error:
+        # Where a library is missing, Dr.Jit's own handler of the ImportError fails by a NameError.
+        reason = error.__context__ if isinstance(error, NameError) else error
+        if not isinstance(reason, ImportError):
+            raise
+        raise MissingPackageError(_how_to_install(str(reason))) from None
     chosen: str | None = mitsuba.variant()
     if chosen is None:
         chosen = VECTORISED if _has_llvm(drjit) else SCALAR
@@ -58,16 +61,31 @@ def choose_variant() -> Variant:
     return Variant(chosen, (f"{slow} than as {VECTORISED}: {cure}.",))
 
 
+def _how_to_install(reason: str) -> str:
+    """Return a sentence on what Mitsuba lacks, from the reason why it cannot be loaded."""
+    library, missing, _ = reason.partition(": cannot open shared object file")
+    if not missing:
+        return (
+            f"Mitsuba scenes need the package mitsuba, which cannot be loaded ({reason}): install "
+            f"it by pip install 'nearfar[mitsuba]'."
+        )
+    package = DEBIAN_PACKAGES.get(library)
+    cure = f"on Debian and Ubuntu by apt install {package}" if package else "as your system does"
+    return f"Mitsuba needs the shared library {library}, which is missing: install it, {cure}."
+
+
 def _name_library() -> str:
     """Name the packaged LLVM, which must be done before Dr.Jit is loaded; say how to get one."""
     if LIBRARY_VARIABLE in os.environ:
         return (
-            f"let {LIBRARY_VARIABLE} name LLVM {LEAST_LLVM} or newer, or remove it from the "
+            f"let {LIBRARY_VARIABLE} name LLVM {OLDEST_LLVM} or newer, or remove it from the "
             f"environment"
         )
     library = _packaged_library()
     if library is None:
-        return f"install LLVM {LEAST_LLVM} or newer, for instance by pip install karellen-llvm-core"
+        return (
+            f"install LLVM {OLDEST_LLVM} or newer, for instance by pip install karellen-llvm-core"
+        )
     if "drjit" not in sys.modules:
         os.environ[LIBRARY_VARIABLE] = library
     return f"set {LIBRARY_VARIABLE} to {library} before Mitsuba is loaded"
@@ -90,4 +108,4 @@ def _has_llvm(drjit: Any) -> bool:
         found = bool(drjit.has_backend(drjit.JitBackend.LLVM))
     finally:
         drjit.set_log_level(level)
-    return found and drjit.detail.llvm_version()[0] >= LEAST_LLVM
+    return found and drjit.detail.llvm_version()[0] >= OLDEST_LLVM

@@ -20,7 +20,7 @@ from nearfar.rigs.simulated.drift import SimulatedDrift
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.transport.rows import BELIEVED, FACTORS
+from nearfar.transport.rows import FACTORS, POSTERIOR_FIELDS
 from nearfar.transport.store import load_transport, write_transport
 from nearfar.workflow import reconstruct as reconstruction
 from nearfar.workflow.acquire import acquire
@@ -225,7 +225,7 @@ def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
     whole, _ = reconstruction.reconstruct(capture, memory=memory)
     for name in (*FACTORS, "provenance"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(whole, name))
-    for name in BELIEVED:
+    for name in POSTERIOR_FIELDS:
         np.testing.assert_array_equal(
             getattr(stored.posterior, name), getattr(whole.posterior, name)
         )

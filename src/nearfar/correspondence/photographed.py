@@ -1,26 +1,22 @@
-"""Correspondence by photos of its own, whichever a plan holds."""
+"""Correspondence by photos of its own, whichever method a plan holds them for."""
 
 from collections.abc import Callable
 
-from nearfar.correspondence.gray import correspond_by_gray_code, has_gray_code
+from nearfar.correspondence.methods import method_of
 from nearfar.correspondence.result import Correspondence
-from nearfar.correspondence.stripes import correspond_by_stripes, has_stripes
+from nearfar.photometry.measure import measure
 from nearfar.photometry.photos import Photos
-from nearfar.plan import Plan
+from nearfar.plan import CORRESPONDENCE_METHODS, Plan
 
 
 def has_correspondence_photos(plan: Plan) -> bool:
-    """Tell whether a plan holds stripes or Gray code on both axes."""
-    return has_stripes(plan) or has_gray_code(plan)
+    """Return whether a plan holds all photos of its own that a correspondence method needs."""
+    return method_of(plan) is not CORRESPONDENCE_METHODS["phase"]
 
 
 def correspond_by_photos(
     photos: Photos, rows: slice | None = None, progress: Callable[[int], None] | None = None
 ) -> Correspondence:
-    """Find q(c) from photos of stripes or, without them, of Gray code.
-
-    Parameters and errors are those of `correspond_by_gray_code`.
-    """
-    if has_stripes(photos.plan):
-        return correspond_by_stripes(photos, rows, progress)
-    return correspond_by_gray_code(photos, rows, progress)
+    """Find q(c) by the method of the photos' plan; see `nearfar.correspondence.methods.Find`."""
+    rows = slice(0, photos.camera.height) if rows is None else rows
+    return method_of(photos.plan).find(photos, rows, lambda: measure(photos, rows), progress)

@@ -6,9 +6,9 @@ from scipy.optimize import linprog
 from sklearn.linear_model import ARDRegression, Lasso
 
 from nearfar.arrays import Size
-from nearfar.estimate.bayesian import solve_bayesian
 from nearfar.estimate.matrices import build_matrices
 from nearfar.estimate.sparse import least_risk, solve
+from tests.estimate.bayesian import solve_bayesian
 from tests.worlds import ideal_measurements, model_transport
 
 

@@ -16,12 +16,14 @@ from nearfar.transport import direct, near
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 
-# Inside the window n takes whatever f leaves, so f is fitted to what lies outside; this weight
-# inside says where a part that both could hold belongs: to f.
-INSIDE = 0.001
-ITERATIONS = 60
-SETTLED = 1e-5
-BLOCK = 256
+# Inside the window n takes whatever f leaves, so f is fitted to what lies outside; with this small
+# weight inside, a part that both could hold goes to f.
+WEIGHT_INSIDE = 0.001
+# Conjugate gradients end at this share of the first residual, or after so many iterations.
+MAXIMUM_ITERATIONS = 60
+TOLERANCE = 1e-5
+# Camera pixels of a batch.
+BATCH_PIXELS = 256
 
 
 def fit_model(
@@ -52,7 +54,7 @@ def fit_model(
     d = np.zeros((pixels, channels), dtype=np.float32)
     n = np.zeros((pixels, channels, window**2), dtype=np.float32)
     f = np.zeros((pixels, channels, far_basis.count), dtype=np.float32)
-    for block in blocks(pixels, BLOCK):
+    for block in blocks(pixels, BATCH_PIXELS):
         rows = truth.rows(block)
         corners = direct.Footprint(where.pixels[block], where.weights[block])
         d[block] = _direct(truth, rows, block, corners)
@@ -109,7 +111,7 @@ def _far(
 ) -> Floats:
     """Weighted least squares for f by conjugate gradients, all rows at once."""
     weights = centred.basis.weights.astype(np.float32)
-    less: Floats = np.float32(1.0 - INSIDE) * inside[:, None]
+    less: Floats = np.float32(1.0 - WEIGHT_INSIDE) * inside[:, None]
 
     def normal(f: Floats) -> Floats:
         seen = (centred.recentre(f * weights, centres) @ centred.on_window) * less
@@ -123,17 +125,17 @@ def _far(
     residual = right.copy()
     # Preconditioned by the diagonal without a window.
     step = residual / weights
-    power = np.sum(residual * step, axis=-1, keepdims=True)
-    first = power.max(initial=0.0)
-    for _ in range(ITERATIONS):
+    squares = np.sum(residual * step, axis=-1, keepdims=True)
+    first = squares.max(initial=0.0)
+    for _ in range(MAXIMUM_ITERATIONS):
         image = normal(step)
-        along = power / np.maximum(np.sum(step * image, axis=-1, keepdims=True), 1e-30)
+        along = squares / np.maximum(np.sum(step * image, axis=-1, keepdims=True), 1e-30)
         f += along * step
         residual -= along * image
         scaled = residual / weights
-        new_power = np.sum(residual * scaled, axis=-1, keepdims=True)
-        if new_power.max(initial=0.0) <= SETTLED**2 * first:
+        new_squares = np.sum(residual * scaled, axis=-1, keepdims=True)
+        if new_squares.max(initial=0.0) <= TOLERANCE**2 * first:
             break
-        step = scaled + step * (new_power / np.maximum(power, 1e-30))
-        power = new_power
+        step = scaled + step * (new_squares / np.maximum(squares, 1e-30))
+        squares = new_squares
     return f

@@ -1,8 +1,8 @@
 """The paper's estimation: direct, then near-range, then far-range (sections 4.1 to 4.3).
 
-All camera pixels go through the same few matrix products: responses re-centred on q meet one
-matrix for every pixel. What the far estimate contributes to near responses off the DFT grid is
-taken out of them, and near and far are estimated again.
+All camera pixels go through the same few matrix products: responses re-centred on q are multiplied
+by one matrix for every pixel. Off the DFT grid f leaks into near responses: what the far estimate
+adds to them is subtracted, and near and far are estimated again, in rounds.
 
 Index convention: arrays are (n, channels, ...) with n camera pixels; r runs over real responses,
 w over window entries, m over far coefficients.
@@ -36,22 +36,27 @@ from nearfar.transport import near
 from nearfar.transport.direct import Footprint, footprint, look_up_each
 from nearfar.transport.model import Transport
 
-# Rounds of near and far at most, and when they agree: as a share of the noise, and of the light.
-ROUNDS = 60
-AGREED_NOISE = 0.02
-AGREED = 2e-7
-# Each round must move a camera pixel's leaks by at most this share of what the last one did.
-SETTLING = 0.8
-# lambda of equation (10) before each window has its own, as a share of an entry's noise.
-FIRST = np.float32(0.75)
-# Where no measured pattern tells direct light from none, d fades out instead of growing noise.
-FAINT = 0.1
-# What strays beyond the border by less than this share of a window's peak is rounding.
-DEPARTS = 1e-3
-# Windows at once, one for each channel of a camera pixel: few enough to lie near the processor.
-BLOCK = 2048
+# Most rounds of near and far.
+MAXIMUM_ROUNDS = 60
+# A camera pixel's rounds end when its leaks change by less than these shares of its noise and of
+# its light together.
+NOISE_TOLERANCE = 0.02
+LIGHT_TOLERANCE = 2e-7
+# Each round must change a camera pixel's leaks by at most this share of what the last one did.
+LARGEST_CONTRACTION = 0.8
+# lambda of equation (10) in the first round, as a share of an entry's noise: later each window has
+# its own.
+FIRST_LAMBDA = np.float32(0.75)
+# Least energy of the responses that d is divided by: where no measured pattern responds to direct
+# light, d fades out instead of growing noise.
+ENERGY_FLOOR = 0.1
+# Light beyond the border of less than this share of a window's peak is rounding.
+ROUNDING_SHARE = 1e-3
+# Windows of a batch, one for each channel of a camera pixel: few enough to stay in the
+# processor's cache.
+BATCH_WINDOWS = 2048
 # Near frequencies that help with direct light between pixels lie above this, in cycles/pixel.
-HIGH = 0.3
+LEAST_HIGH_FREQUENCY = 0.3
 
 
 def estimate(
@@ -61,7 +66,7 @@ def estimate(
     far: Size,
     dropped: Size,
     *,
-    rounds: int = ROUNDS,
+    rounds: int = MAXIMUM_ROUNDS,
     device: Device = "cpu",
     progress: Callable[[int], None] | None = None,
 ) -> Transport:
@@ -98,8 +103,8 @@ def estimate(
     there = matrices.put(move)
     errors = _QuantisationErrors(
         *(
-            np.ascontiguousarray(measurements.quantisation_error[band.places].T)
-            for band in (matrices.near, matrices.far)
+            np.ascontiguousarray(measurements.quantisation_error[centred.places].T)
+            for centred in (matrices.near, matrices.far)
         )
     )
     where = footprint(correspondence, measurements.projector)
@@ -112,16 +117,16 @@ def estimate(
     done = [0]
 
     def work(block: slice) -> None:
-        pixels = _pixels(measurements, where, lit, centres, block, matrices, errors)
-        pixels = _Pixels._make(map(move, pixels))
-        found = _estimate_block(pixels, there, rounds)
+        batch = _gather(measurements, where, lit, centres, block, matrices, errors)
+        batch = _PixelBatch._make(map(move, batch))
+        found = _estimate_block(batch, there, rounds)
         for values, own in ((direct, found.direct), (windows, found.near), (low, found.far)):
             values[block] = fetch(own)
         done[0] += block.stop - block.start
         if progress is not None:
             progress(done[0])
 
-    side_by_side(work, blocks(number, max(1, BLOCK // channels)))
+    side_by_side(work, blocks(number, max(1, BATCH_WINDOWS // channels)))
     shape = (*measurements.camera, channels)
     return Transport(
         projector=measurements.projector,
@@ -136,29 +141,29 @@ def estimate(
 
 
 class _QuantisationErrors(NamedTuple):
-    """What 8 bits got wrong of the near and far patterns, a row for each projector pixel."""
+    """Quantisation errors of the near and far patterns, a row for each projector pixel."""
 
     near: Floats
     far: Floats
 
 
-class _Pixels(NamedTuple):
+class _PixelBatch(NamedTuple):
     """A block of camera pixels; each field's first axis runs over them."""
 
     centres: NDArray[np.int64]
     lit: Booleans
     inside: Booleans
-    corners: Floats  # weights of the direct light over FOOTPRINT_OFFSETS, (n, 9)
+    weights: Floats  # weights of the direct light over FOOTPRINT_OFFSETS, (n, 9)
     noise: Floats
-    light: Floats  # largest answer, (n,)
+    light: Floats  # largest response, (n,)
     checkerboard: Floats  # responses, re-centred
     near: Floats  # responses, re-centred
     far: Floats  # responses, as measured
-    near_of_direct: Floats  # responses of unit direct light, 8 bits included
+    near_of_direct: Floats  # responses of unit direct light, quantisation error included
     far_of_direct: Floats
 
-    def only(self, pixels: Booleans) -> "_Pixels":
-        return _Pixels._make(values[pixels] for values in self)
+    def only(self, selected: Booleans) -> "_PixelBatch":
+        return _PixelBatch._make(values[selected] for values in self)
 
 
 class _Estimate(NamedTuple):
@@ -172,46 +177,46 @@ class _Estimate(NamedTuple):
     def copy(self) -> "_Estimate":
         return _Estimate(*(namespace(values).asarray(values, copy=True) for values in self))
 
-    def only(self, pixels: Booleans) -> "_Estimate":
-        return _Estimate(*(values[pixels] for values in self))
+    def only(self, selected: Booleans) -> "_Estimate":
+        return _Estimate(*(values[selected] for values in self))
 
-    def put(self, pixels: NDArray[np.int64], others: "_Estimate") -> None:
-        """Take over the estimates of others at some pixels."""
+    def put(self, selected: NDArray[np.int64], others: "_Estimate") -> None:
+        """Replace the estimates of some pixels, in place."""
         for values, new in zip(self, others, strict=True):
-            values[pixels] = new
+            values[selected] = new
 
 
-def _estimate_block(pixels: _Pixels, matrices: Matrices, rounds: int) -> _Estimate:
+def _estimate_block(batch: _PixelBatch, matrices: Matrices, rounds: int) -> _Estimate:
     """Alternate near and far; each camera pixel stops when its own leaks have settled.
 
     Where a scene does not obey the model, or the near set reaches into the far band, the rounds
     may not settle: a camera pixel whose leaks move no less than before keeps its best round.
     """
-    xp, here = namespace(pixels.near), device_of(pixels.near)
-    found = _round(pixels, None, _no_leaks(pixels), matrices)
-    moving = xp.arange(len(pixels.lit), device=here)
-    latest, leaks = found.copy(), _no_leaks(pixels)
+    xp, here = namespace(batch.near), device_of(batch.near)
+    found = _round(batch, None, _no_leaks(batch), matrices)
+    moving = xp.arange(len(batch.lit), device=here)
+    latest, leaks = found.copy(), _no_leaks(batch)
     before = xp.full(len(moving), xp.inf, dtype=xp.float64, device=here)
     for _ in range(rounds - 1):
-        previous, leaks = leaks, _leaks(latest.far, pixels, matrices)
+        previous, leaks = leaks, _leaks(latest.far, batch, matrices)
         moved = _moved(previous, leaks)
-        limit = AGREED_NOISE * xp.mean(pixels.noise, axis=1) + AGREED * pixels.light
-        settling = moved <= SETTLING * before
+        limit = NOISE_TOLERANCE * xp.mean(batch.noise, axis=1) + LIGHT_TOLERANCE * batch.light
+        settling = moved <= LARGEST_CONTRACTION * before
         # The latest round of a pixel that still settles is its best so far.
         found.put(moving[settling], latest.only(settling))
         going = settling & (moved > limit)
         if not bool(xp.any(going)):
             break
-        moving, pixels, before = moving[going], pixels.only(going), moved[going]
+        moving, batch, before = moving[going], batch.only(going), moved[going]
         leaks = _Leaks(*(leak[going] for leak in leaks))
-        latest = _round(pixels, latest.unseen[going], leaks, matrices)
+        latest = _round(batch, latest.unseen[going], leaks, matrices)
     else:
         found.put(moving, latest)
     return found
 
 
 def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
-    """Root mean square by which each camera pixel's leaks changed, (n,)."""
+    """Return the root mean square by which each camera pixel's leaks changed, (n,)."""
     xp = namespace(leaks.near)
     moved: NDArray[np.float64] = xp.zeros(
         len(leaks.near), dtype=xp.float64, device=device_of(leaks.near)
@@ -224,41 +229,43 @@ def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
 
 
 class _Leaks(NamedTuple):
-    """What f adds to responses where the model has it silent: off the DFT grid."""
+    """What f adds to near responses and the checkerboard's, off the DFT grid."""
 
     checkerboard: Floats
     near: Floats
 
 
-def _no_leaks(pixels: _Pixels) -> _Leaks:
-    xp = namespace(pixels.near)
-    return _Leaks(xp.zeros_like(pixels.checkerboard), xp.zeros_like(pixels.near))
+def _no_leaks(batch: _PixelBatch) -> _Leaks:
+    xp = namespace(batch.near)
+    return _Leaks(xp.zeros_like(batch.checkerboard), xp.zeros_like(batch.near))
 
 
-def _leaks(far: Floats, pixels: _Pixels, matrices: Matrices) -> _Leaks:
+def _leaks(far: Floats, batch: _PixelBatch, matrices: Matrices) -> _Leaks:
     return _Leaks(
-        matrices.checkerboard.recentre(product(far, matrices.checkerboard_leak), pixels.centres),
-        matrices.near.recentre(product(far, matrices.near_leak), pixels.centres),
+        matrices.checkerboard.recentre(product(far, matrices.checkerboard_leak), batch.centres),
+        matrices.near.recentre(product(far, matrices.near_leak), batch.centres),
     )
 
 
-def _round(pixels: _Pixels, start: Floats | None, leaks: _Leaks, matrices: Matrices) -> _Estimate:
-    """Sections 4.1, 4.2 and 4.3 once."""
-    near_responses = pixels.near - leaks.near
-    direct = _direct(pixels.checkerboard - leaks.checkerboard, near_responses, pixels, matrices)
-    near_responses -= direct[..., None] * pixels.near_of_direct
-    windows, unseen = _near(near_responses, pixels, matrices, start)
-    far = pixels.far - direct[..., None] * pixels.far_of_direct
-    far -= matrices.far.uncentre(product(windows, matrices.far.on_window.T), pixels.centres)
+def _round(
+    batch: _PixelBatch, start: Floats | None, leaks: _Leaks, matrices: Matrices
+) -> _Estimate:
+    """Do sections 4.1, 4.2 and 4.3 once."""
+    near_responses = batch.near - leaks.near
+    direct = _direct(batch.checkerboard - leaks.checkerboard, near_responses, batch, matrices)
+    near_responses -= direct[..., None] * batch.near_of_direct
+    windows, unseen = _near(near_responses, batch, matrices, start)
+    far = batch.far - direct[..., None] * batch.far_of_direct
+    far -= matrices.far.uncentre(product(windows, matrices.far.on_window.T), batch.centres)
     return _Estimate(direct, windows, far, unseen)
 
 
-def _corner_weights(where: Footprint, centres: NDArray[np.int64], width: int) -> Floats:
-    """Weights of the footprint over `FOOTPRINT_OFFSETS`, shape (n, 9)."""
+def _footprint_weights(where: Footprint, centres: NDArray[np.int64], width: int) -> Floats:
+    """Return weights of the footprint over `FOOTPRINT_OFFSETS`, shape (n, 9)."""
     y, x = np.divmod(where.pixels, width)
     place = (y - centres[:, 0, None] + 1) * 3 + (x - centres[:, 1, None] + 1)
     weights = np.zeros((len(centres), len(FOOTPRINT_OFFSETS)), dtype=np.float32)
-    # Weightless corners of unlit or whole pixels may lie anywhere: clip, they add nothing.
+    # Corners without weight, of unlit or whole pixels, may lie anywhere: clip, they add nothing.
     np.add.at(
         weights,
         (np.arange(len(weights))[:, None], np.clip(place, 0, len(FOOTPRINT_OFFSETS) - 1)),
@@ -267,7 +274,7 @@ def _corner_weights(where: Footprint, centres: NDArray[np.int64], width: int) ->
     return weights
 
 
-def _pixels(
+def _gather(
     measurements: Measurements,
     where: Footprint,
     lit: Booleans,
@@ -275,92 +282,92 @@ def _pixels(
     block: slice,
     matrices: Matrices,
     errors: _QuantisationErrors,
-) -> _Pixels:
-    """Gather what a block's rounds need."""
+) -> _PixelBatch:
+    """Gather what the rounds of a block need."""
     projector = measurements.projector
     where = Footprint(where.pixels[block], where.weights[block])
     centres = centres[block]
-    corners = _corner_weights(where, centres, projector.width)
+    weights = _footprint_weights(where, centres, projector.width)
     responses = measurements.responses[block]
 
-    def quantisation_error(error: Floats) -> Floats:
-        """Responses (n, 1, R) of unit direct light to what 8 bits got wrong."""
+    def of_error(error: Floats) -> Floats:
+        """Return responses (n, 1, R) of unit direct light to quantisation errors."""
         return look_up_each(error, where.pixels, where.weights)[:, None]
 
-    def of_direct(band: CentredBasis) -> Floats:
-        return np.asarray((corners @ band.on_footprint.T)[:, None])
+    def of_direct(centred: CentredBasis) -> Floats:
+        return np.asarray((weights @ centred.on_footprint.T)[:, None])
 
-    checkerboard, near_band, far_band = matrices.checkerboard, matrices.near, matrices.far
-    near_error = near_band.recentre(quantisation_error(errors.near), centres)
-    return _Pixels(
+    checkerboard, near_basis, far_basis = matrices.checkerboard, matrices.near, matrices.far
+    near_error = near_basis.recentre(of_error(errors.near), centres)
+    return _PixelBatch(
         centres=centres,
         lit=lit[block],
         inside=near.inside(centres, matrices.window, projector),
-        corners=corners,
+        weights=weights,
         noise=measurements.noise[block],
         light=np.abs(responses).max(axis=(1, 2)),
         checkerboard=checkerboard.recentre(responses[..., checkerboard.places], centres),
-        near=near_band.recentre(responses[..., near_band.places], centres),
-        far=responses[..., far_band.places],
-        near_of_direct=of_direct(near_band) + near_error,
-        far_of_direct=far_band.uncentre(of_direct(far_band), centres)
-        + quantisation_error(errors.far),
+        near=near_basis.recentre(responses[..., near_basis.places], centres),
+        far=responses[..., far_basis.places],
+        near_of_direct=of_direct(near_basis) + near_error,
+        far_of_direct=far_basis.uncentre(of_direct(far_basis), centres) + of_error(errors.far),
     )
 
 
 def _direct(
-    checkerboard: Floats, near_responses: Floats, pixels: _Pixels, matrices: Matrices
+    checkerboard: Floats, near_responses: Floats, batch: _PixelBatch, matrices: Matrices
 ) -> Floats:
     """Return d, shape (n, channels): section 4.1, and more where q falls between pixels.
 
-    There the checkerboard's answer fades, d (1 - 2a)(1 - 2b) for an offset (a, b), so the
+    There the response to the checkerboard fades, d (1 - 2a)(1 - 2b) for an offset (a, b), so the
     highest near frequencies are weighed in as far as it does.
     """
     xp = namespace(near_responses)
-    answer = pixels.corners @ matrices.checkerboard.on_footprint.T
+    response = batch.weights @ matrices.checkerboard.on_footprint.T
     frequencies = np.abs(matrices.near.basis.cycles).max(axis=1, initial=0.0)
-    high = beside(np.flatnonzero(frequencies[matrices.near.basis.index] > HIGH), near_responses)
-    high_answer = pixels.corners @ matrices.near.on_footprint[high].T
-    faded = 1.0 - answer[:, 0] ** 2
-    energy = answer[:, 0] ** 2 + faded * xp.sum(high_answer**2, axis=1)
-    of_high = (near_responses[..., high] @ high_answer[..., None])[..., 0]
-    total = checkerboard[..., 0] * answer + faded[:, None] * of_high
-    d = total / xp.clip(energy, min=FAINT)[:, None] * pixels.lit[:, None]
+    of_response = frequencies[matrices.near.basis.index]
+    high = beside(np.flatnonzero(of_response > LEAST_HIGH_FREQUENCY), near_responses)
+    high_response = batch.weights @ matrices.near.on_footprint[high].T
+    faded = 1.0 - response[:, 0] ** 2
+    energy = response[:, 0] ** 2 + faded * xp.sum(high_response**2, axis=1)
+    of_high = (near_responses[..., high] @ high_response[..., None])[..., 0]
+    total = checkerboard[..., 0] * response + faded[:, None] * of_high
+    d = total / xp.clip(energy, min=ENERGY_FLOOR)[:, None] * batch.lit[:, None]
     found: Floats = xp.astype(d, xp.float32)
     return found
 
 
 def _near(
-    responses: Floats, pixels: _Pixels, matrices: Matrices, start: Floats | None
+    responses: Floats, batch: _PixelBatch, matrices: Matrices, start: Floats | None
 ) -> tuple[Floats, Floats]:
-    """Equation (10): windows n, shape (n, channels, W^2), and the unseen part z."""
+    """Solve equation (10): windows n, shape (n, channels, W^2), and the unseen part z."""
     number, channels = responses.shape[:2]
     xp, rows = namespace(responses), number * channels
     n0 = product(responses, matrices.near_inverse).reshape((rows, matrices.window**2))
     # A window entry is a mean of W^2 responses, cosine and sine of each pair.
-    entry_noise = pixels.noise.reshape((rows,)) * (math.sqrt(2.0) / matrices.window)
-    inside = xp.repeat(pixels.inside, channels, axis=0)
+    entry_noise = batch.noise.reshape((rows,)) * (math.sqrt(2.0) / matrices.window)
+    inside = xp.repeat(batch.inside, channels, axis=0)
     if start is None:
-        _, z = solve(n0, matrices.unseen, inside, FIRST * entry_noise)
+        _, z = solve(n0, matrices.unseen, inside, FIRST_LAMBDA * entry_noise)
     else:
         z = start.reshape((rows, matrices.unseen.shape[1]))
     v = n0 + z @ matrices.unseen.T
     entry_noise = xp.maximum(entry_noise, _strays_beyond_the_border(v, inside, z.shape[1]))
     windows, unseen = solve(n0, matrices.unseen, inside, least_risk(v, inside, entry_noise), z)
-    windows = windows.reshape((number, channels, matrices.window**2)) * pixels.lit[:, None, None]
+    windows = windows.reshape((number, channels, matrices.window**2)) * batch.lit[:, None, None]
     return windows, unseen.reshape((number, channels, z.shape[1]))
 
 
 def _strays_beyond_the_border(v: Floats, inside: Booleans, unknowns: int) -> Floats:
-    """Root mean square of window entries beyond the projector's border, (I,); 0 where none are.
+    """Return the root mean square of window entries beyond the projector's border, (I,).
 
-    They are known to be zero: what a scene that departs from the model leaves there tells how far
-    the entries inside can be trusted, as noise would. Where the model holds it is 0.
+    They should be zero: what a scene that departs from the model leaves there counts as noise of
+    the entries inside. It is 0 where the model holds, and where there are too few such entries.
     """
     xp = namespace(v)
     beyond = xp.count_nonzero(~inside, axis=1)
     energy = xp.sum(xp.where(inside, 0.0, v) ** 2, axis=1)
     strays = xp.sqrt(energy / xp.astype(xp.clip(beyond - unknowns, min=1), v.dtype))
-    told = (beyond > unknowns) & (strays > DEPARTS * xp.max(xp.abs(v), axis=1))
-    known: Floats = strays * told
-    return known
+    strayed = (beyond > unknowns) & (strays > ROUNDING_SHARE * xp.max(xp.abs(v), axis=1))
+    noise: Floats = strays * strayed
+    return noise

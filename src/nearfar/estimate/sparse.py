@@ -21,19 +21,23 @@ from array_api_compat import device
 
 from nearfar.arrays import Booleans, Floats, namespace
 
-# Reweighting steps at most, and when a row is settled: relative to lambda, and to its size.
-STEPS = 60
-SETTLED_NOISE = 0.01
-SETTLED = 1e-6
-# The noise-free corner of |.|_1 is reached under a floor that shrinks by this at each step.
-FLOOR = 0.3
+# Most reweighting steps. A row has settled when it changes by less than these shares of lambda and
+# of its largest entry together.
+MAXIMUM_STEPS = 60
+LAMBDA_TOLERANCE = 0.01
+SIZE_TOLERANCE = 1e-6
+# The noise-free corner of |.|_1 is reached under a floor, at first this share of a row's largest
+# entry, that shrinks by this factor at each step.
+FIRST_FLOOR = 0.3
+FLOOR_FACTOR = 0.6
 # A lambda of less than this share of a row's largest entry is close to that corner.
-CORNER = 1e-3
-SHRINK = 0.6
+CORNER_SHARE = 1e-3
 # lambda is looked for among these shares of an entry's noise.
-SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
-# A window of zeros weighs its entries alike.
-TINY = 1e-30
+LAMBDA_SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
+# Keeps weights defined in a window of zeros.
+WIDTH_FLOOR = 1e-30
+# Share of the trace of the normal equations that is added to their diagonal.
+RIDGE = 1e-9
 
 
 def solve(
@@ -72,14 +76,14 @@ def solve(
     if unknowns and rows:
         scale = xp.max(xp.abs(n0), axis=1)
         largest = float(xp.max(xp.abs(unseen)))
-        # Rows stop on their own, so that no row's answer depends on its company.
+        # Rows stop on their own, so that no row's result depends on its company.
         moving = xp.arange(rows, device=here)
-        floor = FLOOR * scale
+        floor = FIRST_FLOOR * scale
         if start is not None:
             # From close by the minimum needs no floor to be found, but at the corner.
-            floor = xp.where(threshold > CORNER * scale, 0.0, floor)
+            floor = xp.where(threshold > CORNER_SHARE * scale, 0.0, floor)
         problem = _Problem(n0, inside, threshold, scale, floor)
-        for _ in range(STEPS):
+        for _ in range(MAXIMUM_STEPS):
             change = _step(problem, z[moving], unseen)
             z[moving] -= change
             problem = problem.with_lower_floor()
@@ -111,20 +115,20 @@ def least_risk(v: Floats, inside: Booleans, noise: Floats) -> Floats:
     Returns
     -------
     ndarray, shape (I,)
-        One of `SHARES` of the noise.
+        One of `LAMBDA_SHARES` of the noise.
     """
     xp = namespace(v)
     size = xp.abs(v)
     size *= inside
     beyond = xp.count_nonzero(~inside, axis=1)
     risks = []
-    for share in SHARES:
+    for share in LAMBDA_SHARES:
         threshold = (share * noise)[:, None]
         zeroed = xp.count_nonzero(size <= threshold, axis=1) - beyond
         kept = xp.minimum(size, threshold)
         risks.append(xp.vecdot(kept, kept) - 2 * noise**2 * zeroed)
     best = xp.argmin(xp.stack(risks, axis=1), axis=1)
-    chosen: Floats = xp.asarray(SHARES, dtype=v.dtype, device=device(v))[best] * noise
+    chosen: Floats = xp.asarray(LAMBDA_SHARES, dtype=v.dtype, device=device(v))[best] * noise
     return chosen
 
 
@@ -138,23 +142,25 @@ class _Problem(NamedTuple):
     floor: Floats
 
     def with_lower_floor(self) -> "_Problem":
-        return self._replace(floor=self.floor * SHRINK)
+        return self._replace(floor=self.floor * FLOOR_FACTOR)
 
     def only(self, rows: Booleans) -> "_Problem":
         return _Problem._make(values[rows] for values in self)
 
     def settled(self, moved: Floats) -> Booleans:
-        """Tell which rows moved no more, under a floor that no longer matters."""
-        least = SETTLED * self.scale
-        still = moved <= SETTLED_NOISE * self.threshold + least
+        """Return which rows changed no more, under a floor that no longer matters."""
+        least = SIZE_TOLERANCE * self.scale
+        still = moved <= LAMBDA_TOLERANCE * self.threshold + least
         done: Booleans = still & (self.floor <= self.threshold + least)
         return done
 
 
 def _step(problem: _Problem, z: Floats, unseen: Floats) -> Floats:
-    """Return what reweighted least squares takes off z."""
+    """Return the step of reweighted least squares that is subtracted from z."""
     xp = namespace(z)
-    width = xp.maximum(problem.threshold, problem.floor + SETTLED * problem.scale + TINY)[:, None]
+    width = xp.maximum(
+        problem.threshold, problem.floor + SIZE_TOLERANCE * problem.scale + WIDTH_FLOOR
+    )[:, None]
     v = z @ unseen.T
     v += problem.n0
     weight = width / xp.maximum(xp.abs(v), width)
@@ -163,14 +169,14 @@ def _step(problem: _Problem, z: Floats, unseen: Floats) -> Floats:
 
 
 def _weighted_step(v: Floats, weight: Floats, unseen: Floats) -> Floats:
-    """(Z^T diag(weight) Z)^-1 Z^T diag(weight) v for each row."""
+    """Return (Z^T diag(weight) Z)^-1 Z^T diag(weight) v for each row."""
     xp, unknowns = namespace(v), unseen.shape[1]
     pairs = (unseen[:, :, None] * unseen[:, None, :]).reshape((len(unseen), unknowns**2))
     normal = xp.astype((weight @ pairs).reshape((len(v), unknowns, unknowns)), xp.float64)
     weight *= v
     right = xp.astype(weight @ unseen, xp.float64)
-    # A window with no weight at all has nothing to say; the ridge keeps it still.
+    # The ridge keeps a window without any weight where it is.
     unit = xp.eye(unknowns, dtype=xp.float64, device=device(v))
-    ridge = 1e-9 * xp.linalg.trace(normal)[:, None, None] * unit
+    ridge = RIDGE * xp.linalg.trace(normal)[:, None, None] * unit
     step: Floats = xp.astype(xp.linalg.solve(normal + ridge, right[..., None])[..., 0], v.dtype)
     return step

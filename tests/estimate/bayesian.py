@@ -9,9 +9,9 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 
-ITERATIONS = 300
-SETTLED = 1e-5
-# A prior this much narrower than the noise is a zero.
+MAXIMUM_ITERATIONS = 300
+# Shares of the noise: a change that ends the iterations, and, in variance, a prior that is a zero.
+TOLERANCE = 1e-5
 PRUNED = 1e-6
 
 
@@ -48,7 +48,7 @@ def _row(n0: Floats, seen: Floats, inside: Booleans, variance: float) -> Floats:
     active = np.flatnonzero(inside)
     width = np.full(len(active), max(float(np.mean(n0**2)), variance))
     mean = np.zeros(len(active))
-    for _ in range(ITERATIONS):
+    for _ in range(MAXIMUM_ITERATIONS):
         design = seen[:, active]
         # In the data's coordinates, the noise lives in the seen subspace.
         precision = design.T @ design / variance + np.diag(1.0 / width)
@@ -57,7 +57,7 @@ def _row(n0: Floats, seen: Floats, inside: Booleans, variance: float) -> Floats:
         certain = np.clip(1.0 - np.diag(covariance) / width, 1e-12, 1.0)
         width = mean**2 / certain
         kept = width > PRUNED * variance
-        settled = np.max(np.abs(mean - previous), initial=0.0) < SETTLED * np.sqrt(variance)
+        settled = np.max(np.abs(mean - previous), initial=0.0) < TOLERANCE * np.sqrt(variance)
         if kept.all() and settled:
             break
         active, width, mean = active[kept], width[kept], mean[kept]

@@ -1,4 +1,4 @@
-"""The paper's own kind of solver for equation (10): sparse Bayesian learning, pixel by pixel.
+"""The paper's own solver for equation (10): sparse Bayesian learning, pixel by pixel.
 
 Each window entry has a Gaussian prior of its own width, and the widths are those under which the
 photos are most probable (Tipping 2001; Ji, Xue and Carin 2008). Slow, and here to hold the

@@ -56,8 +56,8 @@ def test_the_estimate_is_numpys(shoot, by, offset, between, device):
     )
     again = replace(measurements, responses=rounded.astype(np.float32))
     ours, shaken, theirs = (
-        by(told, q, plan, where)
-        for told, where in ((measurements, "cpu"), (again, "cpu"), (measurements, device))
+        by(given, q, plan, where)
+        for given, where in ((measurements, "cpu"), (again, "cpu"), (measurements, device))
     )
     if ours.posterior is not None:
         assert np.mean(ours.posterior.prior_component == theirs.posterior.prior_component) > 0.99

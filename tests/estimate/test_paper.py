@@ -84,10 +84,10 @@ def test_noise_is_honoured():
     ).astype(np.float32)
     errors = []
     for known in (0.0, noise):
-        told = replace(
+        noisy = replace(
             measurements, responses=shaken, noise=np.full_like(measurements.noise, known)
         )
-        found = estimate(told, world.correspondence, window, far, dropped)
+        found = estimate(noisy, world.correspondence, window, far, dropped)
         errors.append(np.linalg.norm(found.near - world.near))
     assert errors[1] < 0.75 * errors[0]
 
@@ -176,7 +176,7 @@ def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropp
     measurements = ideal_measurements(frame, window, far, dropped)
     responses = rows @ measurements.basis.patterns.T
     responses += np.random.default_rng(0).normal(0, noise, responses.shape)
-    told = replace(
+    noisy = replace(
         measurements,
         responses=responses.astype(np.float32),
         noise=np.full_like(measurements.noise, noise),
@@ -185,7 +185,7 @@ def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropp
     found = [
         _snr(
             rows @ light,
-            estimate(told, frame.correspondence, window, far, dropped, rounds=rounds).dense()
+            estimate(noisy, frame.correspondence, window, far, dropped, rounds=rounds).dense()
             @ light,
         )
         for rounds in (1, 60)
@@ -195,13 +195,13 @@ def test_rounds_do_not_run_away_from_a_scene_beyond_the_model(window, far, dropp
     assert found[1] > found[0] - cost
 
 
-def test_direct_light_fades_where_nothing_tells_it():
-    # W = 1 shoots the checkerboard alone for it, which a camera pixel half-way does not answer.
+def test_direct_light_fades_where_nothing_measures_it():
+    # W = 1 shoots the checkerboard alone for it, which a camera pixel half-way does not respond to.
     projector, far = Size(24, 24), Size(3, 3)
     world = model_transport(projector, Size(37, 37), window=5, far=far, fractional=True, entries=0)
     world = replace(world, near=np.zeros_like(world.near))
     measurements = ideal_measurements(world, 1, far, Size(1, 1))
     noise = np.random.default_rng(0).normal(0, 0.01, measurements.responses.shape)
-    told = replace(measurements, responses=(measurements.responses + noise).astype(np.float32))
-    found = estimate(told, world.correspondence, 1, far, Size(1, 1))
+    noisy = replace(measurements, responses=(measurements.responses + noise).astype(np.float32))
+    found = estimate(noisy, world.correspondence, 1, far, Size(1, 1))
     assert np.abs(found.direct).max() < 0.6

@@ -32,7 +32,7 @@ def _centred(
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Matrices:
     """One set of matrices for every camera pixel.
 

@@ -30,7 +30,7 @@ def window_offsets(window: int) -> NDArray[np.int64]:
 FOOTPRINT_OFFSETS = window_offsets(3)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CentredBasis:
     """Cosines and sines of chosen frequencies in coordinates re-centred on q.
 

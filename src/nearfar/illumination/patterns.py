@@ -76,7 +76,7 @@ def _gray(bit: int, length: int) -> NDArray[np.float64]:
 
 
 def quantise(pattern: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Turn values in [0, 1] into the 8 bits that are shown."""
+    """Round values in [0, 1] to 8 bits."""
     return np.rint(255.0 * pattern).astype(np.uint8)
 
 

@@ -152,15 +152,15 @@ class RealBasis:
 
     def analyse(self, light: Floats) -> Floats:
         """Return weights times the light's overlap with each pattern: (..., P) to (..., M)."""
-        kind = np.result_type(light.dtype, np.float32)
-        overlaps = light.astype(kind, copy=False) @ self.patterns.T.astype(kind, copy=False)
+        dtype = np.result_type(light.dtype, np.float32)
+        overlaps = light.astype(dtype, copy=False) @ self.patterns.T.astype(dtype, copy=False)
         return np.asarray(overlaps * self.weights)
 
     def synthesise(self, coefficients: Floats) -> Floats:
         """Adjoint of `analyse`, and the rows of F: (..., M) to (..., P)."""
-        kind = np.result_type(coefficients.dtype, np.float32)
-        weighted = coefficients * self.weights.astype(kind)
-        return np.asarray(weighted @ self.patterns.astype(kind, copy=False))
+        dtype = np.result_type(coefficients.dtype, np.float32)
+        weighted = coefficients * self.weights.astype(dtype)
+        return np.asarray(weighted @ self.patterns.astype(dtype, copy=False))
 
 
 def real_basis(frequencies: Sequence[Frequency], projector: Size) -> RealBasis:

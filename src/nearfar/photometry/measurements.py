@@ -16,7 +16,7 @@ def _left_out() -> Floats:
     return np.zeros((), dtype=np.float32)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurements:
     """Responses of every camera pixel to cosines and sines without offset.
 

@@ -31,7 +31,7 @@ from nearfar.priors.covariance import (
 VARIANCE_RATIOS = 2.0 ** np.arange(-16.0, 41.0, 0.5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Eigenbasis:
     """Eigenvalues and eigenvectors of the covariance of responses under a prior component.
 
@@ -59,7 +59,7 @@ class Eigenbasis:
         return ("eigenvalues", "eigenvectors", "of_footprint")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResponsePrior(Eigenbasis):
     """One prior component for one set of measured frequencies.
 

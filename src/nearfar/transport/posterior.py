@@ -9,7 +9,7 @@ from nearfar.illumination.frequencies import Frequency
 from nearfar.priors.component import PriorComponent
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """Prior components, their scales, and the noise of a joint estimate.
 

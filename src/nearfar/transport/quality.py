@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from nearfar.arrays import Booleans, Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quality:
     """Seen while a transport was reconstructed, and kept with it.
 

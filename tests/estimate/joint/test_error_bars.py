@@ -37,7 +37,7 @@ SCALE, WHITE = 0.05, 0.8
 
 
 def _transport(centres, lit=True):
-    """Build a transport of one kind, all factors 0: error bars do not depend on them."""
+    """Build a transport of one prior component, all factors 0: error bars do not depend on them."""
     low = [k for k in far_frequencies(Size(3, 3), PROJECTOR) if k != DC]
     frequencies = [DC, *(k for i, k in enumerate(low) if -k not in low[:i])]
     basis = real_basis(frequencies, PROJECTOR)

@@ -89,7 +89,7 @@ def test_clipped_windows_of_every_component_are_those_of_dense_algebra(component
     measurements = measured(rows, frequencies, noise=2e-3)
     multiplicity = measurements.multiplicity.copy()
     if uneven:
-        # Cosines that were shown more often than their sines.
+        # Cosines that were measured more often than their sines.
         multiplicity[centred.places[~centred.basis.is_sine]] = 4.0
     prior = response_prior(component, centred, multiplicity[centred.places])
     batch = batch_of(measurements, centres, centred)
@@ -164,8 +164,8 @@ def test_what_eight_bits_make_of_direct_light_is_no_other_light():
         ).astype(np.float32),
     )
 
-    def stray(told):
-        found = estimate_jointly(told, world.correspondence, WINDOW, FAR)
+    def stray(measurements):
+        found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR)
         return np.sqrt(np.mean(found.near**2)) / world.direct.mean()
 
     unknown, known = stray(quantisation), stray(replace(quantisation, quantisation_error=error))
@@ -218,13 +218,13 @@ def test_the_offset_of_the_references_is_taken_out():
     world = replace(world, near=np.zeros_like(world.near))
     rows = world.dense().astype(np.float64)
     frequencies = chosen_frequencies()
-    told = measured(rows, frequencies, noise=1e-4, offset=0.02, camera=world.camera)
-    untold = replace(told, white_noise=np.zeros_like(told.noise))
+    noisy = measured(rows, frequencies, noise=1e-4, offset=0.02, camera=world.camera)
+    unaware = replace(noisy, white_noise=np.zeros_like(noisy.noise))
     light = np.asarray(exponential(frequencies[3], PROJECTOR).real)
     truth = world @ light
     errors = [
         np.linalg.norm(estimate_jointly(m, world.correspondence, WINDOW, FAR) @ light - truth)
-        for m in (told, untold)
+        for m in (noisy, unaware)
     ]
     assert errors[0] < 0.3 * errors[1]
 

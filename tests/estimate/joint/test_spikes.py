@@ -47,9 +47,9 @@ def test_less_evidence_will_do_where_a_neighbour_sees_the_second_surface():
     assert not expected_spikes(q, 9).any()
 
 
-def test_a_faint_second_surface_is_believed_beside_its_edge_alone():
+def test_a_faint_second_surface_is_accepted_beside_its_edge_alone():
     # Two surfaces 4 projector pixels apart; every camera pixel of the left one also sees the place
-    # of the right one, too faintly to be believed by its own photos.
+    # of the right one, too faintly for its own photos alone.
     camera, faint = Size(8, 10), 0.08
     q = np.full((*camera, 2), 8.0)
     q[..., 1] = np.where(np.arange(camera.width) < 5, 7.0, 11.0)

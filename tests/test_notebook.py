@@ -19,8 +19,7 @@ plan
 """,
     """
 with nearfar.progress_bar() as report:
-    photos = nearfar.counted(report, "photos", len(plan.patterns))
-    capture = nearfar.acquire(plan, PATH, rig, progress=photos)
+    capture = nearfar.acquire(plan, PATH, rig, progress=report)
 capture
 """,
     """

@@ -63,6 +63,11 @@ def _stopped(rig, path, count, plan=PLAN, resume=False):
         acquire(plan, path, rig, observers=[_stop_after(count)], resume=resume)
 
 
+def _counting(told):
+    """Return a progress callback that lists how many photos were there after each."""
+    return lambda _what, share: told.append(round(share * COUNT))
+
+
 def _check_same(capture, other):
     assert capture.plan == other.plan
     assert capture.rig == other.rig
@@ -86,7 +91,7 @@ def test_it_is_as_if_it_had_not_been_stopped(rig, undisturbed, tmp_path, stops):
         _stopped(rig, tmp_path / "c.zarr", stop, resume=i > 0)
         assert [path.name for path in tmp_path.iterdir()] == ["c.zarr.unfinished"]
     told = []
-    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
     # No photo was taken twice.
     assert told == list(range(stops[-1] + 1, COUNT + 1))
     _check_same(capture, undisturbed)
@@ -124,7 +129,7 @@ def test_a_photo_that_was_not_noted_is_taken_again(rig, undisturbed, tmp_path):
     log = tmp_path / "c.zarr.unfinished" / LOG
     log.write_bytes(log.read_bytes()[:-7])
     told = []
-    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
     assert told[0] == 20
     _check_same(capture, undisturbed)
 
@@ -204,7 +209,7 @@ def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_p
     with pytest.raises(ExistingOutputError, match="`force=True`"):
         acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
     told = []
-    acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, force=True, progress=told.append)
+    acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, force=True, progress=_counting(told))
     assert told[0] == 21
     _check_same(open_capture(tmp_path / "c.zarr"), undisturbed)
 
@@ -248,7 +253,7 @@ def test_what_was_whole_but_for_its_name_is_not_shot_again(
         patch.setattr(output, "move_into_place", gone)
         acquire(PLAN, tmp_path / "c.zarr", rig, observers=[EndsWhere(enough)])
     told = []
-    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=told.append)
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
     assert told == []
     if early is None:
         _check_same(capture, undisturbed)
@@ -290,7 +295,7 @@ def test_what_is_there_is_replaced_by_force_alone(rig, undisturbed, tmp_path):
     ):
         acquire(PLAN, tmp_path / "c.zarr", rig)
     told = []
-    capture = acquire(PLAN, tmp_path / "c.zarr", rig, force=True, progress=told.append)
+    capture = acquire(PLAN, tmp_path / "c.zarr", rig, force=True, progress=_counting(told))
     assert told[0] == 1
     _check_same(capture, undisturbed)
     with pytest.raises(MissingFileError, match="nothing to go on with"):
@@ -350,7 +355,7 @@ def test_a_torn_line_does_not_spoil_the_next(rig, undisturbed, tmp_path):
         log.write_bytes(log.read_bytes()[:-5])
     # What was noted after the torn line is still known: one photo is taken again, not twenty.
     taken = []
-    acquire(PLAN, path, rig, resume=True, progress=taken.append)
+    acquire(PLAN, path, rig, resume=True, progress=_counting(taken))
     assert taken[0] > 39
     _check_same(open_capture(path), undisturbed)
 
@@ -407,13 +412,17 @@ def test_a_predicate_and_told_of_before_still_work_and_warn(rig, tmp_path):
     def enough(number, _photo):
         return number + 1 == 20
 
-    told = []
+    told, counts = [], []
     dark = replace(rig, exposure=3 * rig.exposure)
+    old = {"enough": enough, "told": told.append, "progress": counts.append}
     with (
         pytest.warns(DeprecationWarning, match=r"enough of nearfar\.acquire") as predicate,
         pytest.warns(DeprecationWarning, match=r"told of nearfar\.acquire"),
+        pytest.warns(DeprecationWarning, match="progress callback of one argument") as counted,
     ):
-        capture = acquire(PLAN, tmp_path / "c.zarr", dark, enough=enough, told=told.append)
+        capture = acquire(PLAN, tmp_path / "c.zarr", dark, **old)
+    assert counts == list(range(1, 21))
+    assert counted[0].filename == __file__
     assert predicate[0].filename == __file__
     assert len(capture.plan.patterns) == 20
     assert tuple(told) == capture.alarms

@@ -1,7 +1,7 @@
 """Photos that were taken elsewhere: pair them with the patterns of a plan."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import full_scale_of_file, list_pictures, read_picture
 from nearfar.plan import Plan
+from nearfar.progress import Report, ignore_progress
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ def import_photos(
     rig: Mapping[str, Any] | None = None,
     exposure: float | None = None,
     force: bool = False,
-    progress: Callable[[int], None] | None = None,
+    progress: Report = ignore_progress,
 ) -> ImportSummary:
     """Import photos into a capture.
 

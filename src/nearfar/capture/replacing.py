@@ -15,6 +15,7 @@ from nearfar.capture.checks import as_photo, check_count, check_order, check_pho
 from nearfar.capture.store import Capture, open_capture, white_and_black
 from nearfar.errors import InputError
 from nearfar.files import add_array, new_output, open_durable_store, read_selection
+from nearfar.progress import Report, ignore_progress
 
 
 def replace_photos(
@@ -24,7 +25,7 @@ def replace_photos(
     *,
     conditions: Callable[[], Mapping[str, float]] = dict,
     alarms: Callable[[], Sequence[str]] = list,
-    progress: Callable[[int], None] | None = None,
+    progress: Report = ignore_progress,
 ) -> Capture:
     """Put new photos in the places of old ones; the capture changes as a whole or not at all.
 
@@ -39,7 +40,7 @@ def replace_photos(
     conditions, alarms : callable
         Tell of the last photo, and of all so far.
     progress : callable, optional
-        Told the number of photos replaced after each.
+        Called with "photos" and the share of them that is replaced, 0 to 1, after each.
 
     Returns
     -------
@@ -85,8 +86,7 @@ def replace_photos(
             saturated[number] = np.mean(photo >= capture.full_scale)
             for condition, value in conditions().items():
                 told.setdefault(condition, [None] * count)[number] = value
-            if progress is not None:
-                progress(done)
+            progress("photos", done / len(numbers))
         for name, values in (("time", times), ("saturated", saturated)):
             add_array(group, name, (count,), np.float64, (count,))[:] = values
         group.attrs["conditions"] = told

@@ -44,6 +44,7 @@ from nearfar.files import (
 from nearfar.files.logs import note, read_notes
 from nearfar.files.output import synchronise_entry
 from nearfar.plan.model import Plan
+from nearfar.progress import OldReport, Report, as_report
 from nearfar.release import version
 
 
@@ -295,7 +296,7 @@ def write_capture(
     exposure: float | None = None,
     names: Sequence[str] | None = None,
     force: bool = False,
-    progress: Callable[[int], None] | None = None,
+    progress: Report | OldReport | None = None,
     observers: Sequence[CaptureObserver] = (),
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
 ) -> Capture:
@@ -314,7 +315,7 @@ def write_capture(
     force : bool
         Replace a capture that is there.
     progress : callable, optional
-        Told the number of photos written after each.
+        Called with "photos" and the share of them that is written, 0 to 1, after each.
     observers : sequence of CaptureObserver
         Each hears of every photo; where one says that it is enough, the capture ends there, and
         its plan with it.
@@ -347,6 +348,7 @@ def write_capture(
     observers = with_predicate(observers, enough, "nearfar.write_capture")
     path = Path(path)
     count = len(plan.patterns)
+    report = as_report(progress, count)
     with new_output(path, force=force) as partial:
         writer = CaptureWriter(
             partial, plan, full_scale=full_scale, rig=rig, exposure=exposure, names=names
@@ -355,8 +357,7 @@ def write_capture(
         ended = False
         while writer.taken < count and not ended:
             photo = writer.add(next(remaining, None))
-            if progress is not None:
-                progress(writer.taken)
+            report("photos", writer.taken / count)
             ended = is_enough(observers, writer.taken - 1, photo)
         if not ended:
             check_count(count, count, more=next(remaining, None) is not None)

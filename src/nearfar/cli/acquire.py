@@ -18,7 +18,7 @@ from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, warn
 from nearfar.devices import Device
 from nearfar.errors import InputError
-from nearfar.progress import Report, counting, progress_bar
+from nearfar.progress import Report, progress_bar
 from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def acquire(
             opened,
             resume=resume,
             force=force,
-            progress=counting(report, "photos", len(made.patterns)),
+            progress=report,
             observers=[each for each in (estimate, check) if each is not None],
             on_alarm=warn,
         )

@@ -8,7 +8,7 @@ import typer
 from nearfar.arrays import Size
 from nearfar.cli.options import Force, PlanFile, Quiet, size
 from nearfar.cli.saying import say
-from nearfar.progress import counting, progress_bar
+from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     pass
@@ -47,7 +47,7 @@ def export(
             scale=scale,
             native=native,
             force=force,
-            progress=counting(report, "patterns", len(made.patterns)),
+            progress=report,
         )
     say(
         f"{len(made.patterns)} patterns of {shown.frame} written to {folder}, a pattern pixel as "

@@ -7,7 +7,7 @@ import typer
 
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input
 from nearfar.cli.saying import say, say_captured
-from nearfar.progress import counting, progress_bar
+from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     pass
@@ -48,7 +48,7 @@ def import_photos(
             output,
             full_scale=full_scale,
             force=force,
-            progress=counting(report, "photos", len(paths)),
+            progress=report,
         )
     say(f"first: {summary.first}\nlast: {summary.last}", quiet=quiet)
     say_captured(summary.capture, output, quiet=quiet)

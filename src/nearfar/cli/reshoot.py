@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from nearfar.cli.saying import say, warn
-from nearfar.progress import counting, progress_bar
+from nearfar.progress import progress_bar
 
 
 def take_again(plan_file: Path, output: Path, rig: str, numbers: list[int], *, quiet: bool) -> None:
@@ -22,8 +22,7 @@ def take_again(plan_file: Path, output: Path, rig: str, numbers: list[int], *, q
             rig, made.projector, exposure=before.exposure, progress=report, on_alarm=warn
         ) as opened,
     ):
-        progress = counting(report, "photos", len(numbers))
-        shoot_again(before.plan, output, opened, numbers, progress=progress)
+        shoot_again(before.plan, output, opened, numbers, progress=report)
     say(f"{len(numbers)} photos of {output} taken again", quiet=quiet)
 
 

@@ -77,10 +77,7 @@ def run_demo(
             truth = cached_scene(SCENE, PROJECTOR, progress=report)
         with timed("photos"):
             rig = open_rig(SCENE, PROJECTOR)
-            count = len(plan.patterns)
-            capture = acquire(
-                plan, partial / CAPTURE, rig, progress=lambda n: report("photos", n / count)
-            )
+            capture = acquire(plan, partial / CAPTURE, rig, progress=report)
         with timed("reconstruction"):
             transport, correspondence = reconstruct(capture, method="paper", progress=report)
         save_transport(transport, partial / TRANSPORT)

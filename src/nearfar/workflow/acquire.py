@@ -18,6 +18,7 @@ from nearfar.faults.while_capturing import FaultsWhileCapturing
 from nearfar.files import resumable_output
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import Plan
+from nearfar.progress import OldReport, Report, as_report, ignore_progress
 from nearfar.rigs.base import Photo, Rig
 
 
@@ -28,7 +29,7 @@ def acquire(
     *,
     resume: bool = False,
     force: bool = False,
-    progress: Callable[[int], None] | None = None,
+    progress: Report | OldReport | None = None,
     observers: Sequence[CaptureObserver] = (),
     on_alarm: Callable[[str], None] | None = None,
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
@@ -51,7 +52,7 @@ def acquire(
     force : bool
         Replace a capture that is there, and without `resume` what was not finished.
     progress : callable, optional
-        Told the number of photos taken after each.
+        Called with "photos" and the share of them that is there, 0 to 1, after each.
     observers : sequence of CaptureObserver
         Each hears of every photo, of those that were there too; where one says that it is enough,
         no more are taken.
@@ -92,7 +93,9 @@ def acquire(
     if told is not None:
         warn_of("told of nearfar.acquire", "give on_alarm")
         on_alarm = on_alarm or told
-    kept = _Kept(path, len(plan.patterns), resume=resume)
+    count = len(plan.patterns)
+    report = as_report(progress, count)
+    kept = _Kept(path, count, resume=resume)
     try:
         with resumable_output(path, kept.worth, resume=resume, force=force) as folder:
             writer = _writer(folder, plan, rig, resume=resume)
@@ -116,8 +119,7 @@ def acquire(
                 if on_alarm is not None:
                     for alarm in alarms:
                         on_alarm(alarm)
-                if progress is not None:
-                    progress(writer.taken)
+                report("photos", writer.taken / count)
                 ended = is_enough(observers, writer.taken - 1, photo) or writer.ended
             writer.finish(alarms)
     except KeyboardInterrupt as error:
@@ -139,7 +141,7 @@ def shoot_again(
     rig: Rig,
     numbers: Sequence[int],
     *,
-    progress: Callable[[int], None] | None = None,
+    progress: Report = ignore_progress,
 ) -> Capture:
     """Take named photos of a finished capture again; it changes as a whole or not at all.
 
@@ -154,7 +156,7 @@ def shoot_again(
     numbers : sequence of int
         Which photos.
     progress : callable, optional
-        Told the number of photos taken after each.
+        Called with "photos" and the share of them that is there, 0 to 1, after each.
 
     Returns
     -------

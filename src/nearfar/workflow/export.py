@@ -1,12 +1,12 @@
 """Write a plan's patterns as pictures that any player can show."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from nearfar.arrays import Size
 from nearfar.files import encode_png, new_output
 from nearfar.illumination.frames import Shown, draw_frame, fit_frame
 from nearfar.plan import Plan
+from nearfar.progress import Report, ignore_progress
 
 PLAN_NAME = "plan.json"
 
@@ -18,7 +18,7 @@ def export_patterns(
     scale: int | None = None,
     native: Size | None = None,
     force: bool = False,
-    progress: Callable[[int], None] | None = None,
+    progress: Report = ignore_progress,
 ) -> Shown:
     """Write ``pattern-00000.png`` and so on, 8-bit grey, and the plan beside them.
 
@@ -34,7 +34,7 @@ def export_patterns(
     force : bool
         Replace a folder of patterns that is there.
     progress : callable, optional
-        Told the number of patterns written.
+        Called with "patterns" and the share of them that is written, 0 to 1, after each.
 
     Returns
     -------
@@ -56,8 +56,7 @@ def export_patterns(
         for number in range(len(plan.patterns)):
             frame = draw_frame(plan.draw(number), shown)
             (partial / f"pattern-{number:05d}.png").write_bytes(encode_png(frame))
-            if progress is not None:
-                progress(number + 1)
+            progress("patterns", (number + 1) / len(plan.patterns))
         (partial / PLAN_NAME).write_text(plan.to_json(), encoding="utf-8")
     return shown
 

@@ -85,14 +85,13 @@ def acquire_scene(case: Acquisition, report: Report) -> Data:
     truth = cached_scene(case.scene, case.projector, progress=report)
     plan = case.plan
     rig = SimulatedRig(truth, case.scene, SimulatedProjector(), SimulatedCamera(), 1.0, 0)
-    count = len(plan.patterns)
     with tempfile.TemporaryDirectory(prefix="nearfar-") as folder:
         started = time.monotonic()
         capture = acquire(
             plan,
             Path(folder) / "capture.zarr",
             rig,
-            progress=lambda done: report("photos", done / count),
+            progress=report,
         )
         shot = time.monotonic()
         transport, correspondence = reconstruct(capture, method="paper", progress=report)

@@ -16,7 +16,7 @@ def check(
     transport: Annotated[
         Path,
         typer.Argument(
-            metavar="TRANSPORT", help="What render or reconstruct wrote, components apart."
+            metavar="TRANSPORT", help="What render or reconstruct wrote, with its components apart."
         ),
     ],
     near: Annotated[int, typer.Option(min=1, help="W of the near-range window.", metavar="W")],
@@ -29,13 +29,13 @@ def check(
     ] = None,
     page: Annotated[
         Path | None,
-        typer.Option("--html", help="Write a page with maps here.", metavar="FILE.html"),
+        typer.Option("--html", help="Write a page with maps to this file.", metavar="FILE.html"),
     ] = None,
     as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Tell where the paper's assumptions hold on a scene, and where not.
+    """Check where the paper's assumptions hold on a scene, and where they do not.
 
     Example: nearfar check truth.zarr --near 19 --far 13x13 --html check.html
     """

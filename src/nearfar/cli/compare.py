@@ -22,7 +22,7 @@ from nearfar.workflow.rivals import RIVALS
 
 
 def method_names(start: str) -> list[str]:
-    """Names of methods that begin so, for shells to complete."""
+    """Return the methods whose names start so, for shells to complete."""
     return [name for name in RIVALS if name.startswith(start)]
 
 
@@ -39,7 +39,9 @@ def compare(
     photos: Annotated[
         str | None,
         typer.Option(
-            help="Budgets; by default a sixteenth to all of the paper's photos.", metavar="N,N,..."
+            help="Numbers of photos to compare at; by default from a sixteenth of the paper's to "
+            "all of them.",
+            metavar="N,N,...",
         ),
     ] = None,
     method: Annotated[
@@ -85,7 +87,7 @@ def compare(
         return
     say("SNR_b under pictures at equal photos", quiet=quiet)
     say("\n".join(f"  {line}" for line in winners(found.equal_photos)), quiet=quiet)
-    say("at equal total exposure, in photos' worth", quiet=quiet)
+    say("at equal total exposure, counted in photos", quiet=quiet)
     say("\n".join(f"  {line}" for line in winners(found.equal_exposure)), quiet=quiet)
     if output is not None:
         say(f"open {output / INDEX}", quiet=quiet)

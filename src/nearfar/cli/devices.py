@@ -30,6 +30,6 @@ def devices(quiet: Quiet = False) -> None:
         about = f'driver = "{camera.driver}", device = "{camera.device}"'
         say(f"  {about}: {camera.name}", quiet=quiet)
     if not found:
-        say("  none is found: connect one, turn it on, and look again", quiet=quiet)
+        say("  none is found: connect one, turn it on, and run this again", quiet=quiet)
     for sentence in unable:
         warn(sentence)

@@ -30,13 +30,13 @@ def evaluate(
     photos: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of pairs NAME.light.png, NAME.photo.tiff; a pair under an all-black "
-            "light tells the black.",
+            help="Folder of pairs NAME.light.png, NAME.photo.tiff; the photo under an all-black "
+            "light, if there is one, is subtracted.",
             metavar="DIR",
         ),
     ] = None,
     full_scale: Annotated[
-        float | None, typer.Option(help="Value of full scale of the photos.", metavar="VALUE")
+        float | None, typer.Option(help="Value of the photos at full scale.", metavar="VALUE")
     ] = None,
     report: ReportPath = None,
     as_json: AsJson = False,

@@ -18,15 +18,16 @@ def export(
     plan_file: PlanFile,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to make.")],
     scale: Annotated[
-        int | None, typer.Option(min=1, help="Show each pattern pixel as N x N.", metavar="N")
+        int | None,
+        typer.Option(min=1, help="Show each pattern pixel as N x N pixels.", metavar="N"),
     ] = None,
     native: Annotated[
         Size | None,
         typer.Option(
             parser=size,
             metavar="HxW",
-            help="Centre the pattern on a frame of this size, black around; as large as fits "
-            "unless --scale says.",
+            help="Centre the pattern on a black frame of this size, as large as fits or as "
+            "--scale says.",
         ),
     ] = None,
     force: Force = False,

@@ -1,4 +1,4 @@
-"""How faults and interrupts of a command reach people: a sentence, and an exit status."""
+"""How errors and interrupts of a command reach people: a sentence, and an exit status."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ from nearfar.errors import KeptInterrupt, NearfarError
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-# Signals to stop that came while a command ran.
+# Signals to stop that arrived while the command ran.
 _stops: list[int] = []
 
 
@@ -26,14 +26,14 @@ def faults_in_sentences() -> Iterator[None]:
     """Turn whatever stops a command into a sentence on stderr and an exit status."""
     try:
         yield
-        # At exit it would be too late to say that a disk or a pipe took nothing.
+        # At exit it would be too late to report that the output could not be written.
         sys.stdout.flush()
     except NearfarError as error:
         _fail(with_flags(str(error)))
     except KeyboardInterrupt as stopped:
         _interrupted(stopped)
     except BrokenPipeError:
-        # Whoever read our output has gone; the interpreter must not complain at exit.
+        # The reader of our output has gone; the interpreter must not complain of it at exit.
         _discard_stdout()
         sys.exit(1)
     except MemoryError as error:
@@ -42,7 +42,7 @@ def faults_in_sentences() -> Iterator[None]:
         raise
     except OSError as error:
         if error.filename is None:
-            # Files have names; faults of writing them are sentences already.
+            # Errors of files name the file; an error without a name is of stdout.
             _discard_stdout()
             _fail(f"stdout could not be written ({error.strerror or error}): send it elsewhere.")
         _fail(
@@ -51,7 +51,7 @@ def faults_in_sentences() -> Iterator[None]:
         )
     except Exception as error:  # A fault of our own still owes the user a sentence.
         if _stops:
-            # A library interrupted while it loads says so in words of its own.
+            # A library that is interrupted while it loads raises an error of its own.
             _interrupted()
         if os.environ.get("NEARFAR_TRACEBACK"):
             raise
@@ -76,14 +76,14 @@ def warnings_in_lines() -> Iterator[None]:
 
 @contextmanager
 def stopped_cleanly() -> Iterator[None]:
-    """Let a command that is told to end remove what it has half-written."""
+    """Raise KeyboardInterrupt on signals to stop, for the command to remove half-written files."""
 
     def stop(number: int, _frame: FrameType | None) -> NoReturn:
         _stops.append(number)
         raise KeyboardInterrupt
 
     usual = (signal.SIG_DFL, signal.default_int_handler)
-    # What is ignored, as under nohup, stays ignored.
+    # Signals that are ignored, as under nohup, stay ignored.
     replaced = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) in usual}
     _stops.clear()
     for number in replaced:

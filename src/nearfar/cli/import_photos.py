@@ -23,7 +23,9 @@ def import_photos(
     ] = None,
     full_scale: Annotated[
         float | None,
-        typer.Option(help="Value of full scale, such as 16383 for 14 bits.", metavar="VALUE"),
+        typer.Option(
+            help="Value of the photos at full scale, such as 16383 for 14 bits.", metavar="VALUE"
+        ),
     ] = None,
     force: Force = False,
     quiet: Quiet = False,

@@ -20,7 +20,7 @@ def info(
     ],
     quiet: Quiet = False,
 ) -> None:
-    """Say what a file holds.
+    """Describe what a file holds.
 
     Example: nearfar info capture.zarr
     """

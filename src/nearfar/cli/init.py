@@ -45,7 +45,7 @@ def init(
         partial.write_text(draft_rig(monitors, cameras), encoding="utf-8")
     say(
         f"{len(monitors)} monitor{'s' * (len(monitors) != 1)} and {len(cameras)} "
-        f"camera{'s' * (len(cameras) != 1)} found, {rig} written: look it over, then nearfar "
+        f"camera{'s' * (len(cameras) != 1)} found, {rig} written: check it, then run nearfar "
         f"preview {rig}",
         quiet=quiet,
     )

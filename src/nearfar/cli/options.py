@@ -27,15 +27,15 @@ def size(text: str | Size) -> Size:
         raise typer.BadParameter(str(error)) from None
 
 
-def scene_names(begun: str) -> list[str]:
-    """Names of scenes that begin so, for shells to complete; of none they try files."""
+def scene_names(start: str) -> list[str]:
+    """Return the scenes whose names start so; where there are none, shells complete files."""
     from nearfar.scenes import SCENES
 
-    return [name for name in SCENES if name.startswith(begun)]
+    return [name for name in SCENES if name.startswith(start)]
 
 
 def keep_input(output: Path, *inputs: Path) -> None:
-    """Refuse an output that is an input of the same command, for --force to replace.
+    """Refuse an output that is an input of the same command, which --force would replace.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def keep_input(output: Path, *inputs: Path) -> None:
 
 
 def keep_for_page(page: Path, *others: Path, force: bool) -> None:
-    """Refuse, before any work, a page that cannot be written, or over another file of the command.
+    """Check, before any work, that a page can be written and is no other file of the command.
 
     Raises
     ------
@@ -66,10 +66,10 @@ def keep_for_page(page: Path, *others: Path, force: bool) -> None:
 
 
 Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print nothing but faults and warnings.")
+    bool, typer.Option("--quiet", "-q", help="Print nothing but errors and warnings.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, alone, on stdout.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN.json", help="Plan to follow.")]
 CapturePath = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Photos of a plan.")]
 NewCapture = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Capture to make.")]

@@ -25,7 +25,7 @@ def plan(
     ],
     photos: Annotated[
         int | None,
-        typer.Option(min=1, help="Choose the best plan of at most so many photos.", metavar="N"),
+        typer.Option(min=1, help="Choose the best plan of at most N photos.", metavar="N"),
     ] = None,
     near: Annotated[
         int | None, typer.Option(min=1, help="W of the near-range window.", metavar="W")
@@ -60,19 +60,20 @@ def plan(
     look: Annotated[
         Path | None,
         typer.Option(
-            help="Plan for the scene that this transport shows: a quick look, few photos "
-            "reconstructed by --method joint.",
+            help="Plan for one scene: a transport reconstructed from few photos of it, by --method "
+            "joint.",
             metavar="TRANSPORT.zarr",
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write the plan here.", metavar="FILE")
+        Path | None,
+        typer.Option("-o", "--output", help="Write the plan to this file.", metavar="FILE"),
     ] = None,
     as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Plan what to show: the best patterns for a number of photos, or the paper's.
+    """Plan what to project: the best patterns for a number of photos, or the paper's.
 
     Example: nearfar plan --projector 128x128 --photos 150 -o plan.json
 

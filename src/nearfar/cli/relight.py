@@ -38,7 +38,10 @@ def relight(
     output: Annotated[Path, typer.Argument(metavar="OUT", help=".npy, .exr, .tiff or .png.")],
     gain: Annotated[
         list[str] | None,
-        typer.Option(help="Gain of a component: direct=1, near=2, far=0.", metavar="NAME=VALUE"),
+        typer.Option(
+            help="Gain of a component: direct=1, near=2 or far=0; may be repeated.",
+            metavar="NAME=VALUE",
+        ),
     ] = None,
     srgb: Annotated[
         bool, typer.Option("--srgb", help="LIGHT is an ordinary sRGB picture.")
@@ -52,7 +55,7 @@ def relight(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Relight the scene under a light: what the camera would see, ambient light apart.
+    """Relight the scene: what the camera would see under a light, without ambient light.
 
     Example: nearfar relight transport.zarr light.png relit.exr --srgb --gain near=2
     """

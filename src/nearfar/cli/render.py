@@ -47,9 +47,9 @@ def render(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute a scene's transport: a built-in one's exactly, a Mitsuba scene's by path tracing.
+    """Compute a scene's transport: exactly, or by path tracing for a Mitsuba scene.
 
-    Components are apart for a built-in scene, together for a Mitsuba scene.
+    The components of a built-in scene are kept apart; a Mitsuba scene's are not known.
 
     Example: nearfar render cornell truth.zarr --projector 64x64
     """

@@ -1,4 +1,4 @@
-"""What a command says: on stdout for people, on stderr what is wrong."""
+"""What a command prints: results on stdout, warnings on stderr."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def say(text: str, *, quiet: bool = False) -> None:
-    """Print a line for people on stdout."""
+    """Print text for people on stdout, unless they want quiet."""
     if not quiet:
         print(text)
 
@@ -22,7 +22,7 @@ def warn(text: str) -> None:
 
 
 def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:
-    """Say what was captured, and warn of saturated photos."""
+    """Print what was captured, and warn of saturated photos."""
     from nearfar.faults.of_capture import find_saturation
 
     for fault in find_saturation(str(output), taken.saturated_share):

@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.cli import separation_steps as steps
 from nearfar.cli.choices import choice
 from nearfar.cli.options import AsJson, Force, Quiet, keep_input, scene_names, size
-from nearfar.cli.saying import say
+from nearfar.cli.saying import say, warn
 from nearfar.progress import progress_bar
 from nearfar.scenes import SCENES
 
@@ -54,8 +54,9 @@ def separate(
         Pattern,
         choice(
             get_args(Pattern),
-            help="Shifted checkerboards, which a projector that is not linear shows as well; "
-            "shifted sinusoids; any half-lit fine patterns, known by their photos only.",
+            help="Shifted checkerboards, which suit projectors that are not linear, too; shifted "
+            "sinusoids; or any fine patterns that light half of the pixels, known by their "
+            "photos only.",
         ),
     ] = "checkerboard",
     side: Annotated[
@@ -95,7 +96,7 @@ def separate(
         ),
     ] = None,
     full_scale: Annotated[
-        float | None, typer.Option(help="Value of full scale of the photos.", metavar="VALUE")
+        float | None, typer.Option(help="Value of the photos at full scale.", metavar="VALUE")
     ] = None,
     scale: Annotated[
         int | None, typer.Option(min=1, help="Export each pattern pixel as N x N.", metavar="N")
@@ -113,7 +114,8 @@ def separate(
     transport: Annotated[
         Path | None,
         typer.Option(
-            help="Compare with the direct, and near and far, light of a reconstruction.",
+            help="Compare with the direct light, and the near and far light together, of a "
+            "reconstruction.",
             metavar="TRANSPORT.zarr",
         ),
     ] = None,
@@ -130,7 +132,13 @@ def separate(
     """
     from nearfar.baselines.separation_photos import separate as take_apart
     from nearfar.files import check_output
-    from nearfar.workflow.separate import describe_separation, is_separation, write_separation
+    from nearfar.workflow.separate import (
+        describe_separation,
+        find_separation_faults,
+        is_separation,
+        summarise_separation,
+        write_separation,
+    )
 
     source = _source({"--rig": rig, "--photos": photos, "--export": export or None})
     taken_only = {"--ambient": ambient, "--black": black, "--black-level": black_level}
@@ -171,11 +179,12 @@ def separate(
         numbers = describe_separation(found, taken, method) | described
         numbers["snr"] = steps.compare(found, truth, transport, exposure, projector)
         write_separation(output, found, numbers, force=force)
-    steps.warn_of_faults(taken, method, rig or str(photos))
+    for fault in find_separation_faults(taken, method, rig or str(photos)):
+        warn(fault)
     if as_json:
         print(json.dumps(numbers, allow_nan=False))
     else:
-        say(steps.lines(numbers, output), quiet=quiet)
+        say(f"{summarise_separation(numbers)}, written to {output}", quiet=quiet)
 
 
 def _source(sources: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Steps of ``nearfar separate``: photos from a rig or a folder, comparison, what is said."""
+"""Steps of ``nearfar separate``: photos from a rig or a folder, and comparison."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from nearfar.baselines.separation import Separation
     from nearfar.baselines.separation_methods import Method
     from nearfar.baselines.separation_photos import PhotosToSeparate
-
-# Groups of photos whose means differ by more than this are out of order, or the rig is unsteady.
-UNSTEADY = 0.05
 
 
 def export_patterns(
@@ -77,7 +74,7 @@ def read_photos(
 def shoot_photos(
     rig: str, projector: Size | None, method: "Method", report: Report
 ) -> "tuple[PhotosToSeparate, dict[str, Any]]":
-    """Shoot a method's patterns; tell what the rig says of itself."""
+    """Shoot a method's patterns; return the photos and the rig's description."""
     from nearfar.baselines.separation_photos import shoot_to_separate
     from nearfar.rigs.opening import open_rig
     from nearfar.scenes import SCENES, sizes
@@ -105,7 +102,7 @@ def compare(
     exposure: float,
     projector: Size | None,
 ) -> dict[str, dict[str, float]]:
-    """SNR of direct and global against what else is known, dB."""
+    """Return the SNR, in dB, of direct and global against what else is known of the scene."""
     from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
     from nearfar.workflow.separate import compare_to_transport, compare_to_truth
@@ -118,38 +115,3 @@ def compare(
     if transport is not None:
         answer["transport"] = compare_to_transport(found, load_transport(transport))
     return answer
-
-
-def warn_of_faults(taken: "PhotosToSeparate", method: "Method", source: str) -> None:
-    """Say what the photos themselves tell of a fault."""
-    from nearfar.baselines.separation_photos import unsteadiness
-    from nearfar.faults.of_capture import find_saturation
-
-    for fault in find_saturation(f"the photos of {source}", taken.saturated_share):
-        warn(str(fault))
-    if taken.dark is None and taken.black_level == 0.0:
-        warn(
-            f"the photos of {source} have none under black and none of ambient light, so ambient "
-            f"light and the camera's black level count as global: add a photo under black."
-        )
-    apart = unsteadiness(taken, method.groups)
-    if apart > UNSTEADY:
-        warn(
-            f"photos of {source} that should sum to one white differ by {apart:.0%}: they may be "
-            f"out of order or of other patterns, or the lamp drifts."
-        )
-
-
-def lines(numbers: dict[str, Any], output: Path) -> str:
-    """Say in lines what was found."""
-    lines = [
-        f"against the {what}: direct {found['direct']:.2f} dB, global {found['global']:.2f} dB"
-        for what, found in numbers["snr"].items()
-    ]
-    share = numbers["direct_share"]
-    lines.append(
-        f"{numbers['patterns']} photos separated"
-        + (f", {share:.1%} of the light direct" if share is not None else "")
-        + f", written to {output}"
-    )
-    return "\n".join(lines)

@@ -24,14 +24,15 @@ def view(
     memory: Annotated[
         str,
         typer.Option(
-            help="Memory for the transport; a larger one is read again for each light at rest.",
+            help="Memory for the transport; a larger one is read again whenever the light comes "
+            "to rest.",
             metavar="2GB",
         ),
     ] = "2GB",
     browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
-    """Relight the scene in the browser: drag a light, and see direct, near and far answer apart.
+    """Relight the scene in the browser: drag a light, and see its direct, near and far parts.
 
     Example: nearfar view transport.zarr
     """

@@ -10,8 +10,9 @@ import numpy as np
 from nearfar.arrays import Size
 from nearfar.baselines.separation import Separation
 from nearfar.baselines.separation_methods import Method
-from nearfar.baselines.separation_photos import PhotosToSeparate
+from nearfar.baselines.separation_photos import PhotosToSeparate, unsteadiness
 from nearfar.errors import InputError
+from nearfar.faults.of_capture import find_saturation
 from nearfar.files import encode_png, new_output, write_picture
 from nearfar.illumination.frames import Shown, draw_frame, fit_frame
 from nearfar.release import version
@@ -22,6 +23,8 @@ from nearfar.workflow.evaluate import snr
 NUMBERS = "numbers.json"
 PICTURES = ("direct", "global")
 ENDINGS = (".npy", ".exr", ".png")
+# Groups of photos that should sum to one white, and differ by a larger share of it, are at fault.
+MAXIMUM_DIFFERENCE_OF_SUMS = 0.05
 # Channels that picture files hold besides .npy, which holds any number.
 DRAWABLE = (1, 3)
 
@@ -98,6 +101,47 @@ def describe_separation(
         "direct_share": direct / total if total > 0 else None,
         "nearfar": version(),
     }
+
+
+def find_separation_faults(taken: PhotosToSeparate, method: Method, source: str) -> list[str]:
+    """Find what is wrong with photos to separate.
+
+    Parameters
+    ----------
+    taken : PhotosToSeparate
+    method : Method
+    source : str
+        Rig or folder that the photos are from, for the sentences.
+
+    Returns
+    -------
+    list of str
+        A sentence for each fault.
+    """
+    found = list(map(str, find_saturation(f"the photos of {source}", taken.saturated_share)))
+    if taken.dark is None and taken.black_level == 0.0:
+        found.append(
+            f"the photos of {source} have none under black and none of ambient light, so ambient "
+            f"light and the camera's black level count as global: add a photo under black."
+        )
+    difference = unsteadiness(taken, method.groups)
+    if difference > MAXIMUM_DIFFERENCE_OF_SUMS:
+        found.append(
+            f"photos of {source} that should sum to one white differ by {difference:.0%}: they may "
+            f"be out of order or of other patterns, or the lamp drifts."
+        )
+    return found
+
+
+def summarise_separation(numbers: Mapping[str, Any]) -> str:
+    """Return in lines what `describe_separation` says, with ``"snr"`` beside it."""
+    lines = [
+        f"against the {what}: direct {found['direct']:.2f} dB, global {found['global']:.2f} dB"
+        for what, found in numbers["snr"].items()
+    ]
+    share = numbers["direct_share"]
+    direct = f", {share:.1%} of the light direct" if share is not None else ""
+    return "\n".join([*lines, f"{numbers['patterns']} photos separated{direct}"])
 
 
 def write_separation(

@@ -9,9 +9,9 @@ pattern grid, bounds the share of camera pixels that go wrong.
 """
 
 import numpy as np
-from scipy.special import ndtr
 
 from nearfar.correspondence.background import SEARCH
+from nearfar.correspondence.normal import normal_cdf
 from nearfar.errors import InputError
 from nearfar.illumination.real_basis import RealBasis
 
@@ -42,7 +42,7 @@ def expected_wrong(basis: RealBasis) -> float:
     waves = np.exp(2j * np.pi * np.outer(down, cycles[:, 0])) * weights
     alike = (waves @ np.exp(2j * np.pi * np.outer(cycles[:, 1], across))).real
     lost = np.maximum(weights.sum() - alike, 0.0)
-    mistaken = ndtr(-SHARE * np.sqrt(lost / 2))
+    mistaken = normal_cdf(-SHARE * np.sqrt(lost / 2))
     mistaken[height - 1, width - 1] = 0.0
     staying = np.outer(1 - np.abs(down) / height, 1 - np.abs(across) / width)
     return float((mistaken * staying).sum())

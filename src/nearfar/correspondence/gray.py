@@ -15,10 +15,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.correspondence.methods import CorrespondenceMethod
+from nearfar.correspondence.normal import normal_cdf
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
@@ -182,14 +182,14 @@ def decode_axis(differences: Floats, noise: Floats, side: int) -> GrayAxis:
     # Between two neighbours the weakest bit is theirs, and does not matter.
     matters = np.ones_like(turned)
     matters[weakest, number] = ~beside
-    false_alarm = np.sum(ndtr(-size / noise) * matters, axis=0)
+    false_alarm = np.sum(normal_cdf(-size / noise) * matters, axis=0)
     contrast = np.min(np.where(matters, size, np.inf), axis=0)
     others = np.where(np.arange(bits)[:, None] == weakest, np.nan, size)
     usual = np.nanmedian(others, axis=0) if bits > 1 else size[0]
     ratio = size[weakest, number] / np.maximum(usual, np.finfo(np.float64).tiny)
     share = np.where(beside & (ratio < SHARED), 0.5 * (1.0 - ratio), 0.0)
     if bits == 1:
-        contrast, false_alarm = size[0], ndtr(-size[0] / noise)
+        contrast, false_alarm = size[0], normal_cdf(-size[0] / noise)
     return GrayAxis(place + share * (neighbour - place), false_alarm, contrast, place < side)
 
 

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.correspondence.methods import CorrespondenceMethod
+from nearfar.correspondence.normal import normal_cdf
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.photometry.measurements import Measurements
@@ -96,7 +96,7 @@ def correspond_by_stripes(
 
     false_alarm: Floats = np.zeros(camera.pixels)
     for axis, length in ((down, plan.projector.height), (across, plan.projector.width)):
-        false_alarm = false_alarm + length * ndtr(-axis.deviations)
+        false_alarm = false_alarm + length * normal_cdf(-axis.deviations)
     confidence = 1.0 - np.minimum(1.0, false_alarm)
     strong, weak = (
         np.maximum(down.strength, across.strength),

@@ -12,6 +12,7 @@ import typer
 
 from nearfar.arrays import parse_bytes
 from nearfar.cli.choices import choice
+from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
 from nearfar.cli.reconstruct import Seen
 from nearfar.cli.reshoot import photo_numbers, take_again
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.estimating import RunningEstimate
     from nearfar.workflow.running import Standing
 
-# Beyond this no photo of a real camera tells anything.
+# No photo of a real camera reaches this.
 MOST_DECIBELS = 120.0
 LIMITS = {
     "noise": "Most of the error is the photos' noise: expose longer, or plan for more photos",
@@ -64,8 +65,8 @@ def acquire(
     until: Annotated[
         float | None,
         typer.Option(
-            help="Stop as soon as pictures that are shot to check by, and never estimated from, "
-            "are relit this well.",
+            help="Stop as soon as check photos, from which nothing is estimated, are relit this "
+            "well.",
             metavar="35dB",
             parser=decibels,
         ),
@@ -73,8 +74,8 @@ def acquire(
     transport: Annotated[
         Path | None,
         typer.Option(
-            help="Make the transport too, by the joint method: what kind each camera pixel is, is "
-            "found while photos are taken.",
+            help="Make the transport too, by the joint method; part of the work is done while "
+            "photos are taken.",
             metavar="TRANSPORT.zarr",
         ),
     ] = None,
@@ -122,7 +123,7 @@ def acquire(
         _check_transport(transport, output, plan_file, Path(rig), force=force)
     with ExitStack() as stack:
         report = stack.enter_context(progress_bar("opening the rig", quiet=quiet))
-        # What was begun with one exposure is gone on with by it.
+        # A capture that is resumed keeps the exposure that it started with.
         before, exposure = begun_capture(output) if resume else (0, None)
         opened = open_rig(
             rig,
@@ -191,14 +192,14 @@ def _finish(
 
 
 def _tell_time(photos: int, seconds: float, *, quiet: bool) -> None:
-    """Say before the first photo how long all are going to take."""
+    """Print before the first photo how long all of them will take."""
     minutes, rest = divmod(round(photos * seconds), 60)
     long = f"{minutes} min {rest} s" if minutes else f"{rest} s"
     say(f"{photos} photos at {seconds:.2f} s each: about {long}", quiet=quiet)
 
 
 def _say_exposure(rig: "Rig", *, quiet: bool) -> None:
-    """Say by what a simulated scene's transport has become that of the photos."""
+    """Print the factor from a simulated scene's transport to that of the photos, if not 1."""
     from nearfar.rigs.simulated.rig import SimulatedRig
 
     if isinstance(rig, SimulatedRig) and rig.exposure != 1.0:
@@ -206,7 +207,7 @@ def _say_exposure(rig: "Rig", *, quiet: bool) -> None:
 
 
 def _refuse(given: Mapping[str, object], why: str) -> None:
-    """Refuse options that were given where they mean nothing."""
+    """Refuse options that mean nothing beside the others."""
     for name, value in given.items():
         if value:
             raise typer.BadParameter(why, param_hint=name)
@@ -226,7 +227,7 @@ def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool)
 
 def _tell(standing: "Standing", *, quiet: bool) -> None:
     if standing.fault is not None:
-        text = standing.fault
+        text = with_flags(standing.fault)
     elif standing.snr > 0:
         text = f"{standing.snr:.1f} dB under pictures to check by"
     else:

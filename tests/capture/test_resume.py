@@ -14,7 +14,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture, white_and_black, write_capture
-from nearfar.capture.begun import LOG
+from nearfar.capture.unfinished import LOG
 from nearfar.errors import (
     ExistingOutputError,
     InputError,

@@ -1,4 +1,4 @@
-"""What photos must be like: each like the first, and together what their plan asks for."""
+"""Checks of photos: each has the shape and type of the first, and all together fit their plan."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def _describe(photo: NDArray[Any]) -> str:
 
 
 def check_photo(photo: NDArray[Any], first: NDArray[Any], scale: float, name: str) -> None:
-    """Refuse a photo that is not like the first, or is beyond its full scale.
+    """Refuse a photo of another shape or type than the first, or beyond full scale.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class Pairing:
     path: Path
 
     def __str__(self) -> str:
-        """Say it in a line."""
+        """Return the pairing in a line."""
         return f"pattern {self.index} ({self.pattern}) <- {self.path.name}"
 
 
@@ -110,7 +110,7 @@ def _listed(folder: Path, list_file: Path) -> list[Path]:
 
 
 def pairing(plan: Plan, index: int, path: Path) -> Pairing:
-    """Say in words which pattern a photo is taken to show."""
+    """Return which pattern a photo is taken to show, in words."""
     return Pairing(index, plan.patterns[index].description, path)
 
 

@@ -36,9 +36,9 @@ def replace_photos(
     numbers : sequence of int
         Which photos.
     photos : iterable of arrays
-        One for each of them, in that order, like those of the capture.
+        One for each of them, in that order, of the shape and type of the capture's.
     conditions, alarms : callable
-        Tell of the last photo, and of all so far.
+        Return the conditions of the last photo, and all alarms so far.
     progress : callable, optional
         Called with "photos" and the share of them that is replaced, 0 to 1, after each.
 
@@ -49,7 +49,7 @@ def replace_photos(
     Raises
     ------
     InputError
-        If there is no such photo in the capture, or a new one is not like the others.
+        If there is no such photo in the capture, or a new one has another shape or type.
     MissingFileError, UnreadableFileError, StorageError
     """
     path = Path(path)
@@ -70,7 +70,7 @@ def replace_photos(
         old = capture.photos
         stored = add_array(group, "photos", old.shape, old.dtype, old.chunks)
         times, saturated = capture.times.copy(), capture.saturated.copy()
-        told = {name: list(values) for name, values in capture.conditions.items()}
+        by_name = {name: list(values) for name, values in capture.conditions.items()}
         remaining = iter(photos)
         for done, number in enumerate(numbers, start=1):
             name = f"photo {number}"
@@ -85,11 +85,11 @@ def replace_photos(
             times[number] = time.time()
             saturated[number] = np.mean(photo >= capture.full_scale)
             for condition, value in conditions().items():
-                told.setdefault(condition, [None] * count)[number] = value
+                by_name.setdefault(condition, [None] * count)[number] = value
             progress("photos", done / len(numbers))
         for name, values in (("time", times), ("saturated", saturated)):
             add_array(group, name, (count,), np.float64, (count,))[:] = values
-        group.attrs["conditions"] = told
+        group.attrs["conditions"] = by_name
         group.attrs["alarms"] = [*capture.alarms, *alarms()]
     return open_capture(path)
 

@@ -54,10 +54,10 @@ class Capture:
     saturated : array
         Share of values at full scale or above in each photo, float64.
     conditions : dict
-        What the rig told of each photo by name, such as its exposure in seconds or a temperature
-        in degrees Celsius; a list with None where it did not.
+        What may change from photo to photo, by name: a list with a value for each photo, such as
+        its exposure in seconds or a temperature in degrees Celsius, or None where it is unknown.
     alarms : tuple of str
-        What the rig told of while the photos were taken, a sentence each.
+        What went wrong while the photos were taken, a sentence each.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def open_capture(path: AnyPath) -> Capture:
 
 
 def is_positive(value: object) -> TypeGuard[float]:
-    """Tell a finite number above 0 from anything else."""
+    """Return whether a value is a finite number above 0."""
     return isinstance(value, int | float) and 0 < value < math.inf
 
 

@@ -11,7 +11,6 @@ import zarr
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
-from nearfar.capture.begun import LOG, Taken, other_plan, require_same_rig
 from nearfar.capture.checks import (
     as_photo,
     check_count,
@@ -29,6 +28,7 @@ from nearfar.capture.store import (
     open_capture,
     white_and_black,
 )
+from nearfar.capture.unfinished import LOG, Taken, other_plan, require_same_rig
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
@@ -49,7 +49,7 @@ from nearfar.release import version
 
 
 class CaptureWriter:
-    """Writes the photos of a plan into a folder, in order; it may be gone on with by another.
+    """Writes the photos of a plan into a folder, in order; another writer may go on with it.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class CaptureWriter:
         conditions : mapping, optional
             What may change from photo to photo, such as temperatures.
         alarms : sequence of str
-            What the rig told of since the photo before.
+            Alarms since the photo before, a sentence each.
 
         Returns
         -------
@@ -194,7 +194,7 @@ class CaptureWriter:
         scale = full_scale_of(first.dtype) if self._scale is None else float(self._scale)
         check_photo(photo, first, scale, called)
         if self._photos is None:
-            self._photos = self._laid_out(first, scale)
+            self._photos = self._create_arrays(first, scale)
         self._first, self._scale = first, scale
         self._photos[number] = photo
         mean = float(photo.mean(dtype=np.float64))
@@ -204,8 +204,7 @@ class CaptureWriter:
         check_order(self._white_black, self._means, self._called)
         saturated = float(np.mean(photo >= scale))
         same = bool(np.array_equal(photo, first))
-        told = (dict(conditions or {}), list(alarms))
-        taken = Taken(time.time(), saturated, mean, same, *told)
+        taken = Taken(time.time(), saturated, mean, same, dict(conditions or {}), list(alarms))
         note(self._folder / LOG, taken._asdict())
         self._taken.append(taken)
         return photo
@@ -216,7 +215,7 @@ class CaptureWriter:
         Parameters
         ----------
         alarms : sequence of str
-            What was told after the last photo.
+            Alarms after the last photo, a sentence each.
 
         Raises
         ------
@@ -237,21 +236,21 @@ class CaptureWriter:
             # First of all: whoever goes on with this knows by it that no photo is missing.
             self._group.attrs["plan"] = json.loads(self._plan.first(count).to_json())
             self._photos.resize((count, *self._photos.shape[1:]))
-        told = {name for taken in self._taken for name in taken.conditions}
+        names = {name for taken in self._taken for name in taken.conditions}
         self._group.attrs["conditions"] = {
-            name: [taken.conditions.get(name) for taken in self._taken] for name in sorted(told)
+            name: [taken.conditions.get(name) for taken in self._taken] for name in sorted(names)
         }
-        told_before = [text for taken in self._taken for text in taken.alarms]
-        self._group.attrs["alarms"] = [*told_before, *alarms]
+        earlier = [text for taken in self._taken for text in taken.alarms]
+        self._group.attrs["alarms"] = [*earlier, *alarms]
         for name in ("time", "saturated"):
             values = np.array([getattr(taken, name) for taken in self._taken])
             add_array(self._group, name, (count,), np.float64, (count,))[:] = values
 
     def _take_up(self, group: zarr.Group) -> None:
-        """Take over what another writer left."""
+        """Go on from what another writer left."""
         folder, before = self._folder, dict(group.attrs)
         self._taken = read_notes(folder / LOG, lambda words: Taken(**words))
-        # What was being written when it was killed.
+        # Files that were being written when it was killed.
         for left in folder.rglob(".*.partial"):
             left.unlink()
         now = json.loads(json.dumps(self._attributes))
@@ -271,8 +270,8 @@ class CaptureWriter:
         self._group = open_durable_store(folder)
         self._photos = add_array(self._group, "photos", photos.shape, photos.dtype, photos.chunks)
 
-    def _laid_out(self, first: NDArray[Any], scale: float) -> zarr.Array[Any]:
-        """Lay out the folder for photos like the first."""
+    def _create_arrays(self, first: NDArray[Any], scale: float) -> zarr.Array[Any]:
+        """Create the arrays for photos of the first one's shape and type."""
         count = len(self._plan.patterns)
         self._group = create_durable_store(
             self._folder, KIND, FORMAT_VERSION, {**self._attributes, "full_scale": scale}

@@ -101,7 +101,7 @@ def acquire(
 
     Example: nearfar acquire plan.json capture.zarr --rig cornell --transport transport.zarr
     """
-    from nearfar.capture.begun import begun_capture
+    from nearfar.capture.unfinished import unfinished_capture
     from nearfar.files import check_resumable
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire as shoot
@@ -124,7 +124,7 @@ def acquire(
     with ExitStack() as stack:
         report = stack.enter_context(progress_bar("opening the rig", quiet=quiet))
         # A capture that is resumed keeps the exposure that it started with.
-        before, exposure = begun_capture(output) if resume else (0, None)
+        before, exposure = unfinished_capture(output) if resume else (0, None)
         opened = open_rig(
             rig,
             made.projector,

@@ -57,7 +57,7 @@ def describe_calibration(found: Findings) -> str:
     known = found.calibration
     half = sum(row[0] < 0.5 for row in known.response)
     lines = [
-        f"half of white's light at level {half} of 255; straightened to "
+        f"half of white's light at level {half} of 255; linearised to "
         f"{known.residual:.2%} of white",
         f"red, green and blue together: {1 + known.superposition:.1%} of white",
         f"camera: black level {known.black:.4g}, {known.gain:.4g} levels an electron, read noise "
@@ -96,7 +96,7 @@ def _projector(findings: Findings) -> Figure:
     residual.axhline(0, color="#888888", linewidth=0.6)
     residual.plot(255 * level, 100 * (light - level), "o-", markersize=3, color=INK)
     residual.set(
-        xlabel="level", ylabel="error, % of white", title="the straightened ramp, less a line"
+        xlabel="level", ylabel="error, % of white", title="the linearised ramp, less a line"
     )
     _widen_y(residual, 1.0)
     return figure

@@ -18,13 +18,13 @@ from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError
 from nearfar.packages import needed
 
-# Assumed where a monitor does not tell, refreshes a second.
-USUAL_REFRESH = 60.0
-# Seconds between looks at the keyboard while waiting.
-LOOK = 0.01
-# Refreshes that are timed, and how far from the nominal rate they may be to be believed.
-TIMED = 24
-BELIEVED = 0.02
+# Refreshes a second of a monitor that does not report them.
+DEFAULT_REFRESH_RATE = 60.0
+# Seconds between readings of the keyboard while waiting.
+KEYBOARD_INTERVAL_SECONDS = 0.01
+# Refreshes that are timed. The measured period counts if it is within this share of the nominal.
+TIMED_REFRESHES = 24
+PERIOD_TOLERANCE = 0.02
 
 VERTICES = """
 #version 330
@@ -94,7 +94,7 @@ class Screen(Protocol):
         ...
 
     def wait(self, seconds: float) -> None:
-        """Let time pass; a user who wants to stop is heard meanwhile.
+        """Let time pass; the user may stop it by Esc.
 
         Raises
         ------
@@ -211,7 +211,7 @@ class Window:
         self._listen()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass, hearing the keyboard.
+        """Let time pass; the user may stop it by Esc.
 
         Raises
         ------
@@ -223,7 +223,7 @@ class Window:
         until = time.monotonic() + seconds
         self._listen()
         while (left := until - time.monotonic()) > 0:
-            time.sleep(min(left, LOOK))
+            time.sleep(min(left, KEYBOARD_INTERVAL_SECONDS))
             self._listen()
 
     def _listen(self) -> None:
@@ -266,11 +266,11 @@ class Window:
                 f"the display has OpenGL 3.3; on Debian, install libgl1-mesa-dri."
             ) from error
         # A window may be open, and scaled by the desktop all the same.
-        shown = glfw.get_framebuffer_size(self._handle)
-        if tuple(shown) != (size.width, size.height):
+        displayed = glfw.get_framebuffer_size(self._handle)
+        if tuple(displayed) != (size.width, size.height):
             raise DeviceError(
-                f"monitor {self.monitor.name} scales its pictures, {shown[0]} x {shown[1]} pixels "
-                f"to {size.width} x {size.height}: set its scale to 100 %."
+                f"monitor {self.monitor.name} scales its pictures, {displayed[0]} x {displayed[1]} "
+                f"pixels to {size.width} x {size.height}: set its scale to 100 %."
             )
         glfw.set_input_mode(self._handle, glfw.CURSOR, glfw.CURSOR_HIDDEN)
         glfw.swap_interval(1)
@@ -285,12 +285,12 @@ class Window:
     def _timed(self, nominal: float) -> float:
         """Time the refreshes: 60 Hz is often 59.94, and a virtual display has none."""
         ends = []
-        for _ in range(TIMED):
+        for _ in range(TIMED_REFRESHES):
             self._glfw.swap_buffers(self._handle)
             self._context.finish()
             ends.append(time.perf_counter())
         measured = float(np.median(np.diff(ends)))
-        return measured if abs(measured / nominal - 1) < BELIEVED else nominal
+        return measured if abs(measured / nominal - 1) < PERIOD_TOLERANCE else nominal
 
     def _on_key(self, _window: Any, key: int, _code: int, action: int, _modifiers: int) -> None:
         if key == self._glfw.KEY_ESCAPE and action == self._glfw.PRESS:
@@ -332,7 +332,7 @@ def _monitors(glfw: Any) -> tuple[Monitor, ...]:
         mode = glfw.get_video_mode(handle)
         x, y = glfw.get_monitor_pos(handle)
         size = Size(mode.size.height, mode.size.width)
-        refresh = float(mode.refresh_rate) or USUAL_REFRESH
+        refresh = float(mode.refresh_rate) or DEFAULT_REFRESH_RATE
         found.append(Monitor(index, _text(glfw.get_monitor_name(handle)), size, (y, x), refresh))
     return tuple(found)
 

@@ -1,4 +1,4 @@
-"""Show a plan's patterns on a rig and keep the photos, on the disk or in memory."""
+"""Display a plan's patterns on a rig and keep the photos, on the disk or in memory."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
-from nearfar.capture.begun import LOG, count_photos, require_same_rig
 from nearfar.capture.observing import CaptureObserver, is_enough, with_predicate
 from nearfar.capture.replacing import replace_photos
+from nearfar.capture.unfinished import LOG, count_photos, require_same_rig
 from nearfar.deprecation import warn_of
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.faults.while_capturing import FaultsWhileCapturing
@@ -37,9 +37,9 @@ def acquire(
 ) -> Capture:
     """Shoot a plan.
 
-    Every photo is on the disk before the next pattern is shown. Until the last they lie in a
-    folder of the capture's name with ``.unfinished`` behind it, and whatever stops the capture,
-    they can be gone on with.
+    Every photo is on the disk before the next pattern is displayed. Until the last one is there,
+    they lie in a folder of the capture's name with ``.unfinished`` behind it, from which a capture
+    that was stopped can be resumed.
 
     Parameters
     ----------
@@ -73,13 +73,13 @@ def acquire(
         If the plan's patterns are complex.
     InputError
         If the rig's projector is not the plan's; if plan or rig are not those of the photos there;
-        if a photo is not like the others.
+        if a photo has another shape or type than the others.
     UselessPhotosError
-        If the photos tell of a projector that is off: they are removed, unless they were there.
+        If the photos show that the projector is off: they are removed, unless they were there.
     NearfarError
         As `nearfar.files.resumable_output`. What was taken is kept, and the message says where.
     KeptInterrupt
-        If it was told to stop; likewise.
+        If the user stopped it; likewise.
 
     Examples
     --------
@@ -97,10 +97,10 @@ def acquire(
     report = as_report(progress, count)
     kept = _Kept(path, count, resume=resume)
     try:
-        with resumable_output(path, kept.worth, resume=resume, force=force) as folder:
+        with resumable_output(path, kept.is_worth_keeping, resume=resume, force=force) as folder:
             writer = _writer(folder, plan, rig, resume=resume)
             kept.folder = folder
-            ended, taken, heard = writer.ended, writer.taken, 0
+            ended, taken, alarms_of_rig = writer.ended, writer.taken, 0
             finder = FaultsWhileCapturing(plan, rig.full_scale)
             finder.recall(writer.read, taken)
             alarms: list[str] = []
@@ -111,10 +111,10 @@ def acquire(
             photos = iter(()) if ended else _photos(plan, rig, taken)
             while not ended:
                 photo = next(photos, None)
-                alarms += rig.alarms[heard:]
-                heard = len(rig.alarms)
+                alarms += rig.alarms[alarms_of_rig:]
+                alarms_of_rig = len(rig.alarms)
                 photo = writer.add(photo, rig.conditions(), alarms)
-                # Of a photo that is good and kept: what it tells is noted with the next.
+                # The photo is good and kept by now: its faults are noted with the next.
                 alarms = [str(fault) for fault in finder.examine(writer.taken - 1, photo)]
                 if on_alarm is not None:
                     for alarm in alarms:
@@ -130,7 +130,7 @@ def acquire(
         if not kept.photos:
             raise
         raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
-    # Until it had its name, it was what the photos would have been gone on with by.
+    # Until the capture had its name, its photos could be resumed by the log alone.
     (path.resolve() / LOG).unlink(missing_ok=True)
     return open_capture(path)
 
@@ -177,7 +177,7 @@ def shoot_again(
         Path(path), capture.rig, rig.describe(), "take them all anew with `force=True`"
     )
     known = [number for number in numbers if 0 <= number < len(plan.patterns)]
-    # Those that follow one another at a time, so that the rig calls them by their numbers.
+    # A run of consecutive ones at a time, so that the rig numbers them as the plan does.
     runs = _runs(known)
     photos = (
         photo for run in runs for photo in rig.shoot((plan.draw(number) for number in run), run[0])
@@ -193,7 +193,7 @@ def shoot_again(
 
 
 def _runs(numbers: Sequence[int]) -> list[list[int]]:
-    """Cut numbers where they do not follow one another."""
+    """Split numbers into runs of consecutive ones."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -215,8 +215,8 @@ class _Kept:
         """Photos that are kept."""
         return count_photos(self.folder) if self.folder is not None else 0
 
-    def worth(self, folder: Path, error: BaseException) -> bool:
-        """Tell whether a folder is worth keeping: one photo is taken again as soon."""
+    def is_worth_keeping(self, folder: Path, error: BaseException) -> bool:
+        """Return whether a folder is worth keeping: a single photo is taken again as quickly."""
         useless = isinstance(error, UselessPhotosError) or count_photos(folder) <= 1
         return self._resume or not useless
 
@@ -235,7 +235,7 @@ def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWrite
 
 
 def hold(plan: Plan, rig: Rig) -> PhotosInMemory:
-    """Shoot a plan and hold its photos in memory: for simulations.
+    """Shoot a plan and keep its photos in memory: for simulations.
 
     Raises
     ------

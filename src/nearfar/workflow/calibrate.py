@@ -3,7 +3,6 @@
 Index convention: photos are (Cy, Cx, channels), raw levels.
 """
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ from nearfar.photometry.response import (
     pair_noise,
     unmix_response,
 )
+from nearfar.progress import Report, ignore_progress
 from nearfar.rigs.base import Photo
 from nearfar.rigs.calibration import Calibration
 from nearfar.rigs.linear import LinearProjector
@@ -28,22 +28,22 @@ from nearfar.rigs.real.rig import RealRig
 
 # The ramp's levels: close together where a gamma is steep.
 RAMP = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
-CHECKS = (32, 64, 96, 128, 160, 192, 224)
-# Levels from this share of full scale on are not trusted.
-CLIPPED = 0.98
+# Levels at which the linearised ramp is checked.
+CHECK_LEVELS = (32, 64, 96, 128, 160, 192, 224)
+# Values from this share of full scale on are clipped.
+CLIPPED_SHARE = 0.98
 # Multiples of the exposure at which the camera's own line is measured, of a light that fits.
-EXPOSURES = (1, 2, 3, 4, 5, 6, 8)
+EXPOSURE_FACTORS = (1, 2, 3, 4, 5, 6, 8)
 # Camera pixels take part where white adds this share of what it adds to the brightest.
-LIT = 0.1
-# Findings beyond these are told.
-NOT_LINEAR = 0.01
-NOT_ADDED = 0.02
-NOT_STRAIGHT = 0.01
-MUCH_AMBIENT = 0.1
-# Primaries that a camera can tell apart.
-CONDITION = 30.0
-
-Step = Callable[[str, float], None]
+LIT_SHARE_OF_BRIGHTEST = 0.1
+# The user is told of errors of the camera's line, as a share of full scale; of primaries that do
+# not add up to white, of the linearised ramp, and of ambient light, as shares of white.
+MAXIMUM_LINE_ERROR = 0.01
+MAXIMUM_SUPERPOSITION_ERROR = 0.02
+MAXIMUM_RAMP_ERROR = 0.01
+MAXIMUM_AMBIENT_SHARE = 0.1
+# A camera tells primaries apart whose mixing matrix has a smaller condition number.
+MAXIMUM_CONDITION_NUMBER = 30.0
 
 
 class Findings(NamedTuple):
@@ -73,7 +73,7 @@ class Findings(NamedTuple):
     notes: tuple[str, ...]
 
 
-def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
+def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
     """Calibrate a rig before a scene that does not move.
 
     Every light is photographed with the pattern grid full of it, in an order by chance, so that a
@@ -84,7 +84,7 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
     rig : RealRig
         Not calibrated yet: its levels go out as they are.
     progress : callable, optional
-        Told what is done, and the share of it.
+        Called with what is being done and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -97,11 +97,11 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
     InputError
         If the photos do not follow the levels.
     """
-    report = progress or (lambda _what, _share: None)
+    report = progress
     levels = rig.synchronise()
     lit = _lit(levels.white - levels.black)
     full = rig.camera.full_scale
-    if float(np.mean(levels.white[lit] >= CLIPPED * full)) > 0.01:
+    if float(np.mean(levels.white[lit] >= CLIPPED_SHARE * full)) > 0.01:
         raise DeviceError(
             f"{rig.camera.name} is saturated by white: give a shorter exposure, or close its "
             f"aperture."
@@ -125,15 +125,15 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
     superposition = float(mixing.sum() / white.sum() - 1)
     notes = []
     shown = np.asarray(RAMP)
-    if abs(superposition) > NOT_ADDED:
+    if abs(superposition) > MAXIMUM_SUPERPOSITION_ERROR:
         notes.append(
             f"red, green and blue together give {1 + superposition:.1%} of white: turn the "
             f"projector's white segment or brightness boost off; until then its levels are "
-            f"straightened for grey alone."
+            f"linearised for grey alone."
         )
     channels = len(white)
-    apart = channels >= 3 and np.linalg.cond(mixing) < CONDITION
-    if apart and abs(superposition) <= NOT_ADDED:
+    apart = channels >= 3 and np.linalg.cond(mixing) < MAXIMUM_CONDITION_NUMBER
+    if apart and abs(superposition) <= MAXIMUM_SUPERPOSITION_ERROR:
         response = unmix_response(shown, light, mixing)
     else:
         response = np.repeat(fit_response(shown, light.sum(axis=-1))[:, np.newaxis], 3, axis=1)
@@ -146,20 +146,20 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
             "the camera's own line and its black level are not known, since its exposure cannot be "
             "set from here, or only to what is too bright: let it be linear, such as by raw files."
         )
-    elif line.worst > NOT_LINEAR:
+    elif line.worst > MAXIMUM_LINE_ERROR:
         notes.append(
             f"the camera's levels miss a line by up to {line.worst:.1%} of full scale: use raw or "
             f"uncompressed files, and turn its gamma off."
         )
     checked = _checked(rig, response, lit, black_light, report)
     residual = float(np.abs(checked[:, 1] - checked[:, 0]).max())
-    if residual > NOT_STRAIGHT:
+    if residual > MAXIMUM_RAMP_ERROR:
         notes.append(
-            f"the straightened ramp still misses a line by up to {residual:.1%} of white: the "
+            f"the linearised ramp still misses a line by up to {residual:.1%} of white: the "
             f"projector's response depends on the picture, so turn what makes it livelier off."
         )
     ambient = float(max(0.0, (black_light.mean() - black) / full))
-    if ambient > MUCH_AMBIENT * float(white.mean()) / full:
+    if ambient > MAXIMUM_AMBIENT_SHARE * float(white.mean()) / full:
         notes.append(
             f"light under a black pattern is {ambient * full / float(white.mean()):.0%} of "
             f"white's: darken the room."
@@ -185,7 +185,7 @@ def calibrate(rig: RealRig, progress: Step | None = None) -> Findings:
 def _lit(contrast: Floats) -> NDArray[np.bool_]:
     """Camera pixels that see the projector, (Cy, Cx)."""
     seen = contrast.sum(axis=-1)
-    return np.asarray(seen > LIT * np.quantile(seen, 0.999))
+    return np.asarray(seen > LIT_SHARE_OF_BRIGHTEST * np.quantile(seen, 0.999))
 
 
 def _light(photos: list[Photo], lit: NDArray[np.bool_]) -> Floats:
@@ -195,13 +195,13 @@ def _light(photos: list[Photo], lit: NDArray[np.bool_]) -> Floats:
 
 
 def _camera_line(
-    rig: RealRig, lit: NDArray[np.bool_], light: Floats, report: Step
+    rig: RealRig, lit: NDArray[np.bool_], light: Floats, report: Report
 ) -> tuple[Linearity | None, Floats]:
     camera, shortest = rig.camera, rig.camera.exposure
     if shortest is None or camera.exposure_limits is None:
         return None, np.zeros((0, 2))
-    level = RAMP[max(1, int(np.searchsorted(light, 1 / (1.2 * EXPOSURES[-1]))) - 1)]
-    lengths = [n * shortest for n in EXPOSURES if n * shortest <= camera.exposure_limits[1]]
+    level = RAMP[max(1, int(np.searchsorted(light, 1 / (1.2 * EXPOSURE_FACTORS[-1]))) - 1)]
+    lengths = [n * shortest for n in EXPOSURE_FACTORS if n * shortest <= camera.exposure_limits[1]]
     seconds, photos = [], []
     try:
         for i, length in enumerate(lengths):
@@ -212,7 +212,9 @@ def _camera_line(
         camera.set_exposure(shortest)
     # A glint is saturated long before the rest: the same camera pixels at every exposure.
     while len(photos) > 1:
-        below = np.all([photo < CLIPPED * camera.full_scale for photo in photos], axis=(0, -1))
+        below = np.all(
+            [photo < CLIPPED_SHARE * camera.full_scale for photo in photos], axis=(0, -1)
+        )
         good = lit & below
         if good.sum() > lit.sum() / 2:
             break
@@ -237,23 +239,23 @@ def _dark_pair(rig: RealRig) -> list[Photo]:
 
 
 def _noise(pairs: list[list[Photo]], black: float, full: float) -> tuple[Sensor, Floats]:
-    told = [pair_noise(one, other, full) for one, other in pairs]
-    means = np.concatenate([mean for mean, _ in told])
-    variances = np.concatenate([variance for _, variance in told])
+    groups = [pair_noise(one, other, full) for one, other in pairs]
+    means = np.concatenate([mean for mean, _ in groups])
+    variances = np.concatenate([variance for _, variance in groups])
     return fit_noise(means, variances, black), np.stack([means, variances], axis=-1)
 
 
 def _checked(
-    rig: RealRig, response: Floats, lit: NDArray[np.bool_], black: Floats, report: Step
+    rig: RealRig, response: Floats, lit: NDArray[np.bool_], black: Floats, report: Report
 ) -> Floats:
-    """Show a ramp through the new table; return levels and light, over 255 and white's."""
+    """Photograph a linearised ramp; return levels over 255 and light over white's."""
     linear = LinearProjector(response, rig.layout)
     grid = np.ones(rig.projector, dtype=np.uint8)
     found = []
-    for i, level in enumerate((*CHECKS, 255)):
+    for i, level in enumerate((*CHECK_LEVELS, 255)):
         photo = rig.photograph(linear.draw(np.uint8(level) * grid))
         found.append((level / 255, float((_light([photo], lit) - black).sum())))
-        report("straightened ramp", (i + 1) / (len(CHECKS) + 1))
+        report("linearised ramp", (i + 1) / (len(CHECK_LEVELS) + 1))
     points = np.asarray(found)
     points[:, 1] /= points[-1, 1]
     return points

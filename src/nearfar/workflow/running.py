@@ -1,4 +1,4 @@
-"""How well a capture relights while it goes on, and what limits it.
+"""How well the photos of a capture relight while it goes on, and what limits them.
 
 A few pictures are shot that no estimate sees. Whenever white and black have come by again, the
 transport is estimated from the photos so far, for some rows of the camera, and relit under those
@@ -29,27 +29,28 @@ from nearfar.plan.checks import check_photos, ends
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import HIGHEST, decibels
 
-# Rows of the camera are looked at in bands of so many, so that neighbours can help each other.
-BAND = 8
-# Camera pixels that are looked at.
-PIXELS = 6144
-TURNS = 2
-# The first look needs so many photos.
-FEWEST = 20
-# No twice as many photos gain more than this, dB: how long to wait before looking again.
-FASTEST = 8.0
-# After a look that told nothing the next comes at twice the photos.
-FARTHEST = 8.0
-# An error beyond what was expected by this factor, in power, is the model's.
-BEYOND = 2.0
+# Rows of the camera are estimated in bands of so many, since neighbours help each other.
+ROWS_PER_BAND = 8
+# Camera pixels that are estimated.
+CAMERA_PIXELS = 6144
+SWEEPS = 2
+# The first estimate needs so many photos.
+MINIMUM_PHOTOS = 20
+# Twice as many photos gain this many dB at most: the next estimate waits for as many as are needed
+# at least.
+MAXIMUM_GAIN_DECIBELS = 8.0
+# A target farther away than this counts as this far: the next estimate comes at twice the photos.
+MAXIMUM_MISSING_DECIBELS = 8.0
+# An error of more than this factor of what was expected, in power, is the model's.
+MODEL_ERROR_RATIO = 2.0
 # Without noise in the photos, what is left of the expected error is what was never measured.
-QUIET = 1e-3
+NOISE_FACTOR = 1e-3
 
 Limit = Literal["noise", "model", "photos"]
 
 
 class Standing(NamedTuple):
-    """What a capture would be worth if it ended now.
+    """How well a capture would relight if it ended now.
 
     Attributes
     ----------
@@ -97,7 +98,7 @@ class RunningCheck:
         self._photos: list[NDArray[Any]] = []
         self._rows: Integers = np.zeros(0, dtype=np.int64)
         self._ends = set(ends(plan))
-        self._next = FEWEST + sum(map(len, check_photos(plan).values()))
+        self._next = MINIMUM_PHOTOS + sum(map(len, check_photos(plan).values()))
 
     def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict:
         """Take in a photo, (Cy, Cx, channels); it is enough once the target is reached.
@@ -116,7 +117,7 @@ class RunningCheck:
         if taken not in self._ends or (taken < self._next and not last):
             return Verdict.CONTINUE
         try:
-            self.standing = self._look(taken)
+            self.standing = self._estimate(taken)
         except InputError as error:
             if self.standing is None:
                 raise
@@ -124,12 +125,14 @@ class RunningCheck:
         if self._on_standing is not None:
             self._on_standing(self.standing)
         missing = self._target - self.standing.snr
-        self._next = int(taken * 2 ** (np.clip(missing, 0.0, FARTHEST) / FASTEST))
+        self._next = int(
+            taken * 2 ** (np.clip(missing, 0.0, MAXIMUM_MISSING_DECIBELS) / MAXIMUM_GAIN_DECIBELS)
+        )
         return Verdict.ENOUGH if missing <= 0 else Verdict.CONTINUE
 
-    def _look(self, taken: int) -> Standing:
-        held = PhotosInMemory(self._plan.first(taken), np.stack(self._photos), self._full_scale)
-        photos = remove_drift(held)
+    def _estimate(self, taken: int) -> Standing:
+        kept = PhotosInMemory(self._plan.first(taken), np.stack(self._photos), self._full_scale)
+        photos = remove_drift(kept)
         measurements = measure(photos)
         try:
             q = correspond_by_phase(measurements).q
@@ -137,33 +140,33 @@ class RunningCheck:
             # Too few frequencies to settle q yet.
             return Standing(taken, -HIGHEST, "photos")
         plan = self._plan
-        found = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=TURNS)
-        every = slice(0, held.camera.height)
+        found = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
+        every = slice(0, kept.camera.height)
         values, errors, expected, unmeasured = [], [], 0.0, 0.0
         bars, quiet = ErrorBars(found), ErrorBars(_without_noise(found))
-        for numbers in check_photos(held.plan).values():
+        for numbers in check_photos(kept.plan).values():
             light = self._plan.draw(numbers[0]) / np.float32(255)
-            relit = (found @ light).reshape(*held.camera, -1)
-            shown = photos.read(numbers, every) - _black(measurements)
-            signal, error = (_in_common(part) for part in (shown, shown - relit))
+            relit = (found @ light).reshape(*kept.camera, -1)
+            photographed = photos.read(numbers, every) - _black(measurements)
+            signal, error = (_in_common(part) for part in (photographed, photographed - relit))
             values.append(decibels(signal, max(error, 0.0)))
             errors.append(error)
             expected += float(np.mean(bars.picture(light).astype(np.float64) ** 2))
             unmeasured += float(np.mean(quiet.picture(light).astype(np.float64) ** 2))
         limit: Limit = "photos" if unmeasured > expected / 2 else "noise"
-        if sum(errors) > BEYOND * expected:
+        if sum(errors) > MODEL_ERROR_RATIO * expected:
             limit = "model"
         return Standing(taken, float(np.mean(values)), limit)
 
 
 def some_rows(height: int, width: int) -> Integers:
-    """Choose rows of a camera in bands, spread evenly, about `PIXELS` camera pixels in all."""
-    wanted = min(height, max(BAND, PIXELS // width))
-    bands = max(1, wanted // BAND)
+    """Choose rows of a camera in bands, spread evenly, about `CAMERA_PIXELS` pixels in all."""
+    wanted = min(height, max(ROWS_PER_BAND, CAMERA_PIXELS // width))
+    bands = max(1, wanted // ROWS_PER_BAND)
     if wanted == height:
         return np.arange(height)
     starts = [block.start for block in blocks(height, max(1, height // bands))][:bands]
-    rows = [np.arange(start, min(start + BAND, height)) for start in starts]
+    rows = [np.arange(start, min(start + ROWS_PER_BAND, height)) for start in starts]
     return np.concatenate(rows)
 
 
@@ -180,15 +183,15 @@ def _in_common(photos: Floats) -> float:
 
 
 def _without_noise(found: Transport) -> Transport:
-    """Return what the estimate would believe if its photos had no noise."""
+    """Return the estimate with the posterior that photos without noise would give."""
     posterior = found.posterior
     assert posterior is not None
     return replace(
         found,
-        noise=QUIET * found.noise,
+        noise=NOISE_FACTOR * found.noise,
         posterior=replace(
             posterior,
-            offset_noise=QUIET * posterior.offset_noise,
-            light_noise=QUIET * posterior.light_noise,
+            offset_noise=NOISE_FACTOR * posterior.offset_noise,
+            light_noise=NOISE_FACTOR * posterior.light_noise,
         ),
     )

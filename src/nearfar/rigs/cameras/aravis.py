@@ -36,11 +36,11 @@ STATUSES = {
     7: "the camera stopped",
 }
 BUFFERS = 4
-# Seconds beyond the exposure within which a frame must be here.
-PATIENCE = 2.0
-MICROSECONDS = 1e6
-# How the library names the kinds of its features, by what is written to them.
-KINDS: dict[type, list[str]] = {
+# A frame must be here within the exposure and so many seconds.
+FRAME_TIMEOUT_SECONDS = 2.0
+MICROSECONDS_PER_SECOND = 1e6
+# How the library names the types of features that take a Python value.
+FEATURE_TYPES: dict[type, list[str]] = {
     int: ["integer", "float"],
     float: ["float", "integer"],
     str: ["string"],
@@ -69,10 +69,10 @@ def find() -> list[FoundCamera]:
     library.plain("arv_update_device_list")
     found = []
     for index in range(library.plain("arv_get_n_devices")):
-        told = (
+        words = (
             library.plain(f"arv_get_device_{what}", index) for what in ("id", "vendor", "model")
         )
-        device, vendor, model = ((text or b"").decode(errors="replace") for text in told)
+        device, vendor, model = ((text or b"").decode(errors="replace") for text in words)
         found.append(FoundCamera(NAME, device, f"{vendor} {model}"))
     return found
 
@@ -127,11 +127,11 @@ class AravisCamera(Camera):
             # On machines of several networks, cameras opened without this may send nothing.
             self._library.plain("arv_update_device_list")
             self._camera = self._call("arv_camera_new", device.encode() if device else None)
-            told = [
+            words = [
                 self._call(f"arv_camera_get_{what}", self._camera) or b""
                 for what in ("vendor_name", "model_name", "device_serial_number")
             ]
-            self.name = " ".join(text.decode(errors="replace") for text in told)
+            self.name = " ".join(text.decode(errors="replace") for text in words)
             self._set_up(region, pixel_format)
         except BaseException:
             self.close()
@@ -150,10 +150,10 @@ class AravisCamera(Camera):
         low, high = ctypes.c_double(), ctypes.c_double()
         bounds = "arv_camera_get_exposure_time_bounds"
         self._call(bounds, self._camera, ctypes.byref(low), ctypes.byref(high))
-        return max(low.value, 1.0) / MICROSECONDS, high.value / MICROSECONDS
+        return max(low.value, 1.0) / MICROSECONDS_PER_SECOND, high.value / MICROSECONDS_PER_SECOND
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers of the camera."""
+        """Return what a capture remembers of the camera."""
         return {
             **super().describe(),
             "driver": NAME,
@@ -164,15 +164,15 @@ class AravisCamera(Camera):
         }
 
     def conditions(self) -> dict[str, float]:
-        """Exposure in seconds as the camera tells it, and its temperature where it has one."""
-        told = {}
+        """Return the exposure in seconds, and the temperature where the camera reports one."""
+        found = {}
         if self.exposure is not None:
             microseconds = self._call("arv_camera_get_exposure_time", self._camera)
-            told["exposure"] = microseconds / MICROSECONDS
+            found["exposure"] = microseconds / MICROSECONDS_PER_SECOND
         if self._has("DeviceTemperature"):
             name = b"DeviceTemperature"
-            told["temperature"] = self._call("arv_camera_get_float", self._camera, name)
-        return told
+            found["temperature"] = self._call("arv_camera_get_float", self._camera, name)
+        return found
 
     def close(self) -> None:
         """Give the camera back."""
@@ -209,11 +209,12 @@ class AravisCamera(Camera):
             self._library.call("arv_camera_stop_acquisition", self._camera)
 
     def _pop(self) -> Frame:
-        wait = int(MICROSECONDS * ((self.exposure or 0.0) + PATIENCE))
+        wait = int(MICROSECONDS_PER_SECOND * ((self.exposure or 0.0) + FRAME_TIMEOUT_SECONDS))
         buffer = self._library.plain("arv_stream_timeout_pop_buffer", self._stream, wait)
         if not buffer:
             raise LostPhotoError(
-                f"{self.name} sent no photo within {wait / MICROSECONDS:.1f} s: check its cable"
+                f"{self.name} sent no photo within {wait / MICROSECONDS_PER_SECOND:.1f} s: check "
+                f"its cable"
                 + (", and its trigger." if self._trigger not in {"software", "free"} else ".")
             )
         try:
@@ -248,9 +249,12 @@ class AravisCamera(Camera):
         return levels[..., np.newaxis]
 
     def _set_exposure(self, seconds: float) -> float:
-        name, microseconds = "arv_camera_set_exposure_time", MICROSECONDS * seconds
+        name, microseconds = "arv_camera_set_exposure_time", MICROSECONDS_PER_SECOND * seconds
         self._call(name, self._camera, microseconds)
-        return float(self._call("arv_camera_get_exposure_time", self._camera)) / MICROSECONDS
+        return (
+            float(self._call("arv_camera_get_exposure_time", self._camera))
+            / MICROSECONDS_PER_SECOND
+        )
 
     def _set_up(self, region: Size | None, pixel_format: str | None) -> None:
         # A program that was killed leaves it sending, and it would go on sending there.
@@ -335,7 +339,7 @@ class AravisCamera(Camera):
     def _set_feature(self, name: str, value: bool | float | str) -> None:
         given = value.encode() if isinstance(value, str) else value
         # TOML's 0 and 0.0 are numbers; which of them a feature takes is the camera's affair.
-        kinds = ["boolean"] if isinstance(value, bool) else KINDS[type(value)]
+        kinds = ["boolean"] if isinstance(value, bool) else FEATURE_TYPES[type(value)]
         for kind in kinds:
             number = {"integer": int, "float": float}.get(kind, lambda same: same)(given)
             with suppress(DeviceError):
@@ -350,7 +354,7 @@ class AravisCamera(Camera):
             return self._library.call(name, *arguments)
         except DeviceError as error:
             raise DeviceError(
-                f"{self.name} does not do as told ({error}): check its cable, and that no other "
+                f"{self.name} does not obey ({error}): check its cable, and that no other "
                 f"program uses it."
             ) from None
 

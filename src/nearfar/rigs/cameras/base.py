@@ -17,15 +17,15 @@ from nearfar.errors import DeviceError, InputError, LostPhotoError
 from nearfar.photometry.exposures import Sensor, average, merge_exposures
 from nearfar.rigs.base import MAXIMUM_TRIES, Photo
 
-# Auto-exposure: the brightest light is to reach this share of full scale ...
-BRIGHT = 0.8
-# ... but for this share of values, which may be glints.
-GLINTS = 1e-3
-# Where as much is clipped the light can only be guessed.
-CLIPPED = 0.98
-STEPS = 10
-# An exposure this close to what is wanted will do.
-CLOSE = 0.05
+# Auto-exposure brings the brightest values to this share of full scale ...
+BRIGHT_SHARE = 0.8
+# ... all but this share of values, which may be glints.
+GLINTS_SHARE = 1e-3
+# From this share of full scale on values are clipped, and the light can only be guessed.
+CLIPPED_SHARE = 0.98
+MAXIMUM_EXPOSURE_STEPS = 10
+# An exposure this close to the wanted one, as a share of it, will do.
+EXPOSURE_TOLERANCE = 0.05
 
 Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -91,23 +91,23 @@ class Camera(ABC):
         return None
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers of the camera: what stays as it is, as JSON."""
+        """Return what a capture remembers of the camera: what stays as it is, as JSON."""
         return {"name": self.name, "frames": self._frames, "bracket": list(self._bracket)}
 
     def conditions(self) -> dict[str, float]:
-        """Tell what may change from photo to photo, such as temperatures in degrees Celsius."""
+        """Return what may change from photo to photo, such as temperatures in degrees Celsius."""
         return {}
 
     def close(self) -> None:  # noqa: B027
         """Give the device back."""
 
     def set_exposure(self, seconds: float) -> float:
-        """Set the exposure; return what the camera made of it, in seconds.
+        """Set the exposure; return the one that the camera really has, in seconds.
 
         Raises
         ------
         InputError
-            If the camera cannot expose so long or so short, or not be told to.
+            If the camera cannot expose so long or so short, or its exposure cannot be set.
         """
         limits = self.exposure_limits
         if limits is None:
@@ -189,21 +189,23 @@ class Camera(ABC):
         shortest, longest = limits
         factor = max(self._bracket)
         wanted = min(max(rounded(math.sqrt(shortest * longest)), shortest), longest / factor)
-        for _ in range(STEPS):
+        for _ in range(MAXIMUM_EXPOSURE_STEPS):
             exposure = self.set_exposure(wanted)
             frame = self.take_surely()
-            brightest = float(np.quantile(frame, 1.0 - GLINTS))
+            brightest = float(np.quantile(frame, 1.0 - GLINTS_SHARE))
             reached = (brightest - self.sensor.black) / (self.full_scale - self.sensor.black)
-            better = exposure * (BRIGHT / max(reached, 0.02) if reached < CLIPPED else 0.25)
+            better = exposure * (
+                BRIGHT_SHARE / max(reached, 0.02) if reached < CLIPPED_SHARE else 0.25
+            )
             wanted = min(max(rounded(better), shortest), longest / factor)
-            if abs(wanted / exposure - 1) < CLOSE:
+            if abs(wanted / exposure - 1) < EXPOSURE_TOLERANCE:
                 break
-        if reached >= CLIPPED:
+        if reached >= CLIPPED_SHARE:
             raise DeviceError(
                 f"{self.name} is saturated by white even at {exposure:g} s: close its aperture, "
                 f"or make the projector darker."
             )
-        if reached < BRIGHT / 8:
+        if reached < BRIGHT_SHARE / 8:
             raise DeviceError(
                 f"{self.name} sees next to nothing of white even at {exposure:g} s: open its "
                 f"aperture, take its cap off, and look where it points."
@@ -211,7 +213,7 @@ class Camera(ABC):
         return exposure
 
     def _set_exposure(self, seconds: float) -> float:
-        """Tell the device."""
+        """Set the device's exposure; return the one that it really has."""
         raise NotImplementedError
 
     def _averaged(self) -> Photo:

@@ -23,10 +23,10 @@ SETTINGS = """\
 # patience = 30.0
 """
 ENDINGS = (*PICTURE_ENDINGS, *RAW_ENDINGS, ".jpg", ".jpeg")
-# Seconds between looks; network folders tell nobody what comes.
-LOOK = 0.05
-# A file that has not grown for so many looks, and can be read, is whole.
-STILL = 3
+# Seconds between listings of the folder; network folders do not notify of new files.
+LISTING_INTERVAL_SECONDS = 0.05
+# A file that has kept its size for so many listings is whole.
+LISTINGS_OF_ONE_SIZE = 3
 
 
 class FolderCamera(Camera):
@@ -42,7 +42,7 @@ class FolderCamera(Camera):
     patience : float
         Seconds to wait for a photo.
     full_scale : float, optional
-        Level at which a photo is saturated, where its file does not tell.
+        Level at which a photo is saturated, where its file does not say so.
     frames : int
         As `Camera`.
 
@@ -77,14 +77,14 @@ class FolderCamera(Camera):
 
     @property
     def full_scale(self) -> float:
-        """Level at which a photo is saturated; the first photo tells."""
+        """Level at which a photo is saturated; found by the first photo."""
         if self._full_scale is None:
             self.take_surely()
         assert self._full_scale is not None
         return self._full_scale
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers of the camera."""
+        """Return what a capture remembers of the camera."""
         return {**super().describe(), "driver": NAME, "command": self._command}
 
     def take(self) -> Frame:
@@ -138,7 +138,7 @@ class FolderCamera(Camera):
     def _next(self, before: set[str]) -> Path:
         """Wait for a file that was not there, and until it is whole."""
         until = time.monotonic() + self._patience
-        size, still = -1, 0
+        size, unchanged = -1, 0
         while time.monotonic() < until:
             new = sorted(self._files() - before)
             if len(new) > 1:
@@ -154,11 +154,11 @@ class FolderCamera(Camera):
                         f"write one file a photo, raw alone."
                     )
                 now = _size(path)
-                still = still + 1 if now == size and now > 0 else 0
+                unchanged = unchanged + 1 if now == size and now > 0 else 0
                 size = now
-                if still >= STILL:
+                if unchanged >= LISTINGS_OF_ONE_SIZE:
                     return path
-            time.sleep(LOOK)
+            time.sleep(LISTING_INTERVAL_SECONDS)
         raise LostPhotoError(
             f"no photo came into {self._path} within {self._patience:g} s: check that the camera "
             f"writes there."

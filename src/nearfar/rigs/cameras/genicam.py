@@ -16,8 +16,9 @@ from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, PositiveLevel
 from nearfar.rigs.cameras.pixel_formats import parse_pixel_format
 
 NAME = "harvesters"
-PATIENCE = 2.0
-MICROSECONDS = 1e6
+# A frame must be here within the exposure and so many seconds.
+FRAME_TIMEOUT_SECONDS = 2.0
+MICROSECONDS_PER_SECOND = 1e6
 
 
 class HarvestersCamera(Camera):
@@ -88,10 +89,10 @@ class HarvestersCamera(Camera):
         """Shortest and longest exposure in seconds."""
         with self._in_sentences():
             node = self._nodes.ExposureTime
-            return max(node.min, 1.0) / MICROSECONDS, node.max / MICROSECONDS
+            return max(node.min, 1.0) / MICROSECONDS_PER_SECOND, node.max / MICROSECONDS_PER_SECOND
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers of the camera."""
+        """Return what a capture remembers of the camera."""
         return {
             **super().describe(),
             "driver": NAME,
@@ -100,9 +101,9 @@ class HarvestersCamera(Camera):
         }
 
     def conditions(self) -> dict[str, float]:
-        """Exposure in seconds as the camera tells it."""
+        """Return the exposure that the camera reports, in seconds."""
         with self._in_sentences():
-            return {"exposure": self._nodes.ExposureTime.value / MICROSECONDS}
+            return {"exposure": self._nodes.ExposureTime.value / MICROSECONDS_PER_SECOND}
 
     def close(self) -> None:
         """Give the camera back."""
@@ -116,7 +117,7 @@ class HarvestersCamera(Camera):
         """Take a frame by a software trigger; raises as `Camera.take`."""
         with self._in_sentences():
             self._nodes.TriggerSoftware.execute()
-            wait = (self.exposure or 0.0) + PATIENCE
+            wait = (self.exposure or 0.0) + FRAME_TIMEOUT_SECONDS
             with self._acquirer.fetch(timeout=wait) as buffer:
                 part = buffer.payload.components[0]
                 height, width = part.height, part.width
@@ -154,8 +155,8 @@ class HarvestersCamera(Camera):
 
     def _set_exposure(self, seconds: float) -> float:
         with self._in_sentences():
-            self._nodes.ExposureTime.value = seconds * MICROSECONDS
-            return float(self._nodes.ExposureTime.value) / MICROSECONDS
+            self._nodes.ExposureTime.value = seconds * MICROSECONDS_PER_SECOND
+            return float(self._nodes.ExposureTime.value) / MICROSECONDS_PER_SECOND
 
     @contextmanager
     def _in_sentences(self) -> Iterator[None]:
@@ -166,7 +167,7 @@ class HarvestersCamera(Camera):
         except self._faults as error:
             words = " ".join(str(error).split()).rstrip(".")
             raise DeviceError(
-                f"{self.name} does not do as told ({words}): check its cable, and that no other "
+                f"{self.name} does not obey ({words}): check its cable, and that no other "
                 f"program uses it."
             ) from None
 

@@ -20,14 +20,14 @@ SETTINGS = """\
 # Settings by gphoto2's names; 'gphoto2 --list-config' lists them.
 # settings = { iso = "100", "f-number" = "f/8" }
 """
-# What cameras of several makers call the same.
+# Names of the same setting on cameras of several makers.
 SHUTTER = ("shutterspeed", "shutterspeed2")
 QUALITY = ("imageformat", "imagequality")
 RAW = re.compile(r"^(raw|nef|nef \(raw\)|arw)$", re.IGNORECASE)
 TARGET = ("capturetarget", re.compile(r"internal ram|sdram", re.IGNORECASE))
 SPEED = re.compile(r"^(?P<over>[\d.]+)(/(?P<under>[\d.]+))?\s*s?$")
-# Faults after which the camera may do it another time.
-PASSING = (-1, -7, -10, -110)
+# Error codes after which another try may succeed.
+TRANSIENT_ERRORS = (-1, -7, -10, -110)
 
 
 def find() -> list[FoundCamera]:
@@ -52,7 +52,7 @@ class GphotoCamera(Camera):
     Parameters
     ----------
     device : str, optional
-        Port, as `find` tells it; the first camera that is found if left out.
+        Port, as `find` returns it; the first camera that is found if left out.
     settings : mapping
         gphoto2's settings to set first, such as iso or f-number.
     frames, bracket
@@ -91,7 +91,7 @@ class GphotoCamera(Camera):
 
     @property
     def full_scale(self) -> float:
-        """Level at which a photo is saturated; a photo tells."""
+        """Level at which a photo is saturated; found by a photo."""
         if self._full_scale is None:
             self.take_surely()
         assert self._full_scale is not None
@@ -104,7 +104,7 @@ class GphotoCamera(Camera):
         return (min(speeds), max(speeds)) if speeds else None
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers of the camera."""
+        """Return what a capture remembers of the camera."""
         return {**super().describe(), "driver": NAME, "settings": self._settings}
 
     def close(self) -> None:
@@ -141,9 +141,9 @@ class GphotoCamera(Camera):
     def _set_up(self) -> None:
         with self._in_sentences():
             # Nothing on the way slows the card down, and nothing is left on it.
-            self._choose_like(*TARGET)
+            self._choose_matching(*TARGET)
             for name in QUALITY:
-                self._choose_like(name, RAW)
+                self._choose_matching(name, RAW)
         for name, value in self._settings.items():
             self._set(name, str(value))
 
@@ -179,13 +179,13 @@ class GphotoCamera(Camera):
         with self._in_sentences():
             widget.set_value(value)
             self._camera.set_single_config(name, widget)
-            told = str(self._camera.get_single_config(name).get_value())
-        if told != value:
+            kept = str(self._camera.get_single_config(name).get_value())
+        if kept != value:
             raise DeviceError(
-                f"{self.name} keeps {name} at {told} instead of {value}: set it to manual."
+                f"{self.name} keeps {name} at {kept} instead of {value}: set it to manual."
             )
 
-    def _choose_like(self, name: str, wanted: re.Pattern[str]) -> None:
+    def _choose_matching(self, name: str, wanted: re.Pattern[str]) -> None:
         widget = self._widget(name)
         if widget is not None:
             choice = next((c for c in _choices(widget) if wanted.search(c)), None)
@@ -210,16 +210,16 @@ class GphotoCamera(Camera):
     def _fault(self, error: Any) -> DeviceError:
         if error.code == self._gphoto.GP_ERROR_IO_USB_CLAIM:
             return DeviceError(
-                f"{self.name} is held by another program: end it (on many desktops, pkill -f "
+                f"{self.name} is in use by another program: end it (on many desktops, pkill -f "
                 f"gvfs-gphoto2)."
             )
         if error.code == self._gphoto.GP_ERROR_MODEL_NOT_FOUND:
             return DeviceError(
                 "no camera is found: connect it by USB, turn it on, and set it to PTP."
             )
-        kind = LostPhotoError if error.code in PASSING else DeviceError
+        kind = LostPhotoError if error.code in TRANSIENT_ERRORS else DeviceError
         return kind(
-            f"{self.name} does not do as told ({str(error.string).rstrip('.')}): check its cable, "
+            f"{self.name} does not obey ({str(error.string).rstrip('.')}): check its cable, "
             f"battery and card, and that it focuses by hand."
         )
 

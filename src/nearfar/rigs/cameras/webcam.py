@@ -31,10 +31,10 @@ SETTINGS = """\
 # OpenCV's properties without CAP_PROP_.
 # properties = { GAMMA = 100.0, WB_TEMPERATURE = 5000.0 }
 """
-# Video4Linux counts exposures in 100 microseconds.
-TICKS = 1e4
+# Video4Linux counts exposures in units of 100 microseconds.
+EXPOSURE_UNITS_PER_SECOND = 1e4
 MANUAL = 1
-LIMITS = (1e-4, 1.0)
+EXPOSURE_LIMITS_SECONDS = (1e-4, 1.0)
 
 
 def find() -> list[FoundCamera]:
@@ -116,10 +116,10 @@ class OpencvCamera(Camera):
     def exposure_limits(self) -> tuple[float, float] | None:
         """Shortest and longest exposure that such cameras have; None where it cannot be set."""
         can = self._capture.get(self._opencv.CAP_PROP_EXPOSURE) > 0
-        return LIMITS if can else None
+        return EXPOSURE_LIMITS_SECONDS if can else None
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers of the camera."""
+        """Return what a capture remembers of the camera."""
         return {
             **super().describe(),
             "driver": NAME,
@@ -167,11 +167,11 @@ class OpencvCamera(Camera):
 
     def _set_exposure(self, seconds: float) -> float:
         number = self._opencv.CAP_PROP_EXPOSURE
-        if not self._capture.set(number, round(seconds * TICKS)):
+        if not self._capture.set(number, round(seconds * EXPOSURE_UNITS_PER_SECOND)):
             raise DeviceError(f"{self.name} does not let its exposure be set.")
-        # The next frame was begun before.
+        # The exposure of the next frame had started before.
         time.sleep(seconds)
-        return float(self._capture.get(number)) / TICKS
+        return float(self._capture.get(number)) / EXPOSURE_UNITS_PER_SECOND
 
 
 def _opencv() -> ModuleType:

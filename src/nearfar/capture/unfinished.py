@@ -1,4 +1,4 @@
-"""Captures that are under way or were stopped: what is known of their photos."""
+"""Captures that are being taken or were stopped: what is known of their photos."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -15,36 +15,44 @@ LOG = "photos.jsonl"
 
 
 class Taken(NamedTuple):
-    """What is noted of a photo."""
+    """What is noted of a photo; the names are those of the log."""
 
     time: float
     saturated: float
     mean: float
     # Whether it is the first photo again.
     same: bool
-    # What was as it was for this photo alone, such as temperatures.
+    # What may change from photo to photo, such as temperatures.
     conditions: Mapping[str, float] = {}
-    # What the rig told of since the photo before.
+    # Alarms since the photo before, a sentence each.
     alarms: Sequence[str] = ()
 
 
 def count_photos(folder: Path) -> int:
-    """Tell how many photos of a capture that is not finished are on the disk."""
+    """Return how many photos of a capture that is not finished are on the disk."""
     try:
         return (folder / LOG).read_bytes().count(b"\n")
     except FileNotFoundError:
         return 0
 
 
-class Begun(NamedTuple):
-    """What is known of a capture that was begun and not finished."""
+class UnfinishedCapture(NamedTuple):
+    """What is known of a capture that was started and not finished.
+
+    Attributes
+    ----------
+    photos : int
+        How many are on the disk.
+    exposure : float or None
+        In seconds.
+    """
 
     photos: int
     exposure: float | None
 
 
-def begun_capture(path: AnyPath) -> Begun:
-    """Tell of a capture that was begun and not finished; of none, no photos.
+def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
+    """Return what is known of a capture that was started and not finished; of none, no photos.
 
     Raises
     ------
@@ -53,23 +61,25 @@ def begun_capture(path: AnyPath) -> Begun:
     """
     folder = Path(f"{Path(path).resolve()}{UNFINISHED}")
     if not folder.exists():
-        return Begun(0, None)
+        return UnfinishedCapture(0, None)
     exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
-    return Begun(count_photos(folder), exposure if is_positive(exposure) else None)
+    return UnfinishedCapture(count_photos(folder), exposure if is_positive(exposure) else None)
 
 
 def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
-    """Say that a plan is another, or how the same plan was called."""
+    """Return a message that a plan is another, or which option made it so."""
 
-    def shown(plan: object) -> list[Any]:
+    def patterns_of(plan: object) -> list[Any]:
         patterns = plan.get("patterns") if isinstance(plan, Mapping) else None
         return patterns if isinstance(patterns, list) else []
 
     def of_transport(plan: object) -> list[Any]:
-        return [p for p in shown(plan) if not isinstance(p, dict) or p.get("purpose") != "check"]
+        return [
+            p for p in patterns_of(plan) if not isinstance(p, dict) or p.get("purpose") != "check"
+        ]
 
     if of_transport(before) and of_transport(before) == of_transport(now):
-        checked = len(shown(before)) > len(of_transport(before))
+        checked = len(patterns_of(before)) > len(of_transport(before))
         if checked:
             return (
                 f"{folder} was begun with `with_checks(plan)`: give `with_checks(plan)` with "

@@ -15,9 +15,9 @@ pixels: the box, the wedge and the corner together by component, and the corner 
 and two octaves of prior scale. Printed is the share of light that moves between rows, beside the
 share that moves between two halves of the pixels, and by how many octaves prior scales move.
 
-``--quick`` takes smaller versions of the scenes, which need no hours of a cold cache, and 100
-camera pixels of each. Reaches count in projector pixels and decays in cycles per pattern grid, so
-components fitted to small scenes differ in earnest: quick figures show that the fit runs.
+``--quick`` takes smaller versions of the scenes, which are computed in a minute, and 100 camera
+pixels of each. Reaches count in projector pixels, so components that fit small scenes are others:
+quick figures show that the fit runs, not how good the table is.
 """
 
 import argparse

@@ -2,7 +2,7 @@
 
 Run ``python benchmarks/viewer.py``; it needs Chromium. The browser and the server share the
 machine, as they do for a user. Lights that move are of one colour, of several, and all over the
-grid; each figure stands beside what the server alone answers in the same run.
+grid. The rate of the server alone, without a browser, is measured in the same run.
 """
 
 import json
@@ -35,21 +35,21 @@ LIGHTS = {
     "a brush of one colour": {"kind": "paint"},
     "a brush over three colours": {"kind": "paint", "strokes": STROKES},
 }
-# The mouse goes round in the light, once for each time that the screen is drawn.
+# Moves the mouse round in the light, once for each frame of the screen.
 DRAG = """seconds => new Promise(done => {
   const light = document.getElementById('light'), box = light.getBoundingClientRect();
   const count = () => JSON.parse(document.body.dataset.frame).count;
   light.setPointerCapture = () => {};
-  const tell = (kind, turn) => light.dispatchEvent(new PointerEvent(kind, { bubbles: true,
-    pointerId: 1, clientX: box.left + box.width * (0.5 + 0.3 * Math.cos(turn)),
-    clientY: box.top + box.height * (0.5 + 0.3 * Math.sin(turn)) }));
-  tell('pointerdown', 0);
+  const dispatch = (type, angle) => light.dispatchEvent(new PointerEvent(type, { bubbles: true,
+    pointerId: 1, clientX: box.left + box.width * (0.5 + 0.3 * Math.cos(angle)),
+    clientY: box.top + box.height * (0.5 + 0.3 * Math.sin(angle)) }));
+  dispatch('pointerdown', 0);
   const began = performance.now(), before = count();
   const step = now => {
     const passed = (performance.now() - began) / 1000;
-    tell('pointermove', 2 * passed);
+    dispatch('pointermove', 2 * passed);
     if (passed < seconds) return requestAnimationFrame(step);
-    tell('pointerup', 0);
+    dispatch('pointerup', 0);
     done((count() - before) / passed);
   };
   requestAnimationFrame(step);
@@ -57,7 +57,7 @@ DRAG = """seconds => new Promise(done => {
 
 
 def of_the_server(address: str, light: np.ndarray) -> float:
-    """Return the pictures a second that the server answers by itself."""
+    """Return the frames a second that the server sends without a browser."""
     levels = np.rint(65535 * light).astype("<u2")
     text = json.dumps({"number": 1, "shape": [*levels.shape, 1]}).encode()
     text += b" " * (-(4 + len(text)) % 8)
@@ -76,20 +76,20 @@ def main() -> None:
     folder = tempfile.TemporaryDirectory()
     path = Path(folder.name) / "transport.zarr"
     save_transport(random_transport(Size(*PROJECTOR), WINDOW, FAR), path)
-    told, ended = threading.Event(), threading.Event()
+    started, stop = threading.Event(), threading.Event()
     addresses: list[str] = []
 
-    def started(address: str) -> None:
+    def on_start(address: str) -> None:
         addresses.append(address)
-        told.set()
+        started.set()
 
     transport = InteractiveTransport(path)
     threading.Thread(
         target=run_view,
-        args=(transport, ListeningAddress("127.0.0.1", 0), started, ended),
+        args=(transport, ListeningAddress("127.0.0.1", 0), on_start, stop),
         daemon=True,
     ).start()
-    told.wait()
+    started.wait()
     (address,) = addresses
     y, x = np.indices(PROJECTOR)
     spot = (np.hypot(y - 64, x - 64) < PROJECTOR[0] / 6).astype(np.float32)
@@ -103,12 +103,12 @@ def main() -> None:
         for name, state in LIGHTS.items():
             page = browser.new_page(viewport={"width": 1400, "height": 1000})
             page.goto(f"{address}/#{quote(json.dumps(state))}")
-            page.wait_for_selector("body[data-shown]", state="attached")
+            page.wait_for_selector("body[data-frame]", state="attached")
             time.sleep(1)
             print(f"dragged, {name}: {page.evaluate(DRAG, SECONDS):.0f} pictures a second")
             page.close()
         browser.close()
-    ended.set()
+    stop.set()
 
 
 if __name__ == "__main__":

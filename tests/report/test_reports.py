@@ -80,7 +80,7 @@ def test_warnings_stand_in_the_report_and_on_the_terminal(world, tmp_path):
     assert "no cause for concern" not in text
 
 
-def test_what_is_saturated_is_mapped_and_told(world, tmp_path):
+def test_saturated_pixels_are_mapped_and_reported(world, tmp_path):
     plan, _ = choose_plan(PROJECTOR, 40)
     capture = take(plan, world, tmp_path / "c.zarr", exposure=1.8)
     ran = run_nearfar(

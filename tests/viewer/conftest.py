@@ -130,17 +130,17 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
-    """Open the viewer's page; whatever its console says is a failure."""
-    said: list[str] = []
+    """Open the viewer's page; any output on its console is a failure."""
+    console: list[str] = []
     contexts = []
 
     def open_it(address: str, state: Any = None, **options: Any) -> Page:
         context = browser.new_context(viewport={"width": 1300, "height": 900}, **options)
         contexts.append(context)
         page = context.new_page()
-        # Of a file that was refused the browser takes note in words of its own.
-        page.on("console", lambda line: "status of 400" in line.text or said.append(line.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
+        # The browser itself logs the response to a file that was refused.
+        page.on("console", lambda line: "status of 400" in line.text or console.append(line.text))
+        page.on("pageerror", lambda error: console.append(str(error)))
         page.goto(address + "/" + ("#" + quote(json.dumps(state)) if state else ""))
         settled(page)
         return page
@@ -148,4 +148,4 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
     yield open_it
     for context in contexts:
         context.close()
-    assert said == []
+    assert console == []

@@ -1,4 +1,4 @@
-"""Hostile guests of the viewer's server: refused, and it lives."""
+"""Misuse of the viewer's server: hostile requests are refused, and the server goes on."""
 
 import json
 import shutil
@@ -109,7 +109,7 @@ def test_hundreds_of_connections_that_say_nothing_or_do_not_end_keep_nobody_out(
                 first.recv(timeout=30)
 
 
-def test_what_does_not_arrive_in_time_gets_a_sentence(serve_it, monkeypatch):
+def test_an_upload_that_takes_too_long_is_refused(serve_it, monkeypatch):
     monkeypatch.setattr(uploads, "UPLOAD_TIMEOUT_SECONDS", 0.3)
     address = serve_it()
     head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n\r\n"
@@ -122,7 +122,7 @@ def test_what_does_not_arrive_in_time_gets_a_sentence(serve_it, monkeypatch):
     assert b"did not arrive within 0.3 s" in answer
 
 
-def test_a_page_that_goes_while_it_sends_is_no_fault(serve_it, capfd):
+def test_a_page_that_disconnects_during_an_upload_is_no_fault(serve_it, capfd):
     address = serve_it()
     head = f"POST /light.png HTTP/1.1\r\nHost: {address[7:]}\r\nContent-Length: 99\r\n\r\n"
     with ExitStack() as stack:
@@ -191,9 +191,9 @@ def test_a_page_from_elsewhere_is_kept_out(address):
         socket.close()
     policy = urllib.request.urlopen(address + "/", timeout=10)
     with policy:
-        told = policy.headers["Content-Security-Policy"]
-    assert "default-src 'none'" in told
-    assert "unsafe" not in told
+        header = policy.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in header
+    assert "unsafe" not in header
 
 
 def test_elsewhere_a_token_is_asked_for(serve_it):
@@ -231,7 +231,7 @@ def test_elsewhere_a_token_is_asked_for(serve_it):
         socket.recv(timeout=30)
 
 
-def test_a_transport_that_is_damaged_while_it_is_shown_is_told(stored, tmp_path, monkeypatch):
+def test_damage_to_a_transport_on_display_is_reported(stored, tmp_path, monkeypatch):
     path = tmp_path / "t.zarr"
     shutil.copytree(stored, path)
     monkeypatch.setattr(interactive, "MAXIMUM_COARSE_BYTES", 60_000)

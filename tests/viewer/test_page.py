@@ -188,7 +188,7 @@ def test_it_is_used_by_the_keyboard(open_page, address, tmp_path):
             assert named.strip()
 
 
-def test_a_server_that_went_is_told_and_comes_back(open_page, stored, browser):
+def test_the_page_reports_a_lost_server_and_reconnects(open_page, stored, browser):
     from nearfar.viewer.interactive import InteractiveTransport
     from nearfar.viewer.server import ListeningAddress
     from tests.viewer.conftest import served_view

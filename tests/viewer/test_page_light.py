@@ -230,10 +230,10 @@ def test_a_camera_pixel_is_clicked(open_page, address, transport):
     )
     page.wait_for_selector("#row:not([hidden])")
     assert page.inner_text("#pixel") == f"row {y}, column {x}"
-    told = page.inner_text("#pixel-summary")
+    summary = page.inner_text("#pixel-summary")
     q = transport.correspondence[y, x]
-    assert f"q = ({q[0]:.2f}, {q[1]:.2f})" in told
-    assert "confidence" in told
+    assert f"q = ({q[0]:.2f}, {q[1]:.2f})" in summary
+    assert "confidence" in summary
     far = seen(page, "row-far")
     assert far.shape[:2] == tuple(PROJECTOR)
     assert np.ptp(far) > 30

@@ -123,7 +123,7 @@ def served():
     assert faults == []
 
 
-def test_a_browser_sees_and_asks(served):
+def test_a_browser_gets_photos_and_sends_settings(served):
     _, ask, until = served
     page = ask("/").decode()
     assert "<h1>Preview</h1>" in page
@@ -154,17 +154,17 @@ def test_a_real_browser_shows_it(served, tmp_path):
         "--virtual-time-budget=3000", "--dump-dom", ask.address,
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    told = dict(re.findall(r'id="(\w+)"[^>]*>([^<]*)<', done.stdout))
-    assert told["about"].startswith("table camera, 24x32, 1 channel; projector 0: table")
-    assert told["exposure"] == "100 ms"
-    assert told["saturated"] == "0.0 %"
-    assert told["fault"] == ""
-    assert float(told["focus"]) >= 0
+    texts = dict(re.findall(r'id="(\w+)"[^>]*>([^<]*)<', done.stdout))
+    assert texts["about"].startswith("table camera, 24x32, 1 channel; projector 0: table")
+    assert texts["exposure"] == "100 ms"
+    assert texts["saturated"] == "0.0 %"
+    assert texts["fault"] == ""
+    assert float(texts["focus"]) >= 0
     assert re.search(r'src="photo.jpg\?\d+"', done.stdout)
     assert re.search(r'data-pattern="white"[^>]*aria-pressed="true"', done.stdout)
 
 
-def test_faults_are_said_and_it_goes_on(served):
+def test_faults_are_displayed_and_the_preview_goes_on(served):
     camera, ask, until = served
     ask("/settings", {"exposure": 100.0})
     until(lambda state: "cannot expose 100 s" in state["fault"])
@@ -186,7 +186,7 @@ def test_faults_are_said_and_it_goes_on(served):
         ({"stop": True}, {"Content-Type": "text/plain"}, 422),
     ],
 )
-def test_what_cannot_be_asked_is_refused(served, body, headers, status):
+def test_wrong_settings_are_refused(served, body, headers, status):
     _, ask, until = served
     with pytest.raises(urllib.error.HTTPError) as refused:
         ask("/settings", body, **headers)

@@ -353,7 +353,7 @@ def test_what_lies_in_the_folder_is_not_run(address, tmp_path, monkeypatch):
     unpack(ask(address, "/read/light?name=l.npy", encode_npy(light)))
 
 
-def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypatch):
+def test_one_job_runs_at_a_time_even_if_its_page_is_gone(serve_it, lights, monkeypatch):
     import threading
 
     under, most, lock = 0, [], threading.Lock()
@@ -380,7 +380,7 @@ def test_one_thing_is_done_at_a_time_whoever_gives_up(serve_it, lights, monkeypa
     assert max(most) == 1
 
 
-def test_too_much_at_once_is_told_to_wait(serve_it, monkeypatch):
+def test_too_many_requests_at_once_are_refused(serve_it, monkeypatch):
     from concurrent.futures import ThreadPoolExecutor
 
     from nearfar.viewer import jobs, payloads

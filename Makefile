@@ -11,8 +11,10 @@ READY := $(VENV)/.ready
 demo: $(READY)
 	$(BIN)/nearfar demo nearfar-demo --force
 
+# One thread for BLAS: as many processes as processors share the work as it is.
+test: export OPENBLAS_NUM_THREADS := 1
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
+	$(BIN)/python -m pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
 
 # Runs every command and example in them; then open docs/_build/html/index.html.
 docs: $(READY)

@@ -39,7 +39,7 @@ transport.plot.row(5, 6, errors=nearfar.ErrorBars(transport));
 def test_a_notebook_shows_plans_captures_transports_and_progress(tmp_path):
     cells = [cell.strip().replace("PATH", repr(str(tmp_path / "c.zarr"))) for cell in CELLS]
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
-    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute()
 
     def shown(number, kind):
         outputs = notebook.cells[number].outputs

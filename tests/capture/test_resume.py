@@ -3,8 +3,6 @@
 import errno
 import json
 import random
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from itertools import islice
@@ -31,7 +29,9 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
+from tests.cli.conftest import check_done, run_nearfar
 from tests.observers import EndsWhere
+from tests.processes import run_command, start
 from tests.worlds import model_transport
 
 PROJECTOR = Size(16, 20)
@@ -360,34 +360,31 @@ def test_a_torn_line_does_not_spoil_the_next(rig, undisturbed, tmp_path):
     _check_same(open_capture(path), undisturbed)
 
 
-COMMAND = [sys.executable, "-m", "nearfar"]
-
-
 @pytest.mark.slow
 def test_kill_9_at_twenty_moments_costs_nothing(tmp_path):
     generator = random.Random(0)
     plan, scene = tmp_path / "plan.json", tmp_path / "T.npy"
     plan.write_text(paper_plan(PROJECTOR, 13, Size(5, 5)).to_json())
     np.save(scene, np.random.default_rng(0).random((8, 9, 16, 20), dtype=np.float32) / 400)
-    shoot = [*COMMAND, "acquire", str(plan), "--rig", str(scene), "-q"]
+    shoot = ("acquire", plan, "--rig", scene, "-q")
     whole, killed = tmp_path / "whole.zarr", tmp_path / "k" / "killed.zarr"
-    subprocess.run([*shoot, str(whole)], check=True)
+    check_done(run_nearfar(*shoot, whole))
     (tmp_path / "k").mkdir()
     log = tmp_path / "k" / "killed.zarr.unfinished" / LOG
     resume: list[str] = []
     for kill in range(20):
-        process = subprocess.Popen([*shoot, str(killed), *resume])
+        process = start(run_command, *shoot, killed, *resume)
         # At work on its first few photos, of some hundreds in all.
         before = log.read_bytes().count(b"\n") if log.exists() else 0
         while not log.exists() or log.read_bytes().count(b"\n") < before + kill % 3:
-            assert process.poll() is None
+            assert process.exitcode is None
             time.sleep(0.001)
         time.sleep(generator.uniform(0, 0.01))
         process.kill()
-        process.wait()
+        process.join()
         resume = ["--resume"]
     assert not killed.exists()
-    subprocess.run([*shoot, str(killed), *resume], check=True)
+    check_done(run_nearfar(*shoot, killed, *resume))
     one, other = (open_capture(path) for path in (whole, killed))
     np.testing.assert_array_equal(one.photos[:], other.photos[:])
     assert one.plan == other.plan

@@ -13,6 +13,7 @@ from nearfar.transport.exact_store import load_exact
 from tests.absent import need_mitsuba
 from tests.cli.conftest import BY_PAPER, check_done, check_sentence, run_nearfar
 from tests.scenes.mitsuba import descriptions as d
+from tests.waiting import LONGEST_WAIT
 
 need_mitsuba()
 
@@ -149,7 +150,7 @@ def test_without_mitsuba_the_sentence_says_how_to_install_it(
         [sys.executable, "-c", WITHOUT, *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=LONGEST_WAIT,
         check=False,
     )
     assert ran.returncode == 1
@@ -168,7 +169,7 @@ def test_without_llvm_the_command_says_so_and_goes_on(scene: Path, tmp_path: Pat
         env=os.environ | {"DRJIT_LIBLLVM_PATH": "/nothing/libLLVM.so"},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=LONGEST_WAIT,
         check=False,
     )
     assert ran.returncode == 0

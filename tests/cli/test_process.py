@@ -20,6 +20,7 @@ from nearfar.cli.commands import COMMANDS
 from nearfar.cli.faults import STOPS
 from nearfar.release import version
 from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
+from tests.waiting import LONGEST_WAIT
 
 SCRIPT = Path(sys.executable).with_name("nearfar")
 MODULE = (sys.executable, "-m", "nearfar")
@@ -159,7 +160,7 @@ PATIENT = "from nearfar.cli import main\n"
 
 
 def _on_a_terminal(
-    arguments: list[str], *, before: str = PATIENT, patience: float = 60.0
+    arguments: list[str], *, before: str = PATIENT, patience: float = LONGEST_WAIT
 ) -> tuple[int, str]:
     """Run a command with stderr on a pseudo-terminal; return its status and what it wrote."""
     leader, follower = pty.openpty()

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.waiting import LONGEST_WAIT
+
 DUMMY = """
 Section "Device"
   Identifier "device"
@@ -79,7 +81,7 @@ def run_on(display: str, *command: object, **variables: str) -> subprocess.Compl
         env={**os.environ, "DISPLAY": display, **variables},
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=LONGEST_WAIT,
         check=False,
     )
 

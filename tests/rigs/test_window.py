@@ -10,6 +10,7 @@ import pytest
 
 from tests.absent import said_without
 from tests.rigs.displays import need, one_monitor, run_on, two_monitors
+from tests.waiting import LONGEST_WAIT
 
 SHOWN = """
 import sys, mss, numpy as np
@@ -108,12 +109,12 @@ def test_escape_stops_it(display):
     )
     assert waiting.stdout is not None
     assert waiting.stdout.readline() == "shown\n"
-    until = time.monotonic() + 30
+    until = time.monotonic() + LONGEST_WAIT
     while waiting.poll() is None and time.monotonic() < until:
         subprocess.run(["xdotool", "key", "Escape"], env=environment, check=False)
         time.sleep(0.2)
     try:
-        assert waiting.wait(timeout=1) != 0
+        assert waiting.wait(timeout=LONGEST_WAIT) != 0
         assert "KeyboardInterrupt" in waiting.communicate()[1]
     finally:
         if waiting.poll() is None:

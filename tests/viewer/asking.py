@@ -10,6 +10,7 @@ import pytest
 from websockets.sync.client import connect
 
 from nearfar.arrays import Size
+from tests.waiting import LONGEST_WAIT
 
 PROJECTOR, CAMERA = Size(20, 24), Size(30, 42)
 TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2"}
@@ -38,7 +39,7 @@ def message(light, **header):
 
 def ask(address, path, body=None, **headers):
     request = urllib.request.Request(address + path, data=body, headers=headers)
-    with urllib.request.urlopen(request, timeout=30) as response:
+    with urllib.request.urlopen(request, timeout=LONGEST_WAIT) as response:
         return response.read()
 
 
@@ -57,7 +58,7 @@ def socket_of(address, **options):
 
 def frame(socket):
     """Receive a frame; return its header and its parts in photo units."""
-    header, (halves,) = unpack(socket.recv(timeout=30))
+    header, (halves,) = unpack(socket.recv(timeout=LONGEST_WAIT))
     return header, halves.astype(np.float32) / header["scale"]
 
 

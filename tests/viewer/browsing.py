@@ -8,6 +8,7 @@ import numpy as np
 
 from nearfar.files import to_srgb
 from tests.viewer.asking import PROJECTOR
+from tests.waiting import LONGEST_WAIT
 
 
 def pictures(page):
@@ -16,7 +17,7 @@ def pictures(page):
 
 def settled(page):
     """Wait for the exact picture of the newest light, and all that follows from it."""
-    end = time.monotonic() + 30
+    end = time.monotonic() + LONGEST_WAIT
     before = None
     while time.monotonic() < end:
         shown = pictures(page)

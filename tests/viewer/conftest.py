@@ -28,6 +28,7 @@ from nearfar.workflow.reconstruct import reconstruct
 from tests.rigs.displays import need
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import settled
+from tests.waiting import LONGEST_WAIT
 from tests.worlds import model_transport
 
 ANYWHERE = ListeningAddress("127.0.0.1", 0)
@@ -73,12 +74,12 @@ def served_view(
         target=run_view, args=(transport, listening, started, ended), daemon=True
     )
     thread.start()
-    assert there.wait(20)
+    assert there.wait(LONGEST_WAIT)
     try:
         yield addresses[0]
     finally:
         ended.set()
-        thread.join(timeout=20)
+        thread.join(timeout=LONGEST_WAIT)
         assert not thread.is_alive()
 
 

@@ -10,6 +10,7 @@ import pytest
 from nearfar.viewer import server
 from nearfar.viewer.connections import MAXIMUM_WAITING_CONNECTIONS as WAITING
 from nearfar.viewer.server import ListeningAddress, serve
+from tests.waiting import LONGEST_WAIT
 
 # More than the system keeps for who does not read, where it keeps so little.
 LONG, KEPT = 300_000, 2048
@@ -34,14 +35,14 @@ def _asking(address, path, **settings):
     opened = socket.socket()
     for name, value in settings.items():
         opened.setsockopt(socket.SOL_SOCKET, getattr(socket, name), value)
-    opened.settimeout(30)
+    opened.settimeout(LONGEST_WAIT)
     opened.connect(place)
     opened.sendall(f"GET {path} HTTP/1.1\r\nHost: {address[7:]}\r\n\r\n".encode())
     return opened
 
 
 def _is_answered(address):
-    with urllib.request.urlopen(address, timeout=30) as answer:
+    with urllib.request.urlopen(address, timeout=LONGEST_WAIT) as answer:
         return answer.read() == b"here"
 
 

@@ -18,6 +18,7 @@ from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.server import ListeningAddress
 from tests.viewer.asking import PROJECTOR, ask, message, refused, relit, socket_of
 from tests.viewer.conftest import served_view
+from tests.waiting import LONGEST_WAIT
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_messages_that_are_no_light_are_refused(address, lights, sent):
     with socket_of(address) as socket:
         socket.send(sent)
         with pytest.raises(websockets.exceptions.ConnectionClosedError) as closed:
-            socket.recv(timeout=30)
+            socket.recv(timeout=LONGEST_WAIT)
     assert closed.value.rcvd.code == 1008
     assert closed.value.rcvd.reason
     relit(address, lights["spot"])
@@ -53,7 +54,7 @@ def test_messages_that_are_too_large_are_refused(address, lights):
     closed = pytest.raises(websockets.exceptions.ConnectionClosedError)
     with socket_of(address) as socket, closed as gone:
         socket.send(bytes(10**6))
-        socket.recv(timeout=30)
+        socket.recv(timeout=LONGEST_WAIT)
     # The server does not wait for the rest, so its reason may be lost on the way.
     assert gone.value.rcvd is None or gone.value.rcvd.code == 1009
     status, said = refused(address, "/picture.exr", bytes(10**6))
@@ -67,7 +68,7 @@ def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
     with ExitStack() as stack:
         first = stack.enter_context(socket_of(address))
         first.send(message(lights["spot"]))
-        first.recv(timeout=30)
+        first.recv(timeout=LONGEST_WAIT)
         closed = 0
         for _ in range(300):
             socket = stack.enter_context(socket_of(address))
@@ -81,14 +82,14 @@ def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
                 pass
         assert closed >= 300 - 2 * application.MAXIMUM_SESSIONS
         first.send(message(lights["random"]))
-        first.recv(timeout=30)
+        first.recv(timeout=LONGEST_WAIT)
     # Those that went made room.
     relit(address, lights["spot"])
 
 
 def _opened(stack, address, said):
     place = ("127.0.0.1", int(address.rsplit(":", 1)[1]))
-    opened = stack.enter_context(create_connection(place, timeout=30))
+    opened = stack.enter_context(create_connection(place, timeout=LONGEST_WAIT))
     opened.sendall(said.encode())
     return opened
 
@@ -106,7 +107,7 @@ def test_hundreds_of_connections_that_say_nothing_or_do_not_end_keep_nobody_out(
                 relit(address, lights["spot"])
                 assert ask(address, "/main.js")
                 first.send(message(lights["random"]))
-                first.recv(timeout=30)
+                first.recv(timeout=LONGEST_WAIT)
 
 
 def test_an_upload_that_takes_too_long_is_refused(serve_it, monkeypatch):
@@ -189,7 +190,7 @@ def test_a_page_from_elsewhere_is_kept_out(address):
     assert closed.value.response.status_code == 403
     with socket_of(address, origin=address) as socket:
         socket.close()
-    policy = urllib.request.urlopen(address + "/", timeout=10)
+    policy = urllib.request.urlopen(address + "/", timeout=LONGEST_WAIT)
     with policy:
         header = policy.headers["Content-Security-Policy"]
     assert "default-src 'none'" in header
@@ -208,11 +209,11 @@ def test_elsewhere_a_token_is_asked_for(serve_it):
         socket_of(base)
     jar = urllib.request.HTTPCookieProcessor()
     browser = urllib.request.build_opener(jar)
-    with browser.open(address, timeout=10) as page:
+    with browser.open(address, timeout=LONGEST_WAIT) as page:
         # The token is in no address that is passed on.
         assert page.url == base + "/"
         assert b"nearfar view" in page.read()
-    with browser.open(base + "/scene", timeout=10) as scene:
+    with browser.open(base + "/scene", timeout=LONGEST_WAIT) as scene:
         assert json.load(scene)["projector"] == list(PROJECTOR)
     (cookie,) = jar.cookiejar
     assert cookie.has_nonstandard_attr("HttpOnly")
@@ -228,7 +229,7 @@ def test_elsewhere_a_token_is_asked_for(serve_it):
     assert refused(base, "/scene", Cookie=f"{kept}x")[0] == 403
     with socket_of(base, additional_headers={"Cookie": f"{cookie.name}={cookie.value}"}) as socket:
         socket.send(message(np.ones(PROJECTOR)))
-        socket.recv(timeout=30)
+        socket.recv(timeout=LONGEST_WAIT)
 
 
 def test_damage_to_a_transport_on_display_is_reported(stored, tmp_path, monkeypatch):
@@ -240,9 +241,9 @@ def test_damage_to_a_transport_on_display_is_reported(stored, tmp_path, monkeypa
             chunk.unlink()
         with socket_of(address) as socket:
             socket.send(message(np.ones(PROJECTOR)))
-            socket.recv(timeout=30)
+            socket.recv(timeout=LONGEST_WAIT)
             with pytest.raises(websockets.exceptions.ConnectionClosedError) as closed:
-                socket.recv(timeout=30)
+                socket.recv(timeout=LONGEST_WAIT)
         assert closed.value.rcvd.code == 1011
         assert "is damaged" in closed.value.rcvd.reason
         status, said = refused(address, "/row?y=1&x=1")

@@ -13,6 +13,7 @@ from nearfar.illumination.pictures import natural_picture
 from nearfar.viewer import interactive
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, slide, tone
+from tests.waiting import LONGEST_WAIT
 
 pytestmark = pytest.mark.slow
 
@@ -203,7 +204,7 @@ def test_the_page_reports_a_lost_server_and_reconnects(open_page, stored, browse
     port = int(address.rsplit(":", 1)[1])
     with served_view(InteractiveTransport(stored), ListeningAddress("127.0.0.1", port)):
         count = pictures(page)["count"]
-        end = time.monotonic() + 30
+        end = time.monotonic() + LONGEST_WAIT
         while pictures(page)["count"] == count and time.monotonic() < end:
             time.sleep(0.1)
         assert pictures(page)["count"] > count
@@ -218,7 +219,7 @@ def test_large_scenes_are_coarse_while_dragged(open_page, serve_it, monkeypatch,
     assert np.abs(seen(page) - tone(white)).max() <= 1
     page.click("[data-kind=spot]")
     sizes = set()
-    end = time.monotonic() + 20
+    end = time.monotonic() + LONGEST_WAIT
     while time.monotonic() < end and len(sizes) < 2:
         sizes.add(page.evaluate("document.getElementById('picture').width"))
     assert len(sizes) == 2

@@ -11,6 +11,7 @@ from nearfar.illumination.pictures import natural_picture
 from tests.cli.conftest import run_nearfar
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, slide, tone
+from tests.waiting import LONGEST_WAIT
 
 pytestmark = pytest.mark.slow
 
@@ -131,7 +132,7 @@ def test_pictures_are_dropped_and_played(open_page, address, tmp_path):
     np.testing.assert_allclose(light, np.broadcast_to([0, 1, 0], light.shape))
     count = pictures(page)["count"]
     page.click("#play")
-    end = time.monotonic() + 20
+    end = time.monotonic() + LONGEST_WAIT
     shown = set()
     while len(shown) < 3 and time.monotonic() < end:
         shown.add(page.input_value("[data-of=shown]"))
@@ -152,7 +153,7 @@ def test_every_light_plays(open_page, address, kind):
     count = pictures(page)["count"]
     first = seen(page, "light")
     page.click("#play")
-    moved, end = 0, time.monotonic() + 20
+    moved, end = 0, time.monotonic() + LONGEST_WAIT
     # A light that comes round again may look like the first one for a while.
     while time.monotonic() < end and (moved <= 50 or pictures(page)["count"] <= count + 2):
         moved = max(moved, np.abs(seen(page, "light").astype(int) - first).max())

@@ -26,6 +26,7 @@ from tests.absent import said_without
 from tests.cli.conftest import run_nearfar
 from tests.rigs.displays import need
 from tests.rigs.table import TableCamera, TableScreen
+from tests.waiting import LONGEST_WAIT
 
 
 def test_the_statistics_of_a_photo():
@@ -99,11 +100,11 @@ def served():
         data = None if body is None else json.dumps(body).encode()
         headers = {"Content-Type": "application/json", **headers}
         request = urllib.request.Request(addresses[0] + path, data=data, headers=headers)
-        with urllib.request.urlopen(request, timeout=10) as answer:
+        with urllib.request.urlopen(request, timeout=LONGEST_WAIT) as answer:
             return answer.read()
 
     def until(holds):
-        end = time.monotonic() + 20
+        end = time.monotonic() + LONGEST_WAIT
         while time.monotonic() < end:
             state = json.loads(ask("/state"))
             if holds(state):
@@ -118,7 +119,7 @@ def served():
     yield camera, ask, until
     if thread.is_alive():
         ask("/settings", {"stop": True})
-        thread.join(timeout=10)
+        thread.join(timeout=LONGEST_WAIT)
     assert not thread.is_alive()
     assert faults == []
 
@@ -153,7 +154,7 @@ def test_a_real_browser_shows_it(served, tmp_path):
         "chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}",
         "--virtual-time-budget=3000", "--dump-dom", ask.address,
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_WAIT, check=True)
     texts = dict(re.findall(r'id="(\w+)"[^>]*>([^<]*)<', done.stdout))
     assert texts["about"].startswith("table camera, 24x32, 1 channel; projector 0: table")
     assert texts["exposure"] == "100 ms"

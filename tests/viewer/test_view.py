@@ -44,6 +44,7 @@ from tests.viewer.asking import (
     unpack,
 )
 from tests.viewer.conftest import served_view
+from tests.waiting import LONGEST_WAIT
 from tests.worlds import model_transport
 
 # Pictures
@@ -330,7 +331,7 @@ def test_the_command_serves_until_it_is_interrupted(stored):
         address = line.split(" at ")[1].split(",")[0]
         assert json.loads(ask(address, "/scene"))["camera"] == list(CAMERA)
         os.kill(running.pid, signal.SIGINT)
-        rest, faults = running.communicate(timeout=30)
+        rest, faults = running.communicate(timeout=LONGEST_WAIT)
     assert (running.returncode, rest.decode().strip(), faults) == (0, "view ended", b"")
 
 

@@ -24,6 +24,7 @@ from nearfar.transport.store import write_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruct import reconstruct_in_blocks
 from tests.absent import said_without
+from tests.waiting import LONGEST_WAIT
 from tests.workflow.memory import memory_for
 from tests.worlds import model_transport
 
@@ -45,12 +46,19 @@ pytestmark = pytest.mark.slow
 def _cluster(workers):
     script = Path(__file__).with_name("local_cluster.py")
     command = [sys.executable, str(script), str(workers)]
+    # Other threads of BLAS than here, as on other machines.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
     with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command,
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as process:
         yield process.stdout.readline().strip()
         process.stdin.close()
-        process.wait(30)
+        process.wait(LONGEST_WAIT)
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +142,7 @@ def test_a_worker_that_is_killed_costs_its_block(cluster, world, tmp_path):
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     reconstruct_on(cluster, capture, tmp_path / "spread.zarr", method="joint", memory=memory)
-    killer.join(10)
+    killer.join(LONGEST_WAIT)
     assert killed
     assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
 
@@ -233,7 +241,7 @@ def test_a_scheduler_without_workers_is_said(scheduler, world, tmp_path, monkeyp
 
 def _started(client, *command):
     worker = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    client.wait_for_workers(1, timeout=30)
+    client.wait_for_workers(1, timeout=LONGEST_WAIT)
     return worker
 
 
@@ -265,7 +273,7 @@ def test_workers_that_cannot_do_it_are_named(scheduler, world, tmp_path, what):
                 )
         finally:
             worker.terminate()
-            worker.wait(20)
+            worker.wait(LONGEST_WAIT)
     assert _files(tmp_path) == before
 
 

@@ -19,6 +19,8 @@ from nearfar.workflow.evaluate import snr
 from nearfar.workflow.reconstruct import reconstruct
 from nearfar.workflow.running import RunningCheck, some_rows
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def scene():

@@ -103,6 +103,8 @@ def natural_picture(size: AnySize, seed: int, *, colour: bool = False) -> Floats
         shading = 1.0 + slope[0] * down + slope[1] * across
         drawn[box][leaf] = np.clip(tint * shading[leaf][:, None], 0.0, 1.0)
         empty[box] &= ~leaf
+        if not empty.any():
+            break
     drawn[empty] = 0.2
     picture = _averaged(drawn, size)
     return picture if colour else picture[..., 0]

@@ -13,6 +13,7 @@ from nearfar.arrays import Size
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.scenes.mitsuba.transport import render_transport
 from tests.scenes.mitsuba import descriptions as d
+from tests.waiting import LONGEST_WAIT
 
 SCALAR = """
 import json, sys
@@ -35,7 +36,7 @@ def _run(program: str, *arguments: object, library: str = "/nothing/libLLVM.so")
         env=os.environ | {"DRJIT_LIBLLVM_PATH": library},
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=LONGEST_WAIT,
         check=True,
     )
     return ran.stdout

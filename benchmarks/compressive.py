@@ -16,9 +16,9 @@ from nearfar.arrays import Floats
 from nearfar.baselines.choosing import best_share, held_out_share
 from nearfar.baselines.compressive import reconstruct_compressive
 from nearfar.baselines.random_patterns import (
-    answer_in_theory,
     bernoulli_patterns,
     measure_by_rig,
+    measure_without_noise,
 )
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -50,7 +50,7 @@ def main() -> None:
         rig = SimulatedRig(truth, "wedge", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
         measurements = measure_by_rig(rig, patterns)
     else:
-        measurements = answer_in_theory(truth, patterns)
+        measurements = measure_without_noise(truth, patterns)
     started = time.perf_counter()
     choice = best_share(measurements, truth)
     blind = held_out_share(measurements)

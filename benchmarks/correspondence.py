@@ -35,7 +35,7 @@ from nearfar.scenes.description import ByRadiosity
 from nearfar.scenes.optics import pinhole
 from nearfar.scenes.patches import build_patches
 from nearfar.scenes.rays import surface
-from nearfar.scenes.render import SAMPLES
+from nearfar.scenes.render import SAMPLES_PER_SIDE
 
 CASES = (
     *("cornell", "cornell:32x32", "cornell:48x48", "cornell:128x128"),
@@ -54,9 +54,9 @@ def lit_area(name: str, projector: Size, camera: Size) -> Floats:
     everything = surface(scene.parts, range(len(scene.parts)))
     eye = pinhole(scene.projector_view, projector)
     lens = pinhole(scene.camera_view or scene.projector_view, projector)
-    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES)
+    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES_PER_SIDE)
     finest = min(camera.height / projector.height, camera.width / projector.width)
-    samples = max(1, int(np.ceil(SAMPLES / finest)))
+    samples = max(1, int(np.ceil(SAMPLES_PER_SIDE / finest)))
     ends = (eye, projector), (lens, camera)
     seen = gather(everything, scene.parts, patches, *ends, samples=samples)
     return np.asarray(seen.radiosity @ (patches.pixel >= 0).astype(float))

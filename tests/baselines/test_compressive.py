@@ -5,13 +5,13 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.baselines.choosing import best_share, held_out_share
-from nearfar.baselines.compressive import SHARES, reconstruct_compressive, reconstruct_to_noise
+from nearfar.baselines.compressive import SHARES, reconstruct_compressive
 from nearfar.baselines.haar import inverse_haar
 from nearfar.baselines.random_patterns import (
     CompressiveMeasurements,
-    answer_in_theory,
     bernoulli_patterns,
     measure_by_rig,
+    measure_without_noise,
 )
 from nearfar.errors import InputError
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -65,7 +65,7 @@ def test_patterns_are_fair_coins_of_their_seed():
 def test_theory_is_the_transport_times_the_patterns():
     world = _dense_world()
     patterns = bernoulli_patterns(PROJECTOR, 50, seed=0)
-    measurements = answer_in_theory(world, patterns)
+    measurements = measure_without_noise(world, patterns)
     expected = world.far @ patterns.reshape(50, -1).T.astype(np.float32)
     np.testing.assert_allclose(measurements.responses, np.moveaxis(expected, 0, 1), rtol=1e-5)
     assert measurements.photos == 50
@@ -77,21 +77,21 @@ def test_photos_give_the_same_under_ambient_light_and_black_levels():
     camera = QUIET.model_copy(update={"ambient": 0.1, "black_level": 0.05})
     optics = SimulatedProjector(black_level=0.05)
     measurements = measure_by_rig(SimulatedRig(world, "test", optics, camera, 1.0, 0), patterns)
-    theory = answer_in_theory(world, patterns)
+    theory = measure_without_noise(world, patterns)
     assert measurements.photos == 71
     assert np.abs(measurements.responses - theory.responses).max() < 2e-5
 
 
 def test_sparse_rows_are_recovered_from_few_patterns():
     world = _sparse_world()
-    measurements = answer_in_theory(world, bernoulli_patterns(PROJECTOR, 70, seed=0))
+    measurements = measure_without_noise(world, bernoulli_patterns(PROJECTOR, 70, seed=0))
     found = reconstruct_compressive(measurements)
     assert (found.projector, found.camera, found.is_apart) == (PROJECTOR, CAMERA, False)
     assert found.far.dtype == np.float32
     assert _decibels(world.far, found.far) > 80
     # The l1 norm alone takes its toll.
     assert 30 < _decibels(world.far, reconstruct_compressive(measurements, refitted=False).far) < 75
-    too_few = answer_in_theory(world, bernoulli_patterns(PROJECTOR, 8, seed=0))
+    too_few = measure_without_noise(world, bernoulli_patterns(PROJECTOR, 8, seed=0))
     assert _decibels(world.far, reconstruct_compressive(too_few).far) < 30
 
 
@@ -100,7 +100,7 @@ def test_every_row_goes_to_its_own_pixel_and_channel():
     dark = np.array(world.far)
     dark[1, 5] = 0.0
     world = ExactTransport(PROJECTOR, CAMERA, (), (), dark)
-    measurements = answer_in_theory(world, bernoulli_patterns(PROJECTOR, 90, seed=1))
+    measurements = measure_without_noise(world, bernoulli_patterns(PROJECTOR, 90, seed=1))
     told = []
     found = reconstruct_compressive(measurements, progress=told.append)
     assert not found.far[1, 5].any()
@@ -109,35 +109,9 @@ def test_every_row_goes_to_its_own_pixel_and_channel():
         assert _decibels(world.far[channel, pixel], found.far[channel, pixel]) > 60
 
 
-def test_noise_says_how_far_to_go():
-    world = _sparse_world()
-    patterns = bernoulli_patterns(PROJECTOR, 80, seed=0)
-    clean = answer_in_theory(world, patterns)
-    deviation = 1e-3
-    error = np.random.default_rng(5).normal(0, deviation, clean.responses.shape)
-    noisy = CompressiveMeasurements(
-        CAMERA, patterns, (clean.responses + error).astype(np.float32), len(patterns)
-    )
-    found = reconstruct_to_noise(noisy, deviation, refitted=False)
-    lights = patterns.reshape(len(patterns), -1).T.astype(np.float32)
-    responses = np.moveaxis(found.far @ lights, 0, 1)
-    left = np.sqrt(((responses - noisy.responses) ** 2).sum(axis=2) / (len(patterns) - 1))
-    # Below the noise, and above what the next lambda but one would leave.
-    assert (left <= 1.001 * deviation).all()
-    assert (left > 0.3 * deviation).all()
-    assert np.array_equal(
-        found.far, reconstruct_to_noise(noisy, np.full(left.shape, deviation), refitted=False).far
-    )
-    without = reconstruct_to_noise(noisy, deviation / 5, refitted=False)
-    assert np.linalg.norm(
-        without.far @ lights - np.moveaxis(noisy.responses, 1, 0)
-    ) < np.linalg.norm(found.far @ lights - np.moveaxis(noisy.responses, 1, 0))
-    assert _decibels(world.far, found.far) > _decibels(world.far, without.far)
-
-
 def test_the_best_share_is_the_best():
     world = _dense_world(channels=1)
-    measurements = answer_in_theory(world, bernoulli_patterns(PROJECTOR, 80, seed=0))
+    measurements = measure_without_noise(world, bernoulli_patterns(PROJECTOR, 80, seed=0))
     shares = (0.01, 0.3, 0.05)
     choice = best_share(measurements, world, rows=10_000, shares=shares)
     assert choice.shares == tuple(sorted(shares, reverse=True))
@@ -153,7 +127,7 @@ def test_the_best_share_is_the_best():
 
 def test_exposure_scales_the_truth():
     world = _dense_world()
-    theory = answer_in_theory(world, bernoulli_patterns(PROJECTOR, 60, seed=0))
+    theory = measure_without_noise(world, bernoulli_patterns(PROJECTOR, 60, seed=0))
     longer = CompressiveMeasurements(CAMERA, theory.patterns, 2 * theory.responses, 60)
     one = best_share(theory, world, rows=10, shares=[0.01])
     two = best_share(longer, world, rows=10, shares=[0.01], exposure=2.0)
@@ -182,7 +156,7 @@ def test_held_out_patterns_choose_nearly_as_well_as_the_truth():
 def test_faults_are_told_in_a_sentence():
     world = _sparse_world()
     patterns = bernoulli_patterns(PROJECTOR, 20, seed=0)
-    measurements = answer_in_theory(world, patterns)
+    measurements = measure_without_noise(world, patterns)
     with pytest.raises(InputError, match=r"0 random patterns .*: ask for at least 1\.$"):
         bernoulli_patterns(PROJECTOR, 0, seed=0)
     with pytest.raises(InputError, match=r"all patterns are black, .*: draw others\.$"):
@@ -192,11 +166,8 @@ def test_faults_are_told_in_a_sentence():
     for share in (0.0, -1.0, 1.5, float("nan")):
         with pytest.raises(InputError, match=r"gives no lambda: choose one above 0 and up to 1\.$"):
             reconstruct_compressive(measurements, share)
-    for noise in (-1.0, np.ones(3), float("nan")):
-        with pytest.raises(InputError, match=r"the noise is no number .*: give the standard"):
-            reconstruct_to_noise(measurements, noise)
     with pytest.raises(InputError, match=r"the light is 13x16, .*: resize the light"):
-        answer_in_theory(world, bernoulli_patterns(Size(13, 16), 50, seed=0))
+        measure_without_noise(world, bernoulli_patterns(Size(13, 16), 50, seed=0))
     rig = SimulatedRig(world, "test", SimulatedProjector(), QUIET, 1.0, 0)
     with pytest.raises(InputError, match=r"patterns are 13x16, .* is 13x17: draw them of its size"):
         measure_by_rig(rig, bernoulli_patterns(Size(13, 16), 5, seed=0))

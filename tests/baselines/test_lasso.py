@@ -6,7 +6,7 @@ from sklearn.linear_model import Lasso
 
 from nearfar.arrays import Size
 from nearfar.baselines.haar import haar
-from nearfar.baselines.lasso import highest_strength, refit, solve, start
+from nearfar.baselines.lasso import highest_penalty, refit, solve, start
 from nearfar.baselines.random_patterns import bernoulli_patterns
 from nearfar.baselines.sensing import sense
 
@@ -28,30 +28,30 @@ def _problem(count=90, seed=0):
     return rows, patterns, sensing, responses, along
 
 
-def _objective(sensing, responses, coefficients, strength):
+def _objective(sensing, responses, coefficients, penalty):
     coefficients = coefficients.astype(np.float64)
     residual = responses - coefficients @ sensing.columns
-    return 0.5 * (residual**2).sum(axis=1) + strength * np.abs(coefficients).sum(axis=1)
+    return 0.5 * (residual**2).sum(axis=1) + penalty * np.abs(coefficients).sum(axis=1)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.03, 0.003])
 def test_it_finds_a_librarys_minimum(share):
     _, patterns, sensing, responses, _ = _problem()
-    strength = share * highest_strength(start(sensing.columns, responses))
-    found = solve(sensing.columns, responses, strength, tolerance=1e-5)
+    penalty = share * highest_penalty(start(sensing.columns, responses))
+    found = solve(sensing.columns, responses, penalty, tolerance=1e-5)
     oracle = np.zeros_like(found)
     for i in range(ROWS):
         # scikit-learn divides the squares by their number.
         lasso = Lasso(
-            alpha=float(strength[i]) / len(patterns),
+            alpha=float(penalty[i]) / len(patterns),
             fit_intercept=False,
             tol=1e-6,
             max_iter=200_000,
         )
         lasso.fit(sensing.columns[:-1].T.astype(np.float64), responses[i].astype(np.float64))
         oracle[i, :-1] = lasso.coef_
-    ours = _objective(sensing, responses, found, strength)
-    theirs = _objective(sensing, responses, oracle, strength)
+    ours = _objective(sensing, responses, found, penalty)
+    theirs = _objective(sensing, responses, oracle, penalty)
     np.testing.assert_allclose(ours, theirs, rtol=1e-4)
     size = np.linalg.norm(oracle, axis=1)
     assert (np.linalg.norm(found - oracle, axis=1) < 0.01 * size).all()
@@ -59,35 +59,35 @@ def test_it_finds_a_librarys_minimum(share):
 
 def test_every_tolerance_is_kept():
     _, _, sensing, responses, _ = _problem()
-    strength = 0.01 * highest_strength(start(sensing.columns, responses))
+    penalty = 0.01 * highest_penalty(start(sensing.columns, responses))
     best = _objective(
-        sensing, responses, solve(sensing.columns, responses, strength, tolerance=1e-5), strength
+        sensing, responses, solve(sensing.columns, responses, penalty, tolerance=1e-5), penalty
     )
     for tolerance in (1e-1, 1e-2, 1e-3, 1e-4):
-        found = solve(sensing.columns, responses, strength, tolerance)
-        assert (_objective(sensing, responses, found, strength) <= best * (1 + tolerance)).all()
+        found = solve(sensing.columns, responses, penalty, tolerance)
+        assert (_objective(sensing, responses, found, penalty) <= best * (1 + tolerance)).all()
 
 
 def test_a_row_does_not_depend_on_its_company():
     _, _, sensing, responses, _ = _problem()
-    strength = 0.02 * highest_strength(start(sensing.columns, responses))
-    together = solve(sensing.columns, responses, strength, tolerance=1e-5)
+    penalty = 0.02 * highest_penalty(start(sensing.columns, responses))
+    together = solve(sensing.columns, responses, penalty, tolerance=1e-5)
     for i in range(ROWS):
-        alone = solve(sensing.columns, responses[i : i + 1], strength[i : i + 1], tolerance=1e-5)
+        alone = solve(sensing.columns, responses[i : i + 1], penalty[i : i + 1], tolerance=1e-5)
         assert np.linalg.norm(alone - together[i]) < 2e-3 * np.linalg.norm(together[i])
 
 
 def test_above_the_highest_strength_nothing_is_left():
     _, _, sensing, responses, _ = _problem()
-    highest = highest_strength(start(sensing.columns, responses))
+    highest = highest_penalty(start(sensing.columns, responses))
     assert not solve(sensing.columns, responses, 1.001 * highest).any()
     assert solve(sensing.columns, responses, 0.9 * highest).any(axis=1).all()
 
 
 def test_refitting_is_least_squares_on_the_support():
     _, _, sensing, responses, _ = _problem()
-    strength = 0.1 * highest_strength(start(sensing.columns, responses))
-    found = solve(sensing.columns, responses, strength)
+    penalty = 0.1 * highest_penalty(start(sensing.columns, responses))
+    found = solve(sensing.columns, responses, penalty)
     counts = np.count_nonzero(found, axis=1)
     most = int(np.sort(counts)[ROWS // 2])
     fitted = refit(sensing.columns, responses, found, most)
@@ -102,8 +102,8 @@ def test_refitting_is_least_squares_on_the_support():
 
 def test_the_mean_is_not_penalised():
     rows, patterns, sensing, responses, along = _problem()
-    strength = 0.05 * highest_strength(start(sensing.columns, responses))
-    found = sensing.pictures(solve(sensing.columns, responses, strength, tolerance=1e-5), along)
+    penalty = 0.05 * highest_penalty(start(sensing.columns, responses))
+    found = sensing.pictures(solve(sensing.columns, responses, penalty, tolerance=1e-5), along)
     # Of the whole problem, its column of the means included: no overlap is left with the mean's
     # column, lambda with a wavelet in use, and no more with any other.
     lights = patterns.reshape(len(patterns), -1).astype(np.float64)
@@ -112,8 +112,8 @@ def test_the_mean_is_not_penalised():
     overlap = residual @ matrix
     used = np.abs(haar(found).reshape(ROWS, -1)) > 1e-4
     used[:, 0] = False
-    assert np.abs(overlap[:, 0] / np.linalg.norm(matrix[:, 0])).max() < 1e-4 * strength.max()
-    assert (np.abs(overlap[:, 1:]) < 1.01 * strength[:, None]).all()
+    assert np.abs(overlap[:, 0] / np.linalg.norm(matrix[:, 0])).max() < 1e-4 * penalty.max()
+    assert (np.abs(overlap[:, 1:]) < 1.01 * penalty[:, None]).all()
     assert used.any(axis=1).all()
     least = np.where(used, np.abs(overlap), np.inf).min(axis=1)
-    assert (least > 0.99 * strength).all()
+    assert (least > 0.99 * penalty).all()

@@ -8,7 +8,6 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.baselines.brute_force import BruteForce
-from nearfar.baselines.fourier import FullDFT
 from nearfar.baselines.hadamard import Hadamard
 from nearfar.baselines.reference import acquire_reference
 from nearfar.errors import InputError, StorageError
@@ -17,6 +16,7 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact, save_exact
+from tests.baselines.full_dft import FullDFT
 from tests.conftest import QUIET
 
 ACQUISITIONS = (BruteForce, FullDFT, Hadamard)
@@ -115,13 +115,13 @@ def test_held_bounds_memory_and_changes_nothing(kind, tmp_path):
     size = Size(11, 12)
     rig = _rig(_world(size, camera=Size(60, 60), channels=1))
     acquisition = kind(size)
-    free = acquire_reference(acquisition, rig, held=2**30)
+    free = acquire_reference(acquisition, rig, memory=2**30)
     out = np.empty_like(free.far)
     _peak(lambda: list(itertools.islice(rig.shoot(acquisition.patterns()), 3)))
     own = _peak(lambda: [None for _ in rig.shoot(acquisition.patterns())])
     held = 2**20
     # The photos alone are 0.9 to 1.9 MB, the work on them all at once many times that.
-    peak = _peak(lambda: acquire_reference(acquisition, rig, held=held, out=out, folder=tmp_path))
+    peak = _peak(lambda: acquire_reference(acquisition, rig, memory=held, out=out, folder=tmp_path))
     assert peak < own + held
     assert _peak(lambda: acquire_reference(acquisition, rig, out=out.copy())) > own + 4 * held
     np.testing.assert_allclose(out, free.far, atol=1e-7)
@@ -178,4 +178,4 @@ def test_faults_are_told_in_a_sentence(tmp_path):
     with pytest.raises(InputError, match=r"float64 of shape .*: give float32 of shape"):
         acquire_reference(BruteForce(Size(4, 5)), rig, out=np.empty((2, 12, 20)))
     with pytest.raises(StorageError, match=r"cannot be kept in .*: make room or name another"):
-        acquire_reference(BruteForce(Size(4, 5)), rig, held=1, folder=tmp_path / "nowhere")
+        acquire_reference(BruteForce(Size(4, 5)), rig, memory=1, folder=tmp_path / "nowhere")

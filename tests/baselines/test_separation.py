@@ -28,7 +28,7 @@ from nearfar.baselines.separation_photos import (
     PhotosToSeparate,
     separate,
     shoot_to_separate,
-    unsteadiness,
+    spread_of_groups,
 )
 from nearfar.errors import InputError
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -315,13 +315,13 @@ def test_rows_at_a_time_give_the_same(monkeypatch: pytest.MonkeyPatch):
     scene, method = world(), by_checkerboards()
     taken = shoot_to_separate(rig_of(scene, SimulatedCamera()), method.draw(PROJECTOR))
     whole = separate(taken, method.separate)
-    steadiness = unsteadiness(taken, method.groups)
+    steadiness = spread_of_groups(taken, method.groups)
     shares: list[float] = []
     monkeypatch.setattr("nearfar.baselines.separation_photos.BLOCK", 8 * 5 * 3 * 2)
     cut = separate(taken, method.separate, progress=shares.append)
     assert len(shares) == 4
     assert shares[-1] == 1.0
-    assert unsteadiness(taken, method.groups) == pytest.approx(steadiness)
+    assert spread_of_groups(taken, method.groups) == pytest.approx(steadiness)
     for mine, other in zip(cut, whole, strict=True):
         np.testing.assert_array_equal(mine, other)
 
@@ -330,8 +330,8 @@ def test_photos_out_of_order_are_unsteady():
     scene, method = world(), by_checkerboards()
     taken = shoot_to_separate(rig_of(scene, SimulatedCamera()), method.draw(PROJECTOR))
     shuffled = PhotosToSeparate(taken.photos[1:] + taken.photos[:1], taken.full_scale, taken.dark)
-    assert unsteadiness(taken, method.groups) < 0.02
-    assert unsteadiness(shuffled, method.groups) > 0.1
+    assert spread_of_groups(taken, method.groups) < 0.02
+    assert spread_of_groups(shuffled, method.groups) > 0.1
 
 
 @pytest.mark.slow

@@ -1,8 +1,8 @@
 """How strongly to regularise compressive light transport, chosen fairly.
 
-`best_share` looks at the truth and so favours the rival; `held_out_share` needs none: it keeps
-some patterns back and asks which lambda predicts them best. Both try every share of a grid on the
-same random rows, with and without the refit, and name the best.
+`best_share` compares with the truth and so favours the rival. `held_out_share` needs no truth: it
+holds some patterns out and takes the lambda that predicts their responses best. Both try every
+share of a grid on the same random rows, with and without the refit, and return the best.
 
 Index convention: g runs over the shares tried.
 """
@@ -14,19 +14,19 @@ import numpy as np
 
 from nearfar.arrays import Floats, Integers
 from nearfar.baselines.compressive import SHARES, refit_few
-from nearfar.baselines.lasso import highest_strength, settle, start
+from nearfar.baselines.lasso import highest_penalty, settle, start
 from nearfar.baselines.random_patterns import CompressiveMeasurements
 from nearfar.baselines.sensing import sense
 from nearfar.errors import InputError
 from nearfar.transport.exact import ExactTransport
 
-ROWS = 200
+ROWS_TRIED = 200
 # One pattern in so many is held out.
-HELD_OUT = 10
-# Noise that is fitted costs time: no share is tried below one this far under the best, dB.
-FALLEN = 1.5
+PATTERNS_PER_HELD_OUT = 10
+# Fitting noise costs time: the search ends where the score is this far below the best, dB.
+MAXIMUM_DROP = 1.5
 # An exact match has no finite SNR.
-LEAST = 1e-30
+SMALLEST_ENERGY = 1e-30
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Choice:
     ----------
     shares : tuple of float
         lambda as a share of the least that leaves a row without wavelets; those that were tried,
-        down to where the score has fallen by `FALLEN`.
+        down to where the score has fallen by `MAXIMUM_DROP`.
     plain, refitted : tuple of float
         SNR of each share, as the l1 norm has it and refitted, dB.
     """
@@ -63,7 +63,7 @@ def best_share(
     truth: ExactTransport,
     *,
     exposure: float = 1.0,
-    rows: int = ROWS,
+    rows: int = ROWS_TRIED,
     seed: int = 0,
     shares: Sequence[float] = SHARES,
 ) -> Choice:
@@ -107,27 +107,27 @@ def held_out_share(
     measurements: CompressiveMeasurements,
     *,
     held_out: int | None = None,
-    rows: int = ROWS,
+    rows: int = ROWS_TRIED,
     seed: int = 0,
     shares: Sequence[float] = SHARES,
 ) -> Choice:
-    """Try shares on random rows, judged by how well they foretell patterns that were kept back.
+    """Try shares on random rows, judged by how well they predict responses to held-out patterns.
 
     Parameters
     ----------
     measurements : CompressiveMeasurements
     held_out : int, optional
-        Patterns to keep back; one in `HELD_OUT` by default.
+        Patterns to hold out; one in `PATTERNS_PER_HELD_OUT` by default.
     rows, seed, shares
         As `best_share`.
 
     Raises
     ------
     InputError
-        If no pattern is kept back or none is left, or there is no share to try.
+        If no pattern is held out or none is left, or there is no share to try.
     """
     count = len(measurements.patterns)
-    held_out = max(1, count // HELD_OUT) if held_out is None else held_out
+    held_out = max(1, count // PATTERNS_PER_HELD_OUT) if held_out is None else held_out
     if not 1 <= held_out < count:
         raise InputError(
             f"{held_out} of {count} patterns cannot be held out: keep back at least 1 and leave "
@@ -172,7 +172,7 @@ def _try(
     sensing = sense(measurements.patterns[kept])
     responses, along = sensing.project(measurements.rows[chosen][:, kept])
     rows = start(sensing.columns, responses)
-    highest = highest_strength(rows)
+    highest = highest_penalty(rows)
     plain: list[float] = []
     refitted: list[float] = []
     for share in shares:
@@ -181,12 +181,12 @@ def _try(
         for scores, coefficients in zip((plain, refitted), found, strict=True):
             pictures = sensing.pictures(coefficients, along)
             scores.append(judge(pictures.reshape(len(chosen), -1)))
-        if max(plain[-1], refitted[-1]) < max(*plain, *refitted) - FALLEN:
+        if max(plain[-1], refitted[-1]) < max(*plain, *refitted) - MAXIMUM_DROP:
             break
     return Choice(tuple(shares[: len(plain)]), tuple(plain), tuple(refitted))
 
 
 def _decibels(signal: Floats, error: Floats) -> float:
     energies = (float(np.sum(np.square(values, dtype=np.float64))) for values in (signal, error))
-    kept, lost = (max(energy, LEAST) for energy in energies)
+    kept, lost = (max(energy, SMALLEST_ENERGY) for energy in energies)
     return float(10 * np.log10(kept / lost))

@@ -22,13 +22,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from nearfar.arrays import Floats, Integers, blocks, processors
-from nearfar.baselines.lasso import highest_strength, refit, settle, solve, start
+from nearfar.arrays import Floats, blocks, processors
+from nearfar.baselines.lasso import highest_penalty, refit, solve, start
 from nearfar.baselines.random_patterns import (
     CompressiveMeasurements,
-    answer_in_theory,
     bernoulli_patterns,
     measure_by_rig,
+    measure_without_noise,
 )
 from nearfar.baselines.sensing import Sensing, sense
 from nearfar.errors import InputError
@@ -39,11 +39,10 @@ __all__ = [
     "SHARE",
     "SHARES",
     "CompressiveMeasurements",
-    "answer_in_theory",
     "bernoulli_patterns",
     "measure_by_rig",
+    "measure_without_noise",
     "reconstruct_compressive",
-    "reconstruct_to_noise",
     "refit_few",
 ]
 
@@ -57,7 +56,7 @@ BLOCK = 512
 
 Progress = Callable[[float], None]
 
-Solver = Callable[[Sensing, Floats, slice], Floats]
+Solver = Callable[[Sensing, Floats], Floats]
 
 
 def reconstruct_compressive(
@@ -78,7 +77,7 @@ def reconstruct_compressive(
         Fit the coefficients that are kept by least squares, where a row keeps at most half
         as many as there are patterns.
     progress : callable, optional
-        Told the share of rows done.
+        Called with the share of rows done.
 
     Returns
     -------
@@ -93,60 +92,10 @@ def reconstruct_compressive(
     if not 0.0 < share <= 1.0:
         raise InputError(f"a share of {share} gives no lambda: choose one above 0 and up to 1.")
 
-    def solver(sensing: Sensing, responses: Floats, _: slice) -> Floats:
-        strength = share * highest_strength(start(sensing.columns, responses))
-        found = solve(sensing.columns, responses, strength)
+    def solver(sensing: Sensing, responses: Floats) -> Floats:
+        penalty = share * highest_penalty(start(sensing.columns, responses))
+        found = solve(sensing.columns, responses, penalty)
         return refit_few(sensing, responses, found) if refitted else found
-
-    return _reconstruct(measurements, solver, progress)
-
-
-def reconstruct_to_noise(
-    measurements: CompressiveMeasurements,
-    noise: float | Floats,
-    *,
-    refitted: bool = True,
-    progress: Progress | None = None,
-) -> ExactTransport:
-    """Reconstruct every row with the first lambda of `SHARES` whose residual is as small as noise.
-
-    Parameters
-    ----------
-    measurements : CompressiveMeasurements
-    noise : float, or ndarray of shape (C, channels)
-        Standard deviation of one answer, photo units.
-    refitted, progress
-        As `reconstruct_compressive`.
-
-    Returns
-    -------
-    ExactTransport
-        A row that no share brings down to its noise has the least.
-
-    Raises
-    ------
-    InputError
-        If the noise is negative or of another shape.
-    """
-    shape = measurements.responses.shape[:2]
-    if np.shape(noise) not in ((), shape) or not np.min(noise) >= 0:
-        raise InputError(
-            f"the noise is no number or array of shape {shape} of at least 0: give the standard "
-            f"deviation of one answer."
-        )
-    deviation = np.broadcast_to(np.asarray(noise, dtype=np.float64), shape).ravel()
-    freedom = len(measurements.patterns) - 1
-
-    def solver(sensing: Sensing, responses: Floats, block: slice) -> Floats:
-        allowed = freedom * (deviation[block] / sensing.scale) ** 2
-        rows = start(sensing.columns, responses)
-        highest = highest_strength(rows)
-        waiting: Integers = np.arange(len(responses))
-        for share in SHARES:
-            settle(sensing.columns, responses, rows, share * highest, waiting)
-            energy = np.einsum("ik,ik->i", rows.residual[waiting], rows.residual[waiting])
-            waiting = waiting[energy > allowed[waiting]]
-        return refit_few(sensing, responses, rows.coefficients) if refitted else rows.coefficients
 
     return _reconstruct(measurements, solver, progress)
 
@@ -168,7 +117,7 @@ def _reconstruct(
 
     def one(block: slice) -> int:
         responses, along = sensing.project(rows[block])
-        pictures = sensing.pictures(solver(sensing, responses, block), along)
+        pictures = sensing.pictures(solver(sensing, responses), along)
         pixel, channel = np.divmod(np.arange(block.start, block.stop), channels)
         far[channel, pixel] = pictures.reshape(len(pictures), -1)
         return len(pictures)

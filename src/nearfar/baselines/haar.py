@@ -19,7 +19,7 @@ from nearfar.arrays import Floats, Size
 
 
 class _Step(NamedTuple):
-    """One level along one axis: the block that it turns, and cosines and sines of its pairs."""
+    """One level along one axis: the block that it rotates, and cosines and sines of its pairs."""
 
     axis: int
     block: Size
@@ -81,7 +81,7 @@ def inverse_haar(coefficients: Floats) -> Floats:
 
 
 def _block_of(values: Floats, step: _Step) -> Floats:
-    """View what a step turns, its axis last."""
+    """Return a view of the block that a step rotates, its axis last."""
     block = values[..., : step.block.height, : step.block.width]
     return block.swapaxes(-1, -2) if step.axis == 0 else block
 

@@ -23,16 +23,16 @@ from nearfar.baselines.working_sets import relative_gap, solve_small
 TOLERANCE = 1e-3
 ROUGH = 1e-2
 # From one lambda to the next on the way down.
-STEP = 0.3
+PENALTY_RATIO = 0.3
 # A working set is solved to this share of the gap that is asked for.
 INNER = 0.3
 # and no further than this share of the gap that there is.
 SHARE_OF_GAP = 0.3
-ROUNDS = 20
+MAXIMUM_ROUNDS = 20
 # Columns that a row may take up at once: as many as it uses, and at least these.
-FEWEST = 16
+NEW_COLUMNS = 16
 # Rows of working sets within this factor of each other are solved together.
-ALIKE = 1.4
+SIZE_RATIO = 1.4
 # Numbers in the matrices that are solved at once.
 NUMBERS = 2**24
 
@@ -70,13 +70,13 @@ def start(columns: Floats, responses: Floats) -> Rows:
     return Rows(nothing, residual, residual @ columns.T)
 
 
-def highest_strength(rows: Rows) -> Floats:
+def highest_penalty(rows: Rows) -> Floats:
     """Return the least lambda at which rows of zeros stay so, (I,): of `start`'s rows."""
     return np.asarray(np.abs(rows.overlap).max(axis=1, initial=0.0))
 
 
 def solve(
-    columns: Floats, responses: Floats, strength: Floats, tolerance: float = TOLERANCE
+    columns: Floats, responses: Floats, penalty: Floats, tolerance: float = TOLERANCE
 ) -> Floats:
     """Minimise for one lambda per row, by way of larger ones.
 
@@ -84,7 +84,7 @@ def solve(
     ----------
     columns, responses
         As `start`.
-    strength : ndarray, shape (I,)
+    penalty : ndarray, shape (I,)
         lambda; 0 only where the responses are 0.
     tolerance : float
         Duality gap at which a row leaves, as a share of its objective.
@@ -96,11 +96,11 @@ def solve(
     """
     rows = start(columns, responses)
     everything = np.arange(len(responses))
-    before = STEP * highest_strength(rows)
-    while (before > strength).any():
-        settle(columns, responses, rows, np.maximum(before, strength), everything, ROUGH)
-        before = STEP * before
-    settle(columns, responses, rows, strength, everything, tolerance)
+    before = PENALTY_RATIO * highest_penalty(rows)
+    while (before > penalty).any():
+        settle(columns, responses, rows, np.maximum(before, penalty), everything, ROUGH)
+        before = PENALTY_RATIO * before
+    settle(columns, responses, rows, penalty, everything, tolerance)
     return rows.coefficients
 
 
@@ -143,11 +143,11 @@ def settle(
     columns: Floats,
     responses: Floats,
     rows: Rows,
-    strength: Floats,
+    penalty: Floats,
     chosen: Integers,
     tolerance: float = TOLERANCE,
 ) -> None:
-    """Bring chosen rows to their minimum at lambda = `strength`, in place.
+    """Bring chosen rows to their minimum at lambda = `penalty`, in place.
 
     Parameters
     ----------
@@ -155,41 +155,39 @@ def settle(
         As `start`.
     rows : Rows
         Where to start; best at the minimum of a lambda a few times as large.
-    strength : ndarray, shape (I,)
+    penalty : ndarray, shape (I,)
         lambda of every row, chosen or not.
     chosen : ndarray of int
     tolerance : float
-        Duality gap at which a row leaves, as a share of its objective. After `ROUNDS` rounds it
-        stays where it is.
+        Duality gap at which a row leaves, as a share of its objective. After
+        `MAXIMUM_ROUNDS` rounds it stays where it is.
     """
-    strength = strength.astype(np.float32)
+    penalty = penalty.astype(np.float32)
     active = chosen
-    for _ in range(ROUNDS):
+    for _ in range(MAXIMUM_ROUNDS):
         energy = np.einsum("ik,ik->i", rows.residual[active], rows.residual[active])
-        gap = relative_gap(
-            rows.coefficients[active], rows.overlap[active], energy, strength[active]
-        )
+        gap = relative_gap(rows.coefficients[active], rows.overlap[active], energy, penalty[active])
         active, gap = active[gap > tolerance], gap[gap > tolerance]
         if not len(active):
             return
         wanted = np.maximum(INNER * tolerance, SHARE_OF_GAP * gap)
-        _one_round(columns, rows, active, strength, wanted)
+        _one_round(columns, rows, active, penalty, wanted)
         residual = responses[active] - rows.coefficients[active] @ columns
         rows.residual[active] = residual
         rows.overlap[active] = residual @ columns.T
 
 
 def _one_round(
-    columns: Floats, rows: Rows, active: Integers, strength: Floats, tolerance: Floats
+    columns: Floats, rows: Rows, active: Integers, penalty: Floats, tolerance: Floats
 ) -> None:
     """Solve each active row on its working set; only the coefficients are brought up to date."""
     used = rows.coefficients[active] != 0
     steep = np.abs(rows.overlap[active])
-    steep[steep <= strength[active, None]] = 0.0
+    steep[steep <= penalty[active, None]] = 0.0
     in_use = used.sum(axis=1)
     steep[used] = np.inf
     wanted = np.count_nonzero(steep, axis=1) - in_use
-    sizes = in_use + np.minimum(wanted, np.maximum(FEWEST, in_use))
+    sizes = in_use + np.minimum(wanted, np.maximum(NEW_COLUMNS, in_use))
     for group in _groups(sizes, columns.shape[1]):
         i = active[group]
         places = _first_places(steep[group], sizes[group])
@@ -201,7 +199,7 @@ def _one_round(
             np.ascontiguousarray(gram.transpose(1, 0, 2)),
             np.take_along_axis(rows.coefficients[i], places, axis=1),
             np.take_along_axis(rows.overlap[i], places, axis=1),
-            strength[i],
+            penalty[i],
             np.einsum("ik,ik->i", rows.residual[i], rows.residual[i]),
             tolerance[group],
         )
@@ -216,7 +214,7 @@ def _groups(sizes: Integers, responses: int) -> Iterator[Integers]:
     order = order[sizes[order] > 0]
     while len(order):
         alike = order[
-            : np.searchsorted(sizes[order], ALIKE * max(sizes[order[0]], FEWEST), "right")
+            : np.searchsorted(sizes[order], SIZE_RATIO * max(sizes[order[0]], NEW_COLUMNS), "right")
         ]
         largest = int(sizes[alike[-1]])
         for block in blocks(len(alike), max(1, NUMBERS // (largest * (2 * largest + responses)))):

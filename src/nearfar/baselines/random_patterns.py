@@ -86,7 +86,7 @@ class CompressiveMeasurements:
         return self.responses.reshape(-1, len(self.patterns))
 
 
-def answer_in_theory(truth: ExactTransport, patterns: Booleans) -> CompressiveMeasurements:
+def measure_without_noise(truth: ExactTransport, patterns: Booleans) -> CompressiveMeasurements:
     """Measure a known transport without noise, black level or steps of a sensor: b = T l.
 
     Parameters

@@ -1,8 +1,8 @@
 """Reference acquisitions: as many photos as T has columns, or more, and a linear decoder.
 
-They ask nothing of the scene, so they give the truth that other methods are compared with, at its
-price. Photos are kept as they come, in a file where they are many, and decoded for a few camera
-pixels at a time.
+They assume nothing about the scene, so they give the truth that other methods are compared with, at
+the price of many photos. Photos are kept as they come, in a file where they are many, and decoded
+for a few camera pixels at a time.
 
 Index convention: m runs over photos in the order they are shot, i over rows, that is over camera
 pixels and channels, p over projector pixels.
@@ -22,8 +22,8 @@ from nearfar.errors import InputError, StorageError
 from nearfar.rigs.base import Photo, Rig
 from nearfar.transport.exact import ExactTransport
 
-# Bytes of photos and of what is decoded that are held at once, the result aside.
-HELD = 2**29
+# Bytes of photos and of decoded rows in memory at once, the result aside.
+MEMORY = 2**29
 # What a decoder needs for each photo and each column of a row, at the most.
 BYTES_PER_NUMBER = 64
 
@@ -31,7 +31,7 @@ Progress = Callable[[str, float], None]
 
 
 class Acquisition(Protocol):
-    """Patterns to show, and how their photos give T."""
+    """Patterns to project, and how T follows from their photos."""
 
     @property
     def name(self) -> str:
@@ -72,7 +72,7 @@ def acquire_reference(
     acquisition: Acquisition,
     rig: Rig,
     *,
-    held: int = HELD,
+    memory: int = MEMORY,
     out: NDArray[np.float32] | None = None,
     folder: Path | None = None,
     progress: Progress | None = None,
@@ -83,17 +83,17 @@ def acquire_reference(
     ----------
     acquisition : Acquisition
     rig : Rig
-    held : int
-        Bytes of photos and of work that may be held in memory; the rig's own and `out` come on
-        top. One camera pixel is worked on even where it needs more.
+    memory : int
+        Bytes of photos and of decoded rows that may be in memory at once; the rig's own and
+        `out` come on top. One camera pixel is decoded at a time even where it needs more.
     out : ndarray, shape (channels, C, P), float32, optional
         Where T goes, for instance an np.memmap, for a T larger than memory; a new array by
         default. It becomes `far` of the result, which `nearfar.save_exact` can then keep.
     folder : Path, optional
-        Where photos that are more than `held` wait in a file, removed in the end; the system's
+        Where photos that are more than `memory` wait in a file, removed in the end; the system's
         folder for such files by default.
     progress : callable, optional
-        Told what is being done and the share done.
+        Called with what is being done and the share done.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def acquire_reference(
             f"{rig.projector}: make it for {rig.projector}."
         )
     report = progress or (lambda _what, _share: None)
-    photos, camera = _shoot(acquisition, rig, held, folder, report)
+    photos, camera = _shoot(acquisition, rig, memory, folder, report)
     pixels, channels = camera.pixels, photos.shape[2]
     columns = acquisition.projector.pixels
     shape = (channels, pixels, columns)
@@ -123,7 +123,7 @@ def acquire_reference(
             f"the array for T is {far.dtype} of shape {far.shape}: give float32 of shape {shape}."
         )
     row = BYTES_PER_NUMBER * channels * (acquisition.photos + columns)
-    for block in blocks(pixels, held // 2 // row):
+    for block in blocks(pixels, memory // 2 // row):
         cut = photos[:, block].reshape(acquisition.photos, -1)
         rows = acquisition.decode(cut.astype(np.float32) / np.float32(rig.full_scale))
         far[:, block] = np.moveaxis(rows.reshape(-1, channels, columns), 1, 0)
@@ -132,7 +132,7 @@ def acquire_reference(
 
 
 def _shoot(
-    acquisition: Acquisition, rig: Rig, held: int, folder: Path | None, report: Progress
+    acquisition: Acquisition, rig: Rig, memory: int, folder: Path | None, report: Progress
 ) -> tuple[NDArray[Any], Size]:
     """Return the photos as they came, shape (photos, C, channels), and the camera's size."""
     kept: NDArray[Any] | None = None
@@ -141,7 +141,7 @@ def _shoot(
     for photo in rig.shoot(acquisition.patterns()):
         if kept is None:
             camera = Size(*photo.shape[:2])
-            kept = _room(photo, acquisition.photos, held, folder)
+            kept = _room(photo, acquisition.photos, memory, folder)
         kept[taken] = photo.reshape(kept.shape[1:])
         taken += 1
         report("shooting", taken / acquisition.photos)
@@ -153,10 +153,10 @@ def _shoot(
     return kept, camera
 
 
-def _room(photo: Photo, count: int, held: int, folder: Path | None) -> NDArray[Any]:
-    """Return room for photos, in memory where they are a quarter of what may be held."""
+def _room(photo: Photo, count: int, memory: int, folder: Path | None) -> NDArray[Any]:
+    """Return room for photos, in memory where they take at most a quarter of the bytes allowed."""
     shape = (count, photo.shape[0] * photo.shape[1], photo.shape[2])
-    if count * photo.nbytes <= held // 4:
+    if count * photo.nbytes <= memory // 4:
         return np.empty(shape, dtype=photo.dtype)
     try:
         with tempfile.TemporaryFile(dir=folder) as file:

@@ -143,10 +143,10 @@ def separate_by_phase(photos: Floats, shifts: int, black_level: float = 0.0) -> 
         raise InputError(f"{shifts} shifts cannot tell offset and amplitude apart: give 3 or more.")
     _require(photos, shifts, multiple=shifts)
     # Twice the amplitude, in the photos' own precision.
-    turns = (4 / shifts) * np.exp(-2j * np.pi * np.arange(shifts) / shifts)
-    turns = turns.astype(np.result_type(photos.dtype, np.complex64))
+    weights = (4 / shifts) * np.exp(-2j * np.pi * np.arange(shifts) / shifts)
+    weights = weights.astype(np.result_type(photos.dtype, np.complex64))
     by_axis = photos.reshape(-1, shifts, *photos.shape[1:])
-    fitted = np.einsum("j,ajyxi->ayxi", turns, by_axis)
+    fitted = np.einsum("j,ajyxi->ayxi", weights, by_axis)
     together = fitted.sum(axis=-1, keepdims=True)
     modulus = np.maximum(np.abs(together), np.finfo(photos.dtype).tiny)
     return _from_samples((fitted * together.conj() / modulus).real, photos, dark)

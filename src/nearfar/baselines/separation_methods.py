@@ -1,4 +1,4 @@
-"""Which patterns are shown to separate direct from global light, and what goes with them."""
+"""Methods of separating direct from global light: their patterns, and the separation itself."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -92,5 +92,5 @@ def by_sinusoids(period: int | None = None, shifts: int | None = None) -> Method
 
 
 def by_any_patterns() -> Method:
-    """Separate by the extremes of photos under half-lit patterns that nobody describes."""
+    """Separate by the extremes of photos under half-lit patterns that are not known."""
     return Method({"pattern": "any"}, None, 1, None, separate_by_extremes)

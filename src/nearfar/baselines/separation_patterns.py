@@ -116,14 +116,14 @@ def sinusoids(projector: Size, period: int = PERIOD, shifts: int = SHIFTS) -> ND
     drawn: list[NDArray[np.uint8]] = []
     for cycles in ((Fraction(1, period), Fraction(0)), (Fraction(0), Fraction(1, period))):
         start = phase(wrap(*cycles), projector)
-        turns = [
+        shifted = [
             quantise(0.5 + 0.5 * np.cos(2 * np.pi * (start + j / count))) for j in range(count)
         ]
         if count % 2 == 0:
             # Rounded on their own, two opposite phases could sum to a little more than white.
-            half = turns[: count // 2]
-            turns = half + [invert(pattern) for pattern in half]
-        drawn += turns
+            half = shifted[: count // 2]
+            shifted = half + [invert(pattern) for pattern in half]
+        drawn += shifted
     return np.stack(drawn)
 
 

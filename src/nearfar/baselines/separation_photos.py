@@ -64,7 +64,7 @@ class PhotosToSeparate:
         return float(np.mean([np.mean(photo >= self.full_scale) for photo in self.photos]))
 
     def blocks(self) -> Iterator[slice]:
-        """Cut the camera into blocks of rows that are held at once."""
+        """Split the camera into blocks of rows, each read into memory at once."""
         row = len(self.photos) * self.photos[0][0].size
         return blocks(self.camera.height, BLOCK // row)
 
@@ -89,7 +89,7 @@ def shoot_to_separate(
     rig : Rig
     patterns : ndarray, shape (n, Py, Px), uint8
     progress : callable, optional
-        Told the number of photos taken.
+        Called with the number of photos taken.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def read_to_separate(
     full_scale : float, optional
         Raw value of full scale; by default that of the numbers' type.
     progress : callable, optional
-        Told the number of photos read and how many there are.
+        Called with the number of photos read and how many there are.
 
     Returns
     -------
@@ -241,7 +241,7 @@ def separate(
     method : callable
         From photos (n, rows, Cx, channels) and black level to their separation.
     progress : callable, optional
-        Told the share done.
+        Called with the share done.
     """
     height = taken.camera.height
     parts = []
@@ -252,8 +252,8 @@ def separate(
     return Separation(*(np.concatenate(pictures) for pictures in zip(*parts, strict=True)))
 
 
-def unsteadiness(taken: PhotosToSeparate, groups: int) -> float:
-    """Tell how far apart the means of groups of photos are, as a share of their brightness.
+def spread_of_groups(taken: PhotosToSeparate, groups: int) -> float:
+    """Return the root-mean-square deviation of groups of photos from their mean, as its share.
 
     Each group's patterns sum to the same grey: a pair of a pattern and its inverse, all phases
     of a sinusoid. Photos out of order, a lamp that drifts and a response that is not linear

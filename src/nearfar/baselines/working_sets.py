@@ -18,10 +18,10 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 
-# Sweeps between two looks at the gap, looks at most, and the look after which Newton helps.
-SWEEPS = 4
-LOOKS = 30
-PATIENCE = 1
+# Sweeps between two checks of the gap, checks at most, and the check after which Newton steps run.
+SWEEPS_PER_CHECK = 4
+MAXIMUM_CHECKS = 30
+CHECKS_BEFORE_NEWTON = 1
 # Keeps the Newton equations solvable where columns of the working set depend on each other.
 RIDGE = 1e-6
 TINY = 1e-30
@@ -38,7 +38,7 @@ class Small(NamedTuple):
         x; changed in place.
     slopes : ndarray, shape (I, J), float32
         Overlap of each column with the residual; changed in place.
-    strength : ndarray, shape (I,), float32
+    penalty : ndarray, shape (I,), float32
         lambda.
     energy : ndarray, shape (I,), float32
         |residual|^2 at the start.
@@ -49,7 +49,7 @@ class Small(NamedTuple):
     gram: Floats
     entries: Floats
     slopes: Floats
-    strength: Floats
+    penalty: Floats
     energy: Floats
     first_entries: Floats
     first_slopes: Floats
@@ -64,7 +64,7 @@ def solve_small(
     gram: Floats,
     entries: Floats,
     slopes: Floats,
-    strength: Floats,
+    penalty: Floats,
     energy: Floats,
     tolerance: Floats,
 ) -> Floats:
@@ -75,7 +75,7 @@ def solve_small(
     gram : ndarray, shape (J, I, J), float32
     entries, slopes : ndarray, shape (I, J), float32
         Where to start, and the overlap of each column with the residual there.
-    strength, energy : ndarray, shape (I,), float32
+    penalty, energy : ndarray, shape (I,), float32
         lambda, and |residual|^2 at the start.
     tolerance : ndarray, shape (I,)
         Duality gap at which a row stops, as a share of its objective.
@@ -83,12 +83,12 @@ def solve_small(
     Returns
     -------
     ndarray, shape (I, J), float32
-        x. A row that has not settled after `LOOKS` looks is returned as it is.
+        x. A row that has not settled after `MAXIMUM_CHECKS` checks is returned as it is.
     """
     found = entries.copy()
     rows = np.arange(len(entries))
-    small = Small(gram, entries.copy(), slopes.copy(), strength, energy, entries, slopes)
-    for look in range(LOOKS):
+    small = Small(gram, entries.copy(), slopes.copy(), penalty, energy, entries, slopes)
+    for check in range(MAXIMUM_CHECKS):
         _sweep(small)
         going = ~_settled(small, tolerance[rows])
         found[rows] = small.entries
@@ -97,25 +97,25 @@ def solve_small(
         # Cutting costs a copy of the Gram matrices, so it waits until it is worth one.
         if going.mean() < 0.7:
             rows, small = rows[going], small.only(going)
-        if look >= PATIENCE:
+        if check >= CHECKS_BEFORE_NEWTON:
             _newton(small)
     return found
 
 
-def relative_gap(entries: Floats, slopes: Floats, energy: Floats, strength: Floats) -> Floats:
+def relative_gap(entries: Floats, slopes: Floats, energy: Floats, penalty: Floats) -> Floats:
     """Return the duality gap of each row as a share of its objective, (I,).
 
     Parameters
     ----------
     entries, slopes : ndarray, shape (I, J)
         x, and the overlap of every column with the residual.
-    energy, strength : ndarray, shape (I,)
+    energy, penalty : ndarray, shape (I,)
         |residual|^2 and lambda.
     """
     steepest = np.maximum(np.abs(slopes).max(axis=1, initial=0.0), TINY)
     # The residual, scaled until no column overlaps it by more than lambda, is dual feasible.
-    scale = np.minimum(1.0, strength / steepest)
-    size = strength * np.abs(entries).sum(axis=1)
+    scale = np.minimum(1.0, penalty / steepest)
+    size = penalty * np.abs(entries).sum(axis=1)
     # As b = residual + x A, no large numbers are subtracted here.
     gap = 0.5 * (1 - scale) ** 2 * energy + size
     gap -= scale * np.einsum("ij,ij->i", entries, slopes)
@@ -126,18 +126,18 @@ def _settled(small: Small, tolerance: Floats) -> Booleans:
     moved = small.entries - small.first_entries
     middle = small.slopes + small.first_slopes
     energy = small.energy - np.einsum("ij,ij->i", moved, middle)
-    gap = relative_gap(small.entries, small.slopes, np.maximum(energy, 0.0), small.strength)
+    gap = relative_gap(small.entries, small.slopes, np.maximum(energy, 0.0), small.penalty)
     return np.asarray(gap <= tolerance)
 
 
 def _sweep(small: Small) -> None:
     """Minimise over each entry in turn, all rows at once, a few times over."""
-    gram, x, slopes, strength = small[:4]
+    gram, x, slopes, penalty = small[:4]
     squared = np.einsum("jij->ji", gram).copy()
-    for _ in range(SWEEPS):
+    for _ in range(SWEEPS_PER_CHECK):
         for j in range(len(gram)):
             pull = slopes[:, j] + squared[j] * x[:, j]
-            there = (pull - np.minimum(np.maximum(pull, -strength), strength)) / squared[j]
+            there = (pull - np.minimum(np.maximum(pull, -penalty), penalty)) / squared[j]
             step = there - x[:, j]
             if np.count_nonzero(step):
                 x[:, j] = there
@@ -146,7 +146,7 @@ def _sweep(small: Small) -> None:
 
 def _newton(small: Small) -> None:
     """Go to the minimum under the present signs, or to the first change of a sign on the way."""
-    x, slopes, strength = small.entries, small.slopes, small.strength
+    x, slopes, penalty = small.entries, small.slopes, small.penalty
     used = x != 0
     most = int(used.sum(axis=1).max(initial=0))
     if most == 0:
@@ -158,7 +158,7 @@ def _newton(small: Small) -> None:
     matrix = small.gram[place[:, :, None], row[:, None, None], place[:, None, :]]
     matrix *= kept[:, :, None] & kept[:, None, :]
     matrix[:, np.arange(most), np.arange(most)] += np.where(kept, RIDGE, 1.0).astype(x.dtype)
-    pull = np.take_along_axis(slopes, place, axis=1) - strength[:, None] * np.sign(here)
+    pull = np.take_along_axis(slopes, place, axis=1) - penalty[:, None] * np.sign(here)
     step = np.linalg.solve(matrix, np.where(kept, pull, 0)[..., None])[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         until = np.where(kept & (step * here < 0), -here / step, np.inf)

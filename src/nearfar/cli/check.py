@@ -43,7 +43,7 @@ def check(
     from nearfar.plan import paper_plan
     from nearfar.report.model_check import check_page, check_rows
     from nearfar.rigs.simulated.opening import load_world
-    from nearfar.workflow.check import SAMPLE, check_model, numbers_of
+    from nearfar.workflow.check import DEFAULT_SAMPLE, check_model, numbers_of
     from nearfar.workflow.conditioning import condition_near
 
     if page is not None:
@@ -51,7 +51,7 @@ def check(
     with progress_bar("checking", quiet=quiet) as report:
         world = load_world(transport, None, None)
         plan = paper_plan(world.projector, near, far, dropped=drop, correspondence="none")
-        sample = SAMPLE if page is None else world.camera.pixels
+        sample = DEFAULT_SAMPLE if page is None else world.camera.pixels
         found = check_model(
             world, near, far, sample=sample, progress=lambda share: report("rows", share)
         )

@@ -25,9 +25,9 @@ _DIGITS = re.compile(r"([0-9]+)")
 
 
 def read_picture(path: Path) -> NDArray[Any]:
-    """Read a picture as it is stored: PNG, TIFF, OpenEXR or NPY, told by its first bytes.
+    """Read a picture as it is stored: PNG, TIFF, OpenEXR or NPY, recognised by its first bytes.
 
-    Camera raw files, told by their names, come as `nearfar.files.raw.decode_raw` gives them.
+    Camera raw files, recognised by their names, come as `nearfar.files.raw.decode_raw` gives them.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def decode_picture(data: bytes, path: Path) -> NDArray[Any]:
 
 
 def is_raw(path: Path) -> bool:
-    """Tell a camera raw file by its name; it begins like a TIFF, or like nothing."""
+    """Return whether a name is a camera raw file's; its first bytes do not always say so."""
     return path.suffix.lower() in RAW_ENDINGS
 
 
@@ -114,7 +114,7 @@ def _checked(path: Path, pixels: NDArray[Any]) -> NDArray[Any]:
 
 
 def full_scale_of_file(path: Path) -> float | None:
-    """Read the value of full white that a camera raw file tells; None for other files."""
+    """Read the level of full white from a camera raw file; None for other files."""
     return decode_raw(_read_bytes(path), path).white if is_raw(path) else None
 
 

@@ -1,4 +1,4 @@
-"""What a file or folder is, told from its first lines."""
+"""What a Zarr folder holds, from its metadata."""
 
 import json
 from pathlib import Path

@@ -33,7 +33,7 @@ _CURES = {
 
 
 def is_ours(folder: Path) -> bool:
-    """Tell whether a folder may be replaced: it is empty, or a Zarr that nearfar wrote."""
+    """Return whether a folder may be replaced: it is empty, or a Zarr that nearfar wrote."""
     try:
         empty = not any(folder.iterdir())
     except OSError:
@@ -52,7 +52,7 @@ def check_output(
 def new_output(
     path: Path, *, force: bool = False, replaceable: Callable[[Path], bool] = is_ours
 ) -> Iterator[Path]:
-    """Give a hidden path beside `path` to write a file or a folder to; move it there at the end.
+    """Yield a hidden path beside `path` to write a file or a folder to; move it there at the end.
 
     When the body ends well, what it wrote is synchronised to the disk and takes the place of
     `path` in one step; when it raises anything, interrupts too, what it wrote is removed and
@@ -65,7 +65,7 @@ def new_output(
     force : bool
         Replace what is there.
     replaceable : callable
-        Says of an existing folder whether `force` may replace it, so that replacing ``~`` costs
+        Returns whether `force` may replace an existing folder, so that replacing ``~`` costs
         nobody their home. By default an empty folder or a Zarr of nearfar's.
 
     Yields

@@ -53,8 +53,8 @@ def decode_raw(data: bytes, name: str | Path) -> RawPhoto:
             # Some sensors reach beyond, where they are no longer linear.
             mosaic = np.minimum(raw.raw_image_visible, white).astype(np.uint16)
     except (rawpy.LibRawError, ValueError) as error:
-        told = error.args[0] if error.args else error
-        reason = told.decode(errors="replace") if isinstance(told, bytes) else str(told)
+        detail = error.args[0] if error.args else error
+        reason = detail.decode(errors="replace") if isinstance(detail, bytes) else str(detail)
         raise UnreadableFileError(
             f"{name} is no camera raw file that can be read ({reason}): copy it again, or develop "
             f"it to a linear 16-bit TIFF."

@@ -1,4 +1,4 @@
-"""Outputs that take long: what is there is kept whatever stops them, and may be gone on with."""
+"""Outputs that take long: whatever stops them, what is written so far is kept to be resumed."""
 
 import os
 import sys
@@ -26,10 +26,10 @@ def resumable_output(
     resume: bool = False,
     force: bool = False,
 ) -> Iterator[Path]:
-    """Give a folder beside `path` to write to, which is kept where the body does not end.
+    """Yield a folder beside `path` to write to, which is kept where the body does not end.
 
     When the body ends well the folder takes the place of `path`, as with `new_output`. Whatever
-    stops it, kill -9 too, leaves the folder as it stands, to go on with. While the body runs, the
+    stops it, kill -9 too, leaves the folder as it stands, to be resumed. While the body runs, the
     folder is locked against others.
 
     Parameters
@@ -37,10 +37,10 @@ def resumable_output(
     path : Path
         Folder to make; a link is followed.
     worth : callable
-        Says of a folder that was stopped, and of what stopped it, whether there is anything in it
-        to go on with; it is removed otherwise.
+        From the unfinished folder and what stopped the body, whether the folder is worth
+        resuming; it is removed otherwise.
     resume : bool
-        Go on with what is there.
+        Resume what is not finished.
     force : bool
         Replace what has the name already and, without `resume`, what was not finished.
 
@@ -99,7 +99,7 @@ def _checked(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
 
 
 def _is_begun(folder: Path) -> bool:
-    """Tell whether a folder is ours, or was begun when the process was killed."""
+    """Return whether a folder is ours, or was new when the process was killed."""
     return is_ours(folder) or all(entry.suffix == ".partial" for entry in folder.iterdir())
 
 

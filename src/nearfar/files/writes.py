@@ -2,7 +2,7 @@
 
 An interrupt reaches the main thread alone: what it had asked the store's event loop to write goes
 on. Before the folder is removed the loop is waited for, and what has not begun by then is dropped,
-so that nobody hears of files that vanished under them, or of tasks that never ended.
+so that no write fails on a folder that is gone, and no task is left pending.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""What each camera pixel sees: shares of patches, and the highlights on them.
+"""Shares of patches in each camera pixel, and the highlights on them.
 
 Index convention: c is a camera pixel, i a patch. A camera pixel's value is the mean of the
 radiances along its sub-rays, times pi (so that a white patch has its own radiosity).
@@ -20,7 +20,7 @@ from nearfar.scenes.rays import OFFSET, Surface, blocked, hit
 
 @dataclass(frozen=True)
 class Gather:
-    """Two C x n matrices that turn what patches do into what the camera sees.
+    """Two C x n matrices from the light that leaves patches to the camera's pixels.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ from nearfar.parallel import side_by_side
 from nearfar.scenes.geometry import Medium
 from nearfar.scenes.patches import Patches
 
-ROWS = 16
+ROWS_AT_ONCE = 16
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def subsurface(patches: Patches, source: Dipole) -> Floats:
         kernel *= weight[begin:end, None]
         result[rows, rows.start :] = np.add.reduceat(kernel, starts[rows] - begin, axis=0)
 
-    side_by_side(fill, blocks(len(patches), ROWS))
+    side_by_side(fill, blocks(len(patches), ROWS_AT_ONCE))
     # R_d is positive definite, so by Cauchy and Schwarz no mean between two patches is above the
     # geometric mean of those within them; samples of a very coarse grid may say otherwise.
     within = np.sqrt(np.diag(result))

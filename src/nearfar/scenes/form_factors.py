@@ -15,15 +15,15 @@ from nearfar.scenes.patches import Patches
 from nearfar.scenes.rays import OFFSET, Surface, blocked
 
 # Pairs nearer than this many of their radii are summed over their samples.
-NEAR = 3.0
+NEAR_RADII = 3.0
 # Samples nearer than this many of their sides are taken as parallelograms.
-NEAR_SAMPLES = 1.5
+NEAR_SIDES = 1.5
 # Row sums of form factors are at most this.
-MOST = 0.999
+MAXIMUM_ROW_SUM = 0.999
 # Rays between two patches that something may hide from each other.
-RAYS = 4
-ROWS = 256
-PAIRS = 4096
+RAYS_PER_PAIR = 4
+ROWS_AT_ONCE = 256
+PAIRS_AT_ONCE = 4096
 
 
 def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Floats:
@@ -57,7 +57,7 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
             other_normal=patches.normal[columns],
             other_area=patches.area[columns],
         )
-        reach = NEAR * (patches.radius[rows, None] + patches.radius[columns])
+        reach = NEAR_RADII * (patches.radius[rows, None] + patches.radius[columns])
         apart = ~(flat[rows, None] & (patches.part[rows, None] == patches.part[columns]))
         i, j = np.nonzero((square < reach**2) & apart)
         block[i, j] = refined(i + rows.start, j + columns.start, patches)
@@ -72,7 +72,7 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
         result[rows, columns] = block
         result[columns, rows] = block.T
 
-    side_by_side(fill, blocks(count, ROWS))
+    side_by_side(fill, blocks(count, ROWS_AT_ONCE))
     return _at_most_all(result, patches.area)
 
 
@@ -82,8 +82,8 @@ def _at_most_all(form: Floats, area: Floats) -> Floats:
     Where parts run into each other a sliver may be counted with more than its true area.
     """
     total = form.sum(axis=1) / area
-    limit = (MOST / np.maximum(total, MOST)).astype(np.float32)
-    for rows in blocks(len(form), ROWS):
+    limit = (MAXIMUM_ROW_SUM / np.maximum(total, MAXIMUM_ROW_SUM)).astype(np.float32)
+    for rows in blocks(len(form), ROWS_AT_ONCE):
         form[rows] *= np.minimum(limit[rows, None], limit)
     return form
 
@@ -142,7 +142,7 @@ def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
     """
     result = np.empty(len(i))
     order = np.argsort(patches.counts[i] * patches.counts[j], kind="stable")
-    for chunk in blocks(len(i), PAIRS):
+    for chunk in blocks(len(i), PAIRS_AT_ONCE):
         pairs = order[chunk]
         a, b = i[pairs], j[pairs]
         left, right = slice(patches.counts[a].max()), slice(patches.counts[b].max())
@@ -157,7 +157,7 @@ def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
         )
         size = np.linalg.norm(patches.edges[a, left], axis=-1).max(axis=-1)
         other_size = np.linalg.norm(patches.edges[b, right], axis=-1).max(axis=-1)
-        reach = NEAR_SAMPLES * (size[:, :, None] + other_size[:, None, :])
+        reach = NEAR_SIDES * (size[:, :, None] + other_size[:, None, :])
         true = (area > 0)[:, :, None] & (other_area > 0)[:, None, :]
         pair, s, t = np.nonzero(true & (square < reach**2))
         value[pair, s, t] = touching_exchange((a[pair], s), (b[pair], t), patches)
@@ -228,10 +228,10 @@ def _edge(start: Floats, end: Floats, normal: Floats) -> Floats:
 def visible_share(i: Integers, j: Integers, patches: Patches, occluders: Surface) -> Floats:
     """Share of a few rays between pairs of patches that nothing blocks; shape (pairs,)."""
     facing, visible = np.zeros(len(i)), np.zeros(len(i))
-    for turn in range(RAYS):
+    for turn in range(RAYS_PER_PAIR):
         # Samples in opposite order, so that the rays differ from parallel ones.
-        a = (2 * turn + 1) * patches.counts[i] // (2 * RAYS)
-        b = (2 * ((turn * 3 + 1) % RAYS) + 1) * patches.counts[j] // (2 * RAYS)
+        a = (2 * turn + 1) * patches.counts[i] // (2 * RAYS_PER_PAIR)
+        b = (2 * ((turn * 3 + 1) % RAYS_PER_PAIR) + 1) * patches.counts[j] // (2 * RAYS_PER_PAIR)
         start = patches.positions[i, a] + OFFSET * patches.normals[i, a]
         end = patches.positions[j, b] + OFFSET * patches.normals[j, b]
         way = end - start

@@ -17,7 +17,7 @@ from nearfar.arrays import Floats, Integers
 Vector = tuple[float, float, float]
 
 # Triangles smaller than this (square metres) are rounding where curves meet in a point.
-LEAST_AREA = 1e-12
+SMALLEST_AREA = 1e-12
 
 
 @dataclass(frozen=True)
@@ -254,5 +254,5 @@ def _tiled(points: Floats, corners: Integers) -> Any:
     corners = corners.reshape(-1, 4)
     faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     mesh = trimesh.Trimesh(points.reshape(-1, 3), faces, process=False)
-    mesh.update_faces(mesh.area_faces > LEAST_AREA)
+    mesh.update_faces(mesh.area_faces > SMALLEST_AREA)
     return mesh

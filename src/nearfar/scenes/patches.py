@@ -17,13 +17,13 @@ from nearfar.scenes.optics import Pinhole, pixel_of, sub_rays
 from nearfar.scenes.rays import OFFSET, Surface, blocked, hit
 
 # A surface seen at a glancing angle under one sub-ray: its area is no more than this allows.
-LEAST_COSINE = 0.05
+SMALLEST_COSINE = 0.05
 # Cells of the surfaces without light: in projector pixels, and at most so many metres.
 CELL_PIXELS = 2.5
-CELL_LIMIT = 0.08
+LARGEST_CELL = 0.08
 # About so many of them at most: a share of the projector's pixels, but enough for a room.
-CELLS_SHARE = 8
-CELLS_LEAST = 300
+PIXELS_PER_CELL = 8
+FEWEST_CELLS = 300
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def lit_samples(where: Surface, eye: Pinhole, size: Size, samples: int) -> Sampl
     seen = (hits.face >= 0) & (cosine > 0)
     position, face = hits.position[seen], hits.face[seen]
     distance = np.linalg.norm(position - eye.position, axis=-1)
-    area = solid_angle[seen] * distance**2 / np.maximum(cosine[seen], LEAST_COSINE)
+    area = solid_angle[seen] * distance**2 / np.maximum(cosine[seen], SMALLEST_COSINE)
     normal, part = where.normals[face], where.part[face]
     # Where the sides of a cell of the image plane fall on the surface.
     right, up, forward = eye.axes
@@ -184,10 +184,10 @@ def build_patches(
     """
     lit = lit_samples(where, eye, size, samples)
     distance = float(np.median(np.linalg.norm(lit.position - eye.position, axis=-1)))
-    cell = min(CELL_PIXELS * 2 * float(eye.half.max()) * distance / max(size), CELL_LIMIT)
+    cell = min(CELL_PIXELS * 2 * float(eye.half.max()) * distance / max(size), LARGEST_CELL)
     edges_of = np.diff(where.triangles, axis=1)
     whole = np.linalg.norm(np.cross(edges_of[:, 0], edges_of[:, 1]), axis=-1).sum() / 2
-    budget = max(CELLS_LEAST, size.pixels / CELLS_SHARE)
+    budget = max(FEWEST_CELLS, size.pixels / PIXELS_PER_CELL)
     cell = max(cell, float(np.sqrt(max(whole - lit.area.sum(), 0) / budget)))
     dark, dark_patch = dark_samples(where, parts, eye, size, cell)
     lit_patch = np.unique(lit.pixel * len(parts) + lit.part, return_inverse=True)[1]

@@ -26,7 +26,7 @@ from nearfar.errors import NearfarError
 from nearfar.scenes.camera import Gather
 from nearfar.scenes.patches import Patches
 
-ROWS = 1024
+ROWS_AT_ONCE = 1024
 
 
 class ReflectionFactor(NamedTuple):
@@ -71,7 +71,7 @@ def reflection_factor(
 
 
 def _between(factor: ReflectionFactor, block: Floats, matrix: Floats) -> None:
-    """Turn a matrix into X matrix X^T in place, X the factor with `block` for its own."""
+    """Replace a symmetric matrix M by X M X^T, X being the factor with `block` as its block."""
     columns = matrix[:, factor.places] @ block.T
     matrix *= factor.scale
     matrix[:, factor.places] = columns
@@ -110,7 +110,7 @@ def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
     if info != 0:
         raise NearfarError("The scene reflects more light than falls on it: lower its albedos.")
     inverse = lower.T
-    for rows in blocks(len(inverse), ROWS):
+    for rows in blocks(len(inverse), ROWS_AT_ONCE):
         square = inverse[rows, rows]
         inverse[rows, rows] = np.triu(square) + np.triu(square, 1).T
         inverse[rows.stop :, rows] = inverse[rows, rows.stop :].T
@@ -131,7 +131,7 @@ def components(
     inside: tuple[Floats, ...],
     progress: Callable[[float], None],
 ) -> tuple[list[sparse.csr_array], list[sparse.csr_array], Floats]:
-    """D, N and F of every channel.
+    """Compute D, N and F of every channel.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def components(
         )
         last = channel == channels - 1
         rest = bounced(form if last else form.copy(), factor)
-        for rows in blocks(camera_pixels, ROWS):
+        for rows in blocks(camera_pixels, ROWS_AT_ONCE):
             strip = np.ascontiguousarray((see[rows] @ rest).T)
             far[channel, rows] = (fall @ strip).T
         del rest

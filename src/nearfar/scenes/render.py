@@ -17,9 +17,9 @@ from nearfar.scenes.rays import surface
 from nearfar.transport.exact import ExactTransport
 
 # Sub-rays along each side of a projector pixel.
-SAMPLES = 4
+SAMPLES_PER_SIDE = 4
 # The brightest camera pixel under full white.
-EXPOSURE = 0.9
+BRIGHTEST = 0.9
 
 
 def render(
@@ -48,7 +48,7 @@ def render(
     occluders = surface(scene.parts, [i for i, part in enumerate(scene.parts) if part.occludes])
     eye = pinhole(scene.projector_view, projector)
     lens = pinhole(scene.camera_view or scene.projector_view, projector)
-    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES)
+    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES_PER_SIDE)
     finest = min(camera.height / projector.height, camera.width / projector.width)
     seen = gather(
         everything,
@@ -56,7 +56,7 @@ def render(
         patches,
         (eye, projector),
         (lens, camera),
-        samples=max(1, int(np.ceil(SAMPLES / finest))),
+        samples=max(1, int(np.ceil(SAMPLES_PER_SIDE / finest))),
     )
     progress("form factors", 0.1)
     form = exchange(patches, scene.parts, occluders)
@@ -77,7 +77,7 @@ def render(
         float((d.sum(axis=1) + n.sum(axis=1) + f.sum(axis=1)).max())
         for d, n, f in zip(direct, near, far, strict=True)
     )
-    scale = np.float32(EXPOSURE / brightest)
+    scale = np.float32(BRIGHTEST / brightest)
     far *= scale
     return ExactTransport(
         projector=projector,

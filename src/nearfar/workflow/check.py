@@ -23,11 +23,11 @@ from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.workflow.conditioning import Conditioning
 
-BLOCK = 64
-# Camera pixels that are looked at by default, evenly spaced.
-SAMPLE = 4096
-# Shares of the energy for which a bandwidth is told.
-SHARES = (0.5, 0.9, 0.99)
+PIXELS_AT_ONCE = 64
+# Camera pixels that are examined by default, evenly spaced.
+DEFAULT_SAMPLE = 4096
+# Shares of the energy whose bandwidths are reported.
+ENERGY_SHARES = (0.5, 0.9, 0.99)
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ModelCheck:
     k_near : float
         Cycles per projector pixel, on either axis.
     camera_pixels : int
-        Camera pixels that were looked at.
+        Camera pixels that were examined.
     floodlit : mapping
         Shares of direct, near and far in the light under full white.
     near_beyond, near_outside : float
@@ -55,10 +55,10 @@ class ModelCheck:
     far_beyond_in_window : float
         Share of that part that lies inside the window, where n takes it up.
     checkerboard_near, checkerboard_far : float
-        Amplitude of N's and of F's answer to the checkerboard over D's, root mean square over lit
+        Amplitude of N's and of F's response to the checkerboard over D's, root mean square over lit
         camera pixels: what the direct estimate is off by.
     far_beyond_map, checkerboard_map : ndarray, shape (n,)
-        Per camera pixel looked at: share of F beyond k_far that is outside the window, and
+        Per camera pixel examined: share of F beyond k_far that is outside the window, and
         |N + F| over D at the checkerboard (NaN without direct light).
     """
 
@@ -94,10 +94,10 @@ def check_model(
     far: AnySize,
     *,
     k_near: float | None = None,
-    sample: int = SAMPLE,
+    sample: int = DEFAULT_SAMPLE,
     progress: Callable[[float], None] | None = None,
 ) -> ModelCheck:
-    """Tell how far a transport keeps to the paper's model.
+    """Measure how far a transport departs from the paper's model.
 
     Parameters
     ----------
@@ -110,9 +110,9 @@ def check_model(
     k_near : float, optional
         Cycles per projector pixel; `default_k_near` if left out.
     sample : int
-        Camera pixels to look at, evenly spaced; all where there are fewer.
+        Camera pixels to examine, evenly spaced; all where there are fewer.
     progress : callable, optional
-        Told the share done.
+        Called with the share done.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def check_model(
     chosen = np.arange(0, pixels, step)
     centres = near.centre(transport.correspondence, projector)
     lit = np.isfinite(transport.correspondence[..., 0]).ravel()
-    for block in blocks(len(chosen), BLOCK):
+    for block in blocks(len(chosen), PIXELS_AT_ONCE):
         mine = chosen[block]
         part = slice(int(mine[0]), int(mine[-1]) + 1, step)
         rows = [
@@ -199,10 +199,10 @@ class _Totals:
             float(np.sum(n**2, dtype=np.float64)),
         ]
         for number, part in enumerate((n, f)):
-            answer = fft.fft2(part)
-            self.spectrum[number] += np.sum(np.abs(answer) ** 2, axis=(0, 1), dtype=np.float64)
+            spectrum = fft.fft2(part)
+            self.spectrum[number] += np.sum(np.abs(spectrum) ** 2, axis=(0, 1), dtype=np.float64)
             if number == 1:
-                high = fft.ifft2(np.where(self.in_band, 0, answer)).real
+                high = fft.ifft2(np.where(self.in_band, 0, spectrum)).real
                 within = np.sum(high**2 * mask[:, None], axis=(1, 2, 3), dtype=np.float64)
                 total = np.sum(high**2, axis=(1, 2, 3), dtype=np.float64)
                 self.beyond += [within.sum(), total.sum()]
@@ -251,11 +251,11 @@ class _Totals:
         order = np.argsort(self.height, axis=None, kind="stable")
         rising = np.cumsum(energy.ravel()[order])
         if rising[-1] <= 0:
-            return dict.fromkeys(SHARES, 0.0)
-        places = np.searchsorted(rising, np.array(SHARES) * rising[-1])
+            return dict.fromkeys(ENERGY_SHARES, 0.0)
+        places = np.searchsorted(rising, np.array(ENERGY_SHARES) * rising[-1])
         return {
             share: float(self.height.ravel()[order[place]])
-            for share, place in zip(SHARES, places, strict=True)
+            for share, place in zip(ENERGY_SHARES, places, strict=True)
         }
 
 

@@ -1,4 +1,4 @@
-"""How well the near patterns tell the entries of a window apart (equation 5)."""
+"""Condition number of the near patterns on a window (equation 5)."""
 
 from dataclasses import dataclass
 
@@ -11,24 +11,24 @@ from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import as_array, near_frequencies, representatives
 from nearfar.transport import near
 
-# Eigenvalues under this share of the largest stand for directions that no pattern sees.
-UNSEEN = 1e-6
+# Eigenvectors with eigenvalues below this share of the largest are seen by no pattern.
+SMALLEST_EIGENVALUE = 1e-6
 
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How well near patterns tell the entries of a window apart.
+    """How well near patterns determine the entries of a window.
 
     Attributes
     ----------
     windows : int
-        Different ways in which the projector's border cuts a window, the whole one included.
+        Different ways in which the projector's border clips a window, the whole one included.
     unseen : int
         Directions of a whole window that no pattern sees: one for each frequency dropped, and
         for even W the checkerboard, which is the direct measurement.
     whole, worst : float
         Largest over smallest singular value in the directions that are seen: of the whole
-        window, and of the worst cut one. 1 is ideal (equation 5).
+        window, and of the worst clipped one. 1 is ideal (equation 5).
     """
 
     windows: int
@@ -38,7 +38,7 @@ class Conditioning:
 
 
 def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditioning:
-    """Condition of the near patterns over every window on a projector (equation 5).
+    """Compute the condition of the near patterns over every window on a projector (equation 5).
 
     Parameters
     ----------
@@ -77,12 +77,12 @@ def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditi
     patterns = np.concatenate([np.sqrt(twice) * np.cos(angle), np.sqrt(twice) * np.sin(angle)])
     gram = patterns.T @ patterns / window**2
     y, x = np.divmod(np.arange(projector.pixels), projector.width)
-    kinds = np.unique(near.inside(np.stack([y, x], axis=1), window, projector), axis=0)
-    spectra = [np.linalg.eigvalsh(gram[np.ix_(kind, kind)]) for kind in kinds]
+    shapes = np.unique(near.inside(np.stack([y, x], axis=1), window, projector), axis=0)
+    spectra = [np.linalg.eigvalsh(gram[np.ix_(shape, shape)]) for shape in shapes]
     full = np.linalg.eigvalsh(gram)
     return Conditioning(
-        windows=len(kinds),
-        unseen=int(np.sum(full <= UNSEEN * full[-1])),
+        windows=len(shapes),
+        unseen=int(np.sum(full <= SMALLEST_EIGENVALUE * full[-1])),
         whole=_ratio(full),
         worst=max(_ratio(values) for values in spectra),
     )
@@ -90,5 +90,5 @@ def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditi
 
 def _ratio(eigenvalues: Floats) -> float:
     """Largest over smallest singular value of what is seen, from rising eigenvalues."""
-    seen = eigenvalues[eigenvalues > UNSEEN * eigenvalues[-1]]
+    seen = eigenvalues[eigenvalues > SMALLEST_EIGENVALUE * eigenvalues[-1]]
     return float(np.sqrt(seen[-1] / seen[0]))

@@ -56,7 +56,7 @@ def judge_by_truth(
     rows : Rows, optional
         As `nearfar.row_snr` gives them, if they are there already.
     progress : callable, optional
-        Told what is done and the share done.
+        Called with what is done and the share done.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def judge_by_truth(
     if rows is None:
         rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
     components = dict(rows.components)
-    answer: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "snr_b": found,
         "snr_b_pictures": _mean_of_pictures(found),
         "snr_b_frequency": percentiles(rows.snr_b_of_frequency),
@@ -88,14 +88,14 @@ def judge_by_truth(
         report("model's truth", 0.0)
         fitted = model_truth(transport, truth)
         ceiling = relighting_snr(fitted_as(transport, fitted), truth, lights)
-        answer["snr"] |= {
+        numbers["snr"] |= {
             "physical": components,
             "model": split_snr(transport, fitted),
             "floodlit": floodlit_snr(transport, truth),
         }
-        answer["ceiling"] = {"snr_b": ceiling, "snr_b_pictures": _mean_of_pictures(ceiling)}
+        numbers["ceiling"] = {"snr_b": ceiling, "snr_b_pictures": _mean_of_pictures(ceiling)}
         report("model's truth", 1.0)
-    return answer
+    return numbers
 
 
 def fitted_as(transport: Transport, fitted: Transport) -> Transport:
@@ -128,13 +128,6 @@ def judge_pairs(pairs: Mapping[str, Pair]) -> dict[str, Any]:
     """Return ``snr_b`` per light and ``snr_b_mean``, dB."""
     found = {name: snr(pair.known, pair.relit) for name, pair in pairs.items()}
     return {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
-
-
-def judge_by_photos(
-    transport: Transport, folder: Path, *, full_scale: float | None = None
-) -> dict[str, Any]:
-    """Compare relighting with photos; see `beside_photos` and `judge_pairs`."""
-    return judge_pairs(beside_photos(transport, folder, full_scale=full_scale))
 
 
 def beside_photos(

@@ -10,7 +10,7 @@ import numpy as np
 from nearfar.arrays import Size
 from nearfar.baselines.separation import Separation
 from nearfar.baselines.separation_methods import Method
-from nearfar.baselines.separation_photos import PhotosToSeparate, unsteadiness
+from nearfar.baselines.separation_photos import PhotosToSeparate, spread_of_groups
 from nearfar.errors import InputError
 from nearfar.faults.of_capture import find_saturation
 from nearfar.files import encode_png, new_output, write_picture
@@ -87,7 +87,7 @@ def export_to_separate(
 def describe_separation(
     found: Separation, taken: PhotosToSeparate, method: Method
 ) -> dict[str, Any]:
-    """Tell what was separated and how, ready for JSON."""
+    """Return what was separated and how, ready for JSON."""
     direct, global_ = (float(picture.sum(dtype=np.float64)) for picture in found)
     total = direct + global_
     return {
@@ -124,7 +124,7 @@ def find_separation_faults(taken: PhotosToSeparate, method: Method, source: str)
             f"the photos of {source} have none under black and none of ambient light, so ambient "
             f"light and the camera's black level count as global: add a photo under black."
         )
-    difference = unsteadiness(taken, method.groups)
+    difference = spread_of_groups(taken, method.groups)
     if difference > MAXIMUM_DIFFERENCE_OF_SUMS:
         found.append(
             f"photos of {source} that should sum to one white differ by {difference:.0%}: they may "
@@ -171,7 +171,7 @@ def _write_numbers(folder: Path, numbers: Mapping[str, Any]) -> None:
 
 
 def is_separation(folder: Path) -> bool:
-    """Tell whether a folder is empty, or holds pictures or patterns of a separation alone."""
+    """Return whether a folder is empty, or holds pictures or patterns of a separation alone."""
     entries = list(folder.iterdir())
     ours = all(
         entry.name == NUMBERS

@@ -19,7 +19,7 @@ import drjit as dr
 import mitsuba as mi
 
 # A path goes on with at most this probability once Russian roulette plays.
-MOST_LIKELY = 0.95
+MAXIMUM_SURVIVAL = 0.95
 ENDLESS = 2**31
 
 
@@ -60,7 +60,7 @@ def _ratio(value: Any, divisor: Any) -> Any:
 
 
 def _beyond(si, direction, medium):  # type: ignore[no-untyped-def]
-    """Tell the medium that a ray from a surface goes through; `medium` where nothing changes."""
+    """Return the medium that a ray from a surface enters; `medium` where nothing changes."""
     if si.is_medium_transition():
         medium = si.target_medium(direction)
     return medium
@@ -169,7 +169,7 @@ def _connect(scene, projector, sampler, ray, si, mei, medium, channel, joins, sc
 
 def roulette(sampler: Any, throughput: Any, eta: Any, plays: Any, active: Any) -> tuple[Any, Any]:
     """End weak paths by chance; it changes the noise, never the mean."""
-    chance = dr.minimum(dr.max(throughput) * dr.square(eta), MOST_LIKELY)
+    chance = dr.minimum(dr.max(throughput) * dr.square(eta), MAXIMUM_SURVIVAL)
     lives = sampler.next_1d(active) < chance
     return dr.select(plays, _ratio(throughput, chance), throughput), lives | _no(plays)
 

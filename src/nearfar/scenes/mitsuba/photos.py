@@ -64,7 +64,7 @@ class RenderedWorld:
         return self._loaded.notes
 
     def describe(self) -> dict[str, Any]:
-        """Tell what a capture remembers: how the pictures were rendered."""
+        """Return how the pictures were rendered, for a capture to keep."""
         import mitsuba as mi
 
         return {
@@ -80,7 +80,7 @@ class RenderedWorld:
         Parameters
         ----------
         lights : ndarray, shape (n, Py, Px)
-            Full white is 1; each value is held over its projector pixel.
+            Full white is 1; each value is constant over its projector pixel.
 
         Returns
         -------

@@ -53,7 +53,7 @@ def render_transport(
     seed : int
         The vectorised variants add in any order: equal seeds agree to rounding.
     progress : callable, optional
-        Told what is being done and the share done.
+        Called with what is being done and the share done.
 
     Returns
     -------

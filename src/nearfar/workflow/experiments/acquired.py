@@ -73,7 +73,7 @@ def acquire_scene(case: Acquisition, report: Report) -> Data:
     ----------
     case : Acquisition
     report : callable
-        Told what is being done and the share done.
+        Called with what is being done and the share done.
 
     Returns
     -------

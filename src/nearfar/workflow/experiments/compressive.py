@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nearfar.baselines.choosing import best_share
 from nearfar.baselines.compressive import reconstruct_compressive
-from nearfar.baselines.random_patterns import answer_in_theory, bernoulli_patterns
+from nearfar.baselines.random_patterns import bernoulli_patterns, measure_without_noise
 from nearfar.illumination.frequencies import representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan.patterns import Exponential
@@ -25,7 +25,7 @@ def acquire_compressively(case: Theory, report: Report) -> Data:
     ----------
     case : Theory
     report : callable
-        Told what is being done and the share done.
+        Called with what is being done and the share done.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def acquire_compressively(case: Theory, report: Report) -> Data:
     """
     truth = cached_scene(case.scene, case.projector, progress=report)
     count = case.plan.transport_photos
-    measurements = answer_in_theory(truth, bernoulli_patterns(case.projector, count, 0))
+    measurements = measure_without_noise(truth, bernoulli_patterns(case.projector, count, 0))
     report("choosing lambda", 0.0)
     choice = best_share(measurements, truth)
     report("choosing lambda", 1.0)

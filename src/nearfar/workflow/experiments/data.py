@@ -115,7 +115,7 @@ def kept(name: str, make: Callable[[], Data], *, note: Callable[[str], None]) ->
         Which experiment.
     make : callable
     note : callable
-        Told in a sentence why data that are there cannot be used, or could not be kept.
+        Called with a sentence on why data that are there cannot be used, or could not be kept.
 
     Returns
     -------

@@ -95,7 +95,7 @@ def acquire_in_theory(case: Theory, report: Report) -> Data:
     ----------
     case : Theory
     report : callable
-        Told what is being done and the share done.
+        Called with what is being done and the share done.
 
     Returns
     -------

@@ -42,7 +42,7 @@ def components_along_a_line(case: Acquisition, report: Report) -> Data:
     case : Acquisition
         With a coaxial camera as fine as the projector.
     report : callable
-        Told what is being done and the share done.
+        Called with what is being done and the share done.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from nearfar.correspondence.gray import decode_axis
 from nearfar.errors import InputError
 from nearfar.files import read_picture
 from nearfar.photometry.modulation import (
-    TOO_MANY,
+    LARGEST_SHARE_ABOVE,
     fit_exponent,
     of_pair,
     of_steps,
@@ -51,7 +51,7 @@ def test_fringes_tell_the_response(gamma):
     assert fit_exponent(shone) == pytest.approx(1 / gamma, rel=1e-3)
     _, modulation = of_steps(shone, PHASES)
     lit = np.ones(x.size, dtype=bool)
-    assert (share_above_one(modulation, lit) > TOO_MANY) == (gamma > 1)
+    assert (share_above_one(modulation, lit) > LARGEST_SHARE_ABOVE) == (gamma > 1)
     _, straight = of_steps(shone ** (1 / gamma), PHASES)
     assert share_above_one(straight, lit) == 0
 
@@ -122,5 +122,5 @@ def test_real_fringes_of_two_periods_agree_better_once_straightened(real_photos,
     assert straightened < 0.75 * as_taken
     # The alarm of modulation above 1, as the photos' README says.
     assert alarm > 0.4
-    assert alarm > TOO_MANY
+    assert alarm > LARGEST_SHARE_ABOVE
     assert after < alarm / 3

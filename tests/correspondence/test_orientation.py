@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nearfar.correspondence.orientation import turned_round
+from nearfar.correspondence.orientation import is_mirrored
 
 
 def _plane(height=14, width=18, derivative=((1.0, 0.0), (0.0, 1.0))):
@@ -24,7 +24,7 @@ def _plane(height=14, width=18, derivative=((1.0, 0.0), (0.0, 1.0))):
 def test_a_surface_is_not_turned_whatever_the_camera(derivative):
     q = _plane(derivative=derivative)
     q += 0.02 * np.random.default_rng(1).normal(size=q.shape)
-    assert not turned_round(q).any()
+    assert not is_mirrored(q).any()
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -33,7 +33,7 @@ def test_a_mirrors_image_is_turned(mirrored):
     q[:, 20:, 1] = 40 - q[:, 20:, 1]
     if mirrored:
         q = q[:, ::-1]
-    found = turned_round(q)
+    found = is_mirrored(q)
     found = found[:, ::-1] if mirrored else found
     assert found[:, 21:].all()
     assert not found[:, :19].any()
@@ -42,21 +42,21 @@ def test_a_mirrors_image_is_turned(mirrored):
 def test_a_region_that_sees_one_line_alone_is_turned():
     q = _plane(14, 30)
     q[:, 22:, 1] = 22.0
-    assert turned_round(q)[:, 23:].all()
+    assert is_mirrored(q)[:, 23:].all()
 
 
 def test_a_depth_edge_is_not_taken_for_a_turn():
     q = _plane(14, 30)
     q[:, 15:, 1] += 9.0
-    assert not turned_round(q).any()
+    assert not is_mirrored(q).any()
 
 
 def test_who_has_no_neighbours_is_not_judged():
     q = _plane(14, 30)
     q[::2] = np.nan
-    assert not turned_round(q).any()
-    assert not turned_round(np.full((5, 6, 2), np.nan)).any()
-    assert not turned_round(_plane(1, 9)).any()
-    assert not turned_round(_plane(1, 1)).any()
+    assert not is_mirrored(q).any()
+    assert not is_mirrored(np.full((5, 6, 2), np.nan)).any()
+    assert not is_mirrored(_plane(1, 9)).any()
+    assert not is_mirrored(_plane(1, 1)).any()
     # The camera sees one place all over.
-    assert not turned_round(np.full((5, 6, 2), 3.0)).any()
+    assert not is_mirrored(np.full((5, 6, 2), 3.0)).any()

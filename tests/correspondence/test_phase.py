@@ -7,7 +7,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
-from nearfar.correspondence.ambiguity import MOST_WRONG, expected_wrong
+from nearfar.correspondence.ambiguity import LARGEST_EXPECTED_WRONG, expected_wrong
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
@@ -317,7 +317,7 @@ def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
 def test_frequencies_that_settle_nothing_are_refused(frequencies):
     size = Size(64, 64)
     world = model_transport(size, Size(2, 2), window=3, far=Size(1, 1))
-    with pytest.raises(InputError, match=r"pattern grid of 64x64 alike .*: plan with .*\.$"):
+    with pytest.raises(InputError, match=r"pattern grid of 64x64 alike, .*: plan with .*\.$"):
         correspond_by_phase(_responses(world, frequencies))
 
 
@@ -326,7 +326,7 @@ def test_responses_without_white_are_refused():
     kept = measured.places([k for k in measured.basis.frequencies if k != DC])
     basis = real_basis([k for k in measured.basis.frequencies if k != DC], PROJECTOR)
     without = replace(measured, basis=basis, responses=measured.responses[..., kept])
-    with pytest.raises(InputError, match=r"no answer to white.*: .*\.$"):
+    with pytest.raises(InputError, match=r"no response to white.*: .*\.$"):
         correspond_by_phase(without)
 
 
@@ -335,7 +335,7 @@ def test_places_that_few_others_resemble_are_settled():
     size = Size(64, 64)
     frequencies = [CHECKERBOARD, *near_frequencies(7, Size(1, 1))]
     frequencies += [k for k in far_frequencies(Size(3, 3), size) if k != DC]
-    assert expected_wrong(real_basis(representatives(frequencies), size)) < MOST_WRONG
+    assert expected_wrong(real_basis(representatives(frequencies), size)) < LARGEST_EXPECTED_WRONG
 
 
 @pytest.mark.parametrize(
@@ -351,7 +351,7 @@ def test_the_papers_plans_settle_every_place(projector, window, far):
     plan = paper_plan(projector, window, far, correspondence="none")
     frequencies = representatives(pattern.frequency for pattern in plan.patterns)
     settled = expected_wrong(real_basis([k for k in frequencies if k != DC], projector))
-    assert settled < 1e-6 < MOST_WRONG
+    assert settled < 1e-6 < LARGEST_EXPECTED_WRONG
     # Without far frequencies the near set repeats itself all over the grid.
     near = representatives(x.frequency for x in plan.patterns if x.purpose != "far")
     assert expected_wrong(real_basis(near, projector)) > 1

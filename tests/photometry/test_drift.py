@@ -164,7 +164,7 @@ def test_whites_and_blacks_may_be_shot_at_other_times(world, shoot, black):
     drift = follow_drift(photos)
     light = (world @ np.ones(PROJECTOR)) * _at(lamp, drift.references.whites).mean()
     np.testing.assert_allclose(drift.light, light, atol=3e-4)
-    steadied = drift.take_out(
+    steadied = drift.remove_from(
         photos.read(drift.references.blacks, slice(None)), drift.references.blacks, slice(None)
     )
     np.testing.assert_allclose(steadied, np.stack([drift.black] * 7), atol=5e-5)
@@ -182,7 +182,7 @@ def test_what_moves_or_saturates_does_not_decide(world, shoot):
     rest = np.r_[0:3, 6:10, 12:24]
     for number in range(0, PHOTOS, 9):
         one, other = (
-            d.take_out(photos.read([number], slice(None)), [number], slice(None))[:, rest]
+            d.remove_from(photos.read([number], slice(None)), [number], slice(None))[:, rest]
             for d in (still, drift)
         )
         np.testing.assert_allclose(other, one, atol=1e-3)

@@ -62,7 +62,7 @@ def test_a_plan_has_references_every_interval(photos):
 
 @pytest.mark.parametrize("counts", [(1, 5), (5, 1), (0, 0)])
 def test_one_of_a_kind_tells_nothing(counts):
-    with pytest.raises(PlanError, match="neither noise nor drift: plan for at least 2"):
+    with pytest.raises(PlanError, match="estimate noise and drift from: plan for at least 2"):
         with_references(OTHERS, *counts)
 
 

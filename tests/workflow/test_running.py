@@ -9,7 +9,14 @@ from nearfar.arrays import Size
 from nearfar.capture import Verdict, open_capture
 from nearfar.errors import InputError, PlanError
 from nearfar.plan import choose_plan, paper_plan, parse_plan
-from nearfar.plan.checks import SEEDS, TIMES, check_photos, ends, is_reference, with_checks
+from nearfar.plan.checks import (
+    PHOTOS_OF_EACH,
+    PICTURE_SEEDS,
+    check_photos,
+    ends,
+    is_reference,
+    with_checks,
+)
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -117,10 +124,10 @@ def test_looks_grow_rarer_as_the_target_is_far(scene, tmp_path):
 def test_checks_stand_behind_the_first_references_and_twice():
     plan = choose_plan(Size(16, 20), 60)[0]
     checked = with_checks(plan)
-    assert len(checked.patterns) == len(plan.patterns) + TIMES * len(SEEDS)
-    assert checked.counts["check"] == TIMES * len(SEEDS)
+    assert len(checked.patterns) == len(plan.patterns) + PHOTOS_OF_EACH * len(PICTURE_SEEDS)
+    assert checked.counts["check"] == PHOTOS_OF_EACH * len(PICTURE_SEEDS)
     assert "check" not in plan.counts
-    assert all(len(numbers) == TIMES for numbers in check_photos(checked).values())
+    assert all(len(numbers) == PHOTOS_OF_EACH for numbers in check_photos(checked).values())
     first = min(n for numbers in check_photos(checked).values() for n in numbers)
     assert all(is_reference(pattern) for pattern in checked.patterns[:first])
     assert tuple(p for p in checked.patterns if p.purpose != "check") == plan.patterns

@@ -1,4 +1,4 @@
-"""What else than direct light responses a frequency: the power of far- and near-range light.
+"""What else than direct light responds to a frequency: spectra of far- and near-range light.
 
 All amplitudes are shares of a camera pixel's white, so that they hold for any exposure.
 """
@@ -18,19 +18,19 @@ class Background:
     Attributes
     ----------
     near : float
-        Highest entry of near-range light, a Gaussian of `NEAR_WIDTH`.
+        Highest entry of near-range light, a Gaussian with the deviation `NEAR_WIDTH`.
     floor : float
-        What responds at any frequency: entries of t that stand out by themselves.
+        Response at any frequency, to single entries of t that stand out.
     """
 
     near: float
     floor: float
 
-    def power(self, basis: RealBasis) -> Floats:
-        """Return the mean square of the responses to each frequency, shape (K,)."""
+    def spectral_density(self, basis: RealBasis) -> Floats:
+        """Return the expected squared response to each frequency, shape (K,)."""
         cycles = basis.cycles
         around = np.hypot(*(cycles * basis.projector).T)
-        far = FAR * np.exp(-around / FAR_DECAY)
+        far = FAR_AMPLITUDE * np.exp(-around / FAR_DECAY_CYCLES)
         spread = 2 * np.pi * NEAR_WIDTH**2
         near = (
             self.near * spread * np.exp(-0.5 * (2 * np.pi * NEAR_WIDTH * np.hypot(*cycles.T)) ** 2)
@@ -38,15 +38,15 @@ class Background:
         return np.asarray(far**2 + near**2 + self.floor**2)
 
 
-# Far-range light: amplitude at DC, and cycles across the projector in which it falls e-fold.
-FAR = 0.1
-FAR_DECAY = 2.0
-# Standard deviation of near-range light's spread, projector pixels.
+# Far-range light: amplitude at DC, and cycles across the projector in which it falls to 1/e.
+FAR_AMPLITUDE = 0.1
+FAR_DECAY_CYCLES = 2.0
+# Standard deviation of near-range light in projector pixels.
 NEAR_WIDTH = 2.0
 
-# To find the place: nearly every answer counts.
-SEARCH = Background(near=0.001, floor=0.003)
-# To measure the footprint: low frequencies would mistake near-range light for it.
-SHARP = Background(near=0.04, floor=0.01)
-# To tell direct light from none: whatever near-range light may do counts against it.
-STRONG = Background(near=0.01, floor=0.03)
+# To find the place: weak, so that nearly every response counts.
+SEARCH_BACKGROUND = Background(near=0.001, floor=0.003)
+# To measure the footprint: strong where low frequencies would add near-range light to it.
+FOOTPRINT_BACKGROUND = Background(near=0.04, floor=0.01)
+# To decide whether there is direct light: as strong as near-range light may be anywhere.
+DETECTION_BACKGROUND = Background(near=0.01, floor=0.03)

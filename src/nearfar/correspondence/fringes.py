@@ -1,4 +1,4 @@
-"""Correspondence by phase shifting: fringes of a period, unwrapped by Gray code of cells.
+"""Correspondence by phase shifting: fringes of one period, unwrapped by Gray code of cells.
 
 Index convention: positions are in projector pixels along the fringes' axis, any shape.
 """
@@ -9,7 +9,7 @@ from nearfar.arrays import Floats
 
 
 def position_in_period(phase: Floats, period: float) -> Floats:
-    """Turn the phase of cos(2 pi x / period) into x within its period, from 0 to `period`."""
+    """Return x within its period, from 0 to `period`, from the phase of cos(2 pi x / period)."""
     return np.asarray(phase / (2 * np.pi) * period % period)
 
 

@@ -1,11 +1,11 @@
 """Correspondence by Gray code with its inverse: 2 log2 photos of each axis.
 
-Each bit is read by its sign: a photo against that of the inverse, so that neither albedo nor
-ambient light matter. Neighbouring rows differ in one bit (Gray 1953), so a camera pixel that sees
-two of them is unsure of that bit alone, and how unsure it is tells its share of each.
+Each bit is the sign of a photo less that of the inverse pattern, so that neither albedo nor ambient
+light matter. Neighbouring rows differ in one bit (Gray 1953), so a camera pixel that sees two of
+them is unsure of that bit alone, and the contrast of that bit measures its share of each.
 
-Far-range light hardly responses fine bits, which is how camera pixels without direct light are
-seen. Where it outshines direct light it turns coarse bits; stripes and phase do better there.
+Far-range light hardly responds to fine bits: this is how camera pixels without direct light are
+recognised. Where it outshines direct light it flips coarse bits; stripes and phase do better there.
 
 Index convention: arrays are (C,) or (B, C); c runs over camera pixels, b over the bits of one axis,
 0 the finest.
@@ -27,23 +27,24 @@ from nearfar.photometry.noise import fit_noise
 from nearfar.photometry.photos import Photos, size_of_rows
 from nearfar.plan import GrayCode, Plan
 
-# Confidence at which direct light is taken as seen: a false alarm of noise in a million.
-SURE = 1 - 1e-6
-# Direct light under this share of a camera pixel's white is near-range light's own.
-LEAST_SHARE = 0.04
-# Two neighbours share a camera pixel where the bit between them is weaker than the others by this:
-# near-range light alone weakens the finest bits, too. Of the Cornell box from aside and the shelf
-# 97 to 98 % are within half a pixel for any value from 1/3 to 0.8, and 81 % without sharing.
-SHARED = 0.5
+# Confidence above which there is direct light: noise is mistaken for it once in a million.
+LEAST_CONFIDENCE = 1 - 1e-6
+# Share of a camera pixel's white below which what responds may be near-range light alone.
+LEAST_DIRECT_SHARE = 0.04
+# Contrast of the bit between two neighbours, over that of the other bits, below which both share a
+# camera pixel: near-range light alone weakens the finest bits, too. Of the Cornell box from aside
+# and the shelf 97 to 98 % of camera pixels are within half a pixel for any value from 1/3 to 0.8,
+# and 81 % without sharing.
+LARGEST_SHARED_RATIO = 0.5
 
 
 class GrayAxis(NamedTuple):
     """One axis of every camera pixel, each of shape (C,)."""
 
     place: Floats
-    # How probable it is that noise turned a bit that matters.
+    # Probability that noise flipped a bit that matters.
     false_alarm: Floats
-    # Least difference of a bit that matters.
+    # Smallest difference of a bit that matters.
     contrast: Floats
     inside: Booleans
 
@@ -59,7 +60,7 @@ def gray_code(projector: Size) -> tuple[GrayCode, ...]:
 
 
 def has_gray_code(plan: Plan) -> bool:
-    """Tell whether a plan holds Gray code with its inverse on both axes."""
+    """Return whether a plan holds Gray code with its inverse on both axes."""
     return plan.projector.pixels > 1 and all(
         set(_numbers(plan, kind)) == {(bit, inverse) for bit in bits for inverse in (False, True)}
         for kind, bits in _bits(plan.projector).items()
@@ -109,7 +110,12 @@ def correspond_by_gray_code(
     )
     confidence = 1.0 - np.minimum(1.0, down.false_alarm + across.false_alarm)
     contrast = np.minimum(down.contrast, across.contrast)
-    lit = (confidence >= SURE) & (contrast >= LEAST_SHARE * white) & down.inside & across.inside
+    lit = (
+        (confidence >= LEAST_CONFIDENCE)
+        & (contrast >= LEAST_DIRECT_SHARE * white)
+        & down.inside
+        & across.inside
+    )
     q = np.stack([down.place, across.place], axis=-1)
     q[~lit] = np.nan
     return Correspondence(
@@ -126,7 +132,7 @@ def _bits(projector: Size) -> dict[str, range]:
 
 
 def _numbers(plan: Plan, kind: str) -> dict[tuple[int, bool], int]:
-    """Photo numbers by bit, and whether of the inverse."""
+    """Return photo numbers by bit and by whether they show the inverse."""
     return {
         (pattern.bit, pattern.inverse): i
         for i, pattern in enumerate(plan.patterns)
@@ -137,7 +143,7 @@ def _numbers(plan: Plan, kind: str) -> dict[tuple[int, bool], int]:
 def _differences(
     photos: Photos, numbers: dict[tuple[int, bool], int], bits: int, rows: slice
 ) -> tuple[Floats, Floats]:
-    """Photo less inverse and their sum, (B, C) each, channels added."""
+    """Return photo less inverse and their sum, (B, C) each, summed over channels."""
     pixels = size_of_rows(photos, rows).pixels
     differences, sums = np.empty((bits, pixels)), np.empty((bits, pixels))
     for bit in range(bits):
@@ -148,7 +154,7 @@ def _differences(
 
 
 def _white_and_noise(sums: Floats) -> tuple[Floats, Floats]:
-    """Light of a pair, and the deviation of a difference, (C,) each: all pairs add up alike."""
+    """Return the mean sum of a pair, and the deviation of its difference, (C,) each."""
     white = sums.mean(axis=0)
     if len(sums) < 2:
         return white, np.full_like(white, np.finfo(np.float64).tiny)
@@ -166,7 +172,7 @@ def decode_axis(differences: Floats, noise: Floats, side: int) -> GrayAxis:
     noise : array, shape (C,)
         Standard deviation of a difference.
     side : int
-        Rows or columns, or cells of them, that are told apart.
+        Number of rows or columns, or of cells of them, that the code distinguishes.
     """
     bits, pixels = differences.shape
     if not bits:
@@ -175,19 +181,19 @@ def decode_axis(differences: Floats, noise: Floats, side: int) -> GrayAxis:
     number, size = np.arange(pixels), np.abs(differences)
     place = _place_of(differences > 0)
     weakest = np.argmin(size, axis=0)
-    turned = differences > 0
-    turned[weakest, number] ^= True
-    neighbour = _place_of(turned)
+    flipped = differences > 0
+    flipped[weakest, number] ^= True
+    neighbour = _place_of(flipped)
     beside = (np.abs(neighbour - place) == 1) & (neighbour < side)
-    # Between two neighbours the weakest bit is theirs, and does not matter.
-    matters = np.ones_like(turned)
+    # The weakest bit does not matter if it only distinguishes two neighbours.
+    matters = np.ones_like(flipped)
     matters[weakest, number] = ~beside
     false_alarm = np.sum(normal_cdf(-size / noise) * matters, axis=0)
     contrast = np.min(np.where(matters, size, np.inf), axis=0)
     others = np.where(np.arange(bits)[:, None] == weakest, np.nan, size)
     usual = np.nanmedian(others, axis=0) if bits > 1 else size[0]
     ratio = size[weakest, number] / np.maximum(usual, np.finfo(np.float64).tiny)
-    share = np.where(beside & (ratio < SHARED), 0.5 * (1.0 - ratio), 0.0)
+    share = np.where(beside & (ratio < LARGEST_SHARED_RATIO), 0.5 * (1.0 - ratio), 0.0)
     if bits == 1:
         contrast, false_alarm = size[0], normal_cdf(-size[0] / noise)
     return GrayAxis(place + share * (neighbour - place), false_alarm, contrast, place < side)

@@ -1,24 +1,25 @@
-"""Where correspondence turns round: the mark of light that came by way of another surface.
+"""Where correspondence is mirrored, which is a mark of light by way of another surface.
 
-Direct light maps a surface from the camera to the projector without turning it over, for both see
-the same side of it. Light from a bright surface beside a crease is a mirror's image of it: its
-strongest place moves away from the crease as the camera pixel does, to the other side. So where q
-turns round, what looks like direct light may well be none.
+Camera and projector see the same side of a surface, so direct light maps camera to projector
+without mirroring it. Light that comes by way of another surface beside a crease is mirrored: as the
+camera pixel moves away from the crease on one side, the strongest projector pixel moves away from
+it on the other. So where q is mirrored, what looks like direct light may well be none.
 """
 
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 
-# Neighbours whose q lies further than this many of the camera's usual steps are of another surface.
-SAME_SURFACE = 4.0
-# Turned round, or squeezed nearly to a line, as at the crease itself: less than this share of the
-# area that a step of the camera usually covers.
-LEAST_AREA = 0.4
+# A neighbour whose q differs by more, in units of the camera's median difference, is on another
+# surface.
+LARGEST_STEP = 4.0
+# Determinant of the derivative of q, over the camera's median, below which q is mirrored, or almost
+# squeezed to a line, as at the crease itself.
+LEAST_DETERMINANT = 0.4
 
 
-def turned_round(correspondence: Floats) -> Booleans:
-    """Tell where the neighbours of a camera pixel see q turn round.
+def is_mirrored(correspondence: Floats) -> Booleans:
+    """Return where q is mirrored, by the neighbours of each camera pixel.
 
     Parameters
     ----------
@@ -29,8 +30,8 @@ def turned_round(correspondence: Floats) -> Booleans:
     -------
     ndarray of bool, shape (Cy, Cx)
         Where the derivative of q, fitted to up to 8 neighbours on the same surface, has a
-        determinant well below the camera's median; False where neighbours do not tell. Which way
-        round most of the camera is does not matter: photos may be mirrored.
+        determinant well below the camera's median; False where neighbours do not determine it. The
+        sign is relative to most of the camera, since the photos themselves may be mirrored.
     """
     height, width = correspondence.shape[:2]
     q = np.pad(correspondence.astype(np.float64), ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
@@ -40,13 +41,13 @@ def turned_round(correspondence: Floats) -> Booleans:
     seen = np.isfinite(distance)
     if not seen.any():
         return np.zeros((height, width), dtype=bool)
-    near = seen & (distance < SAME_SURFACE * max(np.median(distance[seen]), 1e-6))
+    near = seen & (distance < LARGEST_STEP * max(np.median(distance[seen]), 1e-6))
     offsets = np.array(steps, dtype=np.float64)
     # The derivative is B A^-1, of which the determinant alone is wanted.
     a = np.einsum("nyx,ni,nj->yxij", near, offsets, offsets)
     b = np.einsum("nyxc,nj->yxcj", np.where(near[..., None], off, 0.0), offsets)
     spread = np.linalg.det(a)
-    told = spread > 0.5
-    area = np.linalg.det(b) / np.where(told, spread, 1.0)
-    usual = np.median(area[told]) if told.any() else 0.0
-    return np.asarray(told & (area * np.sign(usual) < LEAST_AREA * abs(usual)))
+    determined = spread > 0.5
+    area = np.linalg.det(b) / np.where(determined, spread, 1.0)
+    usual = np.median(area[determined]) if determined.any() else 0.0
+    return np.asarray(determined & (area * np.sign(usual) < LEAST_DETERMINANT * abs(usual)))

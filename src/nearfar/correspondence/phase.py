@@ -1,15 +1,15 @@
 """Correspondence from the photos of transport themselves, without photos of its own.
 
-Direct light is a peak of a row t: its responses to all frequencies agree on one place, where they
-add up. Far-range light responses low frequencies alone, and near-range light mostly those. So each
-answer is divided by the power of what else is in it (noise, far- and near-range light), and the
-responses are laid on every place of the pattern grid: a whitened matched filter. Two weightings are
-used. A weak background finds the place, for every answer helps to tell one place from another; a
-strong one then measures the footprint, the 5 x 5 entries of t around it, and tells direct light
-from near-range light that is concentrated, as in a crease.
+Direct light is a peak of a row t, so its responses to all frequencies have the phases of one place.
+Far-range light responds to low frequencies alone, and near-range light mostly to those. So each
+response is divided by the variance of all else in it (noise, far- and near-range light), and the
+inverse transform of the result scores every place of the pattern grid: a whitened matched filter.
+It is used with several backgrounds. A weak one finds the place, since every response helps to tell
+one place from another. Stronger ones measure the footprint, the 5 x 5 entries of t around it, and
+tell direct light from concentrated near-range light, as in a crease.
 
-Sums over places, first along rows and then down, replace an inverse FFT, so that frequencies may
-lie off the DFT grid.
+The inverse transform is computed as matrix products, first along rows and then down, so that
+frequencies may lie off the DFT grid.
 
 Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
 frequencies of one fy, o and i over the offsets of a footprint.
@@ -23,9 +23,14 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.correspondence.ambiguity import require_settled
-from nearfar.correspondence.background import SEARCH, SHARP, STRONG, Background
+from nearfar.correspondence.background import (
+    DETECTION_BACKGROUND,
+    FOOTPRINT_BACKGROUND,
+    SEARCH_BACKGROUND,
+    Background,
+)
 from nearfar.correspondence.methods import CorrespondenceMethod
-from nearfar.correspondence.orientation import turned_round
+from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC
@@ -34,33 +39,34 @@ from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos
 
-# Values of the score that are held at once.
-HELD = 2**22
+# Values of the score that are in memory at once.
+SCORES_AT_ONCE = 2**22
 # Camera pixels at once.
-BLOCK = 1024
-# White under this share of the brightest white is rounding.
-BLACK = 1e-6
-# Half the side of a footprint.
-REACH = 2
-# Passes over a footprint's entries.
+PIXELS_AT_ONCE = 1024
+# White below this share of the brightest white is rounding.
+LEAST_WHITE = 1e-6
+# Pixels on each side of the middle of a footprint.
+FOOTPRINT_REACH = 2
+# Sweeps over a footprint's entries.
 SWEEPS = 15
-# Ridge on a footprint's entries two pixels away, in units of the diagonal: a second pixel of
-# direct light is believed more readily next to the first.
-RIDGE = 1.0
-# Direct light is seen where it stands above the background by this factor, root mean square over
-# the responses. Between the 98th percentile of unlit and the 0.05th of lit camera pixels of a
-# Cornell box seen from aside, by plans of 79 to 340 photos (benchmarks/correspondence.py).
-SEEN = 2.25
-# By how much more where q turns round, which light by way of another surface does: so much leaves
-# the fewest wrong, lit and unlit together, on the same box.
-TURNED = 1.35
+# Ridge on a footprint's entries two pixels from its middle, in units of the diagonal: a second
+# pixel of direct light is more probable next to the first.
+OUTER_RIDGE = 1.0
+# Least root mean square over the responses of what direct light explains, in deviations of the
+# background, for it to be seen. It lies between the 98th percentile of unlit and the 0.05th of lit
+# camera pixels of a Cornell box seen from aside, by plans of 79 to 340 photos
+# (benchmarks/correspondence.py).
+LEAST_EXCESS = 2.25
+# Factor on that where q is mirrored, as by light by way of another surface. This value makes the
+# fewest errors, lit and unlit together, on the same box.
+MIRRORED_FACTOR = 1.35
 
 
 class _Weighed(NamedTuple):
     """Responses over white, channels summed by their weights.
 
-    `responses` (C, R) is sum of weight times answer, `weights` (C, K) the sum of weights, one for
-    the cosine and the sine of a frequency.
+    `responses` (C, R) are the sums of weight times response, `weights` (C, K) the sums of weights,
+    one for both cosine and sine of a frequency.
     """
 
     responses: Floats
@@ -73,20 +79,20 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     Parameters
     ----------
     measurements : Measurements
-        DC among them; any other frequencies that settle a place.
+        Of DC and of any frequencies that determine a place.
 
     Returns
     -------
     Correspondence
         q is the centroid of the direct light within 2 pixels of its peak: where one camera pixel
         sees two surfaces, that of the stronger. NaN where no direct light stands above near-range
-        light; where neighbours see q turn round it must stand further above. Confidence is 1/2 at
-        that border.
+        light; where q is mirrored it must stand further above. Confidence is 1/2 at this
+        threshold.
 
     Raises
     ------
     InputError
-        If there is no answer to DC, or if the frequencies leave several places alike.
+        If there is no response to DC, or if the frequencies leave several places alike.
     """
     basis = _without_dc(measurements)
     require_settled(basis)
@@ -99,22 +105,28 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
 
     def work(block: slice) -> None:
         part = measurements.of_pixels(Size(1, block.stop - block.start), block)
-        responses, variance = _relative(part, BLACK * brightest)
-        found = _search(basis, waves, _weigh(basis, responses, variance, SEARCH))
-        pixels[block], _ = _footprints(basis, _weigh(basis, responses, variance, SHARP), found)
-        _, excess[block] = _footprints(basis, _weigh(basis, responses, variance, STRONG), found)
+        responses, variance = _relative(part, LEAST_WHITE * brightest)
+        found = _search(basis, waves, _weigh(basis, responses, variance, SEARCH_BACKGROUND))
+        pixels[block], _ = _footprints(
+            basis, _weigh(basis, responses, variance, FOOTPRINT_BACKGROUND), found
+        )
+        _, excess[block] = _footprints(
+            basis, _weigh(basis, responses, variance, DETECTION_BACKGROUND), found
+        )
 
-    side_by_side(work, blocks(camera.pixels, BLOCK))
-    pixels[excess <= SEEN] = np.nan
+    side_by_side(work, blocks(camera.pixels, PIXELS_AT_ONCE))
+    pixels[excess <= LEAST_EXCESS] = np.nan
     q = pixels.reshape(*camera, 2)
-    ratio = excess.reshape(camera) / np.where(turned_round(q), TURNED * SEEN, SEEN)
+    ratio = excess.reshape(camera) / np.where(
+        is_mirrored(q), MIRRORED_FACTOR * LEAST_EXCESS, LEAST_EXCESS
+    )
     q[ratio <= 1] = np.nan
     power = ratio**4
     return Correspondence(q, (power / (1 + power)).astype(np.float32))
 
 
-def answer_variance(measurements: Measurements) -> Floats:
-    """Return the variance of each answer, broadcastable to (C, channels, R)."""
+def response_variance(measurements: Measurements) -> Floats:
+    """Return the variance of each response, broadcastable to (C, channels, R)."""
     references = measurements.white_noise**2 + measurements.black_noise**2
     repeated = measurements.noise[..., None] ** 2 / measurements.multiplicity
     return np.asarray(repeated + references[..., None])
@@ -124,20 +136,20 @@ def _without_dc(measurements: Measurements) -> RealBasis:
     basis = measurements.basis
     if DC not in basis.frequencies:
         raise InputError(
-            "the measurements have no answer to white, of which direct light is a share: "
+            "the measurements have no response to white, of which direct light is a share: "
             "plan with a white photo."
         )
     return RealBasis(tuple(k for k in basis.frequencies if k != DC), basis.projector)
 
 
-def _relative(measurements: Measurements, black: float) -> tuple[Floats, Floats]:
+def _relative(measurements: Measurements, least_white: float) -> tuple[Floats, Floats]:
     """Responses over each pixel's own white, (C, channels, R), and their variances; DC left out."""
     places = measurements.places([k for k in measurements.basis.frequencies if k != DC])
     white = measurements.responses[..., measurements.places([DC])[0]]
-    scale = np.maximum(white, black)
+    scale = np.maximum(white, least_white)
     inverse = np.divide(1.0, scale, where=scale > 0, out=np.zeros_like(scale))[..., None]
     shape = measurements.responses.shape
-    variance = np.broadcast_to(answer_variance(measurements), shape)[..., places] * inverse**2
+    variance = np.broadcast_to(response_variance(measurements), shape)[..., places] * inverse**2
     return measurements.responses[..., places] * inverse, variance
 
 
@@ -146,9 +158,9 @@ def _weigh(
 ) -> _Weighed:
     cosine = np.flatnonzero(~basis.is_sine)
     count = np.bincount(basis.index, minlength=len(basis.frequencies))
-    # A cosine and its sine get one weight, so that no place is favoured.
+    # A cosine and its sine have the same weight, so that no place is favoured.
     of_pair = np.add.reduceat(variance, cosine, axis=-1) / count if len(cosine) else variance
-    weights = 1.0 / (of_pair + background.power(basis))
+    weights = 1.0 / (of_pair + background.spectral_density(basis))
     summed = np.einsum("cir,cir->cr", responses, weights[..., basis.index])
     return _Weighed(summed.astype(np.float32), weights.sum(axis=1).astype(np.float32))
 
@@ -159,7 +171,7 @@ class _Group(NamedTuple):
     Attributes
     ----------
     cosines, sines : ndarray of int
-        Their responses; what is its own negative has no sine.
+        Places of their responses; a frequency that is its own negative has no sine.
     along : ndarray, shape (len(cosines) + len(sines), 2 Px), float32
         From these responses to real and imaginary parts of their sum along a row.
     """
@@ -193,7 +205,7 @@ def _waves(basis: RealBasis) -> _Waves:
     for level in levels:
         mine = np.flatnonzero(basis.cycles[:, 0] == level)
         wave = np.exp(2j * np.pi * (np.outer(basis.cycles[mine, 1], width) % 1.0))
-        # The answer to a cosine less j times that to its sine.
+        # The response to a cosine less j times that to its sine.
         waves = np.concatenate([wave, -1j * wave[paired[mine]]])
         along = np.concatenate([waves.real, waves.imag], axis=1).astype(np.float32)
         groups.append(_Group(cosine[mine], cosine[mine][paired[mine]] + 1, along))
@@ -213,29 +225,29 @@ def _scores(responses: Floats, waves: _Waves) -> Floats:
 
 
 def _search(basis: RealBasis, waves: _Waves, weighed: _Weighed) -> NDArray[np.float64]:
-    """Find the place, to half a pixel, at which direct light explains the responses best: (C, 2).
+    """Return the place, to half a pixel, at which direct light explains the responses best: (C, 2).
 
-    Light at half a pixel is shared by the pixels around it, which adds half of both scores.
+    Light at half a pixel is shared by the two pixels beside it, so its score is the mean of theirs.
     """
     best = np.empty((len(weighed.responses), 2))
-    for block in blocks(len(weighed.responses), max(1, HELD // basis.projector.pixels)):
+    for block in blocks(len(weighed.responses), max(1, SCORES_AT_ONCE // basis.projector.pixels)):
         score = _scores(weighed.responses[block], waves)
         best[block] = _highest(basis, score, weighed.weights[block])
     return best
 
 
 def _highest(basis: RealBasis, score: Floats, weights: Floats) -> NDArray[np.float64]:
-    """Return the places of the highest scores, in units of their deviation: (n, 2)."""
+    """Return the places of the scores that are highest in units of their deviation: (n, 2)."""
     number, (height, width) = np.arange(len(score)), basis.projector
     flat = score.reshape(len(score), -1)
     place = flat.argmax(axis=1)
     peak = flat[number, place]
-    # Squares of a cosine and its sine add up to 1 at every whole place, and lose this between.
+    # Squares of a cosine and its sine add up to 1 at every whole place, and to this between two.
     down, across = np.cos(np.pi * basis.cycles.T) ** 2
     whole = np.sqrt(weights.sum(axis=1)) + 1e-12
     between = np.sqrt(weights @ np.stack([across, down, down * across], axis=1)) + 1e-12
     found = np.stack(np.divmod(place, width), axis=-1).astype(np.float64)
-    # Half a pixel off is better only beside a score that is above this.
+    # A place between two pixels can only be better beside a score above this bound.
     bound = peak * between.min(axis=1) / whole
     above = np.flatnonzero(flat > np.where(peak > 0, bound, np.inf)[:, None])
     c, y, x = np.unravel_index(above, score.shape)
@@ -268,26 +280,27 @@ def _footprints(
     -------
     centroid : ndarray, shape (C, 2)
     excess : ndarray, shape (C,)
-        What the footprint explains, in units of the background, root mean square over responses.
+        Root mean square over the responses of what the footprint explains, in deviations of the
+        background.
     """
     limit = np.array(basis.projector) - 1
-    offsets = _square(REACH)
+    offsets = _square(FOOTPRINT_REACH)
     centre = np.clip(np.floor(around + 0.5).astype(np.int64), 0, limit)
     # Two entries overlap by a sum that depends on the offset between them alone.
-    steps = _square(2 * REACH)
+    steps = _square(2 * FOOTPRINT_REACH)
     overlap = np.cos(2 * np.pi * (basis.cycles @ steps.T)).astype(np.float32)
-    apart = offsets[:, None] - offsets[None] + 2 * REACH
-    number = apart[..., 0] * (4 * REACH + 1) + apart[..., 1]
-    ridge = np.where(np.abs(offsets).max(axis=1) > 1, RIDGE, 0.0).astype(np.float32)
+    apart = offsets[:, None] - offsets[None] + 2 * FOOTPRINT_REACH
+    number = apart[..., 0] * (4 * FOOTPRINT_REACH + 1) + apart[..., 1]
+    ridge = np.where(np.abs(offsets).max(axis=1) > 1, OUTER_RIDGE, 0.0).astype(np.float32)
     places = offsets[:, None] + centre
     inside: Booleans = np.all((places >= 0) & (places <= limit), axis=-1)
-    turned = basis.recentre(weighed.responses[:, None], centre)[:, 0]
-    scores = np.ascontiguousarray((turned @ basis.patterns_at(offsets)).T)
+    phase_shifted = basis.recentre(weighed.responses[:, None], centre)[:, 0]
+    scores = np.ascontiguousarray((phase_shifted @ basis.patterns_at(offsets)).T)
     gram = (overlap.T @ weighed.weights.T)[number]
     entries, left = _nonnegative(scores, gram, inside, ridge)
     total = entries.sum(axis=0)
     centroid = centre + (entries.T @ offsets) / np.where(total > 0, total, 1.0)[:, None]
-    # 2 s.w - w.G.w, of which s - G.w is what is left.
+    # 2 s.w - w.G.w = (s + (s - G.w)).w
     explained = np.einsum("oc,oc->c", scores + left, entries)
     return np.clip(centroid, 0, limit), np.sqrt(np.maximum(explained, 0.0) / basis.count)
 
@@ -336,6 +349,6 @@ def _find(
     return correspond_by_phase(measure())
 
 
-# Every plan has sinusoids, and whether they settle q shows when they are measured. Which way round
-# surfaces are seen depends on the row beside.
+# Every plan has sinusoids; whether they determine q is checked when they are measured. Whether q is
+# mirrored depends on the rows beside.
 PHASE = CorrespondenceMethod(serves=lambda _plan: True, find=_find, rows_beside=1)

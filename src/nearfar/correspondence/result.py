@@ -22,8 +22,8 @@ class Correspondence:
     q : ndarray, shape (Cy, Cx, 2), float32
         (y, x) of the direct light's centroid, projector pixels; NaN where there is none.
     confidence : ndarray, shape (Cy, Cx), float32
-        Between 0 and 1: how sure it is that direct light was seen, or, at unlit camera pixels,
-        what speaks for direct light after all.
+        Between 0 and 1: probability that direct light was seen where there is q, and the evidence
+        for direct light all the same where there is none.
 
     Examples
     --------
@@ -48,12 +48,12 @@ class Correspondence:
         return np.isfinite(self.q[..., 0])
 
     def of_rows(self, rows: slice) -> "Correspondence":
-        """Return that of some rows of the camera, as views."""
+        """Return the correspondence of some rows of the camera, as views."""
         return Correspondence(self.q[rows], self.confidence[rows])
 
 
 def joined(parts: Sequence[Correspondence]) -> Correspondence:
-    """Put those of blocks of camera rows together, in order."""
+    """Join the correspondence of tiles of camera rows, in order."""
     return Correspondence(
         np.concatenate([part.q for part in parts]),
         np.concatenate([part.confidence for part in parts]),

@@ -1,8 +1,8 @@
 """Correspondence by black stripes (section 5.1), robust under global illumination.
 
-A black stripe takes away what its row or column of projector pixels gave: the photos tell the
-marginals of every row t. Direct light is a peak of one or two pixels on that marginal; near- and
-far-range light are smooth under it and fall out of a second difference.
+A black stripe removes the light of its row or column of projector pixels: the photos measure the
+marginals of every row t. Direct light is a peak of one or two pixels on such a marginal; near- and
+far-range light are smooth below it, and a second difference removes them.
 
 Index convention: c runs over camera pixels, s over the stripes of one axis.
 """
@@ -18,25 +18,25 @@ from nearfar.correspondence.normal import normal_cdf
 from nearfar.correspondence.result import Correspondence
 from nearfar.errors import InputError
 from nearfar.photometry.measurements import Measurements
-from nearfar.photometry.photos import BATCH, Photos, size_of_rows
+from nearfar.photometry.photos import PHOTOS_AT_ONCE, Photos, size_of_rows
 from nearfar.plan import Plan, Stripe
 
-# A peak has no background closer than this to it.
-REACH = 2
-# Stripes away from the peak that are needed to tell its noise.
-FEWEST = 3
-# Confidence at which direct light is taken as seen: a false alarm of noise in a million.
-SURE = 1 - 1e-6
-# A second pixel shares the direct light only if it stands out by as many deviations.
-SHARED = 4.0
-# Direct light under this share of a camera pixel's white is near-range light's own peak.
-LEAST_SHARE = 0.04
-# The two axes see the same direct light; they may differ by this factor.
-AGREEMENT = 3.0
+# Distance of the pixels, on both sides, that a peak is compared with.
+BACKGROUND_REACH = 2
+# Stripes away from the peak that are needed to estimate its noise.
+FEWEST_FOR_NOISE = 3
+# Confidence at which direct light is removed as seen: a false alarm of noise in a million.
+LEAST_CONFIDENCE = 1 - 1e-6
+# Standard deviations by which a second pixel must stand out to share the direct light.
+LEAST_SECOND_DEVIATIONS = 4.0
+# Share of a camera pixel's white below which a peak may be of near-range light.
+LEAST_DIRECT_SHARE = 0.04
+# Largest ratio of the direct light that the two axes measure, which should be the same.
+LARGEST_STRENGTH_RATIO = 3.0
 
 
 class _Axis(NamedTuple):
-    """One axis's answer for every camera pixel, each of shape (C,)."""
+    """What one axis measures at every camera pixel, each of shape (C,)."""
 
     place: Floats
     strength: Floats
@@ -103,9 +103,9 @@ def correspond_by_stripes(
         np.minimum(down.strength, across.strength),
     )
     lit = (
-        (confidence >= SURE)
-        & (strong <= AGREEMENT * weak)
-        & (np.minimum(down.share, across.share) >= LEAST_SHARE)
+        (confidence >= LEAST_CONFIDENCE)
+        & (strong <= LARGEST_STRENGTH_RATIO * weak)
+        & (np.minimum(down.share, across.share) >= LEAST_DIRECT_SHARE)
     )
     q = np.stack([down.place, across.place], axis=-1)
     q[~lit] = np.nan
@@ -117,14 +117,14 @@ def correspond_by_stripes(
 
 def _axis(photos: Photos, kind: str, rows: slice, progress: Callable[[int], None] | None) -> _Axis:
     numbers = _numbers(photos.plan, kind)
-    taken, white = _marginal(photos, [numbers[s] for s in sorted(numbers)], rows)
+    removed, white = _marginal(photos, [numbers[s] for s in sorted(numbers)], rows)
     if progress is not None:
         progress(len(numbers))
-    return _peak(taken, white)
+    return _peak(removed, white)
 
 
 def _numbers(plan: Plan, kind: str) -> dict[int, int]:
-    """Photo numbers by row or column."""
+    """Return photo numbers by row or column."""
     return {
         pattern.index: i
         for i, pattern in enumerate(plan.patterns)
@@ -133,49 +133,58 @@ def _numbers(plan: Plan, kind: str) -> dict[int, int]:
 
 
 def _marginal(photos: Photos, numbers: Sequence[int], rows: slice) -> tuple[Floats, Floats]:
-    """Light that each stripe takes away, (C, s), and the photo without stripes, (C,).
+    """Return the light that each stripe removes, (C, s), and the photo without stripes, (C,).
 
-    Channels are weighed by their light: where shot noise rules, that is the best sum.
+    Channels are summed as they are, which is the best sum where shot noise dominates.
     """
     stack = [
-        photos.read(numbers[start : start + BATCH], rows) for start in range(0, len(numbers), BATCH)
+        photos.read(numbers[start : start + PHOTOS_AT_ONCE], rows)
+        for start in range(0, len(numbers), PHOTOS_AT_ONCE)
     ]
-    shown = np.concatenate(stack).sum(axis=-1).reshape(len(numbers), -1).T
-    # Most stripes leave a pixel's direct light alone: the median is the photo without stripes.
-    white = np.median(shown, axis=1) if len(numbers) > 2 else shown.max(axis=1)
-    return white[:, None] - shown, white
+    values = np.concatenate(stack).sum(axis=-1).reshape(len(numbers), -1).T
+    # Most stripes do not touch a pixel's direct light: their median is the photo without stripes.
+    white = np.median(values, axis=1) if len(numbers) > 2 else values.max(axis=1)
+    return white[:, None] - values, white
 
 
 def _deviation(curvature: Floats, peak: Integers) -> Floats:
-    """Scatter of what is no peak, (C,): the noise as each pixel's own stripes show it."""
+    """Return the deviation of each pixel's second differences away from its peak, (C,)."""
     length = curvature.shape[1]
-    # A peak bends the curve as far as two reaches of the second difference.
-    away = np.abs(np.arange(length) - peak[:, None]) > REACH + 1
-    enough = away.sum(axis=1) >= FEWEST
+    # The peak is in the second differences of pixels up to this distance.
+    away = np.abs(np.arange(length) - peak[:, None]) > BACKGROUND_REACH + 1
+    enough = away.sum(axis=1) >= FEWEST_FOR_NOISE
     kept = np.where(away | ~enough[:, None], curvature, np.nan)
     spread = np.abs(kept - np.nanmedian(kept, axis=1)[:, None])
     return np.asarray(1.4826 * np.nanmedian(spread, axis=1) + 1e-12)
 
 
-def _peak(taken: Floats, white: Floats) -> _Axis:
-    pixels, length = taken.shape
+def _peak(removed: Floats, white: Floats) -> _Axis:
+    pixels, length = removed.shape
     number = np.arange(pixels)
-    # At the border the one neighbour there is stands for both.
+    # At the border the only neighbour is used for both sides.
     place = np.arange(length)
-    left = np.where(place >= REACH, place - REACH, np.minimum(place + REACH, length - 1))
-    right = np.where(place < length - REACH, place + REACH, np.maximum(place - REACH, 0))
-    curvature = taken - 0.5 * (taken[:, left] + taken[:, right])
+    left = np.where(
+        place >= BACKGROUND_REACH,
+        place - BACKGROUND_REACH,
+        np.minimum(place + BACKGROUND_REACH, length - 1),
+    )
+    right = np.where(
+        place < length - BACKGROUND_REACH,
+        place + BACKGROUND_REACH,
+        np.maximum(place - BACKGROUND_REACH, 0),
+    )
+    curvature = removed - 0.5 * (removed[:, left] + removed[:, right])
     peak = np.argmax(curvature, axis=1)
     deviation = _deviation(curvature, peak)
     noise = deviation / np.sqrt(1.5)
 
-    # Beyond the border stands what lies past the neighbour on the other side: no direct light.
-    before = taken[number, np.where(peak > 0, peak - 1, np.minimum(REACH, length - 1))]
+    # Beyond the border, the pixel past the other neighbour is used: it has no direct light.
+    before = removed[number, np.where(peak > 0, peak - 1, np.minimum(BACKGROUND_REACH, length - 1))]
     last = length - 1
-    after = taken[number, np.where(peak < last, peak + 1, np.maximum(last - REACH, 0))]
-    # Near-range light is the same to both sides, so the difference is direct light's own.
+    after = removed[number, np.where(peak < last, peak + 1, np.maximum(last - BACKGROUND_REACH, 0))]
+    # Near-range light is the same on both sides, so their difference is direct light.
     second = np.abs(after - before)
-    second = np.where(second > SHARED * np.sqrt(2.0) * noise, second, 0.0)
+    second = np.where(second > LEAST_SECOND_DEVIATIONS * np.sqrt(2.0) * noise, second, 0.0)
     first = curvature[number, peak]
     side = np.where(after > before, 1.0, -1.0)
     total = first + second

@@ -18,7 +18,12 @@ from nearfar.faults.records import (
     PhotoSaturated,
 )
 from nearfar.illumination.frequencies import DC, Frequency
-from nearfar.photometry.modulation import TOO_MANY, TOO_MUCH, of_pair, share_above_one
+from nearfar.photometry.modulation import (
+    LARGEST_MODULATION,
+    LARGEST_SHARE_ABOVE,
+    of_pair,
+    share_above_one,
+)
 from nearfar.plan import Plan, Sinusoid
 
 # A photo is faulty with more than this share of its values at full scale.
@@ -144,9 +149,9 @@ class FaultsWhileCapturing:
             return None
         means = modulation[: groups * together].reshape(groups, together).mean(axis=-1)
         share = share_above_one(means, np.ones(means.shape, dtype=bool))
-        if share <= TOO_MANY:
+        if share <= LARGEST_SHARE_ABOVE:
             return None
-        return ModulationTooHigh(number, frequency, share, TOO_MUCH)
+        return ModulationTooHigh(number, frequency, share, LARGEST_MODULATION)
 
     def _some_rows(self, photo: NDArray[Any]) -> Floats:
         return photo[:: max(1, len(photo) // MAXIMUM_ROWS)].astype(np.float32)

@@ -1,4 +1,4 @@
-"""The frame a projector shows: a pattern as blocks of its pixels, centred, black around."""
+"""The frame that a projector displays: a pattern in blocks of its pixels, centred, black around."""
 
 from typing import NamedTuple
 
@@ -10,14 +10,14 @@ from nearfar.errors import InputError
 
 
 class Shown(NamedTuple):
-    """How patterns appear on the frame."""
+    """Size of the frame, and the side in frame pixels of each pattern pixel."""
 
     frame: Size
     scale: int
 
 
 def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
-    """Return the frame and scale that show a pattern grid.
+    """Return the frame and scale at which a pattern grid is displayed.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
 
 
 def draw_frame(pattern: NDArray[np.uint8], shown: Shown) -> NDArray[np.uint8]:
-    """Show a pattern on a frame, each pixel as a block, centred, black around."""
-    blown = pattern.repeat(shown.scale, axis=0).repeat(shown.scale, axis=1)
+    """Draw a pattern on a frame, each pixel as a block, centred, black around."""
+    enlarged = pattern.repeat(shown.scale, axis=0).repeat(shown.scale, axis=1)
     frame = np.zeros(shown.frame, dtype=np.uint8)
     top, left = (
-        (outer - inner) // 2 for outer, inner in zip(shown.frame, blown.shape, strict=True)
+        (outer - inner) // 2 for outer, inner in zip(shown.frame, enlarged.shape, strict=True)
     )
-    frame[top : top + blown.shape[0], left : left + blown.shape[1]] = blown
+    frame[top : top + enlarged.shape[0], left : left + enlarged.shape[1]] = enlarged
     return frame

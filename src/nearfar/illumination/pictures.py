@@ -12,7 +12,7 @@ from nearfar.checks import as_count
 
 # Drawn this many times finer on each axis, then averaged: edges fall between pixels, as in
 # photographs.
-FINER = 4
+OVERSAMPLING = 4
 NUMBER_OF_LEAVES = 2000
 # Radii, as shares of the longer side.
 SMALLEST_RADIUS = 0.035
@@ -46,7 +46,9 @@ def white(size: AnySize) -> Floats:
 
 def _averaged(drawn: Floats, size: Size) -> Floats:
     """Average what was drawn finer: (Py, Px, channels), float32."""
-    averaged = drawn.reshape(size.height, FINER, size.width, FINER, -1).mean(axis=(1, 3))
+    averaged = drawn.reshape(size.height, OVERSAMPLING, size.width, OVERSAMPLING, -1).mean(
+        axis=(1, 3)
+    )
     return np.asarray(averaged, dtype=np.float32)
 
 
@@ -79,7 +81,7 @@ def natural_picture(size: AnySize, seed: int, *, colour: bool = False) -> Floats
     """
     size, seed = as_size(size), as_count(seed, "the seed", 0)
     generator = np.random.default_rng([seed, 2001])
-    height, width = size.height * FINER, size.width * FINER
+    height, width = size.height * OVERSAMPLING, size.width * OVERSAMPLING
     longest = max(height, width)
     drawn = np.zeros((height, width, 3 if colour else 1))
     empty = np.ones((height, width), dtype=bool)
@@ -152,7 +154,7 @@ def penguin(size: AnySize) -> Floats:
     (8, 8, 3)
     """
     size = as_size(size)
-    height, width = size.height * FINER, size.width * FINER
+    height, width = size.height * OVERSAMPLING, size.width * OVERSAMPLING
     side = min(height, width)
     y = (np.arange(height)[:, None] + 0.5 - height / 2) / side + 0.5
     x = (np.arange(width)[None, :] + 0.5 - width / 2) / side + 0.5
@@ -168,7 +170,7 @@ def penguin(size: AnySize) -> Floats:
 
 def landscape(size: Size) -> Floats:
     """Draw hills and a lake under a sky, after the paper's figure 4: (Py, Px, 3), float32."""
-    height, width = size.height * FINER, size.width * FINER
+    height, width = size.height * OVERSAMPLING, size.width * OVERSAMPLING
     y = (np.arange(height)[:, None] + 0.5) / height
     x = (np.arange(width)[None, :] + 0.5) / width
     drawn = np.array([0.08, 0.30, 0.85]) + np.clip(y * 1.6, 0, 1)[..., None] * [0.5, 0.45, 0.15]

@@ -1,13 +1,14 @@
 """Photos of inverse pairs become measurements.
 
-A pair's difference is the answer to a sinusoid without offset; ambient light, black level and
-the projector's black fall out. Every pair sums to white + black: the mean of the sums is a
-white reference with almost no noise, and their scatter is the noise.
+A pair's difference is the response to a sinusoid without offset: ambient light, black level and
+the projector's black cancel. Every pair sums to white + black: the mean of the sums is a white
+reference with almost no noise, and their scatter measures the noise.
 
-What a pair's sum strays from that mean is noise that can be seen. Shot noise is larger in the
-brighter photo of a pair, so it shows in the difference too, by rho = (v+ - v-) / (v+ + v-) for
-variances v+ and v-; taking it out leaves 1 - rho^2 of the variance (half of it, on average, at a
-camera pixel with direct light alone), and a lamp that flickers falls out with it.
+A pair's sum deviates from that mean by noise alone, so this part of the noise is known. Shot noise
+is larger in the brighter photo of a pair, so the noise of the difference correlates with that of
+the sum: its regression coefficient is rho = (v+ - v-) / (v+ + v-) for variances v+ and v-.
+Subtracting rho times the sum's deviation leaves 1 - rho^2 of the variance (half of it, on average,
+at a camera pixel with direct light alone), and removes the flicker of the lamp too.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +24,7 @@ from nearfar.parallel import ahead
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.noise import NoiseModel, fit_noise
 from nearfar.photometry.photos import (
-    BATCH,
+    PHOTOS_AT_ONCE,
     Photos,
     Reference,
     basis_of,
@@ -34,14 +35,15 @@ from nearfar.photometry.photos import (
 )
 from nearfar.plan import Plan, Sinusoid
 
-# Pairs that sum to more or less than white + black by this share of white are not linear.
-NOT_LINEAR = 0.005
-# Camera pixels whose responses are laid side by side at once: few enough to lie near the processor.
-TURNED = 256
+# Share of white by which pairs may sum to more or less than white + black; projector or camera is
+# not linear beyond.
+LARGEST_LINEAR_EXCESS = 0.005
+# Camera pixels whose responses are transposed at once: few enough to stay in the cache.
+TRANSPOSED_PIXELS = 256
 
 
 class Pair(NamedTuple):
-    """Photo numbers of a pattern and its inverse, and what they answer."""
+    """Photo numbers of a sinusoid and of its inverse."""
 
     frequency: Frequency
     sine: bool
@@ -68,7 +70,7 @@ def find_pairs(plan: Plan) -> list[Pair]:
         if len(partners) != len(numbers):
             raise InputError(
                 f"the plan shows pattern {numbers[0]} without its inverse, and measurements are "
-                f"made of inverse pairs: plan with `offset='inverse'`."
+                f"made from inverse pairs: plan with `offset='inverse'`."
             )
         if not inverse:
             pairs += [
@@ -120,22 +122,22 @@ def measure_pairs(
     pairs, (basis, places, multiplicity) = find_pairs(plan), responses_of_pairs(plan)
     shape = (camera.pixels, photos.channels)
     differences = np.empty((len(pairs), *shape), dtype=np.float32)
-    strays = np.empty((len(pairs), *shape), dtype=np.float32)
+    deviations = np.empty((len(pairs), *shape), dtype=np.float32)
 
     def read(batch: slice) -> Floats:
         numbers = [n for pair in pairs[batch] for n in (pair.photo, pair.inverse)]
         return photos.read(numbers, rows).reshape(-1, 2, *shape)
 
-    for batch, both in ahead(read, blocks(len(pairs), BATCH // 2)):
+    for batch, both in ahead(read, blocks(len(pairs), PHOTOS_AT_ONCE // 2)):
         np.subtract(both[:, 0], both[:, 1], out=differences[batch])
-        np.add(both[:, 0], both[:, 1], out=strays[batch])
+        np.add(both[:, 0], both[:, 1], out=deviations[batch])
         if progress is not None:
             progress(2 * batch.stop)
-    pair_mean = strays.mean(axis=0, dtype=np.float64)
-    strays -= pair_mean.astype(np.float32)
-    pair_variance = np.einsum("kci,kci->ci", strays, strays, dtype=np.float64)
+    pair_mean = deviations.mean(axis=0, dtype=np.float64)
+    deviations -= pair_mean.astype(np.float32)
+    pair_variance = np.einsum("kci,kci->ci", deviations, deviations, dtype=np.float64)
     pair_variance /= max(len(pairs) - 1, 1)
-    white, black = _reference_photos(pairs, differences, strays, pair_mean)
+    white, black = _reference_photos(pairs, differences, deviations, pair_mean)
     models = [
         fit_noise(pair_mean[:, i], pair_variance[:, i], float(np.median(black[:, i])))
         for i in range(photos.channels)
@@ -145,9 +147,9 @@ def measure_pairs(
         return np.stack([m.variance(photo[:, i]) for i, m in enumerate(models)], axis=1)
 
     excess = _excess_of_sums(pair_mean, white, black)
-    # Sums that do not add up tell of a projector or camera that is not linear, not of white.
+    # Where projector or camera is not linear, the sums are no reference for white.
     sums = [Reference(pair_mean, 2.0, 1.0, pair_variance / len(pairs))]
-    if abs(excess) > NOT_LINEAR:
+    if abs(excess) > LARGEST_LINEAR_EXCESS:
         sums = []
     levels = two_levels(
         [
@@ -157,7 +159,7 @@ def measure_pairs(
             *stripe_references(photos, rows, variance),
         ]
     )
-    left = _take_out_strays(differences, strays, models, variance(pair_mean / 2) * 2)
+    left = _remove_visible_noise(differences, deviations, models, variance(pair_mean / 2) * 2)
     responses = _means(differences, places, multiplicity)
     responses[..., basis.places([DC])[0]] = levels.light
     return Measurements(
@@ -174,41 +176,41 @@ def measure_pairs(
 
 
 def _means(differences: Floats, places: Integers, multiplicity: Floats) -> Floats:
-    """Mean of the differences (pairs, C, channels) of each answer, (C, channels, R)."""
+    """Return the mean difference of each response's pairs, (C, channels, R)."""
     order = np.argsort(places, kind="stable")
     first = np.flatnonzero(np.diff(places[order], prepend=-1))
     shape = differences.shape[1:]
     responses = np.empty((*shape, len(multiplicity)), dtype=np.float32)
-    for block in blocks(shape[0], TURNED):
+    for block in blocks(shape[0], TRANSPOSED_PIXELS):
         sums = np.add.reduceat(differences[:, block][order], first, axis=0)
         responses[block] = np.moveaxis(sums, 0, -1) / multiplicity
     return responses
 
 
 def _excess_of_sums(pair_mean: Floats, white: Floats, black: Floats) -> float:
-    """Tell by what share of white the pairs sum to more than white + black: 0 if all is linear."""
+    """Return the share of white by which pairs exceed white + black: 0 if all is linear."""
     light = (white - black).sum()
     return float((pair_mean - white - black).sum() / light) if light > 0 else 0.0
 
 
 def _reference_photos(
-    pairs: Sequence[Pair], differences: Floats, strays: Floats, pair_mean: Floats
+    pairs: Sequence[Pair], differences: Floats, deviations: Floats, pair_mean: Floats
 ) -> tuple[Floats, Floats]:
     """Photos of white and of black, which are the DC pair's."""
     chosen = [i for i, pair in enumerate(pairs) if pair.frequency == DC]
-    total = strays[chosen].mean(axis=0) + pair_mean
+    total = deviations[chosen].mean(axis=0) + pair_mean
     difference = differences[chosen].mean(axis=0)
     return (total + difference) / 2, (total - difference) / 2
 
 
-def _take_out_strays(
-    differences: Floats, strays: Floats, models: Sequence[NoiseModel], total: Floats
+def _remove_visible_noise(
+    differences: Floats, deviations: Floats, models: Sequence[NoiseModel], total: Floats
 ) -> Floats:
-    """Take the noise that the sums show out of the differences, in place.
+    """Subtract from the differences, in place, the noise that the sums reveal.
 
     Parameters
     ----------
-    differences, strays : ndarray, shape (pairs, C, channels)
+    differences, deviations : ndarray, shape (pairs, C, channels)
     models : sequence of NoiseModel, one per channel
     total : ndarray, shape (C, channels)
         v+ + v-, the same for all pairs.
@@ -216,16 +218,16 @@ def _take_out_strays(
     Returns
     -------
     ndarray, shape (C, channels)
-        Share of the variance that is left, the mean over pairs.
+        Share of the variance that remains, the mean over pairs.
     """
     gain = np.array([model.gain for model in models], dtype=np.float32)
     scale = (gain / total).astype(np.float32)
     shrinkage = np.clip(gain * scale, 0.0, 0.5)
     left = np.zeros(total.shape)
-    for difference, stray in zip(differences, strays, strict=True):
+    for difference, deviation in zip(differences, deviations, strict=True):
         rho = np.clip(scale * difference, -1.0, 1.0)
-        # rho is taken from the noisy difference, which shrinks it by gain * scale on average.
-        np.subtract(difference, rho * stray, out=difference)
+        # rho is computed from the noisy difference, which shrinks that by gain * scale on average.
+        np.subtract(difference, rho * deviation, out=difference)
         np.divide(difference, 1.0 - shrinkage, out=difference)
         left += 1.0 - rho.astype(np.float64) ** 2
     return left / len(differences)

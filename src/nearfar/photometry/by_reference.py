@@ -1,9 +1,10 @@
 """Photos against white and black become measurements.
 
-b(0.5 + 0.5 s) = 0.5 b(1) + 0.5 b(s), so the answer to a sinusoid without offset is twice its photo
-less white and black: b = 2 photo - (white + black). One photo does for two, but errors of white and
-black go into every answer of a camera pixel, so these are shown often, and how well they are known
-is told apart from the noise. Lamp and ambient light are followed by the same photos.
+b(0.5 + 0.5 s) = 0.5 b(1) + 0.5 b(s), so the response to a sinusoid without offset is
+twice its photo less white and black: b = 2 photo - (white + black). One photo serves instead of
+two, but the errors of white and black go into every response of a camera pixel. So these are
+projected often, and their standard deviations are kept apart from the noise. The drift of lamp and
+ambient light is estimated from the same photos.
 
 Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
 real responses.
@@ -23,7 +24,7 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import (
     Reference,
     basis_of,
-    find_shown,
+    find_waves,
     in_batches,
     mean_photo,
     quantisation_error,
@@ -35,22 +36,22 @@ from nearfar.plan import Plan
 
 
 def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, int]], Floats]:
-    """Tell what the photos of a plan by reference answer.
+    """Return the responses that the photos of a plan by reference measure.
 
     Returns
     -------
     basis : RealBasis
     terms : dict
-        Place and sign of the answer of each photo, but of white's and black's.
+        Place and sign of each photo's response, those of white and black left out.
     multiplicity : ndarray, shape (R,)
-        How often each was shown, white for DC.
+        How often each was measured, DC by white.
     """
-    shown = find_shown(plan)
-    basis, place = basis_of(list(shown), plan.projector)
+    waves = find_waves(plan)
+    basis, place = basis_of(list(waves), plan.projector)
     terms = {
-        number: (place[answer], sign)
-        for answer, numbers in shown.items()
-        if answer != (DC, False)
+        number: (place[wave], sign)
+        for wave, numbers in waves.items()
+        if wave != (DC, False)
         for number, sign in numbers
     }
     places = np.array([at for at, _ in terms.values()], dtype=np.int64)
@@ -62,7 +63,7 @@ def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, 
 def measure_by_reference(
     photos: PhotosWithoutDrift, rows: slice, progress: Callable[[int], None] | None = None
 ) -> Measurements:
-    """Turn photos against white and black into measurements.
+    """Turn photos by reference into measurements.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def measure_by_reference(
     Raises
     ------
     InputError
-        If a cosine was shown without its sine.
+        If a cosine was projected without its sine.
     """
     camera = size_of_rows(photos, rows)
     basis, terms, multiplicity = responses_by_reference(photos.plan)

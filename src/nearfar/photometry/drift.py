@@ -1,10 +1,11 @@
-"""Lamp and ambient light, followed through a capture by its whites and blacks.
+"""Drift of lamp and ambient light through a capture, estimated from its whites and blacks.
 
-A photo of pattern l at time t is ambient(t, c) + lamp(t) (T l)(c). Blacks show the ambient light
-(with the camera's black level and the projector's own black), whites what the lamp adds. The
-lamp has one gain per channel. Ambient light changes by a constant, by a share of itself and by a
-share of the white picture: three numbers per channel, whatever the scene, so that next to no
-noise gets in. Between references they run straight, beyond the ends they stay.
+A photo of pattern l at time t is ambient(t, c) + lamp(t) (T l)(c). Black photos
+measure the ambient light (with the camera's black level and the projector's own black), white ones
+what the lamp adds. The lamp has one gain per channel. Ambient light changes by a constant, by a
+share of itself and by a share of the white picture: three numbers per channel for any scene, so
+that the correction adds next to no noise. Gains and changes are interpolated linearly between
+references and constant before the first and after the last.
 
 Index convention: t runs over photos, c over camera pixels row by row, i over channels, j over
 the shapes of a change: 1, black, light = white - black.
@@ -25,13 +26,13 @@ from nearfar.photometry.robust import robust_fit
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.references import FEWEST
 
-# Camera pixels that a fit looks at, evenly spaced; more would take time and add nothing: at half a
-# percent of noise the lamp is known to a hundred thousandth.
-SAMPLE = 2**17
-# A channel whose lamp is known no better than this is taken as steady.
-UNSURE = 0.02
-# A lamp under this share of its mean has failed.
-FAILED = 0.1
+# Camera pixels of a fit, evenly spaced. At half a percent of noise they determine the lamp's gain
+# to 1e-5; more would only take time.
+SAMPLED_PIXELS = 2**17
+# Standard deviation of the lamp's gain above which a channel's lamp is taken as constant.
+LARGEST_GAIN_ERROR = 0.02
+# Gain of the lamp, over its mean, below which it has failed.
+LEAST_LAMP = 0.1
 
 
 class References(NamedTuple):
@@ -67,7 +68,7 @@ def find_references(plan: Plan) -> References:
     if min(map(len, found)) < FEWEST:
         raise InputError(
             f"the plan shows white {len(found.whites)} and black {len(found.blacks)} times, "
-            f"which tells neither noise nor drift: plan again with `offset='reference'`, "
+            f"too few to estimate noise and drift from: plan again with `offset='reference'`, "
             f"which shows each at least {FEWEST} times."
         )
     return found
@@ -115,8 +116,8 @@ class Drift:
     def _pictures(self) -> tuple[Floats, Floats]:
         return self.black, self.light
 
-    def take_out(self, photos: Floats, numbers: Sequence[int], rows: slice) -> Floats:
-        """Bring photos to the mean lamp and the mean ambient light.
+    def remove_from(self, photos: Floats, numbers: Sequence[int], rows: slice) -> Floats:
+        """Remove the drift from photos: as if lamp and ambient light had been at their means.
 
         Parameters
         ----------
@@ -133,12 +134,12 @@ class Drift:
         black, light = (picture[rows] for picture in self._pictures)
         ambient = _between(self.ambient, self.references.blacks, numbers).astype(np.float32)
         lamp = _between(self.lamp, self.references.whites, numbers).astype(np.float32)
-        steady = np.empty_like(photos)
+        corrected = np.empty_like(photos)
         for photo, (constant, own, white), gain, out in zip(
-            photos, ambient, lamp, steady, strict=True
+            photos, ambient, lamp, corrected, strict=True
         ):
             out[...] = black + (photo - (constant + (1 + own) * black + white * light)) / gain
-        return steady
+        return corrected
 
 
 def _between(values: Floats, at: Integers, numbers: Sequence[int]) -> NDArray[np.float64]:
@@ -149,7 +150,7 @@ def _between(values: Floats, at: Integers, numbers: Sequence[int]) -> NDArray[np
 
 
 def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) -> Drift:
-    """Follow lamp and ambient light by least squares over the camera.
+    """Estimate the drift of lamp and ambient light by robust least squares over the camera.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
     report(len(whites) + len(blacks))
 
     mean_light = white - black
-    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLE))
+    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLED_PIXELS))
     channels = [
         _Channel(
             np.stack([np.ones_like(black[sampled, i]), black[sampled, i], mean_light[sampled, i]]),
@@ -198,7 +199,8 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
             for photo in read[:, sampled]
         ]
         report(len(whites) + len(blacks) + len(changes))
-    # The mean of the whites holds ambient light of its own times: what is left is the lamp's.
+    # The ambient light at the whites differs from its mean at the blacks; the mean white less that
+    # ambient light is the lamp's.
     ambient = np.swapaxes(changes, 1, 2)
     constant, own, share = _between(ambient, blacks, whites.tolist()).mean(axis=0)
     light = (1 - share) * mean_light - constant - own * black
@@ -215,9 +217,9 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
     )
     gains: list[list[tuple[float, float]]] = []
     for numbers, read in in_batches(photos, whites.tolist(), rows):
-        # With the ambient light taken out, and the lamp left as it was.
-        steady = drift.take_out(read.reshape(-1, *drift.black.shape), numbers, rows)
-        lit = steady.reshape(read.shape)[:, sampled] - black[sampled]
+        # Without the ambient light's drift; the lamp's gain is still 1 here.
+        corrected = drift.remove_from(read.reshape(-1, *drift.black.shape), numbers, rows)
+        lit = corrected.reshape(read.shape)[:, sampled] - black[sampled]
         gains += [
             [channel.gain(photo[:, i], light[sampled, i]) for i, channel in enumerate(channels)]
             for photo in lit
@@ -229,12 +231,12 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
 def _lamp(gains: NDArray[np.float64], whites: Integers) -> NDArray[np.float64]:
     """Return the lamp at each white from gains and their errors, (whites, channels, 2)."""
     gain, error = gains[..., 0], gains[..., 1]
-    known = np.all(error < UNSURE, axis=0)
+    known = np.all(error < LARGEST_GAIN_ERROR, axis=0)
     lamp: NDArray[np.float64] = np.where(known, gain, 1.0)
-    if lamp.min() < FAILED:
+    if lamp.min() < LEAST_LAMP:
         raise InputError(
-            f"photo {whites[lamp.min(axis=1).argmin()]}, of white, shows under {FAILED:.0%} of the "
-            f"light of the others: shoot again with the projector on throughout."
+            f"photo {whites[lamp.min(axis=1).argmin()]}, of white, shows under {LEAST_LAMP:.0%} of "
+            f"the light of the others: shoot again with the projector on throughout."
         )
     return np.asarray(lamp / lamp.mean(axis=0))
 
@@ -244,21 +246,29 @@ def _picture(values: Floats, photos: Photos) -> NDArray[np.float32]:
 
 
 class _Channel(NamedTuple):
-    """What the fits of a channel share: the shapes (3, C), noise up to a factor, pixels to use."""
+    """What all fits of a channel share.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (3, C)
+    scatter : ndarray, shape (C,)
+        Standard deviation of a photo's noise, up to a factor.
+    usable : ndarray of bool, shape (C,)
+    """
 
     shapes: Floats
     scatter: Floats
     usable: Booleans
 
     def change(self, photo: Floats) -> NDArray[np.float64]:
-        """Return what a black is more than their mean, as multiples of the shapes."""
-        return robust_fit(self._told(self.shapes), self._told(photo - self.shapes[1]))[0]
+        """Return a black photo less the mean black, as multiples of the shapes."""
+        return robust_fit(self._whitened(self.shapes), self._whitened(photo - self.shapes[1]))[0]
 
     def gain(self, photo: Floats, light: Floats) -> tuple[float, float]:
-        """Return the lamp at a white, whose ambient light was taken out, and its error."""
-        found, error = robust_fit(self._told(light[None]), self._told(photo))
+        """Return the lamp's gain at a white photo without ambient light, and its deviation."""
+        found, error = robust_fit(self._whitened(light[None]), self._whitened(photo))
         return float(found[0]), error
 
-    def _told(self, values: Floats) -> Floats:
-        # Bright pixels scatter more: by shot noise, that much.
+    def _whitened(self, values: Floats) -> Floats:
+        # Divided by the shot noise, which grows with the root of the light.
         return np.asarray((values / self.scatter)[..., self.usable], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Photos by reference, with lamp and ambient light made steady and their noise told.
+"""Photos by reference without the drift of lamp and ambient light, and a model of their noise.
 
 Index convention: arrays are (photos, C, channels) with C camera pixels row by row; i runs over
 channels.
@@ -11,13 +11,13 @@ import numpy as np
 
 from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
-from nearfar.photometry.drift import SAMPLE, Drift, follow_drift
+from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, follow_drift
 from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few
-from nearfar.photometry.photos import BATCH, Answer, Photos, find_shown, in_batches
+from nearfar.photometry.photos import PHOTOS_AT_ONCE, Photos, Wave, find_waves, in_batches
 from nearfar.plan import Plan
 
-# Values among which two neighbouring levels are looked for.
-LEVELS = 2**18
+# Values among which the smallest difference of two levels is searched.
+SAMPLED_VALUES = 2**18
 
 
 @dataclass(frozen=True)
@@ -53,19 +53,19 @@ class PhotosWithoutDrift:
         return self.photos.channels
 
     def read(self, indices: Sequence[int], rows: slice) -> Floats:
-        """Photos `indices` as float32, (n, len(rows), Cx, channels), lamp and ambient steady."""
-        return self.drift.take_out(self.photos.read(indices, rows), indices, rows)
+        """Photos `indices` as float32, (n, len(rows), Cx, channels), without drift."""
+        return self.drift.remove_from(self.photos.read(indices, rows), indices, rows)
 
     def variance(self, photo: Floats) -> Floats:
         """Variance of one photo that reads `photo`, (C, channels)."""
-        told = [model.variance(photo[:, i]) for i, model in enumerate(self.noise)]
-        return np.stack(told, axis=1)
+        variances = [model.variance(photo[:, i]) for i, model in enumerate(self.noise)]
+        return np.stack(variances, axis=1)
 
 
 def remove_drift(
     photos: Photos, progress: Callable[[int], None] | None = None
 ) -> PhotosWithoutDrift:
-    """Follow lamp, ambient light and noise through a capture, the whole camera at once.
+    """Estimate the drift and the noise of a capture, from the whole camera at once.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def remove_drift(
     Returns
     -------
     PhotosWithoutDrift
-        To be measured in blocks of rows as one pleases.
+        May be measured in tiles of any rows.
 
     Raises
     ------
@@ -86,32 +86,32 @@ def remove_drift(
     """
     drift = follow_drift(photos, progress)
     found = PhotosWithoutDrift(photos, drift)
-    return PhotosWithoutDrift(photos, drift, _noise_of_repeats(found))
+    return PhotosWithoutDrift(photos, drift, _noise_of_repeated_patterns(found))
 
 
-def _noise_of_repeats(photos: PhotosWithoutDrift) -> tuple[NoiseModel, ...]:
-    """Fit shot and read noise to the scatter of every pattern that was shown more than once."""
-    shown: dict[tuple[Answer, bool], list[int]] = {}
-    for answer, signed in find_shown(photos.plan).items():
+def _noise_of_repeated_patterns(photos: PhotosWithoutDrift) -> tuple[NoiseModel, ...]:
+    """Fit shot and read noise to the scatter of every pattern that was projected repeatedly."""
+    repeated: dict[tuple[Wave, bool], list[int]] = {}
+    for wave, signed in find_waves(photos.plan).items():
         for number, sign in signed:
-            shown.setdefault((answer, sign > 0), []).append(number)
+            repeated.setdefault((wave, sign > 0), []).append(number)
     rows = slice(0, photos.camera.height)
-    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLE))
+    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLED_PIXELS))
     usable = photos.drift.unsaturated.reshape(-1, photos.channels)[sampled]
     means, variances = [], []
-    for numbers in shown.values():
+    for numbers in repeated.values():
         if len(numbers) > 1:
             first = photos.read(numbers[:1], rows).reshape(-1, photos.channels)[sampled]
             total, squares = np.zeros(first.shape), np.zeros(first.shape)
             for _, read in in_batches(photos, numbers, rows):
-                # Sums of what differs from the first photo lose no digits.
+                # Differences from the first photo are small: their sums lose no digits.
                 off = (read[:, sampled] - first).astype(np.float64)
                 total += off.sum(axis=0)
                 squares += (off**2).sum(axis=0)
             means.append(first + total / len(numbers))
             variances.append((squares - total**2 / len(numbers)) / (len(numbers) - 1))
     mean, variance = np.stack(means), np.maximum(np.stack(variances), 0.0)
-    rounding = _rounding(photos.photos)
+    rounding = _rounding_variance(photos.photos)
     models = []
     for i in range(photos.channels):
         if not usable[:, i].any():
@@ -133,9 +133,9 @@ def _noise_of_repeats(photos: PhotosWithoutDrift) -> tuple[NoiseModel, ...]:
     return tuple(models)
 
 
-def _rounding(photos: Photos) -> float:
-    """Variance of rounding to whole levels, of which two neighbours are the least apart."""
-    numbers = range(min(BATCH, len(photos.plan.patterns)))
+def _rounding_variance(photos: Photos) -> float:
+    """Variance of rounding to whole levels, a twelfth of their squared distance."""
+    numbers = range(min(PHOTOS_AT_ONCE, len(photos.plan.patterns)))
     some = photos.read(numbers, slice(0, photos.camera.height)).ravel()
-    levels = np.unique(some[:: -(-some.size // LEVELS)].astype(np.float64))
+    levels = np.unique(some[:: -(-some.size // SAMPLED_VALUES)].astype(np.float64))
     return float(np.diff(levels).min()) ** 2 / 12 if len(levels) > 1 else 0.0

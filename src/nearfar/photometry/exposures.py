@@ -1,4 +1,4 @@
-"""Several frames of the same light made one: averages, and exposures of several lengths.
+"""Several frames of the same light combined: averages, and exposures of several lengths.
 
 Index convention: frames are (n, ...), raw levels; whatever follows is a frame's own shape.
 """
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
 
-# The brightest levels bend before they clip.
-TRUSTED = 0.98
+# Share of full scale up to which levels are linear: the brightest bend before they clip.
+LARGEST_TRUSTED_SHARE = 0.98
 
 
 class Sensor(NamedTuple):
@@ -43,7 +43,7 @@ def average(frames: Iterable[NDArray[Any]], full_scale: float) -> NDArray[np.flo
     Parameters
     ----------
     frames : iterable of arrays
-        Of one shape, light and exposure; one is held at a time.
+        Of one shape, light and exposure; one is in memory at a time.
     full_scale : float
 
     Returns
@@ -63,9 +63,9 @@ def merge_exposures(
 ) -> NDArray[np.float32]:
     """Merge exposures of several lengths, each weighted by the inverse of its variance.
 
-    The rate of light that best explains all levels that are not clipped: with w = t^2 / variance,
-    rate = sum(w (level - black) / t) / sum(w), with the variance at the level that is expected of
-    the rate itself, so that weights do not follow the noise.
+    The rate of light that best explains all levels that are not clipped is
+    sum(w (level - black) / t) / sum(w) with w = t^2 / variance. The variance is that of the level
+    that a first estimate of the rate predicts, so that weights do not follow the noise.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ def merge_exposures(
         float32: levels as of the first exposure; `full_scale` where even that is saturated.
     """
     lengths = np.asarray(times, dtype=np.float64).reshape(-1, *(1,) * (frames.ndim - 1))
-    trusted = frames < TRUSTED * full_scale
+    trusted = frames < LARGEST_TRUSTED_SHARE * full_scale
     light = frames.astype(np.float64) - sensor.black
-    # Without read noise this is the answer already.
+    # Without read noise this would be the result.
     time = (trusted * lengths).sum(axis=0)
     rate = (trusted * light).sum(axis=0) / np.where(time > 0, time, 1.0)
     weight = trusted * lengths**2 / sensor.variance(rate * lengths + sensor.black)
     total = weight.sum(axis=0)
     rate = (weight * light / lengths).sum(axis=0) / np.where(total > 0, total, 1.0)
     levels = sensor.black + rate * lengths[0]
-    # What is bright even in the shortest is that alone.
+    # Where even the shortest exposure is not trusted, its level is kept.
     return np.asarray(np.where(total > 0, levels, frames[0]), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Photos of a plan that are held in memory."""
+"""Photos of a plan that are kept in memory."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From the photos of a plan to measurements, whatever takes the offset out."""
+"""From the photos of a plan to measurements, by inverse pairs or by reference."""
 
 from collections.abc import Callable
 
@@ -10,12 +10,12 @@ from nearfar.photometry.by_reference import measure_by_reference, responses_by_r
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import PhotosWithoutDrift, remove_drift
 from nearfar.photometry.measurements import Measurements
-from nearfar.photometry.photos import Photos, find_shown
+from nearfar.photometry.photos import Photos, find_waves
 from nearfar.plan import Plan
 
 
 def measured_frequencies(plan: Plan) -> set[Frequency]:
-    """Tell which frequencies the photos of a plan measure.
+    """Return the frequencies that the photos of a plan measure.
 
     Raises
     ------
@@ -27,19 +27,19 @@ def measured_frequencies(plan: Plan) -> set[Frequency]:
     plan.require_real("measure")
     if plan.offset == "reference":
         find_references(plan)
-        return {frequency for frequency, _ in find_shown(plan)}
+        return {frequency for frequency, _ in find_waves(plan)}
     return {pair.frequency for pair in find_pairs(plan)}
 
 
 def answered(plan: Plan) -> tuple[RealBasis, Floats]:
-    """Tell what the photos of a plan measure before there are any.
+    """Return what the photos of a plan will measure, before there are any.
 
     Returns
     -------
     basis : RealBasis
         That of the measurements.
     multiplicity : ndarray, shape (R,)
-        How often each answer is measured.
+        How often each response is measured.
 
     Raises
     ------
@@ -62,8 +62,8 @@ def measure(
     Parameters
     ----------
     photos : Photos
-        A capture; one by reference is made `steady` first, so to measure it in blocks of rows
-        make it steady once and give that.
+        A capture. The drift of one by reference is removed first, from the whole camera: to
+        measure such a capture in tiles of rows, give what `remove_drift` returned.
     rows : slice, optional
         Rows of the camera to measure; all by default.
     progress : callable, optional
@@ -84,6 +84,6 @@ def measure(
     photos.plan.require_real("measure")
     rows = slice(0, photos.camera.height) if rows is None else rows
     if photos.plan.offset == "reference":
-        followed = photos if isinstance(photos, PhotosWithoutDrift) else remove_drift(photos)
-        return measure_by_reference(followed, rows, progress)
+        without_drift = photos if isinstance(photos, PhotosWithoutDrift) else remove_drift(photos)
+        return measure_by_reference(without_drift, rows, progress)
     return measure_pairs(photos, rows, progress)

@@ -12,7 +12,7 @@ from nearfar.illumination.real_basis import RealBasis
 
 
 def _left_out() -> Floats:
-    """Stand in for a field that was not given: an array without axes."""
+    """Return an array without axes, which stands for a field that was not given."""
     return np.zeros((), dtype=np.float32)
 
 
@@ -21,7 +21,7 @@ class Measurements:
     """Responses of every camera pixel to cosines and sines without offset.
 
     Index convention: c runs over camera pixels row by row, r over the real responses of `basis`;
-    b_k(c) = (answer to cos) - j (answer to sin).
+    b_k(c) = (response to cos) - j (response to sin).
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Measurements:
         The frequencies that were measured, one of each +-k, and the pattern grid.
     responses : ndarray, shape (C, channels, R), float32
     noise : ndarray, shape (C, channels), float32
-        Standard deviation of one real answer from one measurement: a pair, or one photo against
+        Standard deviation of one real response from one measurement: a pair, or one photo against
         references; 0 where there is none.
     black : ndarray, shape (C, channels), float32
         The photo under black.
@@ -50,7 +50,8 @@ class Measurements:
         Standard deviation of the response to DC, white - black, whatever its multiplicity; by
         default `noise`.
     brightest : float
-        Largest answer to DC of the camera of which these are some rows; 0, the default: of these.
+        Largest response to DC of the whole camera, where these are some of its rows; by default 0:
+        that of these rows.
 
     Examples
     --------

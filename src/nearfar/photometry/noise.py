@@ -1,4 +1,4 @@
-"""The camera's noise as the photos themselves tell it."""
+"""The camera's noise, estimated from the photos themselves."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,15 +7,15 @@ import numpy as np
 
 from nearfar.arrays import Floats
 
-# Variances this many times that of the quiet nine tenths are no noise: something moved. Of the
-# variances of two photos each, the widest there are, fewer than one in ten thousand are beyond.
-OUTLYING = 30.0
+# Variances this many times the mean of the lower nine tenths are no noise: something moved. Those
+# of two photos each scatter most, and fewer than one in ten thousand of them exceed it.
+OUTLIER_FACTOR = 30.0
 
 
 class NoiseModel(NamedTuple):
     """Variance of one photo's pixel: gain times its value, plus a floor (photo units).
 
-    `least` is below no variance: that of rounding, where it is known.
+    No variance is below `least`, that of rounding where it is known.
     """
 
     gain: float
@@ -23,7 +23,7 @@ class NoiseModel(NamedTuple):
     least: float = 0.0
 
     def variance(self, photo: Floats) -> Floats:
-        """Return the variance of a pixel that reads `photo`; at least a hair above 0."""
+        """Return the variance of a pixel that reads `photo`; always above 0."""
         least = max(self.floor, self.least, 0.0) + 1e-12
         return np.asarray(np.maximum(self.gain * photo + self.floor, least))
 
@@ -41,7 +41,7 @@ def fit_noise(
 
     A pattern and its inverse sum to the same picture in every pair, so the scatter of the sums
     is the noise of two photos: variance = gain * sum + 2 * floor (shot noise grows with light,
-    read noise does not). A pattern that is shown again tells the noise of one photo likewise.
+    read noise does not). A pattern that is projected again measures the noise of one photo.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def fit_noise(
     least : float
         Variance of rounding, which photos that are all the same do not show.
     typical : callable
-        What variances of pixels of one brightness come to; the median, which is right where
-        each comes from many photos.
+        Reduces the variances of pixels of one brightness to one; by default their median, which
+        is right where each variance is of many photos.
 
     Returns
     -------
@@ -79,10 +79,10 @@ def fit_noise(
 
 
 def mean_of_few(variances: Floats) -> float:
-    """Return the mean of variances that come from a few photos each, less what moved.
+    """Return the mean of variances of a few photos each, without those of what moved.
 
     Their median would be far below their mean, the more so where the camera rounds coarsely.
     """
     ordered = np.sort(variances)
     quiet = ordered[: max(1, int(0.9 * len(ordered)))].mean()
-    return float(ordered[ordered <= OUTLYING * quiet].mean())
+    return float(ordered[ordered <= OUTLIER_FACTOR * quiet].mean())

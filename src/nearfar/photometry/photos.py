@@ -1,4 +1,4 @@
-"""What measuring reads, and what its shapes share: batches, the responses' places, two levels.
+"""What measuring by pairs and by reference share: photos in batches, places of responses, levels.
 
 Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
 real responses.
@@ -19,10 +19,10 @@ from nearfar.parallel import ahead
 from nearfar.plan import Plan, Sinusoid, Stripe
 
 # Photos read at once.
-BATCH = 16
+PHOTOS_AT_ONCE = 16
 
-# An answer: a frequency, and whether to its sine.
-Answer = tuple[Frequency, bool]
+# A wave: a frequency, and whether it is the sine and not the cosine.
+Wave = tuple[Frequency, bool]
 
 
 class Photos(Protocol):
@@ -56,12 +56,12 @@ def size_of_rows(photos: Photos, rows: slice) -> Size:
 def in_batches(
     photos: Photos, numbers: Sequence[int], rows: slice
 ) -> Iterator[tuple[Sequence[int], Floats]]:
-    """Yield photo numbers and their photos, (n, C, channels), `BATCH` at once."""
+    """Yield photo numbers and their photos, (n, C, channels), `PHOTOS_AT_ONCE` at once."""
 
     def read(mine: Sequence[int]) -> Floats:
         return photos.read(mine, rows).reshape(len(mine), -1, photos.channels)
 
-    yield from ahead(read, [list(numbers[batch]) for batch in blocks(len(numbers), BATCH)])
+    yield from ahead(read, [list(numbers[batch]) for batch in blocks(len(numbers), PHOTOS_AT_ONCE)])
 
 
 def mean_photo(photos: Photos, numbers: Sequence[int], rows: slice) -> NDArray[np.float64]:
@@ -73,23 +73,23 @@ def mean_photo(photos: Photos, numbers: Sequence[int], rows: slice) -> NDArray[n
     return total / len(numbers)
 
 
-def find_shown(plan: Plan) -> dict[Answer, list[tuple[int, int]]]:
-    """List the photos of each cosine and sine, with the sign of their answer: -1 for inverses."""
-    found: dict[Answer, list[tuple[int, int]]] = {}
+def find_waves(plan: Plan) -> dict[Wave, list[tuple[int, int]]]:
+    """List the photos of each cosine and sine, with their sign: -1 for inverses."""
+    found: dict[Wave, list[tuple[int, int]]] = {}
     for number, pattern in enumerate(plan.patterns):
         if isinstance(pattern, Sinusoid):
-            answer = (pattern.frequency, pattern.kind == "sine")
-            found.setdefault(answer, []).append((number, -1 if pattern.inverse else 1))
+            wave = (pattern.frequency, pattern.kind == "sine")
+            found.setdefault(wave, []).append((number, -1 if pattern.inverse else 1))
     return found
 
 
-def basis_of(responses: Sequence[Answer], projector: Size) -> tuple[RealBasis, dict[Answer, int]]:
-    """Return the basis of what was answered, and the place of each answer in it.
+def basis_of(responses: Sequence[Wave], projector: Size) -> tuple[RealBasis, dict[Wave, int]]:
+    """Return the basis of the waves that were projected, and the place of each wave in it.
 
     Raises
     ------
     InputError
-        If a cosine was shown without its sine, or a sine without its cosine.
+        If a cosine was projected without its sine, or a sine without its cosine.
     """
     known = set(responses)
     basis = real_basis(list(dict.fromkeys(frequency for frequency, _ in responses)), projector)
@@ -119,7 +119,7 @@ def quantisation_error(basis: RealBasis) -> Floats:
 
 
 class Reference(NamedTuple):
-    """A picture, how many blacks and how many (white - black) it holds, and its variance."""
+    """A photo that is `blacks` x black + `lights` x (white - black), and its variance."""
 
     value: Floats
     blacks: float
@@ -130,7 +130,7 @@ class Reference(NamedTuple):
 def stripe_references(
     photos: Photos, rows: slice, variance: Callable[[Floats], Floats]
 ) -> list[Reference]:
-    """Every set of stripes adds up to a known number of whites: one more reference each."""
+    """Return the mean of all stripes of each axis, which is black + (1 - 1 / stripes) light."""
     found: list[Reference] = []
     for kind in ("black row", "black column"):
         numbers = [

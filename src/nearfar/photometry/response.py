@@ -1,4 +1,4 @@
-"""What a projector makes of its levels, and a camera of light: fits of ramps and of pairs."""
+"""Responses of a projector and a camera, fitted to ramps of levels and to pairs of photos."""
 
 from typing import NamedTuple
 
@@ -11,25 +11,23 @@ from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.photometry.exposures import Sensor
 
-LEVELS = 256
-# Less than this share of white's light at the highest level below white is no ramp.
-LEAST_LIGHT = 0.05
-# Rounds of a fit whose weights follow from itself.
-ROUNDS = 8
-# Photos of so many levels say something about a response.
-FEWEST = 5
+LEVEL_COUNT = 256
+# Rounds of a fit whose weights depend on its result.
+REWEIGHTINGS = 8
+# Levels that a ramp must have for a response to be fitted.
+FEWEST_LEVELS = 5
 
 
 def fit_response(levels: NDArray[np.integer], light: Floats) -> Floats:
     """Fit a projector's response to a ramp of its levels.
 
-    The light is made never to fall, by the nearest such sequence, and what lies between the levels
-    of the ramp follows a cubic that does not overshoot.
+    Isotonic regression makes the light increase with the level, and a monotone cubic interpolates
+    between the levels of the ramp.
 
     Parameters
     ----------
     levels : array, shape (n,)
-        Levels shown, 0 and 255 among them; a level may come several times.
+        Projected levels, 0 and 255 among them; a level may come several times.
     light : array, shape (n,)
         Light of each, in any unit.
 
@@ -43,11 +41,11 @@ def fit_response(levels: NDArray[np.integer], light: Floats) -> Floats:
     InputError
         If the ends are missing, levels are few, or light does not rise.
     """
-    shown, place = np.unique(levels, return_inverse=True)
-    if len(shown) < FEWEST or shown[0] != 0 or shown[-1] != LEVELS - 1:
+    projected, place = np.unique(levels, return_inverse=True)
+    if len(projected) < FEWEST_LEVELS or projected[0] != 0 or projected[-1] != LEVEL_COUNT - 1:
         raise InputError(
-            f"a ramp of the levels {shown.tolist()} tells no response: show {FEWEST} levels or "
-            f"more, 0 and 255 among them."
+            f"a ramp of the levels {projected.tolist()} is too short to fit a response to: project "
+            f"{FEWEST_LEVELS} levels or more, 0 and 255 among them."
         )
     weights = np.bincount(place).astype(np.float64)
     mean = np.bincount(place, weights=np.asarray(light, dtype=np.float64)) / weights
@@ -55,10 +53,10 @@ def fit_response(levels: NDArray[np.integer], light: Floats) -> Floats:
     if not rising[-1] > rising[0]:
         raise InputError(
             "the ramp's photos do not become brighter with its levels: check that the projector "
-            "shows them and the camera sees them."
+            "displays them and the camera sees them."
         )
     share = (rising - rising[0]) / (rising[-1] - rising[0])
-    table = PchipInterpolator(shown, share)(np.arange(LEVELS))
+    table = PchipInterpolator(projected, share)(np.arange(LEVEL_COUNT))
     table[-1] = 1.0
     return np.maximum.accumulate(np.clip(table, 0.0, 1.0))
 
@@ -108,7 +106,7 @@ class Linearity(NamedTuple):
 
 
 def fit_linearity(seconds: Floats, levels: Floats, full_scale: float) -> Linearity:
-    """Fit a line to the mean levels of a steady light at several exposures.
+    """Fit a line to the mean levels of a constant light at several exposures.
 
     Parameters
     ----------
@@ -122,7 +120,7 @@ def fit_linearity(seconds: Floats, levels: Floats, full_scale: float) -> Lineari
         If there are fewer than two exposures.
     """
     if len(np.unique(seconds)) < 2:
-        raise InputError("one exposure tells no line: take photos at two or more.")
+        raise InputError("a line cannot be fitted to one exposure: take photos at two or more.")
     # Each error counts as a share of its level, so that the short ones place the black level.
     weight = 1.0 / np.sqrt(np.maximum(levels, 1.0))
     system = np.stack([np.ones_like(seconds), seconds], axis=-1)
@@ -143,10 +141,10 @@ def fit_noise(means: Floats, variances: Floats, black: float) -> Sensor:
     """
     light = np.maximum(np.asarray(means, dtype=np.float64) - black, 0.0)
     system = np.stack([np.ones_like(light), light], axis=-1)
-    # A variance's own error is as large as what is expected of it, not as what was measured: by
-    # that, chance would choose whom to trust.
+    # The error of a variance is proportional to its expectation. Weights by the measured variance
+    # would favour those that chance made small.
     expected = np.full_like(light, max(float(variances.mean()), 1e-6))
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         weight = 1.0 / expected
         solution, _ = nnls(system * weight[:, np.newaxis], variances * weight)
         expected = np.maximum(system @ solution, 1e-6)
@@ -173,6 +171,6 @@ def pair_noise(
         if len(group) > 1:
             difference = first[group] - second[group]
             means.append(mean[group].mean())
-            # A lamp's flicker moves all pixels of one light together; it is not theirs.
+            # The variance is about the group's mean difference, which the lamp's flicker shifts.
             variances.append(difference.var(ddof=1) / 2)
     return np.array(means), np.array(variances)

@@ -17,7 +17,7 @@ from nearfar.plan import Plan
 from nearfar.plan.patterns import Exponential
 
 # Camera pixels at once.
-BLOCK = 512
+PIXELS_AT_ONCE = 512
 
 
 class Known(Protocol):
@@ -44,7 +44,7 @@ class Known(Protocol):
 
 
 def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
-    """Answer a plan's complex patterns exactly (equation 2).
+    """Compute the exact responses to a plan's complex patterns (equation 2).
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
     Returns
     -------
     Measurements
-        Without noise, black or errors of what was shown.
+        Without noise, black or quantisation error.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
     patterns = np.ascontiguousarray(basis.patterns.T, dtype=np.float64)
     pixels, channels = transport.camera.pixels, transport.channels
     responses = np.empty((pixels, channels, basis.count), dtype=np.float32)
-    for block in blocks(pixels, BLOCK):
+    for block in blocks(pixels, PIXELS_AT_ONCE):
         responses[block] = transport.rows(block).astype(np.float64) @ patterns
     nothing = np.zeros((pixels, channels), dtype=np.float32)
     return Measurements(

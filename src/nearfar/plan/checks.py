@@ -1,4 +1,4 @@
-"""Pictures among a plan's patterns that no estimate sees, to tell how well it relights."""
+"""Check pictures: patterns whose photos no estimate uses, to measure how well it relights."""
 
 from collections import Counter
 
@@ -7,19 +7,19 @@ from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.plan.model import Plan
 from nearfar.plan.patterns import Pattern, Picture, Sinusoid
 
-# Not those that `nearfar evaluate` relights under.
-SEEDS = (101, 102, 103)
-# Two photos of each: what they have in common is no noise.
-TIMES = 2
+# Seeds of the pictures, other than those that `nearfar evaluate` relights under.
+PICTURE_SEEDS = (101, 102, 103)
+# Photos of each picture: what two have in common is not noise.
+PHOTOS_OF_EACH = 2
 
 
 def with_checks(plan: Plan) -> Plan:
-    """Put pictures to check by behind the first white and black of a plan.
+    """Insert check pictures after the first white and black of a plan.
 
     Raises
     ------
     PlanError
-        If the plan is not one whose first photos can be estimated from.
+        If an estimate needs all photos of the plan.
     """
     if plan.offset != "reference" or plan.counts["correspondence"]:
         raise PlanError(
@@ -28,18 +28,18 @@ def with_checks(plan: Plan) -> Plan:
             "nothing to check on the way: make the plan with `photos`."
         )
     start = next(i for i, pattern in enumerate(plan.patterns) if not is_reference(pattern))
-    checks = tuple(Picture(seed=seed) for _ in range(TIMES) for seed in SEEDS)
+    checks = tuple(Picture(seed=seed) for _ in range(PHOTOS_OF_EACH) for seed in PICTURE_SEEDS)
     patterns = (*plan.patterns[:start], *checks, *plan.patterns[start:])
     return plan.model_copy(update={"patterns": patterns})
 
 
 def is_reference(pattern: Pattern) -> bool:
-    """Tell white and black from other patterns."""
+    """Return whether a pattern is white or black."""
     return isinstance(pattern, Sinusoid) and pattern.frequency == DC
 
 
 def check_photos(plan: Plan) -> dict[int, list[int]]:
-    """List the photos of each picture by its seed."""
+    """Return the photo numbers of each check picture by its seed."""
     found: dict[int, list[int]] = {}
     for number, pattern in enumerate(plan.patterns):
         if isinstance(pattern, Picture):
@@ -48,11 +48,11 @@ def check_photos(plan: Plan) -> dict[int, list[int]]:
 
 
 def ends(plan: Plan) -> list[int]:
-    """Numbers of photos after which a plan may end.
+    """Return the numbers of photos after which a capture of a plan may end.
 
-    Every cosine has its sine, stripes or Gray code that were begun are whole, and white and black
-    have just been shown for the second time or later; or every pattern has its inverse, white
-    among them.
+    By then every cosine has its sine, patterns for correspondence are complete or not started, and
+    white and black have just been projected for the second time or later; or, in a plan of inverse
+    pairs, every pattern has its inverse, white among them.
     """
     own = [i for i, p in enumerate(plan.patterns) if p.purpose == "correspondence"]
     first, last = (own[0], own[-1]) if own else (0, -1)
@@ -79,16 +79,16 @@ def _ends_of(plan: Plan) -> list[int]:
 
 def _ends_of_pairs(plan: Plan) -> list[int]:
     found: list[int] = []
-    shown: set[tuple[Frequency, str]] = set()
+    projected: set[tuple[Frequency, str]] = set()
     surplus: Counter[tuple[Frequency, str, str]] = Counter()
     without_other: set[Frequency] = set()
     for i, pattern in enumerate(plan.patterns):
         if isinstance(pattern, Sinusoid):
             frequency, kind = pattern.frequency, pattern.kind
             surplus[frequency, kind, pattern.purpose] += -1 if pattern.inverse else 1
-            if (frequency, kind) not in shown and not frequency.is_own_negative:
+            if (frequency, kind) not in projected and not frequency.is_own_negative:
                 without_other ^= {frequency}
-            shown |= {(frequency, kind)}
-        if (DC, "cosine") in shown and not without_other and not any(surplus.values()):
+            projected |= {(frequency, kind)}
+        if (DC, "cosine") in projected and not without_other and not any(surplus.values()):
             found.append(i + 1)
     return found

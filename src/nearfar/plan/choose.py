@@ -33,7 +33,7 @@ from nearfar.illumination.frequencies import (
 )
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan.model import Plan
-from nearfar.plan.paper import LARGEST, sinusoids
+from nearfar.plan.paper import LARGEST_SIDE, sinusoids
 from nearfar.plan.patterns import Purpose
 from nearfar.plan.references import FEWEST, with_references
 from nearfar.priors.covariance import far_variance, near_covariance
@@ -142,10 +142,10 @@ def choose_plan(
             f"{photos} photos are too few to settle correspondence and light: plan with "
             f"`photos={FEWEST_PHOTOS}` or more."
         )
-    if min(projector) < SMALLEST_SIDE or max(projector) > LARGEST:
+    if min(projector) < SMALLEST_SIDE or max(projector) > LARGEST_SIDE:
         raise PlanError(
             f"a projector of {projector} is no pattern grid to choose frequencies on: its sides "
-            f"must be from {SMALLEST_SIDE} to {LARGEST} pixels."
+            f"must be from {SMALLEST_SIDE} to {LARGEST_SIDE} pixels."
         )
     window = default_window(projector) if window is None else window
     if not 1 <= window <= min(projector):

@@ -34,10 +34,10 @@ from nearfar.plan.patterns import (
     pattern_reader,
 )
 
-# Stands in the model as a literal, too. Version 2 knows phase, repeats and pictures to check by,
-# version 3 Gray code; all of an earlier version is of the next as well.
+# Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
+# 3 Gray code; a plan of an earlier version is one of the next as well.
 FORMAT_VERSION = 3
-READABLE = (1, 2, 3)
+READABLE_VERSIONS = (1, 2, 3)
 
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
 
@@ -128,7 +128,7 @@ class Plan(Frozen):
 
     @cached_property
     def counts(self) -> dict[Purpose, int]:
-        """Photos for each purpose; of checks where there are any."""
+        """Number of photos for each purpose; checks are left out where there are none."""
         counted: Counter[Purpose] = Counter(pattern.purpose for pattern in self.patterns)
         return {**dict.fromkeys(PURPOSES, 0), **counted}
 
@@ -157,7 +157,7 @@ class Plan(Frozen):
         return self.model_copy(update={"patterns": self.patterns[:count]})
 
     def require_real(self, what: str) -> None:
-        """Refuse a plan of complex patterns for anything but simulation by theory.
+        """Refuse a plan of complex patterns, which are for simulation without noise only.
 
         Raises
         ------
@@ -193,8 +193,8 @@ class Plan(Frozen):
             ("photos", f"{len(self.patterns)}: {counted}"),
             ("brute force over photos of transport", f"{self.savings:.2f}"),
         ]
-        shown = [] if self.offset == "none" else [0, *range(3, len(self.patterns), 7)][:5]
-        images = [(f"pattern {i}", picture(self.draw(i) / np.float32(255), "")) for i in shown]
+        chosen = [] if self.offset == "none" else [0, *range(3, len(self.patterns), 7)][:5]
+        images = [(f"pattern {i}", picture(self.draw(i) / np.float32(255), "")) for i in chosen]
         return card("plan", rows, images)
 
     def to_json(self) -> str:
@@ -240,7 +240,7 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
         raise UnreadableFileError(
             f"{source} is not a nearfar plan: make one with 'nearfar plan -o'."
         )
-    if data.get("version") not in READABLE:
+    if data.get("version") not in READABLE_VERSIONS:
         raise UnreadableFileError(
             f"{source} is a plan of version {data.get('version')!r}, this nearfar reads versions "
             f"1 to {FORMAT_VERSION}: make the plan again, or use the nearfar that "

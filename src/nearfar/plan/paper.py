@@ -21,7 +21,7 @@ from nearfar.plan.patterns import Exponential, Purpose, Sinusoid
 from nearfar.plan.references import with_references
 
 # No projector has a longer side.
-LARGEST = 16384
+LARGEST_SIDE = 16384
 
 Offset = Literal["inverse", "reference", "none"]
 
@@ -65,8 +65,8 @@ def paper_plan(
     Raises
     ------
     PlanError
-        If the projector has a side over `LARGEST`, if W or the far band is larger than it, or if
-        the dropped block is even or larger than W.
+        If the projector has a side over `LARGEST_SIDE`, if W or the far band is larger than it, or
+        if the dropped block is even or larger than W.
     InputError
         If a size or W is not made of whole numbers, or there is no such correspondence method.
     ExtensionError
@@ -81,9 +81,9 @@ def paper_plan(
     projector, far = as_size(projector, "projector"), as_size(far, "far band")
     window = as_count(window, "window")
     method = CORRESPONDENCE_METHODS[correspondence]
-    if max(projector) > LARGEST:
+    if max(projector) > LARGEST_SIDE:
         raise PlanError(
-            f"a projector of {projector} has a side over {LARGEST}: give the pattern grid, of "
+            f"a projector of {projector} has a side over {LARGEST_SIDE}: give the pattern grid, of "
             f"which a pixel may be a block of the projector's."
         )
     if not 1 <= window <= min(projector):
@@ -106,11 +106,11 @@ def paper_plan(
             f"`dropped={tuple(dropped)}` is not a block of near frequencies around DC: both "
             f"sides must be odd, from 1 to W = {window}."
         )
-    shown = _SHAPES[offset]
+    patterns_of = _SHAPES[offset]
     patterns = (
-        *shown([CHECKERBOARD], "direct"),
-        *shown(far_frequencies(far, projector), "far"),
-        *shown(near_frequencies(window, dropped), "near"),
+        *patterns_of([CHECKERBOARD], "direct"),
+        *patterns_of(far_frequencies(far, projector), "far"),
+        *patterns_of(near_frequencies(window, dropped), "near"),
         *method.patterns(projector),
     )
     return Plan(
@@ -130,7 +130,7 @@ def _exponentials(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterato
 
 
 def _inverse_pairs(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
-    # A pair stands together, so that a drifting lamp leaves its difference alone.
+    # A pair is projected together, so that drift of the lamp hardly affects its difference.
     for frequency in representatives(frequencies):
         kinds: tuple[Literal["cosine", "sine"], ...] = ("cosine", "sine")
         for kind in kinds[:1] if frequency.is_own_negative else kinds:
@@ -139,12 +139,12 @@ def _inverse_pairs(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterat
 
 
 def sinusoids(frequencies: Iterable[Frequency], purpose: Purpose) -> Iterator[Sinusoid]:
-    """Yield the cosine and the sine of each frequency, or the one photo that it needs.
+    """Yield the cosine and the sine of each frequency, or only the cosine of its own negative.
 
-    DC is left out: its photo is white, which `with_references` brings.
+    DC is left out: its photo is white, which `with_references` adds.
     """
     wanted = (frequency for frequency in frequencies if frequency != DC)
-    return (shown for shown in _inverse_pairs(wanted, purpose) if not shown.inverse)
+    return (pattern for pattern in _inverse_pairs(wanted, purpose) if not pattern.inverse)
 
 
 _SHAPES: dict[

@@ -1,8 +1,8 @@
-"""White and black through a plan, so that no pattern needs its inverse.
+"""Whites and blacks throughout a plan, so that no pattern needs its inverse.
 
-b(0.5 + 0.5 s) = 0.5 b(1) + 0.5 b(s): one white and one black tell the offset of every sinusoid.
-They are repeated, at the start, the end and in between, so that lamp and ambient light can be
-followed and the noise be told.
+b(0.5 + 0.5 s) = 0.5 b(1) + 0.5 b(s): one white and one black determine the offset of every
+sinusoid. They are repeated at the start, the end and in between, so that the drift of lamp and
+ambient light, and the noise, can be estimated.
 """
 
 from collections.abc import Sequence
@@ -13,12 +13,12 @@ from nearfar.plan.patterns import Pattern, Purpose, Sinusoid
 
 # Other photos from one white and black to the next.
 INTERVAL = 18
-# Whites, and blacks, from which scatter and drift can be told.
+# Whites, and blacks, from which noise and drift can be estimated.
 FEWEST = 2
 
 
 def reference_count(photos: int) -> int:
-    """Return how many whites, and as many blacks, suit a number of other photos."""
+    """Return the number of whites, and of blacks, for a number of other photos."""
     return max(FEWEST, round(photos / INTERVAL) + 1)
 
 
@@ -32,13 +32,14 @@ def with_references(
     patterns : sequence of patterns
         Everything but white and black, in the order to shoot; stripes as well.
     whites, blacks : int, optional
-        How many; `reference_count` if left out. Each of the fewer stands next to one of the more.
+        How many; `reference_count` if left out. Where one is fewer, each of it is next to one of
+        the other.
 
     Returns
     -------
     tuple of patterns
-        `patterns` in their order, and the references between them. The first white is the DC
-        frequency and counts as far, all others as reference.
+        `patterns` in their order, and the references between them. The first white measures DC
+        and has the purpose far, all others have the purpose reference.
 
     Raises
     ------
@@ -48,8 +49,8 @@ def with_references(
     counts = [reference_count(len(patterns)) if n is None else n for n in (whites, blacks)]
     if min(counts) < FEWEST:
         raise PlanError(
-            f"{counts[0]} whites and {counts[1]} blacks tell neither noise nor drift: plan for at "
-            f"least {FEWEST} of each."
+            f"{counts[0]} whites and {counts[1]} blacks are too few to estimate noise and "
+            f"drift from: plan for at least {FEWEST} of each."
         )
     places = max(counts)
     at_white, at_black = (set(_spread(count, places - 1)) for count in counts)
@@ -65,7 +66,7 @@ def with_references(
         if place not in at_white:
             found += black
         else:
-            # Blacks begin and end it: the ambient light is known at every white.
+            # The first and the last reference are black: ambient light is known at every white.
             found += [*black, *white] if place == 0 else [*white, *black]
     return tuple(found)
 
@@ -76,9 +77,9 @@ def _spread(count: int, last: int) -> list[int]:
 
 
 def _between_pairs(patterns: Sequence[Pattern], upto: int) -> int:
-    """Move a place behind the sine whose cosine it would part it from.
+    """Move a place that would separate a cosine from its sine behind the sine.
 
-    So whatever has been shown when white and black come by is whole.
+    So all measurements are complete wherever white and black are projected.
     """
     if not 0 < upto < len(patterns):
         return upto

@@ -27,3 +27,31 @@ def test_a_path_that_comes_first_is_still_taken(tmp_path):
         assert seen[0].filename == __file__
         function(what, str(path), *more, force=True)
     assert nearfar.load_transport(tmp_path / "save_transport.zarr").camera == SIZE
+
+
+def test_a_callback_of_one_argument_is_still_called_with_counts(tmp_path):
+    plan = nearfar.paper_plan(SIZE, 1, (1, 1), correspondence="none")
+    photos = [plan.draw(i) for i in range(len(plan.patterns))]
+    built_in, written = [], []
+
+    def note(done):
+        written.append(done)
+
+    for number, progress in enumerate((built_in.append, note)):
+        with pytest.warns(DeprecationWarning, match="callback of one argument") as seen:
+            nearfar.write_capture(plan, tmp_path / f"{number}.zarr", photos, progress=progress)
+        assert seen[0].filename == __file__
+    assert built_in == written == list(range(1, len(photos) + 1))
+
+
+def test_counted_is_taken_wherever_progress_is(tmp_path):
+    plan = nearfar.paper_plan(SIZE, 1, (1, 1), correspondence="none")
+    photos = [plan.draw(i) for i in range(len(plan.patterns))]
+    told = []
+    with pytest.warns(DeprecationWarning, match=r"nearfar\.counted"):
+        counted = nearfar.counted
+    progress = counted(lambda what, share: told.append((what, share)), "shots", len(photos))
+    nearfar.write_capture(plan, tmp_path / "a.zarr", photos, progress=progress)
+    assert told[-1] == ("photos", 1.0)
+    progress(len(photos))
+    assert told[-1] == ("shots", 1.0)

@@ -41,7 +41,7 @@ def bernoulli_patterns(projector: Size, count: int, seed: int) -> Booleans:
     return np.asarray(generator.integers(0, 2, size=(count, *projector), dtype=np.uint8) > 0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CompressiveMeasurements:
     """Responses of every camera pixel to random patterns.
 

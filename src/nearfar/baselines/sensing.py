@@ -11,7 +11,7 @@ from nearfar.arrays import Booleans, Floats, Size
 from nearfar.baselines.haar import haar, inverse_haar
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sensing:
     """The matrix that all rows share, the column of the means projected out.
 

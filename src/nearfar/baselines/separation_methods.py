@@ -26,7 +26,7 @@ from nearfar.baselines.separation_patterns import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Method:
     """Patterns, and how their photos are separated.
 

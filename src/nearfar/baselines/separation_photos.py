@@ -22,7 +22,7 @@ from nearfar.rigs.base import Rig
 BLOCK = 1 << 23
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhotosToSeparate:
     """Photos of half-lit patterns, and one to subtract from each.
 

@@ -33,7 +33,7 @@ FORMAT_VERSION = 1
 DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Capture:
     """A capture open for reading; photos are read when asked for.
 

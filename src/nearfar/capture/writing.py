@@ -347,7 +347,8 @@ def write_capture(
     observers = with_predicate(observers, enough, "nearfar.write_capture")
     path = Path(path)
     count = len(plan.patterns)
-    report = as_report(progress, count)
+    # A frame more than elsewhere: the function that accepts either order of arguments.
+    report = as_report(progress, count, stacklevel=5)
     with new_output(path, force=force) as partial:
         writer = CaptureWriter(
             partial, plan, full_scale=full_scale, rig=rig, exposure=exposure, names=names

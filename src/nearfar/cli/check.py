@@ -52,9 +52,7 @@ def check(
         world = load_world(transport, None, None)
         plan = paper_plan(world.projector, near, far, dropped=drop, correspondence="none")
         sample = DEFAULT_SAMPLE if page is None else world.camera.pixels
-        found = check_model(
-            world, near, far, sample=sample, progress=lambda share: report("rows", share)
-        )
+        found = check_model(world, near, far, sample=sample, progress=report)
         condition = condition_near(world.projector, near, plan.dropped)
         if page is not None:
             with new_output(page, force=force) as partial:

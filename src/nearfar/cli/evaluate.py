@@ -65,7 +65,7 @@ def evaluate(
         opened = load_transport(transport)
         if truth is not None:
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
-            rows = row_snr(opened, known, progress=lambda share: told("rows", share))
+            rows = row_snr(opened, known, progress=told)
             found = judge_by_truth(opened, known, rows, progress=told)
         else:
             assert photos is not None

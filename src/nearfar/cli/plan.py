@@ -11,7 +11,7 @@ from nearfar.cli.choices import choice
 from nearfar.cli.options import AsJson, Force, Quiet, size
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
-from nearfar.progress import counting, progress_bar
+from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.plan.paper import Offset
@@ -97,7 +97,7 @@ def plan(
                 window=near,
                 typical=typical,
                 noise=noise,
-                progress=counting(report, "photos", photos),
+                progress=report,
             )
     elif near is None or far is None:
         raise typer.BadParameter("give --photos N, or --near W and --far HxW for the paper's plan")

@@ -74,7 +74,7 @@ def find_references(plan: Plan) -> References:
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drift:
     """How lamp and ambient light changed through a capture.
 

@@ -11,7 +11,7 @@ from nearfar.arrays import Floats, Size
 from nearfar.plan import Plan
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhotosInMemory:
     """Photos in memory, read as from a capture.
 

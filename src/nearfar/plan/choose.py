@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import AnySize, Floats, Size, as_size
+from nearfar.callbacks import OldReport, Report, as_report, counting
 from nearfar.checks import as_count, as_number
 from nearfar.errors import PlanError
 from nearfar.illumination.centred_basis import window_offsets
@@ -97,7 +98,7 @@ def choose_plan(
     window: int | None = None,
     typical: TypicalScenes | None = None,
     noise: float = NOISE,
-    progress: Callable[[int], None] | None = None,
+    progress: Report | OldReport | None = None,
 ) -> tuple[Plan, Expected]:
     """Choose a plan of at most so many photos, correspondence by phase among them.
 
@@ -113,7 +114,7 @@ def choose_plan(
     noise : float
         Standard deviation of the response to a sinusoid, as a share of white.
     progress : callable, optional
-        Called with the number of photos chosen so far.
+        Called with what is being done and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -137,6 +138,7 @@ def choose_plan(
     projector, photos = as_size(projector, "projector"), as_count(photos, "photos")
     window = None if window is None else as_count(window, "window")
     noise = as_number(noise, "noise")
+    report = counting(as_report(progress, photos), "photos", photos)
     if photos < FEWEST_PHOTOS:
         raise PlanError(
             f"{photos} photos are too few to settle correspondence and light: plan with "
@@ -154,7 +156,7 @@ def choose_plan(
             f"{min(projector)}."
         )
     choice = choose_frequencies(
-        projector, photos, window, typical=typical or TYPICAL_SCENES, noise=noise, progress=progress
+        projector, photos, window, typical=typical or TYPICAL_SCENES, noise=noise, progress=report
     )
     band = Size(*(min(FAR_BAND_SIDE, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))

@@ -18,7 +18,7 @@ from nearfar.scenes.patches import Patches
 from nearfar.scenes.rays import OFFSET, Surface, blocked, hit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gather:
     """Two C x n matrices from the light that leaves patches to the camera's pixels.
 

@@ -53,7 +53,7 @@ class Medium:
     index: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Material:
     """How a surface reflects.
 
@@ -73,7 +73,7 @@ class Material:
     texture: Callable[[Floats], Floats] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
     """One smooth piece of surface.
 

@@ -12,7 +12,7 @@ from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.scenes.geometry import View
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pinhole:
     """A pinhole with its field of view.
 

@@ -26,7 +26,7 @@ PIXELS_PER_CELL = 8
 FEWEST_CELLS = 300
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Points on the surfaces, each standing for a little area.
 
@@ -51,7 +51,7 @@ class Samples:
     pixel: Integers
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Patches:
     """All patches of a scene; lit ones come first, ordered by projector pixel.
 

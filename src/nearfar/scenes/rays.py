@@ -15,7 +15,7 @@ from nearfar.scenes.geometry import Part
 OFFSET = 2e-4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """All triangles of some parts.
 
@@ -41,7 +41,7 @@ class Surface:
     occluded: Callable[[Floats, Floats], Integers]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hits:
     """First hits of n rays; where `face` is -1 there is none and the rest is undefined.
 

@@ -6,7 +6,7 @@ and both to be silent at the checkerboard. `check_model` says how much of each l
 Index convention: rows are (n, channels, Py, Px), n camera pixels in a block.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import gcd
 from typing import Any
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from nearfar.arrays import AnySize, Floats, Size, as_size, blocks
+from nearfar.callbacks import OldReport, Report, as_report
 from nearfar.checks import as_count, as_number
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band
@@ -30,7 +31,7 @@ DEFAULT_SAMPLE = 4096
 ENERGY_SHARES = (0.5, 0.9, 0.99)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModelCheck:
     """Where a transport keeps to the paper's model; shares are of energy, 0 to 1.
 
@@ -95,7 +96,7 @@ def check_model(
     *,
     k_near: float | None = None,
     sample: int = DEFAULT_SAMPLE,
-    progress: Callable[[float], None] | None = None,
+    progress: Report | OldReport | None = None,
 ) -> ModelCheck:
     """Measure how far a transport departs from the paper's model.
 
@@ -112,7 +113,7 @@ def check_model(
     sample : int
         Camera pixels to examine, evenly spaced; all where there are fewer.
     progress : callable, optional
-        Called with the share done.
+        Called with what is being done and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -129,6 +130,7 @@ def check_model(
     >>> sorted(found.floodlit)  # shares of the light under full white
     ['direct', 'far', 'near']
     """
+    report = as_report(progress)
     projector, far = transport.projector, as_size(far, "far band")
     window, sample = as_count(window, "window"), as_count(sample, "the sample of camera pixels")
     if not 1 <= window <= min(projector) or far.height > projector[0] or far.width > projector[1]:
@@ -165,8 +167,7 @@ def check_model(
             for component in transport.component_rows(part)
         ]
         totals.add(rows, centres[mine], lit[mine])
-        if progress is not None:
-            progress(block.stop / len(chosen))
+        report("rows", block.stop / len(chosen))
     return totals.result(limit)
 
 

@@ -3,7 +3,7 @@
 Index convention: rows are (n, channels, P), n camera pixels in a block.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from nearfar.arrays import Floats, blocks, processors
+from nearfar.callbacks import OldReport, Report, as_report
 from nearfar.checks import finite_numbers
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
@@ -65,7 +66,7 @@ def decibels(signal: float, error: float) -> float:
     return float(np.clip(10 * np.log10(signal / max(error, 1e-300)), -HIGHEST, HIGHEST))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rows:
     """How rows and frequencies fare.
 
@@ -149,7 +150,7 @@ def row_snr(
     transport: Transport,
     truth: ExactTransport,
     *,
-    progress: Callable[[float], None] | None = None,
+    progress: Report | OldReport | None = None,
 ) -> Rows:
     """Compare every row of T with the truth.
 
@@ -159,7 +160,7 @@ def row_snr(
     truth : ExactTransport
         Where its components are apart, D, N and F are compared as the scene's physics has them.
     progress : callable, optional
-        Told the share done.
+        Called with what is being done and the share of it that is done, 0 to 1.
 
     Raises
     ------
@@ -174,6 +175,7 @@ def row_snr(
     >>> list(rows.components)
     ['T']
     """
+    report = as_report(progress)
     require_same_kind(transport, truth)
     exposure = np.float32(transport_exposure(transport))
     pixels, projector = transport.camera.pixels, transport.projector
@@ -192,8 +194,7 @@ def row_snr(
         for name, values, mine in zip(parts, known, found, strict=False):
             one, other = energies(exposure * values, mine)
             parts[name] = (parts[name][0] + one, parts[name][1] + other)
-        if progress is not None:
-            progress(block.stop / pixels)
+        report("rows", block.stop / pixels)
     components = {"T": decibels(float(signal.sum()), float(error.sum()))}
     components |= {name: decibels(*pair) for name, pair in parts.items()}
     with np.errstate(divide="ignore", invalid="ignore"):

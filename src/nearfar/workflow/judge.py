@@ -75,7 +75,7 @@ def judge_by_truth(
     lights = standard_lights(transport.projector)
     found = relighting_snr(transport, truth, lights)
     if rows is None:
-        rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
+        rows = row_snr(transport, truth, progress=report)
     components = dict(rows.components)
     numbers: dict[str, Any] = {
         "snr_b": found,

@@ -34,7 +34,7 @@ DEFAULT_SAMPLES = 4
 GREY_FILMS = ("luminance", "luminance_alpha")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MitsubaScene:
     """A Mitsuba scene whose projector shows a pattern grid.
 

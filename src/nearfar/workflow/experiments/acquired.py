@@ -31,7 +31,7 @@ from nearfar.workflow.reconstruct import reconstruct
 Report = Callable[[str, float], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Acquisition:
     """A scene to acquire.
 
@@ -97,7 +97,7 @@ def acquire_scene(case: Acquisition, report: Report) -> Data:
         transport, correspondence = reconstruct(capture, method="paper", progress=report)
         done = time.monotonic()
     lights = {"white": white(case.projector), "picture": case.light(case.projector)}
-    rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
+    rows = row_snr(transport, truth, progress=report)
     arrays: dict[str, NDArray[Any]] = {"snr_t": rows.snr_t, "snr_b": rows.snr_b_of_frequency}
     arrays |= {f"{name}/light": light for name, light in lights.items()}
     arrays |= relit(transport, truth, lights)

@@ -23,7 +23,7 @@ ABOUT = "about"
 SHOWING = ("cli", "report")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Data:
     """What an experiment found.
 

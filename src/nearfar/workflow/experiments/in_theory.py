@@ -107,7 +107,7 @@ def acquire_in_theory(case: Theory, report: Report) -> Data:
     started = time.monotonic()
     transport = estimate_in_theory(case, truth, report)
     seconds = time.monotonic() - started
-    rows = row_snr(transport, truth, progress=lambda share: report("rows", share))
+    rows = row_snr(transport, truth, progress=report)
     shown = lights(case.projector)
     arrays: dict[str, NDArray[Any]] = {"snr_t": rows.snr_t, "snr_b": rows.snr_b_of_frequency}
     arrays |= {f"{name}/light": light for name, light in shown.items()}

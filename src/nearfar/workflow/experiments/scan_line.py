@@ -64,7 +64,7 @@ def components_along_a_line(case: Acquisition, report: Report) -> Data:
     strongest = singular["T"][0]
     shown = dict(zip("DNF", truth.component_pictures(white(case.projector)), strict=True))
     check = check_model(
-        truth, case.window, case.far, progress=lambda share: report("model check", share)
+        truth, case.window, case.far, progress=lambda _rows, share: report("model check", share)
     )
     condition = condition_near(case.projector, case.window, case.plan.dropped)
     arrays: dict[str, NDArray[Any]] = dict(cut)

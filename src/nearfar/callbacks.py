@@ -1,0 +1,84 @@
+"""The callback that reports progress, without what draws it: see `nearfar.progress`."""
+
+from collections.abc import Callable
+from inspect import signature
+from typing import Any, cast
+
+from nearfar.deprecation import warn_of
+
+# What every function that takes long calls as `progress`: with what is being done, and the share
+# of it that is done, 0 to 1.
+Report = Callable[[str, float], None]
+# A callback of before: called with a count, or with a share.
+OldReport = Callable[[Any], None]
+
+
+def counting(report: Report, what: str, total: int) -> Callable[[int], None]:
+    """Return a function that takes the number of things done, and reports the share of `total`."""
+    return lambda done: report(what, done / max(1, total))
+
+
+def counted(report: Report, what: str, total: int) -> Callable[..., None]:
+    """Return a callback that takes a count; every function now takes a report of shares as it is.
+
+    .. deprecated:: 0.1
+        Give `report` itself as `progress`.
+
+    Parameters
+    ----------
+    report : callable
+        Takes what is being done and the share of it that is done.
+    what : str
+        What is counted.
+    total : int
+        The count at which all is done.
+
+    Returns
+    -------
+    callable
+        Takes a count, or what is being done and its share.
+    """
+
+    def report_either(*done: Any) -> None:
+        report(*(done if len(done) == 2 else (what, done[0] / max(1, total))))
+
+    return report_either
+
+
+def as_report(
+    progress: Report | OldReport | None, total: float = 1.0, *, stacklevel: int = 4
+) -> Report:
+    """Return a callback of shares, whichever callback a user gave.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        A report of shares; or, with a warning, a callback of one argument as before.
+    total : float
+        What a callback of one argument is called with when all is done: a count as an int, or
+        a share as a float.
+    stacklevel : int
+        As `warnings.warn` takes it; 4 is the caller of the function that calls this one.
+    """
+    if progress is None:
+        return ignore_progress
+    try:
+        signature(progress).bind("", 0.0)
+    except TypeError:
+        warn_of(
+            "a progress callback of one argument",
+            "take what is being done, a str, and the share of it that is done, a float",
+            stacklevel=stacklevel,
+        )
+        of_one = cast("OldReport", progress)
+        if isinstance(total, int):
+            return lambda _what, share: of_one(round(share * total))
+        return lambda _what, share: of_one(share * total)
+    except ValueError:
+        # A built-in that does not tell its arguments.
+        pass
+    return cast("Report", progress)
+
+
+def ignore_progress(_what: str, _share: float) -> None:
+    """Draw nothing: for functions that were given no `progress`."""

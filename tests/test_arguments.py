@@ -1,0 +1,188 @@
+"""What cannot be used is refused by a sentence, alike at every public entry; lists are arrays."""
+
+import numpy as np
+import pytest
+
+import nearfar
+from nearfar.errors import InputError
+from tests.worlds import model_transport
+
+SIZE = nearfar.Size(6, 7)
+WORLD = model_transport(SIZE, SIZE, window=3, far=nearfar.Size(3, 3))
+EXACT = nearfar.ExactTransport(SIZE, SIZE, (), (), WORLD.dense().transpose(1, 0, 2))
+PREPARED = nearfar.prepare_transport(WORLD)
+OPERATOR = WORLD.as_linear_operator()
+GOOD = np.full(SIZE, 0.5)
+
+
+def _bad_arrays(good):
+    """Yield arrays that cannot be used in the place of a good one."""
+    one = np.array(good, dtype=float)
+    for value in (np.nan, np.inf):
+        yield f"{value}", np.where(np.arange(one.size).reshape(one.shape) == 1, value, one)
+    yield "complex", one.astype(complex)
+    yield "text", one.astype(str)
+    yield "dates", np.full(one.shape, np.datetime64("2026-01-01"))
+    yield "objects", one.astype(object)
+    yield "another shape", one[..., 1:]
+    yield "a number", 0.5
+    yield "ragged", [[1.0, 2.0], [1.0]]
+    yield "None", None
+
+
+BAD_NUMBERS = {
+    "nan": np.nan,
+    "inf": -np.inf,
+    "complex": 1j,
+    "text": "1",
+    "a date": np.datetime64("2026-01-01"),
+    "an object": object(),
+    "an array": np.ones(2),
+    "None": None,
+}
+BAD_COUNTS = {**BAD_NUMBERS, "a fraction": 1.5, "a whole float": 2.0, "a bool": True}
+# A seed and a place are counted from 0; negative ones are refused, too.
+BAD_COUNTS_FROM_0 = {**BAD_COUNTS, "negative": -1}
+BAD_SIZES = {
+    "one side": (6,),
+    "three sides": (6, 7, 1),
+    "fractions": (6.5, 7),
+    "whole floats": (6.0, 7.0),
+    "negative": (-6, 7),
+    "zero": (0, 7),
+    "bools": (True, True),
+    "text": "67",
+    "texts": ("6", "7"),
+    "nan": (np.nan, 7),
+    "a number": 6,
+    "None sides": (None, None),
+}
+ARRAYS = {
+    "Transport @": (GOOD, WORLD.__matmul__),
+    "components": (GOOD, WORLD.components),
+    "relight": (GOOD, WORLD.relight),
+    "pictures": (GOOD[None], WORLD.pictures),
+    "adjoint": (GOOD, WORLD.adjoint),
+    "H @": (GOOD, WORLD.H.__matmul__),
+    "ExactTransport @": (GOOD, EXACT.__matmul__),
+    "ExactTransport.pictures": (GOOD[None], EXACT.pictures),
+    "ExactTransport.adjoint": (GOOD, EXACT.adjoint),
+    "ExactTransport.H @": (GOOD, EXACT.H.__matmul__),
+    "PreparedTransport @": (GOOD, PREPARED.__matmul__),
+    "PreparedTransport.pictures": (GOOD[None], PREPARED.pictures),
+    "ExactTransport": (
+        np.ones((1, 42, 42)),
+        lambda far: nearfar.ExactTransport(SIZE, SIZE, (), (), far),
+    ),
+    "snr, truth": (GOOD, lambda truth: nearfar.snr(truth, GOOD)),
+    "snr, estimate": (GOOD, lambda estimate: nearfar.snr(GOOD, estimate)),
+    "relighting_snr": (GOOD, lambda light: nearfar.relighting_snr(WORLD, EXACT, {"a": light})),
+}
+NUMBERS = {
+    f"{method.__qualname__}, {gain}": lambda value, method=method, gain=gain, given=given: method(
+        *given, **{gain: value}
+    )
+    for method, given in (
+        (WORLD.relight, (GOOD,)),
+        (WORLD.with_gains, ()),
+        (PREPARED.pictures, (GOOD[None],)),
+    )
+    for gain in ("direct", "near", "far")
+} | {
+    "Transport *": WORLD.__mul__,
+    "* Transport": WORLD.__rmul__,
+    "ExactTransport *": EXACT.__mul__,
+    "choose_plan, noise": lambda noise: nearfar.choose_plan((8, 8), 30, noise=noise),
+}
+COUNTS = {
+    "column, y": lambda y: WORLD.column(y, 1),
+    "column, x": lambda x: WORLD.column(1, x),
+    "natural_picture, seed": lambda seed: nearfar.natural_picture(SIZE, seed),
+    "random_pattern, seed": lambda seed: nearfar.random_pattern(SIZE, seed),
+    "as_linear_operator": WORLD.as_linear_operator,
+    "paper_plan, window": lambda window: nearfar.paper_plan(SIZE, window, (3, 3)),
+    "choose_plan, photos": lambda photos: nearfar.choose_plan((8, 8), photos),
+    "condition_near, window": lambda window: nearfar.condition_near(SIZE, window, (1, 1)),
+    "check_model, window": lambda window: nearfar.check_model(WORLD, window, (3, 3)),
+    "check_model, sample": lambda sample: nearfar.check_model(WORLD, 3, (3, 3), sample=sample),
+}
+SIZES = {
+    "white": nearfar.white,
+    "penguin": nearfar.penguin,
+    "natural_picture": lambda size: nearfar.natural_picture(size, 1),
+    "random_pattern": lambda size: nearfar.random_pattern(size, 1),
+    "paper_plan, projector": lambda size: nearfar.paper_plan(size, 3, (3, 3)),
+    "choose_plan": lambda size: nearfar.choose_plan(size, 30),
+    "given_correspondence, camera": lambda size: nearfar.given_correspondence(
+        np.ones((6, 7, 2)), size, SIZE
+    ),
+    "given_correspondence, projector": lambda size: nearfar.given_correspondence(
+        np.ones((6, 7, 2)), SIZE, size
+    ),
+    "ExactTransport": lambda size: nearfar.ExactTransport(size, SIZE, (), (), EXACT.far),
+    "condition_near": lambda size: nearfar.condition_near(size, 3, (1, 1)),
+    "open_rig": lambda size: nearfar.open_rig("cornell", size),
+}
+CASES = {
+    f"{entry}: {what}": (call, value)
+    for table, bad in ((NUMBERS, BAD_NUMBERS), (COUNTS, BAD_COUNTS_FROM_0), (SIZES, BAD_SIZES))
+    for entry, call in table.items()
+    for what, value in bad.items()
+} | {
+    f"{entry}: {what}": (call, value)
+    for entry, (good, call) in ARRAYS.items()
+    for what, value in _bad_arrays(good)
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_cannot_be_used_is_refused_by_a_sentence(case):
+    call, value = CASES[case]
+    with pytest.raises(InputError) as refused:
+        call(value)
+    said = str(refused.value)
+    assert said.endswith(".")
+    assert len(said.split()) > 6
+
+
+@pytest.mark.parametrize("entry", ARRAYS)
+def test_a_list_is_an_array(entry):
+    good, call = ARRAYS[entry]
+    call(good.tolist())
+
+
+@pytest.mark.parametrize("entry", [name for name in SIZES if name != "open_rig"])
+def test_a_size_is_two_whole_numbers_of_any_sort(entry):
+    side = (8, 8) if entry == "choose_plan" else SIZE
+    for size in (tuple(side), list(side), np.array(side), tuple(np.int16(n) for n in side)):
+        SIZES[entry](size)
+
+
+def test_q_may_be_a_list():
+    q = np.stack(np.indices(SIZE), axis=-1)
+    found = nearfar.given_correspondence(q.tolist(), SIZE, SIZE)
+    np.testing.assert_array_equal(found.q, q)
+
+
+@pytest.mark.parametrize("operator", [WORLD, EXACT, PREPARED, WORLD.H, EXACT.H])
+def test_an_operator_is_not_an_array(operator):
+    with pytest.raises(InputError, match="operator and not an array"):
+        np.asarray(operator)
+
+
+@pytest.mark.parametrize("operator", [WORLD, EXACT, 2 * WORLD, EXACT * -0.5, WORLD.H.H * 3])
+def test_the_adjoint_is_the_adjoint(operator):
+    generator = np.random.default_rng(5)
+    light, image = generator.random((2, *SIZE))
+    one, other = np.vdot(operator @ light, image), np.vdot(light, operator.H @ image)
+    assert one == pytest.approx(other, rel=1e-5)
+    assert operator.H.H is operator
+    np.testing.assert_allclose((2 * operator.H) @ image, 2 * (operator.H @ image), rtol=1e-6)
+
+
+@pytest.mark.parametrize("operator", [WORLD, EXACT])
+def test_a_factor_scales_pictures(operator):
+    for factor in (2, 0.5, np.float32(-1.5), np.int64(3)):
+        expected = factor * (operator @ GOOD)
+        np.testing.assert_allclose((factor * operator) @ GOOD, expected, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose((operator * factor) @ GOOD, expected, rtol=1e-5, atol=1e-6)

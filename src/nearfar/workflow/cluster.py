@@ -101,7 +101,7 @@ def reconstruct_on(
     Here with a worker in this process:
 
     >>> from distributed import LocalCluster
-    >>> options = {"n_workers": 1, "processes": False, "dashboard_address": None}
+    >>> options = {"n_workers": 1, "processes": False, "dashboard_address": ":0"}
     >>> with LocalCluster(**options) as cluster:
     ...     done = nearfar.reconstruct_on(cluster.scheduler_address, capture, "made.zarr")
     >>> nearfar.load_transport("made.zarr").camera

@@ -18,7 +18,11 @@ from numpy.typing import NDArray
 
 from nearfar import Transport, open_capture, reconstruct
 from nearfar.capture import Capture, write_capture
+from nearfar.progress import ignore_progress
 from nearfar.workflow.estimating import RunningEstimate
+from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.sinks import MemorySink
 from reconstruction import make, one_product
 
 # Room for photos and estimate of the whole camera.
@@ -51,7 +55,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         source = open_capture(make(Path(folder)))
         plan, scale = source.plan, source.full_scale
-        with RunningEstimate(plan, scale, memory=MEMORY) as estimate:
+        with RunningEstimate(plan, scale, ReconstructionOptions(memory=MEMORY)) as estimate:
             capture = write_capture(
                 plan,
                 Path(folder, "again.zarr"),
@@ -60,7 +64,9 @@ def main() -> None:
                 observers=[estimate],
             )
             last = time.perf_counter()
-            (part,) = estimate.finish(capture)
+            sink = MemorySink()
+            execute(estimate.finish(capture), SerialExecutor(), sink, ignore_progress)
+            made, _ = sink.collected()
             after = time.perf_counter() - last
         started = time.perf_counter()
         found, _ = reconstruct(capture, memory=MEMORY)
@@ -68,7 +74,7 @@ def main() -> None:
     print(f"one product: {product:.2f} s; kinds chosen by {estimate.chosen_by} photos")
     print(f"after the last photo: {after:.1f} s, {after / product:.0f} products")
     print(f"from the disk: {whole:.1f} s, {whole / product:.0f} products")
-    print(f"they differ by {differ(part.transport, found)}")
+    print(f"they differ by {differ(made, found)}")
 
 
 if __name__ == "__main__":

@@ -120,10 +120,10 @@ if TYPE_CHECKING:
     from nearfar.transport.store import load_transport, save_transport
     from nearfar.workflow.acquire import acquire
     from nearfar.workflow.check import check_model
-    from nearfar.workflow.cluster import reconstruct_on
     from nearfar.workflow.conditioning import condition_near
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
-    from nearfar.workflow.reconstruct import reconstruct
+    from nearfar.workflow.reconstruction.options import ReconstructionOptions
+    from nearfar.workflow.reconstruction.reconstruct import reconstruct, reconstruct_to_file
     from nearfar.workflow.steps import correspond, estimate_transport, measure
 
     __version__: str
@@ -150,8 +150,9 @@ _HOMES = {
     "read_correspondence": "nearfar.correspondence",
     "Correspondence": "nearfar.correspondence",
     "estimate_transport": "nearfar.workflow.steps",
-    "reconstruct": "nearfar.workflow.reconstruct",
-    "reconstruct_on": "nearfar.workflow.cluster",
+    "reconstruct": "nearfar.workflow.reconstruction.reconstruct",
+    "reconstruct_to_file": "nearfar.workflow.reconstruction.reconstruct",
+    "ReconstructionOptions": "nearfar.workflow.reconstruction.options",
     "Transport": "nearfar.transport.model",
     "ErrorBars": "nearfar.estimate.joint",
     "prepare_transport": "nearfar.transport.prepared",
@@ -195,7 +196,8 @@ __all__ = [  # noqa: RUF022
     "Correspondence",
     "estimate_transport",
     "reconstruct",
-    "reconstruct_on",
+    "reconstruct_to_file",
+    "ReconstructionOptions",
     "Transport",
     "ErrorBars",
     "prepare_transport",
@@ -225,6 +227,10 @@ _OLD = {
     ),
     "counted": ("nearfar.progress", "give progress what nearfar.progress_bar yields, as it is"),
     "opened_rig": ("nearfar.rigs.opening", "use nearfar.open_rig, whose rigs are contexts, too"),
+    "reconstruct_on": (
+        "nearfar.workflow.reconstruction.old",
+        "use nearfar.reconstruct_to_file(capture, output, scheduler=address)",
+    ),
     "version": ("nearfar.release", "use nearfar.__version__"),
 }
 

@@ -8,10 +8,10 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.correspondence import (
     correspond_by_gray_code,
-    correspond_by_photos,
     correspond_by_stripes,
     has_gray_code,
 )
+from nearfar.correspondence.methods import method_of
 from nearfar.errors import InputError
 from nearfar.illumination.patterns import gray_bits
 from nearfar.photometry.in_memory import PhotosInMemory
@@ -24,6 +24,11 @@ from nearfar.workflow.acquire import hold
 from tests.worlds import model_transport
 
 SIZES = [Size(16, 16), Size(13, 18), Size(33, 7), Size(9, 64)]
+
+
+def _found(photos):
+    """Correspondence by the method of the photos' plan."""
+    return method_of(photos.plan).find(photos, slice(0, photos.camera.height), measure=None)
 
 
 def _plan(projector, correspondence="gray"):
@@ -64,7 +69,7 @@ def test_whole_pixels_are_found_exactly(projector, shoot):
     world = model_transport(projector, projector, window=3, far=Size(3, 3), channels=2)
     # Direct light outshines the rest.
     world = replace(world, near=0.2 * world.near, far=0.2 * world.far)
-    found = correspond_by_photos(shoot(_plan(projector), world))
+    found = _found(shoot(_plan(projector), world))
     np.testing.assert_array_equal(found.q, world.correspondence)
     assert (found.confidence > 0.999).all()
 
@@ -121,7 +126,7 @@ def test_scenes_with_noise_are_found_about_as_well_as_by_stripes(name):
     shares, recalls = [], []
     for how in ("gray", "stripes"):
         plan = paper_plan(scene.projector, 5, Size(3, 3), correspondence=how)
-        found = correspond_by_photos(hold(plan, rig))
+        found = _found(hold(plan, rig))
         both = found.lit & np.isfinite(truth[..., 0])
         off = np.abs(found.q - truth).max(axis=-1)[both]
         shares.append(np.mean(off <= 1.0))
@@ -136,7 +141,7 @@ def test_what_is_no_gray_code_is_said(shoot):
     assert not has_gray_code(stripes.plan)
     with pytest.raises(InputError, match="no Gray code"):
         correspond_by_gray_code(stripes)
-    np.testing.assert_array_equal(correspond_by_photos(stripes).q, correspond_by_stripes(stripes).q)
+    np.testing.assert_array_equal(_found(stripes).q, correspond_by_stripes(stripes).q)
     plan = _plan(SIZES[0])
     missing = plan.first(len(plan.patterns) - 1)
     assert has_gray_code(plan)

@@ -10,7 +10,7 @@ from nearfar.rigs.real.rig import RealRig
 from nearfar.transport.colour import as_channels_see
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.calibrate import calibrate
-from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from tests.rigs.table import TableCamera, TableScreen
 
 PROJECTOR, CAMERA = Size(12, 16), Size(12, 16)

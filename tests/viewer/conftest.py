@@ -24,7 +24,7 @@ from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.server import ListeningAddress
 from nearfar.viewer.view import run_view
 from nearfar.workflow.acquire import acquire
-from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from tests.rigs.displays import need
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import settled

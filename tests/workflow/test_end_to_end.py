@@ -20,15 +20,17 @@ from nearfar.rigs.simulated.drift import SimulatedDrift
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.transport.rows import FACTORS, POSTERIOR_FIELDS
+from nearfar.transport.rows import FACTORS, POSTERIOR_FIELDS, of_rows
 from nearfar.transport.store import load_transport, write_transport
-from nearfar.workflow import reconstruct as reconstruction
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import relighting_snr, snr
 from nearfar.workflow.judge import judge_by_truth
+from nearfar.workflow.reconstruction import reconstruct as reconstruction
+from nearfar.workflow.reconstruction.job import tiling_of
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from tests.conftest import QUIET
 from tests.estimate.test_fit import _exact_of
-from tests.workflow.memory import memory_for
+from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
 reconstruct = partial(reconstruction.reconstruct, method="paper")
@@ -203,12 +205,13 @@ def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
     whole, q = reconstruction.reconstruct(capture, known)
     for rows in (11, 5):
         memory = memory_for(rows, plan, PROJECTOR, "joint")
-        cut = list(reconstruction.reconstruct_in_blocks(capture, known, memory=memory))
-        assert len(cut) == -(-24 // rows)
+        options = ReconstructionOptions(memory=memory)
+        tiles = list(tiling_of(capture, options, given=given).tiles())
+        assert len(tiles) == -(-24 // rows)
         parts, found = reconstruction.reconstruct(capture, known, memory=memory)
         np.testing.assert_array_equal(found.lit, q.lit)
         # Matrix products round by blocks, and a camera pixel between two kinds may take the other.
-        same = parts.posterior.kind == whole.posterior.kind
+        same = parts.posterior.prior_component == whole.posterior.prior_component
         assert same.mean() > 0.99
         for name in ("correspondence", "direct", "near", "far", "noise", "black"):
             one, other = getattr(parts, name), getattr(whole, name)
@@ -219,8 +222,8 @@ def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
     plan, _ = choose_plan(PROJECTOR, 60, window=7)
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
     memory = memory_for(5, plan, PROJECTOR, "joint")
-    parts = reconstruction.reconstruct_in_blocks(capture, memory=memory)
-    write_transport(tmp_path / "t.zarr", (part.transport for part in parts), 24)
+    options = ReconstructionOptions(memory=memory)
+    reconstruction.reconstruct_to_file(capture, tmp_path / "t.zarr", options=options)
     stored = load_transport(tmp_path / "t.zarr")
     whole, _ = reconstruction.reconstruct(capture, memory=memory)
     for name in (*FACTORS, "provenance"):
@@ -234,11 +237,10 @@ def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
 def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
     plan, _ = choose_plan(PROJECTOR, 60, window=7)
     capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
-    memory = memory_for(5, plan, PROJECTOR, "joint")
-    parts = reconstruction.reconstruct_in_blocks(capture, memory=memory)
+    transport, _ = reconstruction.reconstruct(capture)
 
     def faulty():
-        yield next(parts).transport
+        yield of_rows(transport, slice(0, 5))
         raise InputError("a photo is damaged")
 
     with pytest.raises(InputError, match="a photo is damaged"):
@@ -249,8 +251,43 @@ def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
 @pytest.mark.parametrize("method", ["joint", "paper"])
 def test_too_little_memory_is_said_before_any_work(tmp_path, world, method):
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world))
-    with pytest.raises(InputError, match=r"too few for one row.*--memory 0\.\dGB or more"):
+    with pytest.raises(InputError, match=r"too few for one row.*`memory=\d00000000` or more"):
         reconstruction.reconstruct(capture, method=method, memory=10**6)
+
+
+def test_a_square_transport_in_tiles_is_that_of_the_whole(tmp_path):
+    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3), channels=3)
+    plan, _ = choose_plan(PROJECTOR, 60, window=7)
+    capture = acquire(plan, tmp_path / "c.zarr", _rig(fine.with_gains(near=0.1), SimulatedCamera()))
+    known = given_correspondence(fine.correspondence, fine.camera, PROJECTOR)
+    whole, _ = reconstruction.reconstruct(capture, known, square=True)
+    # Measured in one piece, and estimated in tiles of 5 of the projector's rows.
+    memory = memory_for(5, plan, PROJECTOR, "joint")
+    options = ReconstructionOptions(square=True, memory=memory)
+    summary = reconstruction.reconstruct_to_file(capture, tmp_path / "t.zarr", known, options)
+    assert (summary.lit, summary.pixels) == (PROJECTOR.pixels, PROJECTOR.pixels)
+    parts = load_transport(tmp_path / "t.zarr")
+    for name in ("direct", "near", "far"):
+        one, other = getattr(parts, name), getattr(whole, name)
+        assert np.mean(np.abs(one - other) > 1e-3 * np.abs(other).max()) < 0.01, name
+
+
+def test_the_square_transport_keeps_how_far_its_rows_are_to_be_trusted(tmp_path):
+    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3)).with_gains(near=0.1)
+    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(fine))
+    q = np.array(fine.correspondence, dtype=np.float32)
+    q[:, :30] = np.nan
+    known = given_correspondence(q, fine.camera, PROJECTOR)
+    known.confidence[...] = np.where(known.lit, np.linspace(0, 1, 48)[:, None], 0.0)
+    transport, _ = reconstruct(capture, known, square=True)
+    lit = np.zeros(PROJECTOR, bool)
+    nearest = np.rint(q[known.lit]).astype(int)
+    lit[nearest[:, 0], nearest[:, 1]] = True
+    assert not transport.quality.saturated.any()
+    np.testing.assert_array_equal(transport.quality.confidence[~lit], 0)
+    for y, x in ((3, 20), (20, 25)):
+        mine = (np.rint(q) == (y, x)).all(axis=-1)
+        assert transport.quality.confidence[y, x] == pytest.approx(known.confidence[mine].mean())
 
 
 def test_the_square_transport_by_reference(tmp_path):

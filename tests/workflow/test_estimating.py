@@ -15,6 +15,7 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import answered, measure
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.plan.checks import ends
+from nearfar.progress import ignore_progress
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -23,9 +24,13 @@ from nearfar.workflow import estimating
 from nearfar.workflow.acquire import acquire, hold
 from nearfar.workflow.estimating import RunningEstimate
 from nearfar.workflow.evaluate import relighting_snr
-from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
+from nearfar.workflow.reconstruction.job import Part
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.sinks import MemorySink
 from tests.observers import EndsWhere
-from tests.workflow.memory import memory_for
+from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
 SIZE = Size(32, 32)
@@ -84,8 +89,14 @@ class Patient(RunningEstimate):
 def _follow(plan, rig, path):
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(plan, path, rig, observers=[estimate])
-        (part,) = estimate.finish(capture)
-    return part, estimate, capture
+        return _made(estimate, capture), estimate, capture
+
+
+def _made(estimate, capture):
+    """Transport and correspondence of a capture that was followed."""
+    sink = MemorySink()
+    execute(estimate.finish(capture), SerialExecutor(), sink, ignore_progress)
+    return Part(*sink.collected())
 
 
 @pytest.mark.parametrize("plan", ["reference", "pairs", "pairs and stripes"])
@@ -114,12 +125,12 @@ def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, mon
     plan = PLANS["pairs and stripes"]
     dark = (3, 4)
 
-    def unlit(*arguments):
-        found = correspond_by_stripes(*arguments)
+    def unlit(photos, _measurements, rows):
+        found = correspond_by_stripes(photos, rows)
         found.q[dark] = np.nan
         return found
 
-    monkeypatch.setattr("nearfar.workflow.blocks.correspond_by_photos", unlit)
+    monkeypatch.setattr("nearfar.workflow.reconstruction.sources.find_correspondence", unlit)
     part, estimate, capture = _follow(plan, rig, tmp_path / "c.zarr")
     assert estimate.chosen_by > 0
     expected, _ = reconstruct(capture)
@@ -143,20 +154,22 @@ def test_photos_that_come_too_fast_are_estimated_from_all_the_same(
 def test_photos_that_do_not_fit_are_read_again_in_blocks(rig, tmp_path):
     plan = PLANS["reference"]
     memory = memory_for(9, plan, SIZE, "joint")
-    with Patient(plan, rig.full_scale, memory=memory) as estimate:
+    with Patient(plan, rig.full_scale, ReconstructionOptions(memory=memory)) as estimate:
         capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
-        parts = list(estimate.finish(capture))
+        work = estimate.finish(capture)
+        part = _made(estimate, capture)
     assert estimate.held is None
-    assert len(parts) > 1
+    assert work.tiling.rows < SIZE.height
     expected, _ = reconstruct(capture, memory=memory)
-    found = np.concatenate([part.transport.near for part in parts])
-    np.testing.assert_array_equal(found, expected.near)
+    np.testing.assert_array_equal(part.transport.near, expected.near)
 
 
 def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
     with (
-        pytest.raises(InputError, match="--memory"),
-        RunningEstimate(PLANS["reference"], rig.full_scale, memory=10**6) as estimate,
+        pytest.raises(InputError, match="`memory="),
+        RunningEstimate(
+            PLANS["reference"], rig.full_scale, ReconstructionOptions(memory=10**6)
+        ) as estimate,
     ):
         acquire(PLANS["reference"], tmp_path / "c.zarr", rig, observers=[estimate])
     assert list(tmp_path.iterdir()) == []
@@ -172,7 +185,7 @@ def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path
             rig,
             observers=[estimate, EndsWhere(lambda n, _photo: n + 1 == end)],
         )
-        (part,) = estimate.finish(capture)
+        part = _made(estimate, capture)
     assert len(capture.plan.patterns) == end
     # Kinds that were chosen by enough of the photos that there are.
     assert estimating.ENOUGH * end < estimate.chosen_by < end
@@ -210,7 +223,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
         capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
         assert len(capture.plan.patterns) == len(plan.patterns)
         with pytest.raises(RuntimeError, match="out of memory"):
-            list(estimate.finish(capture))
+            _made(estimate, capture)
 
 
 def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
@@ -245,7 +258,7 @@ def test_photos_that_cannot_be_measured_are_kept(rig, tmp_path):
     with Patient(PLANS["reference"], rig.full_scale) as estimate:
         capture = acquire(PLANS["reference"], tmp_path / "c.zarr", bright, observers=[estimate])
         with pytest.raises(InputError, match="full scale"):
-            list(estimate.finish(capture))
+            _made(estimate, capture)
     assert estimate.chosen_by == 0
     np.testing.assert_array_equal(
         capture.read([0]), hold(PLANS["reference"], bright).read([0], slice(None))

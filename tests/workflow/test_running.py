@@ -23,7 +23,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import snr
-from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from nearfar.workflow.running import RunningCheck, some_rows
 
 pytestmark = pytest.mark.slow

@@ -14,7 +14,7 @@ from nearfar.arrays import parse_bytes
 from nearfar.cli.choices import choice
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
-from nearfar.cli.reconstruct import Seen
+from nearfar.cli.reconstruct import conclude
 from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, warn
 from nearfar.devices import Device
@@ -106,6 +106,7 @@ def acquire(
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire as shoot
     from nearfar.workflow.estimating import RunningEstimate
+    from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.running import RunningCheck
 
     if reshoot is not None:
@@ -116,6 +117,7 @@ def acquire(
     if transport is None:
         _refuse({"--memory": memory, "--device": device}, "is for --transport.")
     available = parse_bytes(memory or "2GB", name="--memory")
+    options = ReconstructionOptions(memory=available, device=device or "cpu")
     made = _plan_to_shoot(plan_file, with_check_photos=until is not None)
     keep_input(output, plan_file, Path(rig))
     check_resumable(output, resume=resume, force=force)
@@ -140,9 +142,7 @@ def acquire(
         if until is not None:
             check = RunningCheck(made, until, opened.full_scale, partial(_tell, quiet=quiet))
         if transport is not None:
-            estimate = stack.enter_context(
-                RunningEstimate(made, opened.full_scale, memory=available, device=device or "cpu")
-            )
+            estimate = stack.enter_context(RunningEstimate(made, opened.full_scale, options))
         taken = shoot(
             made,
             output,
@@ -181,13 +181,14 @@ def _finish(
     quiet: bool,
 ) -> None:
     """Make and write the transport, most of whose work was done while photos were taken."""
-    from nearfar.transport.store import write_transport
+    from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
+    from nearfar.workflow.reconstruction.sinks import new_file
 
     start = time.monotonic()
-    seen = Seen()
-    transports = (seen.add(*part) for part in estimate.finish(taken, report))
-    write_transport(transport, transports, taken.camera.height, force=force)
-    seen.conclude(taken, transport, quiet=quiet)
+    work = estimate.finish(taken)
+    with new_file(transport, work.tiling, force=force) as sink:
+        summary = execute(work, SerialExecutor(), sink, report)
+    conclude(summary, taken, transport, quiet=quiet)
     say(f"{time.monotonic() - start:.1f} s after the last photo", quiet=quiet)
 
 

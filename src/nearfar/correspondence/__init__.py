@@ -8,7 +8,6 @@ from nearfar.correspondence.methods import (
     method_of,
 )
 from nearfar.correspondence.phase import correspond_by_phase
-from nearfar.correspondence.photographed import correspond_by_photos, has_correspondence_photos
 from nearfar.correspondence.result import (
     Correspondence,
     given_correspondence,
@@ -23,11 +22,9 @@ __all__ = [
     "CorrespondenceMethod",
     "correspond_by_gray_code",
     "correspond_by_phase",
-    "correspond_by_photos",
     "correspond_by_stripes",
     "find_correspondence",
     "given_correspondence",
-    "has_correspondence_photos",
     "has_gray_code",
     "has_stripes",
     "joined",

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.correspondence.result import Correspondence
 from nearfar.photometry.measurements import Measurements
 
@@ -30,9 +30,7 @@ def onto_projector(
         Each projector pixel's own place, NaN where no camera pixel is lit by it.
     """
     projector = parts[0].projector
-    rounded = np.rint(correspondence.q).reshape(-1, 2)
-    lit = np.isfinite(rounded[:, 0])
-    place = (rounded[lit, 0] * projector.width + rounded[lit, 1]).astype(np.int64)
+    lit, place = _places(correspondence, projector)
     count = np.bincount(place, minlength=projector.pixels)
     share = (1.0 / np.maximum(count, 1)).astype(np.float32)[:, None]
 
@@ -60,3 +58,39 @@ def onto_projector(
     q = np.stack([y, x], axis=-1).astype(np.float32)
     q[count == 0] = np.nan
     return measurements, q.reshape(*projector, 2)
+
+
+def quality_on_projector(
+    correspondence: Correspondence, saturated: Booleans | None, projector: Size
+) -> tuple[Floats, Booleans | None]:
+    """Return how far each row of the square T is to be trusted.
+
+    Parameters
+    ----------
+    correspondence : Correspondence
+    saturated : ndarray of bool, shape (Cy, Cx), optional
+        Camera pixels at full scale under white.
+    projector : Size
+
+    Returns
+    -------
+    confidence : ndarray, shape (Py, Px), float32
+        Mean over the camera pixels that a projector pixel lights; 0 where there are none.
+    saturated : ndarray of bool, shape (Py, Px), optional
+        Whether one of them is saturated.
+    """
+    lit, place = _places(correspondence, projector)
+    count = np.bincount(place, minlength=projector.pixels)
+    total = np.bincount(place, correspondence.confidence.ravel()[lit], minlength=projector.pixels)
+    confidence = (total / np.maximum(count, 1)).astype(np.float32).reshape(projector)
+    if saturated is None:
+        return confidence, None
+    full = np.bincount(place, saturated.ravel()[lit], minlength=projector.pixels) > 0
+    return confidence, full.reshape(projector)
+
+
+def _places(correspondence: Correspondence, projector: Size) -> tuple[Booleans, Integers]:
+    """Return which camera pixels are lit, (C,), and the projector pixel nearest to q of those."""
+    nearest = np.rint(correspondence.q).reshape(-1, 2)
+    lit = np.isfinite(nearest[:, 0])
+    return lit, (nearest[lit, 0] * projector.width + nearest[lit, 1]).astype(np.int64)

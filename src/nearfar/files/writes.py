@@ -31,6 +31,11 @@ def abandon(folder: Path) -> None:
     settle()
 
 
+def admit(folder: Path) -> None:
+    """Let writes into `folder` begin again after it was abandoned."""
+    _abandoned.discard(folder)
+
+
 def settle() -> None:
     """Let writes that are under way end."""
     for loop in [loop for loop in _loops if loop.is_running()]:

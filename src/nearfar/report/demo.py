@@ -18,7 +18,7 @@ from nearfar.transport.store import save_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import row_snr
 from nearfar.workflow.judge import judge_by_truth
-from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.reconstruct import reconstruct
 
 SCENE = "cornell"
 PROJECTOR = Size(64, 64)

@@ -7,9 +7,7 @@ estimate is made from all of them, and those kinds are not chosen again (docs/de
 
 import time
 from collections import deque
-from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -19,30 +17,22 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from nearfar.capture import Capture
-from nearfar.correspondence import (
-    correspond_by_phase,
-    correspond_by_photos,
-    has_correspondence_photos,
-)
-from nearfar.devices import Device, require_device
+from nearfar.correspondence.methods import find_correspondence
+from nearfar.devices import require_device
 from nearfar.errors import InputError
 from nearfar.estimate.joint import Choices, choose_components
+from nearfar.estimate.joint.estimator import JOINT, JointEstimator
 from nearfar.estimate.joint.problem import build_model
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import answered, measure
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import ends
-from nearfar.workflow.blocks import (
-    MEMORY,
-    Part,
-    Progress,
-    prepare,
-    rows_at_once,
-    unheard,
-    without_drift,
-)
-from nearfar.workflow.methods import ESTIMATORS, jointly
-from nearfar.workflow.reconstruct import parts_of, reconstruct_in_blocks
+from nearfar.progress import ignore_progress
+from nearfar.workflow.reconstruction.executors import Work
+from nearfar.workflow.reconstruction.job import prepare, tiling_of
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.sources import photos_without_drift
+from nearfar.workflow.reconstruction.tiles import tile_rows
 
 # Kinds are first chosen by this share of the photos of transport, to see how long it takes.
 FIRST = 0.5
@@ -80,10 +70,9 @@ class RunningEstimate:
     plan : Plan
     full_scale : float
         Value of full scale of the photos.
-    memory : int
-        Bytes to work in. Where photos and estimate do not fit, nothing is held, and the transport
-        is made from the capture's file, block by block.
-    device : {"cpu", "cuda", "torch"}
+    options : ReconstructionOptions, optional
+        Of the joint method. Where photos and estimate do not fit in their memory, no photo is kept
+        in memory, and the transport is made from the capture's file, tile by tile.
 
     Raises
     ------
@@ -95,13 +84,13 @@ class RunningEstimate:
     """
 
     def __init__(
-        self, plan: Plan, full_scale: float, *, memory: int = MEMORY, device: Device = "cpu"
+        self, plan: Plan, full_scale: float, options: ReconstructionOptions | None = None
     ) -> None:
-        require_device(device)
-        ESTIMATORS["joint"].require(plan)
+        self._options = options or ReconstructionOptions()
+        require_device(self._options.device)
+        JOINT.require(plan)
         self.held: PhotosInMemory | None = None
         self._plan, self._full_scale = plan, full_scale
-        self._memory, self._device = memory, device
         self._ends = ends(plan)
         told = np.cumsum([isinstance(pattern, Sinusoid) for pattern in plan.patterns])
         self._share = np.concatenate([[0.0], told / told[-1]])
@@ -143,52 +132,37 @@ class RunningEstimate:
         if self._under_way is None and taken in self._ends and self._is_time(taken):
             self._under_way = self._beside.submit(self._choose, taken)
 
-    def finish(self, capture: Capture, progress: Progress | None = None) -> Iterator[Part]:
-        """Reconstruct the capture that was followed; see `nearfar.reconstruct`.
+    def finish(self, capture: Capture) -> Work:
+        """Return the reconstruction that remains after the last photo.
 
         Parameters
         ----------
         capture : Capture
             With all photos that were taken in, and no others.
-        progress : callable, optional
-            Told what is being done and the share done, 0 to 1.
-
-        Yields
-        ------
-        Part
-            In order.
 
         Raises
         ------
         Exception
             Whatever went wrong beside the capture, and is no fault of the photos.
         NearfarError
-            As `nearfar.reconstruct`.
+            As `nearfar.workflow.reconstruction.job.tiling_of`.
         """
         self._end()
         if self._fault is not None:
             raise self._fault
-        report, memory = progress or unheard, self._memory
-        if self.held is None:
-            yield from reconstruct_in_blocks(
-                capture, memory=memory, device=self._device, progress=report
+        options = self._options
+        photos: PhotosInMemory | None = None
+        choices: Choices = ()
+        if self.held is not None:
+            photos = PhotosInMemory(
+                capture.plan, self.held.photos[: len(capture.plan.patterns)], self._full_scale
             )
-            return
-        photos = PhotosInMemory(
-            capture.plan, self.held.photos[: len(capture.plan.patterns)], self._full_scale
-        )
-        job = prepare(
-            capture,
-            method="joint",
-            memory=memory,
-            given=False,
-            device=self._device,
-            photos=photos,
-            report=report,
-        )
-        kinds = self._choice.kinds if self._choice is not None and self.chosen_by else ()
-        # All of the camera is one block, since the photos fit beside it.
-        yield from parts_of(replace(job, estimate=partial(jointly, chosen=kinds)), None, report)
+            # All of the camera is one tile, since the photos fit beside it.
+            choices = self._choice.kinds if self._choice is not None and self.chosen_by else ()
+        estimator = JointEstimator(choices=choices)
+        preparing = partial(prepare, capture, options, None, estimator=estimator, photos=photos)
+        tiling = tiling_of(capture, options, given=False)
+        return Work(capture, options, None, tiling, preparing)
 
     @property
     def chosen_by(self) -> int:
@@ -203,16 +177,19 @@ class RunningEstimate:
         count = len(self._plan.patterns)
         shape = (count, *photo.shape)
         room = PhotosInMemory(self._plan, np.broadcast_to(photo[:1, :1], shape), self._full_scale)
-        # One more set of kinds, for the photos there are while they are chosen.
-        shared, _ = ESTIMATORS["joint"].bytes_of(self._plan, photo.shape[-1])
-        rest = self._memory - count * photo.nbytes - shared
+
+        def fits(memory: int) -> bool:
+            tiling = tile_rows(self._plan, room.camera, room.channels, JOINT, JOINT.halo, memory)
+            return tiling.rows == room.camera.height
+
+        # One more set of prior components, for the photos there are while they are chosen.
+        shared = JOINT.memory(self._plan, room.channels).shared
         try:
-            fits = rows_at_once(room, "joint", rest) >= len(photo)
+            if not fits(self._options.memory - count * photo.nbytes - shared):
+                return None
         except InputError:
-            # Not beside the photos; where not without them either, that is said now.
-            rows_at_once(room, "joint", self._memory)
-            return None
-        if not fits:
+            # Not beside the photos; where not without them either, that is a fault now.
+            fits(self._options.memory)
             return None
         return PhotosInMemory(self._plan, np.empty(shape, photo.dtype), self._full_scale)
 
@@ -248,21 +225,18 @@ class RunningEstimate:
         assert self.held is not None
         plan = self._plan.first(taken)
         some = PhotosInMemory(plan, self.held.photos[:taken], self._full_scale)
-        photos = without_drift(some, unheard)
+        photos = photos_without_drift(some, ignore_progress)
         measurements = measure(photos, progress=self._heed)
-        if has_correspondence_photos(plan):
-            q = correspond_by_photos(photos).q
-        else:
-            try:
-                q = correspond_by_phase(measurements).q
-            except InputError:
-                return None
+        try:
+            q = find_correspondence(photos, measurements).q
+        except InputError:
+            return None
         kinds = choose_components(
-            measurements, q, plan.window, device=self._device, progress=self._heed
+            measurements, q, plan.window, device=self._options.device, progress=self._heed
         )
         # Those for all photos, for when they are there.
         basis, multiplicity = answered(self._plan)
-        build_model(basis, multiplicity, plan.window, self._device, unlit=True)
+        build_model(basis, multiplicity, plan.window, self._options.device, unlit=True)
         return _Choice(taken, kinds, time.monotonic() - begun)
 
     def _heed(self, _done: float) -> None:

@@ -17,15 +17,13 @@ from nearfar.correspondence import (
 )
 from nearfar.devices import Device
 from nearfar.errors import InputError
-from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.paper import estimate
+from nearfar.estimate.base import ESTIMATORS, Model
 from nearfar.illumination.frequencies import default_dropped
 from nearfar.photometry.measure import measure as measure_photos
 from nearfar.photometry.measurements import Measurements
 from nearfar.progress import Report, counting, ignore_progress
 from nearfar.transport.model import Transport
-from nearfar.workflow.blocks import brightest_white, without_drift
-from nearfar.workflow.methods import Method
+from nearfar.workflow.reconstruction.sources import brightest_white, photos_without_drift
 
 
 def measure(capture: Capture, *, progress: Report | None = None) -> Measurements:
@@ -58,7 +56,7 @@ def measure(capture: Capture, *, progress: Report | None = None) -> Measurements
     (64, 1, 18)
     """
     report = progress or ignore_progress
-    photos = without_drift(capture, report)
+    photos = photos_without_drift(capture, report)
     count = len(capture.plan.patterns)
     with threadpool_limits(1, "blas"):
         found = measure_photos(photos, progress=counting(report, "measuring", count))
@@ -104,7 +102,7 @@ def correspond(
     """
     report, plan = progress or ignore_progress, capture.plan
     chosen = method_of(plan) if method is None else method_named(method)
-    photos = without_drift(capture, report)
+    photos = photos_without_drift(capture, report)
     count = max(1, plan.counts["correspondence"])
     with threadpool_limits(1, "blas"):
         return chosen.find(
@@ -121,7 +119,7 @@ def estimate_transport(
     window: int,
     far: AnySize,
     *,
-    method: Method = "joint",
+    method: str = "joint",
     dropped: AnySize | None = None,
     device: Device = "cpu",
     progress: Report | None = None,
@@ -136,8 +134,9 @@ def estimate_transport(
         W: near-range light comes from a window of W x W projector pixels around q.
     far : Size or (height, width)
         Far band, in DFT frequencies of the pattern grid.
-    method : {"joint", "paper"}
-        Estimator: all three components in one model, or one after the other as in the paper.
+    method : str
+        Estimator: ``"joint"`` for all three components in one model, ``"paper"`` for one after the
+        other as in the paper, or one that another package adds.
     dropped : Size or (height, width), optional
         Block of near frequencies that were not shot, which the paper's estimator needs; by
         default those of `nearfar.paper_plan`.
@@ -173,25 +172,13 @@ def estimate_transport(
     def done(share: float) -> None:
         report("estimating", share)
 
+    left_out = (
+        default_dropped(window, far, measurements.projector)
+        if dropped is None
+        else as_size(dropped, "dropped")
+    )
+    estimator, model = ESTIMATORS[method], Model(window, far, left_out)
     with threadpool_limits(1, "blas"):
-        if method == "joint":
-            return estimate_jointly(
-                measurements, correspondence.q, window, far, device=device, progress=done
-            )
-        if method != "paper":
-            raise InputError(f"there is no estimator {method!r}: choose joint or paper.")
-        left_out = (
-            default_dropped(window, far, measurements.projector)
-            if dropped is None
-            else as_size(dropped, "dropped")
-        )
-        pixels = measurements.camera.pixels
-        return estimate(
-            measurements,
-            correspondence.q,
-            window,
-            far,
-            left_out,
-            device=device,
-            progress=lambda count: done(count / pixels),
+        return estimator.estimate(
+            measurements, correspondence.q, model, device=device, progress=done
         )

@@ -26,7 +26,7 @@ from nearfar.transport.model import Transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import percentiles, relighting_snr, row_snr
 from nearfar.workflow.experiments.data import Data
-from nearfar.workflow.reconstruct import reconstruct
+from nearfar.workflow.reconstruction.reconstruct import reconstruct
 
 Report = Callable[[str, float], None]
 

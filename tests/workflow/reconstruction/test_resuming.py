@@ -20,9 +20,11 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.store import load_transport
-from nearfar.workflow import blocks
 from nearfar.workflow.acquire import acquire
-from nearfar.workflow.resuming import LOG, reconstruct_into
+from nearfar.workflow.reconstruction.job import tiling_of
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+from nearfar.workflow.reconstruction.sinks import LOG
 from tests.absent import NEEDS_PYTORCH
 from tests.cli.conftest import run_nearfar
 from tests.worlds import model_transport
@@ -34,10 +36,27 @@ SLOW = """
 import sys
 from nearfar.capture import open_capture
 from nearfar.capture.replacing import replace_photos
-from nearfar.workflow.resuming import reconstruct_into
-reconstruct_into(sys.argv[2], open_capture(sys.argv[1]), memory=int(sys.argv[3]),
-                 resume="--resume" in sys.argv)
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+options = ReconstructionOptions(memory=int(sys.argv[3]), square="--square" in sys.argv)
+reconstruct_to_file(open_capture(sys.argv[1]), sys.argv[2], options=options,
+                    resume="--resume" in sys.argv)
 """
+
+
+def into(
+    path, capture, *, correspondence=None, resume=False, force=False, progress=None, **options
+):
+    """Reconstruct into a file, with options as keywords."""
+    return reconstruct_to_file(
+        capture,
+        path,
+        correspondence,
+        ReconstructionOptions(**options),
+        resume=resume,
+        force=force,
+        progress=progress,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +72,10 @@ def memory(capture):
     """Bytes in which so few rows are worked at that there are many blocks."""
     for size in range(400_000_000, 10**9, 100_000):
         try:
-            cut = blocks.cut_rows(capture, method="joint", memory=size, given=False)
+            tiling = tiling_of(capture, ReconstructionOptions(memory=size), given=False)
         except InputError:
             continue
-        if cut.rows >= ROWS:
+        if tiling.rows >= ROWS:
             return size
     raise AssertionError
 
@@ -64,7 +83,7 @@ def memory(capture):
 @pytest.fixture(scope="module")
 def whole(capture, memory, tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "t.zarr"
-    reconstruct_into(path, capture, memory=memory)
+    into(path, capture, memory=memory)
     return path
 
 
@@ -87,19 +106,21 @@ def _stop_after(count):
 
 
 def test_it_is_cut_into_many_blocks(capture, whole, memory):
-    cut = blocks.cut_rows(capture, method="joint", memory=memory, given=False)
-    assert len(list(cut.blocks())) >= 25
+    tiling = tiling_of(capture, ReconstructionOptions(memory=memory), given=False)
+    assert len(list(tiling.tiles())) >= 25
     assert not (whole / LOG).exists()
 
 
 def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
     path = tmp_path / "t.zarr"
     given = {"memory": memory}
-    with pytest.raises(KeptInterrupt, match=r"^interrupted; \d+ blocks .* and --resume goes on"):
-        reconstruct_into(path, capture, progress=_stop_after(50), **given)
+    with pytest.raises(
+        KeptInterrupt, match=r"^interrupted; \d+ blocks .* and `resume=True` goes on"
+    ):
+        into(path, capture, progress=_stop_after(50), **given)
     assert not path.exists()
     with pytest.raises(ExistingOutputError):
-        reconstruct_into(path, capture, **given)
+        into(path, capture, **given)
     for other in (
         {**given, "half": True},
         {"memory": 10**9},
@@ -107,9 +128,9 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
             np.ones((*CAMERA, 2), np.float32), np.ones(CAMERA, np.float32))},
     ):  # fmt: skip
         with pytest.raises(InputError, match="was begun with another"):
-            reconstruct_into(path, capture, resume=True, **other)
+            into(path, capture, resume=True, **other)
     done = []
-    reconstruct_into(
+    into(
         path, capture, resume=True, progress=lambda what, share: done.append((what, share)), **given
     )
     # What was there is not worked at again.
@@ -117,31 +138,31 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
     _check_same(whole, path)
     assert [p.name for p in tmp_path.iterdir()] == ["t.zarr"]
     with pytest.raises(MissingFileError, match="nothing to go on with"):
-        reconstruct_into(path, capture, resume=True, force=True, **given)
+        into(path, capture, resume=True, force=True, **given)
 
 
 @NEEDS_PYTORCH
 def test_another_device_does_not_go_on_with_it(capture, memory, tmp_path):
     path = tmp_path / "t.zarr"
     with pytest.raises(KeptInterrupt):
-        reconstruct_into(path, capture, memory=memory, progress=_stop_after(20))
+        into(path, capture, memory=memory, progress=_stop_after(20))
     with pytest.raises(InputError, match="was begun with another"):
-        reconstruct_into(path, capture, memory=memory, device="torch", resume=True)
+        into(path, capture, memory=memory, device="torch", resume=True)
 
 
 def test_photos_that_were_taken_again_are_another_capture(capture, memory, tmp_path):
     path, source = tmp_path / "t.zarr", tmp_path / "c.zarr"
     shutil.copytree(capture.path, source)
     with pytest.raises(KeptInterrupt):
-        reconstruct_into(path, open_capture(source), memory=memory, progress=_stop_after(20))
+        into(path, open_capture(source), memory=memory, progress=_stop_after(20))
     again = replace_photos(source, [3], [capture.photos[3]])
     with pytest.raises(InputError, match="another capture"):
-        reconstruct_into(path, again, memory=memory, resume=True)
+        into(path, again, memory=memory, resume=True)
 
 
 def test_what_was_stopped_before_its_first_block_leaves_nothing(capture, memory, tmp_path):
     with pytest.raises(KeyboardInterrupt) as stopped:
-        reconstruct_into(tmp_path / "t.zarr", capture, memory=memory, progress=_stop_after(0))
+        into(tmp_path / "t.zarr", capture, memory=memory, progress=_stop_after(0))
     assert not isinstance(stopped.value, KeptInterrupt)
     assert list(tmp_path.iterdir()) == []
 
@@ -183,13 +204,11 @@ def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path
 def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):
     path = tmp_path / "t.zarr"
     options = (capture.path, path, "--memory", f"{memory / 1e6}MB")
-    for wrong in (("--square",), ("--scheduler", "tcp://127.0.0.1:1")):
-        assert run_nearfar("reconstruct", *options, "--resume", *wrong).status == 2
     ran = run_nearfar("reconstruct", *options, "--resume")
     assert ran.status == 1
     assert "nothing to go on with" in ran.err
     with pytest.raises(KeptInterrupt):
-        reconstruct_into(path, open_capture(capture.path), memory=memory, progress=_stop_after(30))
+        into(path, open_capture(capture.path), memory=memory, progress=_stop_after(30))
     log = tmp_path / "t.zarr.unfinished" / LOG
     log.write_bytes(log.read_bytes()[:-9])
     ran = run_nearfar("reconstruct", *options, "--resume")

@@ -13,24 +13,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import nearfar
 from nearfar.arrays import Size
 from nearfar.correspondence import Correspondence, given_correspondence
-from nearfar.errors import ClusterError, ExistingOutputError, InputError
+from nearfar.errors import ClusterError, ExistingOutputError, InputError, KeptInterrupt
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.transport.store import write_transport
 from nearfar.workflow.acquire import acquire
-from nearfar.workflow.reconstruct import reconstruct_in_blocks
+from nearfar.workflow.reconstruction.job import tiling_of
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+from nearfar.workflow.reconstruction.sinks import LOG
 from tests.absent import said_without
 from tests.waiting import LONGEST_WAIT
-from tests.workflow.memory import memory_for
+from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed")
-
-from nearfar.workflow.cluster import reconstruct_on  # noqa: E402
 
 PROJECTOR = Size(24, 30)
 CAMERA = Size(36, 30)
@@ -92,10 +93,22 @@ def _files(folder):
     }
 
 
-def _locally(capture, known, method, memory, path, **options):
-    parts = list(reconstruct_in_blocks(capture, known, method=method, memory=memory, **options))
-    assert len(parts) == 8
-    write_transport(path, (part.transport for part in parts), CAMERA.height)
+def _reconstruct(
+    capture, path, known=None, *, resume=False, progress=None, scheduler=None, **options
+):
+    return reconstruct_to_file(
+        capture,
+        path,
+        known,
+        ReconstructionOptions(**options),
+        scheduler=scheduler,
+        resume=resume,
+        progress=progress,
+    )
+
+
+def _tiles(capture, **options):
+    return list(tiling_of(capture, ReconstructionOptions(**options), given=False).tiles())
 
 
 @pytest.mark.parametrize("method", ["joint", "paper"])
@@ -103,37 +116,44 @@ def _locally(capture, known, method, memory, path, **options):
 def test_the_transport_is_the_local_one_to_the_bit(cluster, world, tmp_path, method, given):
     capture, memory = _capture(method, world, tmp_path)
     known = given_correspondence(world.correspondence, CAMERA, PROJECTOR) if given else None
-    _locally(capture, known, method, memory, tmp_path / "local.zarr")
-    done = reconstruct_on(
-        cluster,
-        capture,
-        tmp_path / "spread.zarr",
-        known,
-        method=method,
-        memory=memory,
-    )
+    options = {"method": method, "memory": memory}
+    assert len(_tiles(capture, **options)) == 8
+    _reconstruct(capture, tmp_path / "local.zarr", known, **options)
+    done = _reconstruct(capture, tmp_path / "spread.zarr", known, scheduler=cluster, **options)
     assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
     assert done.pixels == CAMERA.pixels
 
 
 def test_half_precision_is_the_local_one_to_the_bit(cluster, world, tmp_path):
     capture, memory = _capture("joint", world, tmp_path)
-    _locally(capture, None, "joint", memory, tmp_path / "local.zarr", half=True)
-    done = reconstruct_on(cluster, capture, tmp_path / "spread.zarr", memory=memory, half=True)
+    options = {"memory": memory, "half": True}
+    _reconstruct(capture, tmp_path / "local.zarr", **options)
+    done = _reconstruct(capture, tmp_path / "spread.zarr", scheduler=cluster, **options)
     assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
     assert 0 < done.provenance["rounding"] < 0.5
 
 
+@pytest.mark.parametrize("method", ["joint", "paper"])
+def test_a_square_transport_is_the_local_one_to_the_bit(cluster, world, tmp_path, method):
+    capture, memory = _capture(method, world, tmp_path)
+    options = {"method": method, "memory": memory, "square": True}
+    assert len(_tiles(capture, **options)) > 2
+    _reconstruct(capture, tmp_path / "local.zarr", **options)
+    done = _reconstruct(capture, tmp_path / "spread.zarr", scheduler=cluster, **options)
+    assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
+    assert done.pixels == PROJECTOR.pixels
+
+
 def test_a_worker_that_is_killed_costs_its_block(cluster, world, tmp_path):
     capture, memory = _capture("joint", world, tmp_path)
-    _locally(capture, None, "joint", memory, tmp_path / "local.zarr")
+    _reconstruct(capture, tmp_path / "local.zarr", memory=memory)
     killed = []
     with distributed.Client(cluster, set_as_default=False) as client:
         pids = client.run(os.getpid)
     assert len(pids) == 2
 
     def kill():
-        while not list(tmp_path.glob(".*partial*/near/c.*")):
+        while not list(tmp_path.glob("*.unfinished/near/c.*")):
             time.sleep(0.01)
         victim = next(iter(pids.values()))
         os.kill(victim, signal.SIGKILL)
@@ -141,31 +161,46 @@ def test_a_worker_that_is_killed_costs_its_block(cluster, world, tmp_path):
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
-    reconstruct_on(cluster, capture, tmp_path / "spread.zarr", method="joint", memory=memory)
+    _reconstruct(capture, tmp_path / "spread.zarr", scheduler=cluster, memory=memory)
     killer.join(LONGEST_WAIT)
     assert killed
     assert _files(tmp_path / "spread.zarr") == _files(tmp_path / "local.zarr")
 
 
-def test_a_scheduler_that_is_lost_is_told_and_leaves_nothing(world, tmp_path, monkeypatch):
-    monkeypatch.setattr("nearfar.workflow.cluster.PATIENCE", 2)
+def test_a_scheduler_that_is_lost_costs_what_was_not_written(cluster, world, tmp_path, monkeypatch):
+    monkeypatch.setattr("nearfar.workflow.reconstruction.cluster.CONNECTION_SECONDS", 2)
     capture, memory = _capture("joint", world, tmp_path)
-    before = _files(tmp_path)
+    _reconstruct(capture, tmp_path / "local.zarr", memory=memory)
+    log = tmp_path / "t.zarr.unfinished" / LOG
     with _cluster(2) as address:
         with distributed.Client(address, set_as_default=False) as client:
             host = client.run_on_scheduler(os.getpid)
 
         def kill():
-            while not list(tmp_path.glob(".*partial*/near/c.*")):
+            # What tiles have in common, and one tile.
+            while not log.exists() or log.read_bytes().count(b"\n") < 2:
                 time.sleep(0.01)
             os.kill(host, signal.SIGKILL)
 
         threading.Thread(target=kill, daemon=True).start()
-        with pytest.raises(ClusterError, match="was lost in the middle of the work"):
-            reconstruct_on(address, capture, tmp_path / "t.zarr", memory=memory)
+        with pytest.raises(ClusterError, match=r"was lost in the middle.* blocks of rows are kept"):
+            _reconstruct(capture, tmp_path / "t.zarr", scheduler=address, memory=memory)
+    before = _files(tmp_path)
     # Workers that go on without a scheduler for a while write nothing more.
     time.sleep(4.0)
     assert _files(tmp_path) == before
+    done = []
+    _reconstruct(
+        capture,
+        tmp_path / "t.zarr",
+        scheduler=cluster,
+        memory=memory,
+        resume=True,
+        progress=lambda _what, share: done.append(share),
+    )
+    # Fewer tiles than there are were left to be done.
+    assert len(done) < len(_tiles(capture, memory=memory))
+    assert _files(tmp_path / "t.zarr") == _files(tmp_path / "local.zarr")
 
 
 def test_a_fault_on_a_worker_is_told_here_and_leaves_nothing(cluster, world, tmp_path):
@@ -174,52 +209,59 @@ def test_a_fault_on_a_worker_is_told_here_and_leaves_nothing(cluster, world, tmp
     chunk.write_bytes(chunk.read_bytes()[:-9])
     before = _files(tmp_path)
     with pytest.raises(OSError, match=r"c\.zarr is damaged"):
-        reconstruct_on(
-            cluster,
-            capture,
-            tmp_path / "spread.zarr",
-            method="paper",
-            memory=memory,
-        )
+        _reconstruct(capture, tmp_path / "t.zarr", scheduler=cluster, method="paper", memory=memory)
     time.sleep(1.0)
     assert _files(tmp_path) == before
 
 
-def test_an_interrupt_leaves_nothing_behind(cluster, world, tmp_path):
+def test_what_was_interrupted_is_gone_on_with_here_or_there(cluster, world, tmp_path):
     capture, memory = _capture("joint", world, tmp_path)
-    before = _files(tmp_path)
+    _reconstruct(capture, tmp_path / "local.zarr", memory=memory)
 
     def interrupt(_what, _share):
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        reconstruct_on(
-            cluster,
-            capture,
-            tmp_path / "spread.zarr",
-            memory=memory,
-            progress=interrupt,
-        )
-    # Blocks that were under way end in the meantime.
-    time.sleep(3.0)
-    assert _files(tmp_path) == before
+    for scheduler, resumed_by in ((cluster, None), (None, cluster)):
+        path = tmp_path / f"{'cluster' if scheduler else 'local'}-first.zarr"
+        with pytest.raises(KeptInterrupt, match=r"^interrupted; \d+ blocks .* are kept"):
+            _reconstruct(
+                capture,
+                path,
+                scheduler=scheduler,
+                memory=memory,
+                progress=interrupt if scheduler else _interrupt_at(0.4),
+            )
+        before = _files(tmp_path)
+        # Tiles that were under way end in the meantime, and are not written.
+        time.sleep(3.0 if scheduler else 0.0)
+        assert _files(tmp_path) == before
+        _reconstruct(capture, path, scheduler=resumed_by, memory=memory, resume=True)
+        assert _files(path) == _files(tmp_path / "local.zarr")
+
+
+def _interrupt_at(least):
+    def progress(what, share):
+        if what == "reconstructing" and share >= least:
+            raise KeyboardInterrupt
+
+    return progress
 
 
 def test_what_cannot_be_is_said_before_any_work(cluster, world, tmp_path, monkeypatch):
-    monkeypatch.setattr("nearfar.workflow.cluster.PATIENCE", 2)
+    monkeypatch.setattr("nearfar.workflow.reconstruction.cluster.CONNECTION_SECONDS", 2)
     capture, memory = _capture("paper", world, tmp_path)
     before, address = _files(tmp_path), cluster
 
     def tried(scheduler=address, output="t.zarr", known=None, memory=memory):
-        return reconstruct_on(
-            scheduler, capture, tmp_path / output, known, method="paper", memory=memory
+        return _reconstruct(
+            capture, tmp_path / output, known, scheduler=scheduler, method="paper", memory=memory
         )
 
     with pytest.raises(ClusterError, match=r"no scheduler at tcp://127\.0\.0\.1:9 "):
         tried("tcp://127.0.0.1:9")
     with pytest.raises(ClusterError, match="no scheduler at nonsense://x "):
         tried("nonsense://x")
-    with pytest.raises(ClusterError, match=r"has 2\.0 GB: give a smaller --memory"):
+    with pytest.raises(ClusterError, match=r"has 2\.0 GB: give a smaller `memory`"):
         tried(memory=10**10)
     with pytest.raises(InputError, match="too few for one row"):
         tried(memory=10**6)
@@ -233,10 +275,12 @@ def test_what_cannot_be_is_said_before_any_work(cluster, world, tmp_path, monkey
 
 
 def test_a_scheduler_without_workers_is_said(scheduler, world, tmp_path, monkeypatch):
-    monkeypatch.setattr("nearfar.workflow.cluster.PATIENCE", 1)
+    monkeypatch.setattr("nearfar.workflow.reconstruction.cluster.CONNECTION_SECONDS", 1)
     capture, memory = _capture("paper", world, tmp_path)
     with pytest.raises(ClusterError, match="has no workers: start some by dask worker tcp://"):
-        reconstruct_on(scheduler, capture, tmp_path / "t.zarr", method="paper", memory=memory)
+        _reconstruct(
+            capture, tmp_path / "t.zarr", scheduler=scheduler, method="paper", memory=memory
+        )
 
 
 def _started(client, *command):
@@ -268,8 +312,8 @@ def test_workers_that_cannot_do_it_are_named(scheduler, world, tmp_path, what):
         worker = _started(client, *work)
         try:
             with pytest.raises(ClusterError, match=said):
-                reconstruct_on(
-                    scheduler, capture, tmp_path / "t.zarr", method="paper", memory=memory
+                _reconstruct(
+                    capture, tmp_path / "t.zarr", scheduler=scheduler, method="paper", memory=memory
                 )
         finally:
             worker.terminate()
@@ -279,5 +323,14 @@ def test_workers_that_cannot_do_it_are_named(scheduler, world, tmp_path, what):
 
 def test_without_dask_it_is_said():
     assert "pip install 'nearfar[dask]'" in said_without(
-        "distributed", "import nearfar.workflow.cluster"
+        "distributed", "import nearfar.workflow.reconstruction.cluster"
     )
+
+
+def test_the_old_name_says_what_replaces_it(cluster, world, tmp_path):
+    capture, memory = _capture("paper", world, tmp_path)
+    with pytest.warns(DeprecationWarning, match="reconstruct_to_file"):
+        done = nearfar.reconstruct_on(
+            cluster, capture, tmp_path / "t.zarr", method="paper", memory=memory
+        )
+    assert done.pixels == CAMERA.pixels

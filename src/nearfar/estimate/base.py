@@ -1,0 +1,121 @@
+"""What an estimator is: it makes a transport of measurements and correspondence.
+
+nearfar's own estimators are listed in `ESTIMATORS`; other packages add theirs through the entry
+point group ``nearfar.estimators``, an instance of a subclass of `Estimator`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import NamedTuple
+
+from nearfar.arrays import Floats, Size
+from nearfar.devices import Device
+from nearfar.photometry.measurements import Measurements
+from nearfar.plan import Plan
+from nearfar.registry import Registry
+from nearfar.transport.model import Transport
+
+
+class Model(NamedTuple):
+    """Sizes of the model that an estimate is made in.
+
+    Attributes
+    ----------
+    window : int
+        W, the side of the near-range window in projector pixels.
+    far : Size
+        Far band, in frequencies.
+    dropped : Size
+        Block of lowest near frequencies that are not measured.
+    """
+
+    window: int
+    far: Size
+    dropped: Size
+
+
+def model_of(plan: Plan) -> Model:
+    """Return the sizes of the model that a plan was made for."""
+    return Model(plan.window, plan.far, plan.dropped)
+
+
+class Memory(NamedTuple):
+    """Memory that an estimate takes.
+
+    Attributes
+    ----------
+    shared : int
+        Bytes of what all camera pixels share.
+    pixel : int
+        Bytes of each camera pixel.
+    """
+
+    shared: int
+    pixel: int
+
+
+class Estimator(ABC):
+    """From measurements and correspondence to a transport.
+
+    Camera pixels may be estimated in tiles of camera rows. Where the estimate of a row depends on
+    rows beside it, `halo` says on how many; a tile is then estimated with them, and they are
+    dropped from the result.
+    """
+
+    @property
+    def halo(self) -> int:
+        """Rows of the camera on either side of a tile that its estimate depends on."""
+        return 0
+
+    @abstractmethod
+    def require(self, plan: Plan) -> None:
+        """Refuse a plan whose photos this estimator cannot use.
+
+        Raises
+        ------
+        PlanError
+        """
+
+    @abstractmethod
+    def memory(self, plan: Plan, channels: int) -> Memory:
+        """Return the memory that an estimate from a plan's photos of so many channels takes."""
+
+    @abstractmethod
+    def estimate(
+        self,
+        measurements: Measurements,
+        q: Floats,
+        model: Model,
+        *,
+        device: Device = "cpu",
+        progress: Callable[[float], None] | None = None,
+    ) -> Transport:
+        """Estimate the transport of the camera pixels that were measured.
+
+        Parameters
+        ----------
+        measurements : Measurements
+        q : ndarray, shape (Cy, Cx, 2), float32
+            Correspondence as (y, x) in projector pixels, NaN without direct light.
+        model : Model
+        device : {"cpu", "cuda", "torch"}
+            NumPy on the processor, PyTorch on an accelerator, or PyTorch on the processor.
+        progress : callable, optional
+            Called with the share done, 0 to 1.
+
+        Raises
+        ------
+        InputError, MissingPackageError
+            If the measurements do not suffice, or the device is not there.
+        """
+
+
+ESTIMATORS = Registry(
+    "method",
+    "nearfar.estimators",
+    {
+        "joint": "nearfar.estimate.joint.estimator:JOINT",
+        "paper": "nearfar.estimate.paper_estimator:PAPER",
+    },
+    Estimator,  # type: ignore[type-abstract]
+)

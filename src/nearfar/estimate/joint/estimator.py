@@ -1,0 +1,86 @@
+"""The joint estimate as an estimator: which plans it takes, its memory, its halo."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nearfar.arrays import Floats
+from nearfar.devices import Device
+from nearfar.estimate.base import Estimator, Memory, Model
+from nearfar.estimate.joint.estimate import SWEEPS, Choices, estimate_jointly
+from nearfar.photometry.measure import measured_frequencies
+from nearfar.photometry.measurements import Measurements
+from nearfar.plan import Plan
+from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
+from nearfar.priors.responses import VARIANCE_RATIOS
+from nearfar.transport.model import Transport
+
+FLOAT32_BYTES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class JointEstimator(Estimator):
+    """Direct, near- and far-range light in one model, by a prior and by neighbours.
+
+    It takes any plan with a white photo and another frequency.
+
+    Attributes
+    ----------
+    choices : Choices
+        Prior component of each camera pixel in each sweep, where they were chosen before; see
+        `nearfar.estimate.joint.choose_components`.
+    """
+
+    choices: Choices = ()
+
+    @property
+    def halo(self) -> int:
+        """Each sweep but the first reads the neighbours, and the first reads their q."""
+        return SWEEPS
+
+    def require(self, plan: Plan) -> None:
+        """Refuse a plan of complex patterns."""
+        plan.require_real("reconstruct")
+        measured_frequencies(plan)
+
+    def memory(self, plan: Plan, channels: int) -> Memory:
+        """Count the matrices of every prior component, and each camera pixel's responses."""
+        responses = 2 * len(measured_frequencies(plan))
+        entries = plan.window**2
+        components = len(LIT_COMPONENTS) + len(UNLIT_COMPONENTS)
+        component = (
+            2 * responses**2
+            + 2 * responses * entries
+            + len(VARIANCE_RATIOS) * entries
+            + 2 * entries**2
+        )
+        # Responses, re-ordered; and four sets of rows: what a sweep starts from, what is expected
+        # from neighbours, what it finds, and their sum.
+        each = channels * (2 * responses + 4 * (responses + entries))
+        # Inverse pairs are in memory while they are measured.
+        pairs = channels * len(plan.patterns) if plan.offset == "inverse" else 0
+        return Memory(
+            FLOAT32_BYTES * components * component, FLOAT32_BYTES * (each + pairs) + entries
+        )
+
+    def estimate(
+        self,
+        measurements: Measurements,
+        q: Floats,
+        model: Model,
+        *,
+        device: Device = "cpu",
+        progress: Callable[[float], None] | None = None,
+    ) -> Transport:
+        """Estimate jointly; see `nearfar.estimate.joint.estimate_jointly`."""
+        return estimate_jointly(
+            measurements,
+            q,
+            model.window,
+            model.far,
+            chosen=self.choices,
+            device=device,
+            progress=progress,
+        )
+
+
+JOINT = JointEstimator()

@@ -1,0 +1,228 @@
+"""Reconstruction on many machines, by Dask: tiles of camera rows as tasks.
+
+The capture and the transport lie where all workers see them under the same name. Each tile is
+read, reconstructed and written by one worker, in chunks of its own, so that a worker that is lost
+costs its tile, and doing it over again writes the same. The transport is that of one process with
+the same memory, to the bit.
+"""
+
+import hashlib
+import os
+import secrets
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from nearfar.capture import open_capture
+from nearfar.correspondence import Correspondence
+from nearfar.errors import ClusterError, MissingPackageError
+from nearfar.files.writes import abandon, admit
+from nearfar.progress import Report, ignore_progress
+from nearfar.release import version
+from nearfar.workflow.reconstruction.executors import TileReport, Work, one_processor_a_product
+from nearfar.workflow.reconstruction.job import Job, prepare, reconstruct_tile
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.sinks import Store, TileWriter
+from nearfar.workflow.reconstruction.summary import Summary
+
+try:
+    from dask import config
+    from distributed import Client, KilledWorker, as_completed
+except ImportError as error:
+    raise MissingPackageError(
+        f"a scheduler needs Dask, which is not installed ({error}): install it by "
+        f"pip install 'nearfar[dask]'."
+    ) from error
+
+# Seconds in which a scheduler answers, and has a worker.
+CONNECTION_SECONDS = 10
+
+# Holds the token of the run that may write into the folder; gone once the run has ended.
+RUN_MARKER = ".run.partial"
+
+# One tile at a time in a process, however many threads it has: that is what memory is for.
+_at_work = threading.Lock()
+
+
+class DaskExecutor:
+    """The workers of a Dask scheduler, one tile at a time in each process.
+
+    Parameters
+    ----------
+    scheduler : str
+        Its address, for instance ``tcp://10.0.0.1:8786``.
+    """
+
+    def __init__(self, scheduler: str) -> None:
+        self._scheduler = scheduler
+
+    def run(
+        self,
+        work: Work,
+        tiles: Sequence[slice],
+        store: Store,
+        report: Report,
+        tile_report: TileReport,
+    ) -> Iterator[tuple[slice, Summary]]:
+        """Reconstruct and store tiles; yield each with its summary, as they come.
+
+        Raises
+        ------
+        ClusterError
+            If there is no such scheduler, it has no workers, these lack nearfar, another version
+            of it, memory or the files, or are lost again and again.
+        """
+        assert isinstance(store, TileWriter), "workers write into a folder that all see"
+        source, scheduler = work.capture.path.resolve(), self._scheduler
+        store = replace(store, folder=store.folder.resolve())
+        with _connected(scheduler) as client:
+            _require_workers(client, scheduler, source, store.folder, work.options.memory)
+            run, marker = secrets.token_hex(8), store.folder / RUN_MARKER
+            marker.write_text(run)
+            job = client.submit(_prepared, source, work.options, work.correspondence, pure=False)
+            tasks = {
+                client.submit(
+                    _reconstructed, job, tile, work.known_of(tile), store, run, pure=False
+                ): tile
+                for tile in tiles
+            }
+            try:
+                for task in as_completed(list(tasks), loop=client.loop):
+                    yield tasks[task], task.result()
+            except KilledWorker as error:
+                raise ClusterError(
+                    f"a block of rows was lost with its worker again and again, "
+                    f"{error.last_worker} last: look at the workers' logs, and if memory ran out "
+                    f"give less `memory`."
+                ) from error
+            except CancelledError as error:
+                raise ClusterError(
+                    f"the scheduler at {scheduler} was lost in the middle of the work: see that it "
+                    f"and its workers run, and reconstruct again."
+                ) from error
+            finally:
+                # Tiles that are under way end, but write no more.
+                marker.unlink(missing_ok=True)
+                with suppress(OSError, CancelledError):
+                    client.cancel([job, *tasks])
+                    client.run(abandon, store.folder, on_error="ignore")
+
+
+def _prepared(
+    source: Path, options: ReconstructionOptions, correspondence: Correspondence | None
+) -> Job:
+    """On a worker: read what all tiles share."""
+    return prepare(open_capture(source), options, correspondence, ignore_progress)
+
+
+def _reconstructed(
+    job: Job, tile: slice, known: Correspondence | None, store: TileWriter, run: str
+) -> Summary:
+    """On a worker: reconstruct a tile, and write it."""
+    with _at_work, one_processor_a_product():
+        _require_run(store.folder, run)
+        part = reconstruct_tile(job, tile, known)
+        # In this order, so that a run that ends meanwhile is seen here or drops the writes.
+        admit(store.folder)
+        _require_run(store.folder, run)
+        return store.put(tile, part)
+
+
+def _require_run(folder: Path, run: str) -> None:
+    """Refuse to work for a run that has ended, or that another has taken the place of."""
+    try:
+        current = (folder / RUN_MARKER).read_text()
+    except FileNotFoundError:
+        current = ""
+    if current != run:
+        raise ClusterError(f"{folder} was given up while one of its tiles was worked at.")
+
+
+@contextmanager
+def _connected(scheduler: str) -> Iterator[Client]:
+    """Connect to a scheduler that has workers."""
+    # Correspondence goes with each tile; how much is too much is left to the options' memory.
+    with config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
+        try:
+            client = Client(scheduler, timeout=CONNECTION_SECONDS, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ClusterError(
+                f"there is no scheduler at {scheduler} ({str(error).splitlines()[0]}): start one "
+                f"by dask scheduler, and give its address as it prints it, tcp://HOST:8786."
+            ) from error
+        with client:
+            yield client
+
+
+class _Reach(NamedTuple):
+    """What a process reaches of a reconstruction's files.
+
+    Attributes
+    ----------
+    version : str
+        Of nearfar.
+    capture : str
+        Digest of the capture's metadata, or why it cannot be read.
+    output : bool
+        Whether the transport can be written.
+    """
+
+    version: str
+    capture: str
+    output: bool
+
+
+def _reach(source: Path, folder: Path) -> _Reach:
+    """On a worker, or here: return what this process reaches."""
+    try:
+        capture = hashlib.sha256((source / "zarr.json").read_bytes()).hexdigest()
+    except OSError as error:
+        capture = error.strerror or str(error)
+    return _Reach(version(), capture, os.access(folder, os.W_OK | os.X_OK))
+
+
+def _require_workers(
+    client: Client, scheduler: str, source: Path, folder: Path, memory: int
+) -> None:
+    """Refuse workers that cannot do the work, before any is given out."""
+    try:
+        client.wait_for_workers(1, timeout=CONNECTION_SECONDS)
+    except TimeoutError as error:
+        raise ClusterError(
+            f"the scheduler at {scheduler} has no workers: start some by dask worker {scheduler}."
+        ) from error
+    for address, worker in client.scheduler_info(n_workers=-1)["workers"].items():
+        if 0 < worker["memory_limit"] < memory:
+            raise ClusterError(
+                f"the worker at {address} has {worker['memory_limit'] / 1e9:.1f} GB: give a "
+                f"smaller `memory`, or start it with {memory / 1e9:.1f} GB or more."
+            )
+    # Our own functions travel by name: first see that workers know any.
+    for address, fault in client.run(exec, "import nearfar", on_error="return").items():
+        if fault is not None:
+            raise ClusterError(
+                f"the worker at {address} cannot import nearfar ({fault}): install nearfar "
+                f"{version()} where the workers run."
+            )
+    reaches: dict[str, _Reach] = client.run(_reach, source, folder)
+    here = _reach(source, folder)
+    for address, reach in reaches.items():
+        if reach.version != here.version:
+            raise ClusterError(
+                f"the worker at {address} has nearfar {reach.version}, and this is "
+                f"{here.version}: install the same everywhere."
+            )
+        if reach.capture != here.capture:
+            raise ClusterError(
+                f"the worker at {address} does not see {source} as it is here: put it where all "
+                f"workers see it under the same name."
+            )
+        if not reach.output:
+            raise ClusterError(
+                f"the worker at {address} cannot write to {folder.parent}: put the transport in "
+                f"a folder that all workers see under the same name."
+            )

@@ -1,0 +1,181 @@
+"""The job of a reconstruction: what all tiles share, and the work on one tile."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from nearfar.capture import Capture
+from nearfar.correspondence import Correspondence
+from nearfar.correspondence.methods import method_of
+from nearfar.devices import require_device
+from nearfar.estimate.base import Estimator, model_of
+from nearfar.photometry.photos import Photos
+from nearfar.progress import Report
+from nearfar.transport.half import in_half, rounding_over_noise
+from nearfar.transport.model import Transport
+from nearfar.transport.quality import Quality
+from nearfar.transport.rows import of_rows
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.sources import (
+    Source,
+    camera_source,
+    photos_without_drift,
+    square_source,
+    without_light,
+)
+from nearfar.workflow.reconstruction.summary import provenance_of
+from nearfar.workflow.reconstruction.tiles import Tiling, rows_to_measure, tile_rows
+
+
+class Part(NamedTuple):
+    """The transport and the correspondence of a tile."""
+
+    transport: Transport
+    correspondence: Correspondence
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What all tiles of a reconstruction share.
+
+    Attributes
+    ----------
+    capture : Capture
+    photos : Photos
+        The capture's, without drift.
+    options : ReconstructionOptions
+    estimator : Estimator
+    source : Source
+        What the tiles are estimated from.
+    tiling : Tiling
+    correspondence : Correspondence, optional
+        Of the whole camera, where it is there before the tiles: for a square T.
+    """
+
+    capture: Capture
+    photos: Photos
+    options: ReconstructionOptions
+    estimator: Estimator
+    source: Source
+    tiling: Tiling
+    correspondence: Correspondence | None = None
+
+
+def tiling_of(capture: Capture, options: ReconstructionOptions, *, given: bool) -> Tiling:
+    """Cut the rows of the transport into tiles that fit in the memory.
+
+    Parameters
+    ----------
+    capture : Capture
+    options : ReconstructionOptions
+    given : bool
+        Whether the correspondence is given and not to be found.
+
+    Raises
+    ------
+    PlanError
+        If the estimator cannot use the plan's photos.
+    InputError
+        If a row does not fit in the memory.
+    """
+    estimator, plan = options.estimator, capture.plan
+    estimator.require(plan)
+    found_in_tiles = not (given or options.square)
+    halo = estimator.halo + (method_of(plan).rows_beside if found_in_tiles else 0)
+    rows = plan.projector if options.square else capture.camera
+    memory = options.memory // options.tiles_at_once
+    return tile_rows(plan, rows, capture.channels, estimator, halo, memory)
+
+
+def prepare(
+    capture: Capture,
+    options: ReconstructionOptions,
+    correspondence: Correspondence | None,
+    report: Report,
+    *,
+    estimator: Estimator | None = None,
+    photos: Photos | None = None,
+) -> Job:
+    """Read what all tiles share: references, the brightest white, and all that a square T is of.
+
+    Parameters
+    ----------
+    capture : Capture
+    options : ReconstructionOptions
+    correspondence : Correspondence, optional
+        Of the whole camera, if it is given.
+    report : callable
+        Called with what is being done and the share done.
+    estimator : Estimator, optional
+        Instead of the one that the options name.
+    photos : Photos, optional
+        The capture's, where they are in memory already.
+
+    Raises
+    ------
+    PlanError, InputError
+        As `nearfar.reconstruct`.
+    """
+    require_device(options.device)
+    if correspondence is not None and not correspondence.lit.any():
+        raise without_light(capture)
+    tiling = tiling_of(capture, options, given=correspondence is not None)
+    steady = photos_without_drift(photos or capture, report)
+    chosen = estimator or options.estimator
+    if not options.square:
+        source = camera_source(capture, steady)
+        return Job(capture, steady, options, chosen, source, tiling)
+    at_once = rows_to_measure(
+        capture.plan, capture.camera, capture.channels, chosen, options.memory
+    )
+    averaged, found = square_source(capture, steady, correspondence, at_once, report)
+    return Job(capture, steady, options, chosen, averaged, tiling, found)
+
+
+def reconstruct_tile(
+    job: Job,
+    tile: slice,
+    known: Correspondence | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Part:
+    """Reconstruct the camera pixels of a tile.
+
+    Parameters
+    ----------
+    job : Job
+    tile : slice
+        Rows.
+    known : Correspondence, optional
+        Of the tile and its halo, if it is given.
+    progress : callable, optional
+        Called with the share done.
+
+    Returns
+    -------
+    Part
+        The provenance's ``excess_of_sums`` and ``rounding`` are the tile's own.
+    """
+    around = job.tiling.with_halo(tile)
+    core = slice(tile.start - around.start, tile.stop - around.start)
+    measurements, found = job.source.read(around, known)
+    whole = job.estimator.estimate(
+        measurements,
+        found.q,
+        model_of(job.capture.plan),
+        device=job.options.device,
+        progress=progress,
+    )
+    transport = of_rows(whole, core)
+    correspondence = found.of_rows(core)
+    saturated = job.source.saturated(tile)
+    provenance = {
+        **provenance_of(job.capture, job.photos, job.options),
+        "excess_of_sums": measurements.excess_of_sums,
+        "rounding": rounding_over_noise(transport) if job.options.half else 0.0,
+    }
+    transport = replace(
+        in_half(transport) if job.options.half else transport,
+        provenance=provenance,
+        quality=None if saturated is None else Quality(correspondence.confidence, saturated),
+    )
+    return Part(transport, correspondence)

@@ -1,0 +1,73 @@
+"""What a reconstruction is asked for, said once."""
+
+from dataclasses import dataclass
+from numbers import Integral
+from typing import get_args
+
+from nearfar.devices import Device
+from nearfar.errors import InputError
+from nearfar.estimate.base import ESTIMATORS, Estimator
+
+# Bytes of memory that a reconstruction takes at most, unless told otherwise.
+DEFAULT_MEMORY = 2 * 10**9
+
+
+@dataclass(frozen=True)
+class ReconstructionOptions:
+    """How a transport is reconstructed.
+
+    Parameters
+    ----------
+    method : str
+        Name of the estimator: ``"joint"``, ``"paper"``, or one that another package adds.
+    square : bool
+        Whether to make the paper's square T, with a row for each projector pixel: the mean over
+        the camera pixels that it lights.
+    memory : int
+        Bytes to work in, above what is returned. The camera is worked at in tiles of rows that
+        fit; only a square T holds the measurements of the whole camera.
+    device : {"cpu", "cuda", "torch"}
+        Where the estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
+        processor.
+    half : bool
+        Whether n and f are kept as float16, half the bytes. The provenance's ``rounding`` is the
+        error that this adds, as a share of their noise.
+    tiles_at_once : int
+        Tiles that are worked at side by side in this process; they share the memory.
+
+    Raises
+    ------
+    InputError
+        If there is no such method or device, or the memory is not a number of bytes.
+
+    Examples
+    --------
+    >>> nearfar.ReconstructionOptions(method="paper", memory=500_000_000).half
+    False
+    """
+
+    method: str = "joint"
+    square: bool = False
+    memory: int = DEFAULT_MEMORY
+    device: Device = "cpu"
+    half: bool = False
+    tiles_at_once: int = 1
+
+    def __post_init__(self) -> None:
+        if self.method not in ESTIMATORS:
+            raise InputError(
+                f"there is no method {self.method!r}: choose one of {', '.join(ESTIMATORS)}."
+            )
+        if self.device not in get_args(Device):
+            raise InputError(
+                f"there is no device {self.device!r}: choose one of {', '.join(get_args(Device))}."
+            )
+        for name in ("memory", "tiles_at_once"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+                raise InputError(f"{name} is {value!r}: give a whole number above 0.")
+
+    @property
+    def estimator(self) -> Estimator:
+        """The estimator that the method names."""
+        return ESTIMATORS[self.method]

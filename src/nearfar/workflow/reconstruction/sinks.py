@@ -1,0 +1,278 @@
+"""Where the tiles of a transport go: into memory, or into a file that can be resumed."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from nearfar.capture import Capture
+from nearfar.correspondence import Correspondence, joined
+from nearfar.errors import InputError, KeptInterrupt, NearfarError
+from nearfar.files import UNFINISHED, new_output, resumable_output
+from nearfar.files.logs import note, read_notes
+from nearfar.release import version
+from nearfar.transport.model import Transport
+from nearfar.transport.rows import stacked
+from nearfar.transport.store import write_provenance, write_rows
+from nearfar.workflow.reconstruction.job import Part
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.summary import Summary
+from nearfar.workflow.reconstruction.tiles import Tiling
+
+# A line for the job and one for each tile that is written; removed in the end.
+LOG = "blocks.jsonl"
+
+
+class Store(Protocol):
+    """What takes in the tiles, wherever they are made: several at once, on other machines too."""
+
+    def put(self, tile: slice, part: Part) -> Summary:
+        """Store a tile, and return what is said of it."""
+        ...
+
+
+class Sink(Protocol):
+    """Where a transport goes."""
+
+    @property
+    def store(self) -> Store:
+        """What takes in the tiles."""
+        ...
+
+    def stored(self) -> Mapping[int, Summary]:
+        """Return the summaries of the tiles that are there already, by their first row."""
+        ...
+
+    def note(self, tile: slice, summary: Summary) -> None:
+        """Take note of a tile that is stored."""
+        ...
+
+    def finish(self, whole: Summary) -> None:
+        """Take in what is said of the whole transport, all tiles of which are stored."""
+        ...
+
+
+class MemorySink:
+    """A transport in memory."""
+
+    def __init__(self) -> None:
+        self._parts: dict[int, Part] = {}
+        self._provenance: Mapping[str, Any] = {}
+
+    @property
+    def store(self) -> Store:
+        """The sink itself."""
+        return self
+
+    def put(self, tile: slice, part: Part) -> Summary:
+        """Keep a tile."""
+        self._parts[tile.start] = part
+        return summary_of(part)
+
+    def stored(self) -> Mapping[int, Summary]:
+        """Return nothing: there are no tiles before the job."""
+        return {}
+
+    def note(self, tile: slice, summary: Summary) -> None:
+        """Do nothing: tiles are kept as they come."""
+
+    def finish(self, whole: Summary) -> None:
+        """Keep the provenance of the whole."""
+        self._provenance = whole.provenance
+
+    def collected(self) -> tuple[Transport, Correspondence]:
+        """Return the transport and the correspondence of all tiles, put together."""
+        parts = [self._parts[first] for first in sorted(self._parts)]
+        transport = stacked([part.transport for part in parts])
+        transport = replace(transport, provenance=self._provenance)
+        return transport, joined([part.correspondence for part in parts])
+
+
+@dataclass(frozen=True)
+class TileWriter:
+    """Writes tiles into the folder of a transport, from any process that sees it.
+
+    Attributes
+    ----------
+    folder : Path
+    tiling : Tiling
+    """
+
+    folder: Path
+    tiling: Tiling
+
+    def put(self, tile: slice, part: Part) -> Summary:
+        """Write a tile; the first that is written lays the transport out."""
+        rows, height = self.tiling.rows, self.tiling.height
+        write_rows(self.folder, part.transport, tile.start, rows=rows, height=height)
+        return summary_of(part)
+
+
+class FileSink:
+    """A transport in a folder, tile by tile; one that was stopped can be gone on with.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the tiles are written: it becomes the transport once all are there.
+    tiling : Tiling
+    """
+
+    def __init__(self, folder: Path, tiling: Tiling) -> None:
+        self._folder, self._tiling = folder, tiling
+
+    @property
+    def store(self) -> TileWriter:
+        """What writes tiles into the folder."""
+        return TileWriter(self._folder, self._tiling)
+
+    def stored(self) -> Mapping[int, Summary]:
+        """Read from the log which tiles are written."""
+        return stored_tiles(self._folder)
+
+    def note(self, tile: slice, summary: Summary) -> None:
+        """Add a tile that is written to the log."""
+        note(self._folder / LOG, {"start": tile.start, **summary._asdict()})
+
+    def finish(self, whole: Summary) -> None:
+        """Write the provenance, and remove what lost workers left half-written."""
+        for left in self._folder.rglob(".*.partial"):
+            left.unlink()
+        write_provenance(self._folder, whole.provenance)
+
+
+@contextmanager
+def resumable_file(
+    output: Path, tiling: Tiling, identity: Mapping[str, Any], *, resume: bool, force: bool
+) -> Iterator[FileSink]:
+    """Give a sink that writes a transport; the tiles of one that was stopped are kept.
+
+    Until the last tile they lie in a folder of the output's name with ``.unfinished`` behind it.
+
+    Parameters
+    ----------
+    output : Path
+        Transport to write.
+    tiling : Tiling
+    identity : mapping
+        What tiles of one transport have in common; see `identity_of`.
+    resume : bool
+        Go on with the tiles that are there, of the same identity.
+    force : bool
+        Replace a transport that is there and, without `resume`, what was not finished.
+
+    Raises
+    ------
+    InputError
+        If the tiles that are there have another identity.
+    NearfarError
+        As `nearfar.files.resumable_output`, and what the body raises; the message says which tiles
+        are kept, and where.
+    KeptInterrupt
+        If the body was interrupted; likewise.
+    """
+
+    def is_worth_keeping(folder: Path, _fault: BaseException) -> bool:
+        return bool(stored_tiles(folder))
+
+    try:
+        with resumable_output(output, is_worth_keeping, resume=resume, force=force) as folder:
+            if lines := _lines(folder):
+                _require_same(folder, lines[0], identity)
+            else:
+                note(folder / LOG, identity)
+            # What was being written when the job was killed.
+            for left in folder.rglob(".*.partial"):
+                left.unlink()
+            yield FileSink(folder, tiling)
+    except KeyboardInterrupt as error:
+        if kept := _kept(output):
+            raise KeptInterrupt(f"interrupted; {kept}.") from error
+        raise
+    except NearfarError as error:
+        if kept := _kept(output):
+            raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
+        raise
+    (output.resolve() / LOG).unlink(missing_ok=True)
+
+
+@contextmanager
+def new_file(output: Path, tiling: Tiling, *, force: bool) -> Iterator[FileSink]:
+    """Give a sink that writes a transport whole or not at all; see `nearfar.files.new_output`."""
+    with new_output(output, force=force) as folder:
+        folder.mkdir()
+        yield FileSink(folder, tiling)
+        (folder / LOG).unlink(missing_ok=True)
+
+
+def identity_of(
+    capture: Capture,
+    correspondence: Correspondence | None,
+    options: ReconstructionOptions,
+    tiling: Tiling,
+) -> dict[str, Any]:
+    """Return what tiles of one transport have in common, as JSON holds it."""
+    described = (capture.path / "zarr.json").read_bytes()
+    return {
+        # Photos that were taken again have other times.
+        "capture": hashlib.sha256(described + capture.times.tobytes()).hexdigest(),
+        "correspondence": _digest(correspondence),
+        "method": options.method,
+        "square": options.square,
+        "device": options.device,
+        "half": options.half,
+        "memory": tiling.rows,
+        "nearfar": version(),
+    }
+
+
+def summary_of(part: Part) -> Summary:
+    """Return what is said of a tile."""
+    lit = part.correspondence.lit
+    return Summary(int(lit.sum()), int(lit.size), dict(part.transport.provenance))
+
+
+def stored_tiles(folder: Path) -> dict[int, Summary]:
+    """Read the summaries of the tiles that are written into a folder, by their first row."""
+    fields = Summary._fields
+    return {
+        line["start"]: Summary(*(line[name] for name in fields))
+        for line in _lines(folder)
+        if line.keys() >= {"start", *fields}
+    }
+
+
+def _lines(folder: Path) -> list[Mapping[str, Any]]:
+    """Read the log: the identity, and then the tiles."""
+    return read_notes(folder / LOG, lambda line: line)
+
+
+def _digest(correspondence: Correspondence | None) -> str:
+    if correspondence is None:
+        return ""
+    return hashlib.sha256(np.ascontiguousarray(correspondence.q).tobytes()).hexdigest()
+
+
+def _require_same(folder: Path, before: Mapping[str, Any], identity: Mapping[str, Any]) -> None:
+    other = [name for name in identity if before.get(name) != identity[name]]
+    if other:
+        raise InputError(
+            f"{folder} was begun with another {', '.join(other)}: give the same, or begin anew "
+            f"with `force=True`."
+        )
+
+
+def _kept(output: Path) -> str:
+    """Say which tiles of a stopped job are kept, and where; empty if none are."""
+    folder = output.resolve().with_name(f"{output.resolve().name}{UNFINISHED}")
+    count = len(stored_tiles(folder))
+    again = "`resume=True, force=True`" if output.exists() else "`resume=True`"
+    return (
+        f"{count} blocks of rows are kept in {folder}, and {again} goes on with them"
+        if count
+        else ""
+    )

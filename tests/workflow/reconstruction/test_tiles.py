@@ -1,0 +1,54 @@
+"""Tiles of camera rows: the memory that is counted, beside what is taken."""
+
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.estimate.base import ESTIMATORS
+from nearfar.photometry.drift_removal import remove_drift
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.workflow.reconstruction.tiles import memory_of_tile, reference_bytes, tile_rows
+from tests.worlds import model_transport
+
+PROJECTOR, CAMERA = Size(16, 20), Size(60, 9)
+PLAN, _ = choose_plan(PROJECTOR, 60, window=5)
+
+
+@pytest.fixture
+def photos(shoot):
+    return shoot(PLAN, model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3), channels=3))
+
+
+def test_references_of_the_whole_camera_are_counted(photos):
+    # A tile is worked at beside what is known of every row.
+    drift = remove_drift(photos).drift
+    kept = sum(values.nbytes for values in (drift.black, drift.light, drift.unsaturated))
+    assert reference_bytes(PLAN, CAMERA, 3) == kept
+    assert reference_bytes(paper_plan(PROJECTOR, 5, Size(3, 3)), CAMERA, 3) == 0
+
+
+@pytest.mark.parametrize("method", ["joint", "paper"])
+@pytest.mark.parametrize("rows", [1, 3, 15])
+def test_as_many_rows_are_taken_as_fit(method, rows):
+    plan = paper_plan(PROJECTOR, 5, Size(3, 3))
+    estimator = ESTIMATORS[method]
+    memory = int(memory_of_tile(plan, CAMERA, 3, estimator, rows))
+    for bytes_more, expected in ((1, rows), (-1, rows - 1)):
+        if expected:
+            tiling = tile_rows(plan, CAMERA, 3, estimator, 2, memory + bytes_more)
+            assert (tiling.rows, tiling.halo, tiling.height) == (expected, 2, 60)
+        else:
+            with pytest.raises(InputError, match="too few for one row"):
+                tile_rows(plan, CAMERA, 3, estimator, 2, memory + bytes_more)
+
+
+def test_tiles_cover_the_camera_and_their_halo_ends_at_its_border():
+    plan, estimator = paper_plan(PROJECTOR, 5, Size(3, 3)), ESTIMATORS["joint"]
+    memory = int(memory_of_tile(plan, CAMERA, 3, estimator, 21.5))
+    tiling = tile_rows(plan, CAMERA, 3, estimator, 4, memory)
+    # Tiles of many rows are of a multiple of 8, so that chunks of a file divide them.
+    assert [(tile.start, tile.stop) for tile in tiling.tiles()] == [
+        (0, 16), (16, 32), (32, 48), (48, 60)
+    ]  # fmt: skip
+    around = [tiling.with_halo(tile) for tile in tiling.tiles()]
+    assert [(rows.start, rows.stop) for rows in around] == [(0, 20), (12, 36), (28, 52), (44, 60)]

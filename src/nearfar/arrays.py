@@ -142,7 +142,7 @@ def parse_size(text: str, *, name: str = "size") -> Size:
 _UNITS = {"KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
-def parse_bytes(text: str, *, name: str = "memory") -> int:
+def parse_bytes(text: str) -> int:
     """Read an amount of memory written as ``2GB`` or ``500MB``.
 
     Raises
@@ -157,7 +157,7 @@ def parse_bytes(text: str, *, name: str = "memory") -> int:
         amount = -1.0
     if not 0 < amount < math.inf:
         raise InputError(
-            f"{name} {text!r} is not an amount of memory: write for instance 2GB or 500MB."
+            f"`memory` {text!r} is not an amount of memory: write for instance 2GB or 500MB."
         )
     return int(amount)
 

@@ -134,13 +134,6 @@ def test_an_unknown_name_is_wrong_usage_and_the_help_lists_the_known(arguments, 
     assert names.replace(", ", "|") in check_done(run_nearfar(arguments[0], "--help")).out
 
 
-# Its parts are still drivers of their own below the command line.
-LONG = pytest.mark.xfail(reason="reconstruct drives three ways to do one job", strict=False)
-BODIES = [
-    pytest.param(name, marks=LONG) if name == "reconstruct" else name for name in COMMANDS.own
-]
-
-
 def _functions(name: str) -> Iterator[ast.FunctionDef]:
     """Yield the functions of the file of a command."""
     spec = find_spec(COMMANDS[name].__module__)
@@ -151,7 +144,7 @@ def _functions(name: str) -> Iterator[ast.FunctionDef]:
             yield node
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", COMMANDS.own)
 def test_each_command_has_a_file_of_its_own_with_short_bodies(name: str):
     module = import_module(COMMANDS[name].__module__)
     assert [other for other in COMMANDS.own if COMMANDS[other].__module__ == module.__name__] == [

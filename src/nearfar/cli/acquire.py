@@ -116,7 +116,7 @@ def acquire(
         return
     if transport is None:
         _refuse({"--memory": memory, "--device": device}, "is for --transport.")
-    available = parse_bytes(memory or "2GB", name="--memory")
+    available = parse_bytes(memory or "2GB")
     options = ReconstructionOptions(memory=available, device=device or "cpu")
     made = _plan_to_shoot(plan_file, with_check_photos=until is not None)
     keep_input(output, plan_file, Path(rig))

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, Quiet, keep_for_page, size
+from nearfar.cli.options import AsJson, Force, Quiet, check_report_page, size
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -47,7 +47,7 @@ def check(
     from nearfar.workflow.conditioning import condition_near
 
     if page is not None:
-        keep_for_page(page, transport, force=force)
+        check_report_page(page, transport, force=force)
     with progress_bar("checking", quiet=quiet) as report:
         world = load_world(transport, None, None)
         plan = paper_plan(world.projector, near, far, dropped=drop, correspondence="none")

@@ -12,7 +12,7 @@ from nearfar.cli.options import (
     Quiet,
     ReportPath,
     TransportPath,
-    keep_for_page,
+    check_report_page,
 )
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
@@ -60,7 +60,9 @@ def evaluate(
     if (truth is None) == (photos is None):
         raise typer.BadParameter("give either --truth or --photos.", param_hint="--truth")
     if report is not None:
-        keep_for_page(report, transport, *(path for path in (truth, photos) if path), force=force)
+        check_report_page(
+            report, transport, *(path for path in (truth, photos) if path), force=force
+        )
     with progress_bar("evaluating", quiet=quiet) as told:
         opened = load_transport(transport)
         if truth is not None:

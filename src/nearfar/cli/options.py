@@ -1,6 +1,5 @@
 """Options that several commands share."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,13 +7,6 @@ import typer
 
 from nearfar.arrays import Size, parse_size
 from nearfar.errors import InputError
-
-
-class Where(StrEnum):
-    """Where the work is done."""
-
-    CPU = "cpu"
-    CUDA = "cuda"
 
 
 def size(text: str | Size) -> Size:
@@ -47,7 +39,7 @@ def keep_input(output: Path, *inputs: Path) -> None:
         )
 
 
-def keep_for_page(page: Path, *others: Path, force: bool) -> None:
+def check_report_page(page: Path, *others: Path, force: bool) -> None:
     """Check, before any work, that a page can be written and is no other file of the command.
 
     Raises

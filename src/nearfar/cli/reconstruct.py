@@ -12,7 +12,7 @@ from nearfar.cli.options import (
     Force,
     Quiet,
     ReportPath,
-    keep_for_page,
+    check_report_page,
     keep_input,
 )
 from nearfar.cli.saying import say, warn
@@ -92,11 +92,11 @@ def reconstruct(
 
     if device == "cuda" and scheduler is not None:
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
-    available = parse_bytes(memory, name="--memory")
+    available = parse_bytes(memory)
     inputs = [capture, *([correspondence] if correspondence else [])]
     keep_input(output, *inputs)
     if report is not None:
-        keep_for_page(report, output, *inputs, force=force)
+        check_report_page(report, output, *inputs, force=force)
     check_resumable(output, resume=resume, force=force)
     opened = open_capture(capture)
     given = None

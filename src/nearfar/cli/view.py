@@ -42,7 +42,7 @@ def view(
     from nearfar.viewer.server import ListeningAddress
     from nearfar.viewer.view import run_view
 
-    available = parse_bytes(memory, name="--memory")
+    available = parse_bytes(memory)
     with progress_bar("reading", quiet=quiet) as report:
         interactive = InteractiveTransport(
             transport, memory=available, progress=lambda share: report("reading", share)

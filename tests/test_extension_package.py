@@ -63,6 +63,7 @@ def _white(folder):
 def test_help_lists_the_names_of_the_package(run):
     for command, name in (
         ("plan", "binary"),
+        ("reconstruct", "ridge"),
         ("compare", "card"),
         ("compare", "scan"),
     ):
@@ -101,7 +102,7 @@ def test_its_camera_sees_the_screen(run, plan):
     )
     with one_monitor() as display:
         run("acquire", plan, "seen.zarr", "--rig", "rig.toml", "--quiet", DISPLAY=display)
-    run("reconstruct", "seen.zarr", "seen-transport.zarr", "--method", "paper", "--quiet")
+    run("reconstruct", "seen.zarr", "seen-transport.zarr", "--method", "ridge", "--quiet")
     run("relight", "seen-transport.zarr", _white(run.folder), "seen.npy", "--quiet")
     np.testing.assert_allclose(np.load(run.folder / "seen.npy"), DIRECT + FAR, rtol=0.03)
 

@@ -16,6 +16,8 @@ if sys.platform != "win32":
 
 # Ending of a folder that is not finished.
 UNFINISHED = ".unfinished"
+# Endings of what stands in it before the store: logs, and files that are being written.
+EARLY_ENTRIES = {".jsonl", ".partial"}
 
 
 @contextmanager
@@ -94,13 +96,13 @@ def _checked(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
                 f"{unfinished} holds what was not finished: go on with it by `resume=True`, or "
                 f"begin anew by `force=True`."
             )
-        checked_target(unfinished, force=True, replaceable=_is_begun)
+        checked_target(unfinished, force=True, replaceable=_is_unfinished)
     return target, unfinished
 
 
-def _is_begun(folder: Path) -> bool:
-    """Return whether a folder is ours, or was new when the process was killed."""
-    return is_ours(folder) or all(entry.suffix == ".partial" for entry in folder.iterdir())
+def _is_unfinished(folder: Path) -> bool:
+    """Return whether a folder is ours, or held no more than a log when the process was killed."""
+    return is_ours(folder) or all(entry.suffix in EARLY_ENTRIES for entry in folder.iterdir())
 
 
 def _clear(folder: Path) -> None:

@@ -167,6 +167,23 @@ def test_what_was_stopped_before_its_first_block_leaves_nothing(capture, memory,
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
+    capture, whole, memory, tmp_path
+):
+    # As kill -9 leaves it while the first tile is worked at: a log and no store.
+    for again in ({"force": True}, {"resume": True}):
+        path = tmp_path / f"{next(iter(again))}.zarr"
+        folder = Path(f"{path}.unfinished")
+        with pytest.raises(KeptInterrupt):
+            into(path, capture, memory=memory, progress=_stop_after(5))
+        first, *_ = (folder / LOG).read_bytes().splitlines(keepends=True)
+        shutil.rmtree(folder)
+        folder.mkdir()
+        (folder / LOG).write_bytes(first)
+        into(path, capture, memory=memory, **again)
+        _check_same(whole, path)
+
+
 @pytest.mark.slow
 def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path):
     generator = random.Random(0)

@@ -38,7 +38,8 @@ Correspond
 Estimate
     estimate_transport     estimate the transport from measurements and correspondence
     reconstruct            measure, correspond and estimate in bounded memory
-    reconstruct_on         the same on the machines of a Dask cluster
+    reconstruct_to_file    the same into a file, here or on the machines of a Dask cluster
+    ReconstructionOptions  how it is done: method, memory, device, ...
 
 Use the transport
     Transport              direct, near- and far-range transport: relights and takes apart

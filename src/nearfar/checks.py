@@ -91,13 +91,16 @@ def as_pixels(pixels: Any, count: int) -> slice:
 def real_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
     """Return an array of real numbers, NaN and infinities among them; lists are accepted.
 
+    An array that is one already is returned as the same object, a memory map among them.
+
     Raises
     ------
     InputError
         If it holds anything else.
     """
     try:
-        array = np.asarray(values)
+        # asarray would return the array behind a memory map, which no longer knows its file.
+        array = values if isinstance(values, np.memmap) else np.asarray(values)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} is not an array ({error}): give one of numbers.") from None
     if array.dtype.kind not in "biuf":

@@ -32,7 +32,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.workflow.acquire import hold
+from nearfar.workflow.acquire import acquire_in_memory
 
 # Scene, W, far band, and the least mean over pictures that is asked for.
 CASES = {
@@ -47,7 +47,7 @@ CLEAN = SimulatedCamera(shot_noise=False, read_noise=0.0, full_well=1e9, bits=16
 def shoot(plan: Plan, scene: ExactTransport, camera: SimulatedCamera) -> PhotosInMemory:
     """Take the photos of a plan."""
     rig = SimulatedRig(scene, scene.name, SimulatedProjector(), camera, 1.0, 0)
-    return hold(plan, rig)
+    return acquire_in_memory(plan, rig)
 
 
 def scores(truth: Mapping[str, Floats], found: Transport, lights: Mapping[str, Floats]) -> str:

@@ -1,9 +1,9 @@
 """How soon after the last photo the transport is there: 128 x 128 x 3 at W = 19, 1316 photos.
 
 Run ``python benchmarks/while_capturing.py [SECONDS]``. The photos of `benchmarks/reconstruction.py`
-come one by one, a photo in so many seconds (0.1 by default), as from a rig, and are followed by a
-`RunningEstimate`; then the same capture is reconstructed as if it had been found on the disk. Both
-times are printed beside one float32 product of (49152 x 530) x (530 x 530) in the same run.
+come one by one, a photo in so many seconds (0.1 by default), as from a rig, to an
+`EstimateObserver`; then the same capture is reconstructed from the disk. Both times are printed
+beside one float32 product of (49152 x 530) x (530 x 530) in the same run.
 """
 
 import sys
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from nearfar import Transport, open_capture, reconstruct
 from nearfar.capture import Capture, write_capture
 from nearfar.progress import ignore_progress
-from nearfar.workflow.estimating import RunningEstimate
+from nearfar.workflow.observers.estimate import EstimateObserver
 from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.sinks import MemorySink
@@ -49,13 +49,13 @@ def differ(one: Transport, other: Transport) -> str:
 
 
 def main() -> None:
-    """Shoot, follow, reconstruct, compare."""
+    """Shoot, observe, reconstruct, compare."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 0.1
     product = one_product()
     with tempfile.TemporaryDirectory() as folder:
         source = open_capture(make(Path(folder)))
         plan, scale = source.plan, source.full_scale
-        with RunningEstimate(plan, scale, ReconstructionOptions(memory=MEMORY)) as estimate:
+        with EstimateObserver(plan, scale, ReconstructionOptions(memory=MEMORY)) as estimate:
             capture = write_capture(
                 plan,
                 Path(folder, "again.zarr"),
@@ -71,7 +71,7 @@ def main() -> None:
         started = time.perf_counter()
         found, _ = reconstruct(capture, memory=MEMORY)
         whole = time.perf_counter() - started
-    print(f"one product: {product:.2f} s; kinds chosen by {estimate.chosen_by} photos")
+    print(f"one product: {product:.2f} s; components chosen from {estimate.chosen_by} photos")
     print(f"after the last photo: {after:.1f} s, {after / product:.0f} products")
     print(f"from the disk: {whole:.1f} s, {whole / product:.0f} products")
     print(f"they differ by {differ(made, found)}")

@@ -15,7 +15,7 @@ from nearfar.plan import Plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.workflow.acquire import hold
+from nearfar.workflow.acquire import acquire_in_memory
 from tests.worlds import model_transport
 
 # A shell that runs the tests in the background has SIGINT ignored, and commands started from here
@@ -70,7 +70,7 @@ def shoot() -> Callable[..., PhotosInMemory]:
     ) -> PhotosInMemory:
         optics = projector or SimulatedProjector()
         rig = SimulatedRig(world, "test", optics, camera, 1.0, seed)
-        return hold(plan, rig)
+        return acquire_in_memory(plan, rig)
 
     return photograph
 

@@ -20,7 +20,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.workflow.acquire import hold
+from nearfar.workflow.acquire import acquire_in_memory
 from tests.worlds import model_transport
 
 SIZES = [Size(16, 16), Size(13, 18), Size(33, 7), Size(9, 64)]
@@ -126,7 +126,7 @@ def test_scenes_with_noise_are_found_about_as_well_as_by_stripes(name):
     shares, recalls = [], []
     for how in ("gray", "stripes"):
         plan = paper_plan(scene.projector, 5, Size(3, 3), correspondence=how)
-        found = _found(hold(plan, rig))
+        found = _found(acquire_in_memory(plan, rig))
         both = found.lit & np.isfinite(truth[..., 0])
         off = np.abs(found.q - truth).max(axis=-1)[both]
         shares.append(np.mean(off <= 1.0))

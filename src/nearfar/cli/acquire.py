@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from nearfar.capture import Capture
     from nearfar.plan import Plan
     from nearfar.rigs.base import Rig
-    from nearfar.workflow.estimating import RunningEstimate
-    from nearfar.workflow.running import Standing
+    from nearfar.workflow.observers.estimate import EstimateObserver
+    from nearfar.workflow.observers.quality import CaptureQuality
 
 # No photo of a real camera reaches this.
 MOST_DECIBELS = 120.0
@@ -105,9 +105,9 @@ def acquire(
     from nearfar.files import check_resumable
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire as shoot
-    from nearfar.workflow.estimating import RunningEstimate
+    from nearfar.workflow.observers.estimate import EstimateObserver
+    from nearfar.workflow.observers.quality import QualityObserver
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
-    from nearfar.workflow.running import RunningCheck
 
     if reshoot is not None:
         given = {"--until": until, "--transport": transport, "--resume": resume, "--force": force}
@@ -140,9 +140,9 @@ def acquire(
             warn(note)
         check = estimate = None
         if until is not None:
-            check = RunningCheck(made, until, opened.full_scale, partial(_tell, quiet=quiet))
+            check = QualityObserver(made, until, opened.full_scale, partial(_tell, quiet=quiet))
         if transport is not None:
-            estimate = stack.enter_context(RunningEstimate(made, opened.full_scale, options))
+            estimate = stack.enter_context(EstimateObserver(made, opened.full_scale, options))
         taken = shoot(
             made,
             output,
@@ -157,8 +157,8 @@ def acquire(
         if estimate is not None and transport is not None:
             _finish(estimate, taken, transport, report, force=force, quiet=quiet)
     _say_exposure(opened, quiet=quiet)
-    if until is not None and check is not None and check.standing is not None:
-        _say_what_limits(check.standing, until, quiet=quiet)
+    if until is not None and check is not None and check.quality is not None:
+        _say_what_limits(check.quality, until, quiet=quiet)
 
 
 def _plan_to_shoot(plan_file: Path, *, with_check_photos: bool) -> "Plan":
@@ -172,7 +172,7 @@ def _plan_to_shoot(plan_file: Path, *, with_check_photos: bool) -> "Plan":
 
 
 def _finish(
-    estimate: "RunningEstimate",
+    estimate: "EstimateObserver",
     taken: "Capture",
     transport: Path,
     report: Report,
@@ -226,24 +226,24 @@ def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool)
     check_output(transport, force=force)
 
 
-def _tell(standing: "Standing", *, quiet: bool) -> None:
-    if standing.fault is not None:
-        text = with_flags(standing.fault)
-    elif standing.snr > 0:
-        text = f"{standing.snr:.1f} dB under pictures to check by"
+def _tell(quality: "CaptureQuality", *, quiet: bool) -> None:
+    if quality.fault is not None:
+        text = with_flags(quality.fault)
+    elif quality.snr > 0:
+        text = f"{quality.snr:.1f} dB under pictures to check by"
     else:
         text = "too few to relight by"
-    say(f"after {standing.photos} photos: {text}", quiet=quiet)
+    say(f"after {quality.photos} photos: {text}", quiet=quiet)
 
 
-def _say_what_limits(standing: "Standing", target: float, *, quiet: bool) -> None:
-    if standing.snr >= target:
-        say(f"{target:g} dB is reached after {standing.photos} photos", quiet=quiet)
+def _say_what_limits(quality: "CaptureQuality", target: float, *, quiet: bool) -> None:
+    if quality.snr >= target:
+        say(f"{target:g} dB is reached after {quality.photos} photos", quiet=quiet)
         return
-    if standing.fault is not None:
-        warn(f"{target:g} dB could not be checked to the end: {standing.fault}")
+    if quality.fault is not None:
+        warn(f"{target:g} dB could not be checked to the end: {quality.fault}")
         return
     warn(
-        f"{target:g} dB is not reached: all {standing.photos} photos relight pictures at "
-        f"{standing.snr:.1f} dB. {LIMITS[standing.limit]}."
+        f"{target:g} dB is not reached: all {quality.photos} photos relight pictures at "
+        f"{quality.snr:.1f} dB. {LIMITS[quality.limit]}."
     )

@@ -234,8 +234,8 @@ def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWrite
     return begin(folder, plan, full_scale=rig.full_scale, rig=about, exposure=about.get("exposure"))
 
 
-def hold(plan: Plan, rig: Rig) -> PhotosInMemory:
-    """Shoot a plan and keep its photos in memory: for simulations.
+def acquire_in_memory(plan: Plan, rig: Rig) -> PhotosInMemory:
+    """Shoot a plan and keep its photos in memory, for simulations.
 
     Raises
     ------

@@ -27,7 +27,7 @@ from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
-from nearfar.workflow.acquire import hold
+from nearfar.workflow.acquire import acquire_in_memory
 
 PROJECTOR = Size(12, 16)
 WINDOW = 5
@@ -295,7 +295,7 @@ def test_the_truth_lies_within_one_deviation_as_often_as_it_should(name):
     scene = cached_scene(name, Size(32, 32))
     plan, _ = choose_plan(scene.projector, 100)
     rig = SimulatedRig(scene, name, SimulatedProjector(), SimulatedCamera(), 1.0, 0)
-    measurements = measure(hold(plan, rig))
+    measurements = measure(acquire_in_memory(plan, rig))
     found = estimate_jointly(measurements, scene.correspondence, plan.window, plan.far)
     bars = ErrorBars(found)
     shares = {}

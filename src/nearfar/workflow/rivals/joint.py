@@ -12,7 +12,7 @@ from nearfar.estimate.joint import estimate_jointly
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.plan.choose import NOISE
-from nearfar.workflow.acquire import hold
+from nearfar.workflow.acquire import acquire_in_memory
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.rival import Attempt, Budget, Rival
 
@@ -22,7 +22,7 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
     projector = bench.scene.projector
     plan, _ = choose_plan(projector, budget.photos, window=bench.window, noise=float(noise))
     photos = len(plan.patterns)
-    measurements = measure(hold(plan, bench.rig(budget.exposure(photos))))
+    measurements = measure(acquire_in_memory(plan, bench.rig(budget.exposure(photos))))
     q = correspond_by_phase(measurements).q
     yield Attempt(photos, estimate_jointly(measurements, q, plan.window, plan.far))
 

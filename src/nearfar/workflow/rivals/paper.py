@@ -11,7 +11,7 @@ from nearfar.estimate.paper import estimate
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, paper_plan
 from nearfar.plan.choose import default_window
-from nearfar.workflow.acquire import hold
+from nearfar.workflow.acquire import acquire_in_memory
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.rival import Attempt, Budget, Rival
 
@@ -64,7 +64,7 @@ def _far_band(projector: Size, window: int, factor: float) -> Size:
 def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
     for plan in paper_plans(bench.scene.projector, budget.photos):
         count = len(plan.patterns)
-        photos = hold(plan, bench.rig(budget.exposure(count)))
+        photos = acquire_in_memory(plan, bench.rig(budget.exposure(count)))
         q = correspond_by_stripes(photos).q
         if np.isfinite(q).any():
             found = estimate(measure(photos), q, plan.window, plan.far, plan.dropped)

@@ -23,8 +23,8 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import snr
+from nearfar.workflow.observers.quality import QualityObserver, choose_rows
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
-from nearfar.workflow.running import RunningCheck, some_rows
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +42,7 @@ def _run(scene, path, photos, target, **camera):
     plan = with_checks(choose_plan(scene.projector, photos)[0])
     rig = _rig(scene, **camera)
     told = []
-    check = RunningCheck(plan, target, rig.full_scale, told.append)
+    check = QualityObserver(plan, target, rig.full_scale, told.append)
     capture = acquire(plan, path, rig, observers=[check])
     return plan, capture, told
 
@@ -51,7 +51,7 @@ def test_a_capture_ends_when_it_is_good_enough_and_is_whole(scene, tmp_path):
     plan, capture, told = _run(scene, tmp_path / "c.zarr", 150, 39.0)
     assert len(capture.plan.patterns) < len(plan.patterns)
     assert told[-1].snr >= 39.0
-    assert all(standing.snr < 39.0 for standing in told[:-1])
+    assert all(quality.snr < 39.0 for quality in told[:-1])
     assert told[-1].photos == len(capture.plan.patterns) == capture.photos.shape[0]
     # On the disk it is a capture like any other.
     again = open_capture(tmp_path / "c.zarr")
@@ -104,7 +104,7 @@ def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_no
     plan = with_checks(choose_plan(scene.projector, 60)[0])
     rig = _rig(scene)
     told = []
-    check = RunningCheck(plan, 90.0, rig.full_scale, told.append)
+    check = QualityObserver(plan, 90.0, rig.full_scale, told.append)
     shown = (plan.draw(i) for i in range(len(plan.patterns)))
     for number, photo in enumerate(rig.shoot(shown)):
         failed = told and number < len(plan.patterns)
@@ -167,8 +167,8 @@ def test_a_plan_of_pairs_or_stripes_is_refused():
 @pytest.mark.parametrize(
     ("height", "width"), [(4, 9), (64, 64), (1000, 2000), (3000, 12), (7, 9000)]
 )
-def test_some_rows_are_few_and_spread(height, width):
-    rows = some_rows(height, width)
+def test_chosen_rows_are_few_and_spread(height, width):
+    rows = choose_rows(height, width)
     assert len(np.unique(rows)) == len(rows)
     assert rows.min() >= 0
     assert rows.max() < height

@@ -20,10 +20,10 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.workflow import estimating
-from nearfar.workflow.acquire import acquire, hold
-from nearfar.workflow.estimating import RunningEstimate
+from nearfar.workflow.acquire import acquire, acquire_in_memory
 from nearfar.workflow.evaluate import relighting_snr
+from nearfar.workflow.observers import estimate as observing
+from nearfar.workflow.observers.estimate import EstimateObserver
 from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
 from nearfar.workflow.reconstruction.job import Part
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
@@ -73,15 +73,15 @@ def afterwards(scene, tmp_path_factory):
     return reconstructed
 
 
-class Patient(RunningEstimate):
+class Patient(EstimateObserver):
     """Waits for what is done beside the capture, as slow photos would."""
 
     def after_photo(self, number, photo):
         super().after_photo(number, photo)
-        if self._under_way is not None:
-            self._under_way.exception()
+        if self._pending_choice is not None:
+            self._pending_choice.exception()
 
-    def _fits(self, taken):
+    def _ends_in_time(self, taken):
         # The photo after one that is not the last is always slow enough.
         return taken < len(self._plan.patterns)
 
@@ -114,7 +114,7 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, afterwards, 
 
 def test_kinds_are_those_that_were_chosen_on_the_way(rig, tmp_path):
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
-    chosen = estimate._choice.kinds[0]
+    chosen = estimate._choice.components[0]
     np.testing.assert_array_equal(
         part.transport.posterior.prior_component.ravel(), chosen.prior_component
     )
@@ -143,7 +143,7 @@ def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, mon
 def test_photos_that_come_too_fast_are_estimated_from_all_the_same(
     rig, afterwards, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(RunningEstimate, "_is_time", lambda *_: False)
+    monkeypatch.setattr(EstimateObserver, "_is_time", lambda *_: False)
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
     assert estimate.chosen_by == 0
     expected, _ = afterwards("reference")
@@ -158,7 +158,7 @@ def test_photos_that_do_not_fit_are_read_again_in_blocks(rig, tmp_path):
         capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
         work = estimate.finish(capture)
         part = _made(estimate, capture)
-    assert estimate.held is None
+    assert estimate.photos is None
     assert work.tiling.rows < SIZE.height
     expected, _ = reconstruct(capture, memory=memory)
     np.testing.assert_array_equal(part.transport.near, expected.near)
@@ -167,7 +167,7 @@ def test_photos_that_do_not_fit_are_read_again_in_blocks(rig, tmp_path):
 def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
     with (
         pytest.raises(InputError, match="`memory="),
-        RunningEstimate(
+        EstimateObserver(
             PLANS["reference"], rig.full_scale, ReconstructionOptions(memory=10**6)
         ) as estimate,
     ):
@@ -188,14 +188,14 @@ def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path
         part = _made(estimate, capture)
     assert len(capture.plan.patterns) == end
     # Kinds that were chosen by enough of the photos that there are.
-    assert estimating.ENOUGH * end < estimate.chosen_by < end
+    assert observing.SUFFICIENT_SHARE * end < estimate.chosen_by < end
     expected, _ = reconstruct(capture)
     assert part.transport.provenance == expected.provenance
 
 
 def test_kinds_by_too_few_photos_are_chosen_again(rig, afterwards, tmp_path, monkeypatch):
     # Photos come too fast for more than the first choice, by half of them.
-    monkeypatch.setattr(Patient, "_fits", lambda *_: False)
+    monkeypatch.setattr(Patient, "_ends_in_time", lambda *_: False)
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
     assert estimate._choice is not None
     assert estimate.chosen_by == 0
@@ -217,7 +217,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
     def faulty(*_arguments, **_options):
         raise RuntimeError("out of memory")
 
-    monkeypatch.setattr(estimating, "choose_components", faulty)
+    monkeypatch.setattr(observing, "choose_components", faulty)
     plan = PLANS["reference"]
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
@@ -226,7 +226,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
             _made(estimate, capture)
 
 
-def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
+def test_what_is_pending_choice_ends_with_the_capture(rig, tmp_path, monkeypatch):
     begun, before = threading.Event(), threading.active_count()
 
     def endless(*_arguments, progress, **_options):
@@ -235,7 +235,7 @@ def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
             time.sleep(0.01)
             progress(0.0)
 
-    monkeypatch.setattr(estimating, "choose_components", endless)
+    monkeypatch.setattr(observing, "choose_components", endless)
 
     def stop(number, _photo):
         if number > 80 and begun.wait(10):
@@ -243,7 +243,7 @@ def test_what_is_under_way_ends_with_the_capture(rig, tmp_path, monkeypatch):
 
     with (
         pytest.raises(KeyboardInterrupt),
-        RunningEstimate(PLANS["reference"], rig.full_scale) as estimate,
+        EstimateObserver(PLANS["reference"], rig.full_scale) as estimate,
     ):
         observers = [estimate, EndsWhere(stop)]
         acquire(PLANS["reference"], tmp_path / "c.zarr", rig, observers=observers)
@@ -261,19 +261,19 @@ def test_photos_that_cannot_be_measured_are_kept(rig, tmp_path):
             _made(estimate, capture)
     assert estimate.chosen_by == 0
     np.testing.assert_array_equal(
-        capture.read([0]), hold(PLANS["reference"], bright).read([0], slice(None))
+        capture.read([0]), acquire_in_memory(PLANS["reference"], bright).read([0], slice(None))
     )
 
 
 def test_complex_patterns_are_refused():
     with pytest.raises(PlanError):
-        RunningEstimate(paper_plan(SIZE, 8, Size(5, 5), offset="none"), 1.0)
+        EstimateObserver(paper_plan(SIZE, 8, Size(5, 5), offset="none"), 1.0)
 
 
 @pytest.mark.parametrize("plan", PLANS)
 def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
     whole = PLANS[plan]
-    photos = hold(whole, rig)
+    photos = acquire_in_memory(whole, rig)
     found = ends(whole)
     stripes = [i for i, pattern in enumerate(whole.patterns) if pattern.purpose == "correspondence"]
     assert len(found) > 4
@@ -291,6 +291,6 @@ def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
 @pytest.mark.parametrize("plan", PLANS)
 def test_what_is_measured_is_known_before(rig, plan):
     basis, multiplicity = answered(PLANS[plan])
-    measurements = measure(hold(PLANS[plan], rig), slice(0, 1))
+    measurements = measure(acquire_in_memory(PLANS[plan], rig), slice(0, 1))
     assert basis.frequencies == measurements.basis.frequencies
     np.testing.assert_array_equal(multiplicity, measurements.multiplicity)

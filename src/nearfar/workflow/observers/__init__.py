@@ -1,0 +1,1 @@
+"""Observers of a capture that estimate transport from the photos so far."""

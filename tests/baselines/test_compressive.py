@@ -5,7 +5,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.baselines.choosing import best_share, held_out_share
-from nearfar.baselines.compressive import SHARES, reconstruct_compressive
+from nearfar.baselines.compressive import PENALTY_SHARES, reconstruct_compressive
 from nearfar.baselines.haar import inverse_haar
 from nearfar.baselines.random_patterns import (
     CompressiveMeasurements,
@@ -140,7 +140,7 @@ def test_held_out_patterns_choose_nearly_as_well_as_the_truth():
     camera = SimulatedCamera(full_well=1e9, read_noise=1e6, bits=16, shot_noise=False)
     rig = SimulatedRig(world, "test", SimulatedProjector(), camera, 1.0, 0)
     measurements = measure_by_rig(rig, patterns)
-    informed = best_share(measurements, world, rows=10_000, shares=SHARES[:10])
+    informed = best_share(measurements, world, rows=10_000, shares=PENALTY_SHARES[:10])
     blind = held_out_share(measurements, rows=10_000)
     scores = dict(
         zip(informed.shares, zip(informed.plain, informed.refitted, strict=True), strict=True)
@@ -149,8 +149,8 @@ def test_held_out_patterns_choose_nearly_as_well_as_the_truth():
     best = max(*informed.plain, *informed.refitted)
     assert best - 1.5 < reached <= best
     # Noise asks for a lambda inside the grid, and a grid is not followed into the noise.
-    assert SHARES[-1] < blind.share < SHARES[0]
-    assert len(blind.shares) < len(SHARES)
+    assert PENALTY_SHARES[-1] < blind.share < PENALTY_SHARES[0]
+    assert len(blind.shares) < len(PENALTY_SHARES)
 
 
 def test_faults_are_told_in_a_sentence():

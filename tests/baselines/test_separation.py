@@ -317,7 +317,7 @@ def test_rows_at_a_time_give_the_same(monkeypatch: pytest.MonkeyPatch):
     whole = separate(taken, method.separate)
     steadiness = spread_of_groups(taken, method.groups)
     shares: list[float] = []
-    monkeypatch.setattr("nearfar.baselines.separation_photos.BLOCK", 8 * 5 * 3 * 2)
+    monkeypatch.setattr("nearfar.baselines.separation_photos.VALUES_AT_ONCE", 8 * 5 * 3 * 2)
     cut = separate(taken, method.separate, progress=shares.append)
     assert len(shares) == 4
     assert shares[-1] == 1.0

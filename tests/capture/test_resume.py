@@ -12,7 +12,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture, white_and_black, write_capture
-from nearfar.capture.unfinished import LOG
+from nearfar.capture.unfinished import LOG_NAME
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -126,7 +126,7 @@ def test_what_was_stopped_before_the_second_photo_leaves_nothing(rig, tmp_path):
 
 def test_a_photo_that_was_not_noted_is_taken_again(rig, undisturbed, tmp_path):
     _stopped(rig, tmp_path / "c.zarr", 20)
-    log = tmp_path / "c.zarr.unfinished" / LOG
+    log = tmp_path / "c.zarr.unfinished" / LOG_NAME
     log.write_bytes(log.read_bytes()[:-7])
     told = []
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
@@ -235,7 +235,7 @@ def test_a_link_is_followed_and_the_folder_named(rig, tmp_path):
         acquire(PLAN, link, rig, observers=[_stop_after(12)])
     capture = acquire(PLAN, link, rig, resume=True)
     assert real.is_dir()
-    assert not (real / LOG).exists()
+    assert not (real / LOG_NAME).exists()
     assert len(capture.plan.patterns) == COUNT
 
 
@@ -339,8 +339,8 @@ def test_what_is_damaged_gets_a_sentence_and_is_left(rig, tmp_path, damage):
         metadata["attributes"]["full_scale"] = "much"
         (folder / "zarr.json").write_text(json.dumps(metadata))
     else:
-        log = (folder / LOG).read_bytes()
-        (folder / LOG).write_bytes(log * COUNT)
+        log = (folder / LOG_NAME).read_bytes()
+        (folder / LOG_NAME).write_bytes(log * COUNT)
     with pytest.raises(UnreadableFileError, match=r"c\.zarr\.unfinished is damaged"):
         acquire(PLAN, tmp_path / "c.zarr", rig, resume=True)
     assert folder.is_dir()
@@ -348,7 +348,7 @@ def test_what_is_damaged_gets_a_sentence_and_is_left(rig, tmp_path, damage):
 
 def test_a_torn_line_does_not_spoil_the_next(rig, undisturbed, tmp_path):
     path = tmp_path / "c.zarr"
-    log = tmp_path / "c.zarr.unfinished" / LOG
+    log = tmp_path / "c.zarr.unfinished" / LOG_NAME
     for photos in (20, 40):
         with pytest.raises(KeptInterrupt):
             acquire(PLAN, path, rig, observers=[_stop_after(photos)], resume=log.exists())
@@ -370,7 +370,7 @@ def test_kill_9_at_twenty_moments_costs_nothing(tmp_path):
     whole, killed = tmp_path / "whole.zarr", tmp_path / "k" / "killed.zarr"
     check_done(run_nearfar(*shoot, whole))
     (tmp_path / "k").mkdir()
-    log = tmp_path / "k" / "killed.zarr.unfinished" / LOG
+    log = tmp_path / "k" / "killed.zarr.unfinished" / LOG_NAME
     resume: list[str] = []
     for kill in range(20):
         process = start(run_command, *shoot, killed, *resume)

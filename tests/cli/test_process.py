@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from nearfar.cli.commands import COMMANDS
-from nearfar.cli.faults import STOPS
+from nearfar.cli.faults import STOP_SIGNALS
 from nearfar.release import version
 from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
 from tests.waiting import LONGEST_WAIT
@@ -116,7 +116,7 @@ def _wait_for_photo(process: subprocess.Popen[str], unfinished: Path, number: in
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("stop", STOPS)
+@pytest.mark.parametrize("stop", STOP_SIGNALS)
 def test_an_interrupted_capture_keeps_its_photos(long_job, tmp_path: Path, stop: signal.Signals):
     plan, rig = long_job
     out = tmp_path / "capture.zarr"
@@ -141,7 +141,7 @@ def test_an_interrupted_capture_keeps_its_photos(long_job, tmp_path: Path, stop:
     assert list(tmp_path.iterdir()) == [out]
 
 
-@pytest.mark.parametrize("stop", STOPS)
+@pytest.mark.parametrize("stop", STOP_SIGNALS)
 def test_a_signal_that_is_ignored_stops_no_capture(long_job, tmp_path: Path, stop: signal.Signals):
     plan, rig = long_job
     out = tmp_path / "capture.zarr"

@@ -6,17 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nearfar.correspondence.fringes import position_in_period, unwrap
 from nearfar.correspondence.gray import decode_axis
 from nearfar.errors import InputError
 from nearfar.files import read_picture
-from nearfar.photometry.modulation import (
-    LARGEST_SHARE_ABOVE,
-    fit_exponent,
-    of_pair,
-    of_steps,
-    share_above_one,
-)
+from nearfar.photometry.modulation import LARGEST_SHARE_ABOVE, of_pair, share_above_one
+from tests.correspondence.phase_shifting import fit_exponent, of_steps, position_in_period, unwrap
 
 PHASES = np.deg2rad([-120.0, 0.0, 120.0])
 PERIODS = (200 / 3, 100.0)

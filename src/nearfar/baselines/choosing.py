@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nearfar.arrays import Floats, Integers
-from nearfar.baselines.compressive import SHARES, refit_few
+from nearfar.baselines.compressive import PENALTY_SHARES, refit_few
 from nearfar.baselines.lasso import highest_penalty, settle, start
 from nearfar.baselines.random_patterns import CompressiveMeasurements
 from nearfar.baselines.sensing import sense
@@ -24,9 +24,9 @@ ROWS_TRIED = 200
 # One pattern in so many is held out.
 PATTERNS_PER_HELD_OUT = 10
 # Fitting noise costs time: the search ends where the score is this far below the best, dB.
-MAXIMUM_DROP = 1.5
+MAXIMUM_DROP_DECIBELS = 1.5
 # An exact match has no finite SNR.
-SMALLEST_ENERGY = 1e-30
+ENERGY_FLOOR = 1e-30
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Choice:
     ----------
     shares : tuple of float
         lambda as a share of the least that leaves a row without wavelets; those that were tried,
-        down to where the score has fallen by `MAXIMUM_DROP`.
+        down to where the score has fallen by `MAXIMUM_DROP_DECIBELS`.
     plain, refitted : tuple of float
         SNR of each share, as the l1 norm has it and refitted, dB.
     """
@@ -65,7 +65,7 @@ def best_share(
     exposure: float = 1.0,
     rows: int = ROWS_TRIED,
     seed: int = 0,
-    shares: Sequence[float] = SHARES,
+    shares: Sequence[float] = PENALTY_SHARES,
 ) -> Choice:
     """Try shares on random rows, judged by the SNR of T against the truth.
 
@@ -109,7 +109,7 @@ def held_out_share(
     held_out: int | None = None,
     rows: int = ROWS_TRIED,
     seed: int = 0,
-    shares: Sequence[float] = SHARES,
+    shares: Sequence[float] = PENALTY_SHARES,
 ) -> Choice:
     """Try shares on random rows, judged by how well they predict responses to held-out patterns.
 
@@ -181,12 +181,12 @@ def _try(
         for scores, coefficients in zip((plain, refitted), found, strict=True):
             pictures = sensing.pictures(coefficients, along)
             scores.append(judge(pictures.reshape(len(chosen), -1)))
-        if max(plain[-1], refitted[-1]) < max(*plain, *refitted) - MAXIMUM_DROP:
+        if max(plain[-1], refitted[-1]) < max(*plain, *refitted) - MAXIMUM_DROP_DECIBELS:
             break
     return Choice(tuple(shares[: len(plain)]), tuple(plain), tuple(refitted))
 
 
 def _decibels(signal: Floats, error: Floats) -> float:
     energies = (float(np.sum(np.square(values, dtype=np.float64))) for values in (signal, error))
-    kept, lost = (max(energy, SMALLEST_ENERGY) for energy in energies)
+    kept, lost = (max(energy, ENERGY_FLOOR) for energy in energies)
     return float(10 * np.log10(kept / lost))

@@ -36,8 +36,8 @@ from nearfar.transport.exact import ExactTransport
 
 # What the method needs from first to last.
 __all__ = [
-    "SHARE",
-    "SHARES",
+    "DEFAULT_PENALTY_SHARE",
+    "PENALTY_SHARES",
     "CompressiveMeasurements",
     "bernoulli_patterns",
     "measure_by_rig",
@@ -47,12 +47,12 @@ __all__ = [
 ]
 
 # lambda as a share of the least that leaves nothing: what is tried, and what is taken unasked.
-SHARES = tuple(10 ** (-0.5 - 0.25 * i) for i in range(13))
-SHARE = 1e-3
+PENALTY_SHARES = tuple(10 ** (-0.5 - 0.25 * i) for i in range(13))
+DEFAULT_PENALTY_SHARE = 1e-3
 # Least squares on the support is trusted with at most one coefficient for this many patterns.
 PATTERNS_PER_COEFFICIENT = 2
 # Rows solved together.
-BLOCK = 512
+ROWS_AT_ONCE = 512
 
 Progress = Callable[[float], None]
 
@@ -61,7 +61,7 @@ Solver = Callable[[Sensing, Floats], Floats]
 
 def reconstruct_compressive(
     measurements: CompressiveMeasurements,
-    share: float = SHARE,
+    share: float = DEFAULT_PENALTY_SHARE,
     *,
     refitted: bool = True,
     progress: Progress | None = None,
@@ -125,7 +125,7 @@ def _reconstruct(
     done = 0
     # One thread of linear algebra in each of ours: more would only wait for each other.
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(processors()) as pool:
-        for count in pool.map(one, blocks(len(rows), BLOCK)):
+        for count in pool.map(one, blocks(len(rows), ROWS_AT_ONCE)):
             done += count
             if progress is not None:
                 progress(done / len(rows))

@@ -20,21 +20,21 @@ from nearfar.arrays import Floats, Integers, blocks
 from nearfar.baselines.working_sets import relative_gap, solve_small
 
 # Duality gap at which a row leaves, as a share of its objective: at the end, and before.
-TOLERANCE = 1e-3
-ROUGH = 1e-2
+GAP_TOLERANCE = 1e-3
+ROUGH_GAP_TOLERANCE = 1e-2
 # From one lambda to the next on the way down.
 PENALTY_RATIO = 0.3
 # A working set is solved to this share of the gap that is asked for.
-INNER = 0.3
+INNER_TOLERANCE_SHARE = 0.3
 # and no further than this share of the gap that there is.
-SHARE_OF_GAP = 0.3
+INNER_GAP_SHARE = 0.3
 MAXIMUM_ROUNDS = 20
 # Columns that a row may take up at once: as many as it uses, and at least these.
-NEW_COLUMNS = 16
+MINIMUM_NEW_COLUMNS = 16
 # Rows of working sets within this factor of each other are solved together.
-SIZE_RATIO = 1.4
+MAXIMUM_SIZE_RATIO = 1.4
 # Numbers in the matrices that are solved at once.
-NUMBERS = 2**24
+ENTRIES_AT_ONCE = 2**24
 
 
 class Rows(NamedTuple):
@@ -76,7 +76,7 @@ def highest_penalty(rows: Rows) -> Floats:
 
 
 def solve(
-    columns: Floats, responses: Floats, penalty: Floats, tolerance: float = TOLERANCE
+    columns: Floats, responses: Floats, penalty: Floats, tolerance: float = GAP_TOLERANCE
 ) -> Floats:
     """Minimise for one lambda per row, by way of larger ones.
 
@@ -98,7 +98,9 @@ def solve(
     everything = np.arange(len(responses))
     before = PENALTY_RATIO * highest_penalty(rows)
     while (before > penalty).any():
-        settle(columns, responses, rows, np.maximum(before, penalty), everything, ROUGH)
+        settle(
+            columns, responses, rows, np.maximum(before, penalty), everything, ROUGH_GAP_TOLERANCE
+        )
         before = PENALTY_RATIO * before
     settle(columns, responses, rows, penalty, everything, tolerance)
     return rows.coefficients
@@ -145,7 +147,7 @@ def settle(
     rows: Rows,
     penalty: Floats,
     chosen: Integers,
-    tolerance: float = TOLERANCE,
+    tolerance: float = GAP_TOLERANCE,
 ) -> None:
     """Bring chosen rows to their minimum at lambda = `penalty`, in place.
 
@@ -170,7 +172,7 @@ def settle(
         active, gap = active[gap > tolerance], gap[gap > tolerance]
         if not len(active):
             return
-        wanted = np.maximum(INNER * tolerance, SHARE_OF_GAP * gap)
+        wanted = np.maximum(INNER_TOLERANCE_SHARE * tolerance, INNER_GAP_SHARE * gap)
         _one_round(columns, rows, active, penalty, wanted)
         residual = responses[active] - rows.coefficients[active] @ columns
         rows.residual[active] = residual
@@ -187,7 +189,7 @@ def _one_round(
     in_use = used.sum(axis=1)
     steep[used] = np.inf
     wanted = np.count_nonzero(steep, axis=1) - in_use
-    sizes = in_use + np.minimum(wanted, np.maximum(NEW_COLUMNS, in_use))
+    sizes = in_use + np.minimum(wanted, np.maximum(MINIMUM_NEW_COLUMNS, in_use))
     for group in _groups(sizes, columns.shape[1]):
         i = active[group]
         places = _first_places(steep[group], sizes[group])
@@ -209,15 +211,21 @@ def _one_round(
 
 
 def _groups(sizes: Integers, responses: int) -> Iterator[Integers]:
-    """Cut rows into groups of like sizes whose matrices fit in `NUMBERS`; size 0 is left out."""
+    """Cut rows into groups of like sizes whose matrices fit in memory; size 0 is left out."""
     order = np.argsort(sizes, kind="stable")
     order = order[sizes[order] > 0]
     while len(order):
         alike = order[
-            : np.searchsorted(sizes[order], SIZE_RATIO * max(sizes[order[0]], NEW_COLUMNS), "right")
+            : np.searchsorted(
+                sizes[order],
+                MAXIMUM_SIZE_RATIO * max(sizes[order[0]], MINIMUM_NEW_COLUMNS),
+                "right",
+            )
         ]
         largest = int(sizes[alike[-1]])
-        for block in blocks(len(alike), max(1, NUMBERS // (largest * (2 * largest + responses)))):
+        for block in blocks(
+            len(alike), max(1, ENTRIES_AT_ONCE // (largest * (2 * largest + responses)))
+        ):
             yield alike[block]
         order = order[len(alike) :]
 

@@ -12,8 +12,8 @@ from nearfar.errors import InputError
 from nearfar.rigs.base import Rig
 from nearfar.transport.exact import ExactTransport
 
-# Patterns shown to a known transport at once.
-LIGHTS = 32
+# Patterns displayed to a known transport at once.
+PATTERNS_AT_ONCE = 32
 
 
 def bernoulli_patterns(projector: Size, count: int, seed: int) -> Booleans:
@@ -100,7 +100,7 @@ def measure_without_noise(truth: ExactTransport, patterns: Booleans) -> Compress
         If the patterns are not of the projector's size.
     """
     responses = np.empty((len(patterns), truth.camera.pixels, truth.channels), dtype=np.float32)
-    for block in blocks(len(patterns), LIGHTS):
+    for block in blocks(len(patterns), PATTERNS_AT_ONCE):
         pictures = truth.pictures(patterns[block].astype(np.float32))
         responses[block] = pictures.reshape(-1, *responses.shape[1:])
     return CompressiveMeasurements(
@@ -126,10 +126,10 @@ def measure_by_rig(rig: Rig, patterns: Booleans) -> CompressiveMeasurements:
             f"the patterns are {Size(*patterns.shape[1:])}, the rig's projector is "
             f"{rig.projector}: draw them of its size."
         )
-    shown = (
+    displayed = (
         255 * pattern.astype(np.uint8) for pattern in (np.zeros(rig.projector, bool), *patterns)
     )
-    photos = rig.shoot(shown)
+    photos = rig.shoot(displayed)
     black = next(photos).astype(np.float32)
     camera = Size(*black.shape[:2])
     responses = np.empty((len(patterns), camera.pixels, black.shape[2]), dtype=np.float32)

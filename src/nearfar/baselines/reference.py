@@ -23,7 +23,7 @@ from nearfar.rigs.base import Photo, Rig
 from nearfar.transport.exact import ExactTransport
 
 # Bytes of photos and of decoded rows in memory at once, the result aside.
-MEMORY = 2**29
+DEFAULT_MEMORY_BYTES = 2**29
 # What a decoder needs for each photo and each column of a row, at the most.
 BYTES_PER_NUMBER = 64
 
@@ -72,7 +72,7 @@ def acquire_reference(
     acquisition: Acquisition,
     rig: Rig,
     *,
-    memory: int = MEMORY,
+    memory: int = DEFAULT_MEMORY_BYTES,
     out: NDArray[np.float32] | None = None,
     folder: Path | None = None,
     progress: Progress | None = None,

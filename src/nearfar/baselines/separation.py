@@ -30,7 +30,7 @@ from nearfar.errors import InputError
 
 # Of a camera pixel's samples, those under this share of the largest are taken to straddle an edge
 # of the pattern. Chosen where both kinds of camera pixels do well (benchmarks/separation.py).
-STRADDLING = 0.7
+STRADDLING_SHARE = 0.7
 
 
 class Separation(NamedTuple):
@@ -82,9 +82,9 @@ def separate_by_extremes(photos: Floats, black_level: float = 0.0) -> Separation
 def separate_by_pairs(photos: Floats, black_level: float = 0.0) -> Separation:
     """Separate by the differences and sums of photos under patterns and their inverses.
 
-    A difference is D or -D, and its size is less where the camera pixel straddles an edge of the
-    pattern: D is the mean of the larger ones (see `STRADDLING`), which takes out noise, and near
-    light that falls on the one side here and on the other there. All sums are
+    A difference is D or -D, and smaller where the camera pixel straddles an edge of the pattern.
+    D is the mean of the larger ones (see `STRADDLING_SHARE`). The mean takes out noise, and near
+    light that is part of a difference in some photos and not in others. All sums are
     (1 + 2 B) (D + G): their mean less D gives G, with next to no noise of its own.
 
     Parameters
@@ -116,7 +116,7 @@ def separate_by_phase(photos: Floats, shifts: int, black_level: float = 0.0) -> 
     is the discrete Fourier transform over j. a = D / 2 and o = (1/2 + B) (D + G). The phase theta
     is that of all channels together, and each channel's amplitude is taken at that phase: a
     modulus would be too large under noise. D is the mean over the axes, of those that do not
-    straddle (see `STRADDLING`).
+    straddle (see `STRADDLING_SHARE`).
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _from_samples(samples: Floats, photos: Floats, dark: float) -> Separation:
     together = samples.sum(axis=-1, keepdims=True)
     size = np.abs(together)
     # Where all is black every sample counts.
-    chosen = size >= STRADDLING * size.max(axis=0)
+    chosen = size >= STRADDLING_SHARE * size.max(axis=0)
     signs = np.where(together < 0, -1, 1) * chosen
     direct = (signs * samples).sum(axis=0) / chosen.sum(axis=0)
     return _pictures(direct, photos.mean(axis=0) / (0.5 + dark) - direct)

@@ -15,9 +15,9 @@ from nearfar.baselines.separation import (
     separate_by_phase,
 )
 from nearfar.baselines.separation_patterns import (
-    PERIOD,
-    SHIFTS,
-    SIDE,
+    DEFAULT_PERIOD,
+    DEFAULT_SHIFTS,
+    DEFAULT_SIDE,
     checkerboards,
     count_checkerboards,
     count_sinusoids,
@@ -60,7 +60,7 @@ def by_checkerboards(side: int | None = None, step: int | None = None) -> Method
     InputError
         If the step does not fit the side.
     """
-    side = SIDE if side is None else side
+    side = DEFAULT_SIDE if side is None else side
     step = default_step(side) if step is None else step
     count = count_checkerboards(side, step)
     return Method(
@@ -80,8 +80,8 @@ def by_sinusoids(period: int | None = None, shifts: int | None = None) -> Method
     InputError
         If there are too few shifts.
     """
-    period = PERIOD if period is None else period
-    shifts = SHIFTS if shifts is None else shifts
+    period = DEFAULT_PERIOD if period is None else period
+    shifts = DEFAULT_SHIFTS if shifts is None else shifts
     return Method(
         {"pattern": "sinusoid", "period": period, "shifts": shifts},
         count_sinusoids(shifts),

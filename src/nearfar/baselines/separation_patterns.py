@@ -18,9 +18,9 @@ from nearfar.illumination.patterns import invert, phase, quantise
 
 # Measured on the built-in scenes (benchmarks/separation.py): the smallest squares that also find
 # the direct light of camera pixels which straddle projector pixels, and the shortest sinusoid.
-SIDE = 2
-PERIOD = 3
-SHIFTS = 4
+DEFAULT_SIDE = 2
+DEFAULT_PERIOD = 3
+DEFAULT_SHIFTS = 4
 
 
 def default_step(side: int) -> int:
@@ -28,7 +28,9 @@ def default_step(side: int) -> int:
     return (side + 1) // 2
 
 
-def checkerboards(projector: Size, side: int = SIDE, step: int | None = None) -> NDArray[np.uint8]:
+def checkerboards(
+    projector: Size, side: int = DEFAULT_SIDE, step: int | None = None
+) -> NDArray[np.uint8]:
     """Draw a checkerboard shifted over both axes, each shift followed by its inverse.
 
     A shift by a whole square is the inverse, so that shifts within one square and their inverses
@@ -71,7 +73,7 @@ def checkerboards(projector: Size, side: int = SIDE, step: int | None = None) ->
     return np.stack(drawn)
 
 
-def count_checkerboards(side: int = SIDE, step: int | None = None) -> int:
+def count_checkerboards(side: int = DEFAULT_SIDE, step: int | None = None) -> int:
     """Count the patterns of `checkerboards`."""
     return 2 * len(_offsets(side, default_step(side) if step is None else step)) ** 2
 
@@ -85,7 +87,9 @@ def _offsets(side: int, step: int) -> range:
     return range(0, side, step)
 
 
-def sinusoids(projector: Size, period: int = PERIOD, shifts: int = SHIFTS) -> NDArray[np.uint8]:
+def sinusoids(
+    projector: Size, period: int = DEFAULT_PERIOD, shifts: int = DEFAULT_SHIFTS
+) -> NDArray[np.uint8]:
     """Draw 0.5 + 0.5 cos(2 pi (y / period + j / shifts)), j = 0 ... shifts - 1, then along x.
 
     Parameters
@@ -127,7 +131,7 @@ def sinusoids(projector: Size, period: int = PERIOD, shifts: int = SHIFTS) -> ND
     return np.stack(drawn)
 
 
-def count_sinusoids(shifts: int = SHIFTS) -> int:
+def count_sinusoids(shifts: int = DEFAULT_SHIFTS) -> int:
     """Count the patterns of `sinusoids`.
 
     Raises

@@ -19,7 +19,7 @@ from nearfar.files import full_scale_of, list_pictures, read_picture
 from nearfar.rigs.base import Rig
 
 # Values of all photos that are separated at once: some tens of megabytes.
-BLOCK = 1 << 23
+VALUES_AT_ONCE = 1 << 23
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class PhotosToSeparate:
     def blocks(self) -> Iterator[slice]:
         """Split the camera into blocks of rows, each read into memory at once."""
         row = len(self.photos) * self.photos[0][0].size
-        return blocks(self.camera.height, BLOCK // row)
+        return blocks(self.camera.height, VALUES_AT_ONCE // row)
 
     def read(self, rows: slice) -> Floats:
         """Read camera rows in photo units less the dark photo: (n, rows, Cx, channels)."""

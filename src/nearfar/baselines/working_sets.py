@@ -23,8 +23,8 @@ SWEEPS_PER_CHECK = 4
 MAXIMUM_CHECKS = 30
 CHECKS_BEFORE_NEWTON = 1
 # Keeps the Newton equations solvable where columns of the working set depend on each other.
-RIDGE = 1e-6
-TINY = 1e-30
+RELATIVE_RIDGE = 1e-6
+DIVISOR_FLOOR = 1e-30
 
 
 class Small(NamedTuple):
@@ -112,14 +112,14 @@ def relative_gap(entries: Floats, slopes: Floats, energy: Floats, penalty: Float
     energy, penalty : ndarray, shape (I,)
         |residual|^2 and lambda.
     """
-    steepest = np.maximum(np.abs(slopes).max(axis=1, initial=0.0), TINY)
+    steepest = np.maximum(np.abs(slopes).max(axis=1, initial=0.0), DIVISOR_FLOOR)
     # The residual, scaled until no column overlaps it by more than lambda, is dual feasible.
     scale = np.minimum(1.0, penalty / steepest)
     size = penalty * np.abs(entries).sum(axis=1)
     # As b = residual + x A, no large numbers are subtracted here.
     gap = 0.5 * (1 - scale) ** 2 * energy + size
     gap -= scale * np.einsum("ij,ij->i", entries, slopes)
-    return np.asarray(gap / np.maximum(0.5 * energy + size, TINY))
+    return np.asarray(gap / np.maximum(0.5 * energy + size, DIVISOR_FLOOR))
 
 
 def _settled(small: Small, tolerance: Floats) -> Booleans:
@@ -136,8 +136,8 @@ def _sweep(small: Small) -> None:
     squared = np.einsum("jij->ji", gram).copy()
     for _ in range(SWEEPS_PER_CHECK):
         for j in range(len(gram)):
-            pull = slopes[:, j] + squared[j] * x[:, j]
-            there = (pull - np.minimum(np.maximum(pull, -penalty), penalty)) / squared[j]
+            partial = slopes[:, j] + squared[j] * x[:, j]
+            there = (partial - np.minimum(np.maximum(partial, -penalty), penalty)) / squared[j]
             step = there - x[:, j]
             if np.count_nonzero(step):
                 x[:, j] = there
@@ -157,9 +157,11 @@ def _newton(small: Small) -> None:
     here = np.take_along_axis(x, place, axis=1)
     matrix = small.gram[place[:, :, None], row[:, None, None], place[:, None, :]]
     matrix *= kept[:, :, None] & kept[:, None, :]
-    matrix[:, np.arange(most), np.arange(most)] += np.where(kept, RIDGE, 1.0).astype(x.dtype)
-    pull = np.take_along_axis(slopes, place, axis=1) - penalty[:, None] * np.sign(here)
-    step = np.linalg.solve(matrix, np.where(kept, pull, 0)[..., None])[..., 0]
+    matrix[:, np.arange(most), np.arange(most)] += np.where(kept, RELATIVE_RIDGE, 1.0).astype(
+        x.dtype
+    )
+    descent = np.take_along_axis(slopes, place, axis=1) - penalty[:, None] * np.sign(here)
+    step = np.linalg.solve(matrix, np.where(kept, descent, 0)[..., None])[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         until = np.where(kept & (step * here < 0), -here / step, np.inf)
     first = until.argmin(axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Size
-from nearfar.capture.store import DTYPES
+from nearfar.capture.store import PHOTO_DTYPES
 from nearfar.errors import InputError, UselessPhotosError
 from nearfar.files import require_finite
 
@@ -21,7 +21,7 @@ def as_photo(photo: NDArray[Any] | None, name: str) -> NDArray[Any]:
     """
     if photo is None:
         raise InputError("there are no photos: give one for each pattern of the plan.")
-    if photo.dtype not in DTYPES or photo.ndim not in {2, 3} or photo.size == 0:
+    if photo.dtype not in PHOTO_DTYPES or photo.ndim not in {2, 3} or photo.size == 0:
         raise InputError(
             f"{name} is an array of {photo.dtype} and shape {photo.shape}: a photo is uint8, "
             f"uint16 or float32, height x width or height x width x channels."

@@ -27,10 +27,10 @@ from nearfar.plan import Plan, Sinusoid, parse_plan
 # Bytes of a chunk at most: rows of a large camera are read without the rest of it.
 CHUNK_BYTES = 2**22
 # Pixels along the longer side of a photo that a notebook shows.
-THUMBNAIL = 256
+THUMBNAIL_PIXELS = 256
 KIND = "nearfar capture"
 FORMAT_VERSION = 1
-DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
+PHOTO_DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -98,7 +98,7 @@ class Capture:
 
     def _repr_html_(self) -> str:
         """Show the capture in a notebook: its first photo and its brightest."""
-        step = -(-max(self.camera) // THUMBNAIL)
+        step = -(-max(self.camera) // THUMBNAIL_PIXELS)
         names = {"first photo": 0}
         if (found := white_and_black(self.plan)) is not None:
             names |= {"white": found[0], "black": found[1]}
@@ -183,7 +183,7 @@ def open_capture(path: AnyPath) -> Capture:
         or (exposure is not None and not is_positive(exposure))
         or not isinstance(rig, dict)
         or photos.ndim != 4
-        or photos.dtype not in DTYPES
+        or photos.dtype not in PHOTO_DTYPES
     ):
         raise UnreadableFileError(
             f"{path} is damaged: its zarr.json does not describe photos; copy or make it again."

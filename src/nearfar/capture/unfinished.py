@@ -11,7 +11,7 @@ from nearfar.errors import InputError
 from nearfar.files import UNFINISHED, open_store
 
 # A line for each photo that is on the disk; gone once the capture is whole.
-LOG = "photos.jsonl"
+LOG_NAME = "photos.jsonl"
 
 
 class Taken(NamedTuple):
@@ -31,7 +31,7 @@ class Taken(NamedTuple):
 def count_photos(folder: Path) -> int:
     """Return how many photos of a capture that is not finished are on the disk."""
     try:
-        return (folder / LOG).read_bytes().count(b"\n")
+        return (folder / LOG_NAME).read_bytes().count(b"\n")
     except FileNotFoundError:
         return 0
 

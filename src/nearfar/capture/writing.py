@@ -28,7 +28,7 @@ from nearfar.capture.store import (
     open_capture,
     white_and_black,
 )
-from nearfar.capture.unfinished import LOG, Taken, other_plan, require_same_rig
+from nearfar.capture.unfinished import LOG_NAME, Taken, other_plan, require_same_rig
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
@@ -205,7 +205,7 @@ class CaptureWriter:
         saturated = float(np.mean(photo >= scale))
         same = bool(np.array_equal(photo, first))
         taken = Taken(time.time(), saturated, mean, same, dict(conditions or {}), list(alarms))
-        note(self._folder / LOG, taken._asdict())
+        note(self._folder / LOG_NAME, taken._asdict())
         self._taken.append(taken)
         return photo
 
@@ -249,7 +249,7 @@ class CaptureWriter:
     def _take_up(self, group: zarr.Group) -> None:
         """Go on from what another writer left."""
         folder, before = self._folder, dict(group.attrs)
-        self._taken = read_notes(folder / LOG, lambda words: Taken(**words))
+        self._taken = read_notes(folder / LOG_NAME, lambda words: Taken(**words))
         # Files that were being written when it was killed.
         for left in folder.rglob(".*.partial"):
             left.unlink()
@@ -362,5 +362,5 @@ def write_capture(
         if not ended:
             check_count(count, count, more=next(remaining, None) is not None)
         writer.finish()
-        (partial / LOG).unlink()
+        (partial / LOG_NAME).unlink()
     return open_capture(path)

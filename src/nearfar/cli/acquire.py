@@ -14,9 +14,8 @@ from nearfar.arrays import parse_bytes
 from nearfar.cli.choices import choice
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
-from nearfar.cli.reconstruct import conclude
 from nearfar.cli.reshoot import photo_numbers, take_again
-from nearfar.cli.saying import say, say_captured, warn
+from nearfar.cli.saying import say, say_captured, say_reconstructed, warn
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.progress import Report, progress_bar
@@ -30,8 +29,8 @@ if TYPE_CHECKING:
     from nearfar.workflow.observers.quality import CaptureQuality
 
 # No photo of a real camera reaches this.
-MOST_DECIBELS = 120.0
-LIMITS = {
+MAXIMUM_DECIBELS = 120.0
+CURE_OF_LIMIT = {
     "noise": "Most of the error is the photos' noise: expose longer, or plan for more photos",
     "model": "Most of the error is light that direct, near and far do not hold as planned: plan "
     "with a larger --near, and look at edges and moving things in the scene",
@@ -45,7 +44,7 @@ def decibels(text: str) -> float:
         value = float(text.strip().lower().removesuffix("db"))
     except ValueError:
         value = nan
-    if not 0 < value < MOST_DECIBELS:
+    if not 0 < value < MAXIMUM_DECIBELS:
         raise typer.BadParameter(f"{text!r} is no SNR to reach: write it as 35dB.")
     return value
 
@@ -188,7 +187,7 @@ def _finish(
     work = estimate.finish(taken)
     with new_file(transport, work.tiling, force=force) as sink:
         summary = execute(work, SerialExecutor(), sink, report)
-    conclude(summary, taken, transport, quiet=quiet)
+    say_reconstructed(summary, taken, transport, quiet=quiet)
     say(f"{time.monotonic() - start:.1f} s after the last photo", quiet=quiet)
 
 
@@ -245,5 +244,5 @@ def _say_what_limits(quality: "CaptureQuality", target: float, *, quiet: bool) -
         return
     warn(
         f"{target:g} dB is not reached: all {quality.photos} photos relight pictures at "
-        f"{quality.snr:.1f} dB. {LIMITS[quality.limit]}."
+        f"{quality.snr:.1f} dB. {CURE_OF_LIMIT[quality.limit]}."
     )

@@ -42,7 +42,7 @@ def export(
 
     made = read_plan(plan_file)
     with progress_bar("patterns", quiet=quiet) as report:
-        shown = export_patterns(
+        layout = export_patterns(
             made,
             folder,
             scale=scale,
@@ -51,7 +51,7 @@ def export(
             progress=report,
         )
     say(
-        f"{len(made.patterns)} patterns of {shown.frame} written to {folder}, a pattern pixel as "
-        f"{shown.scale} x {shown.scale}",
+        f"{len(made.patterns)} patterns of {layout.frame} written to {folder}, a pattern pixel as "
+        f"{layout.scale} x {layout.scale}",
         quiet=quiet,
     )

@@ -15,7 +15,7 @@ from nearfar.cli.flags import with_flags
 from nearfar.cli.saying import warn
 from nearfar.errors import KeptInterrupt, NearfarError
 
-STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 # Signals to stop that arrived while the command ran.
 _stops: list[int] = []
@@ -84,7 +84,7 @@ def stopped_cleanly() -> Iterator[None]:
 
     usual = (signal.SIG_DFL, signal.default_int_handler)
     # Signals that are ignored, as under nohup, stay ignored.
-    replaced = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) in usual}
+    replaced = {n: signal.getsignal(n) for n in STOP_SIGNALS if signal.getsignal(n) in usual}
     _stops.clear()
     for number in replaced:
         signal.signal(number, stop)

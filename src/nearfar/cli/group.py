@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from types import FunctionType
 
 # Room that Typer leaves between the columns of a list, and around them.
-MARGINS = 6
+MARGIN_COLUMNS = 6
 
 
 class CommandGroup(TyperGroup):
@@ -38,7 +38,7 @@ class CommandGroup(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the list of commands, from their docstrings alone."""
         names = list(COMMANDS)
-        limit = formatter.width - MARGINS - max(map(len, names))
+        limit = formatter.width - MARGIN_COLUMNS - max(map(len, names))
         with formatter.section("Commands"):
             formatter.write_dl(
                 [

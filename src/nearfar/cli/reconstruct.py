@@ -15,13 +15,12 @@ from nearfar.cli.options import (
     check_report_page,
     keep_input,
 )
-from nearfar.cli.saying import say, warn
+from nearfar.cli.saying import say, say_reconstructed
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
     from nearfar.devices import Device
-    from nearfar.workflow.reconstruction.summary import Summary
 
 
 def reconstruct(
@@ -114,7 +113,7 @@ def reconstruct(
             force=force,
             progress=progress,
         )
-    conclude(summary, opened, output, quiet=quiet)
+    say_reconstructed(summary, opened, output, quiet=quiet)
     if report is not None:
         _write_report(report, output, opened, force=force)
         say(f"report written to {report}", quiet=quiet)
@@ -126,21 +125,3 @@ def _write_report(report: Path, output: Path, capture: "Capture", *, force: bool
     from nearfar.transport.store import open_transport
 
     write_page(report, reconstruction_page(open_transport(output), capture), force=force)
-
-
-def conclude(summary: "Summary", capture: "Capture", output: Path, *, quiet: bool) -> None:
-    """Say what was made, and what is wrong with the photos."""
-    from nearfar.faults.of_capture import find_faults
-
-    for fault in find_faults(capture, summary.provenance):
-        warn(str(fault))
-    if summary.provenance["square"]:
-        rows, whose = f"{capture.plan.projector} projector pixels", "the projector's"
-    else:
-        rows, whose = f"{capture.camera} camera pixels", "the camera's"
-    say(
-        f"transport of {rows} with {capture.channels} channel"
-        f"{'s' if capture.channels > 1 else ''}, {summary.lit / summary.pixels:.1%} of {whose} "
-        f"directly lit, written to {output}",
-        quiet=quiet,
-    )

@@ -87,9 +87,9 @@ def _render_file(
     report: Report,
 ) -> "ExactTransport":
     from nearfar.scenes.mitsuba.loading import load_scene
-    from nearfar.scenes.mitsuba.transport import SAMPLES, render_transport
+    from nearfar.scenes.mitsuba.transport import DEFAULT_SAMPLES, render_transport
 
     loaded = load_scene(scene, projector, camera)
     for note in loaded.notes:
         warn(note)
-    return render_transport(loaded, samples or SAMPLES, seed, progress=report)
+    return render_transport(loaded, samples or DEFAULT_SAMPLES, seed, progress=report)

@@ -8,6 +8,7 @@ from nearfar.cli.flags import with_flags
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
+    from nearfar.workflow.reconstruction.summary import Summary
 
 
 def say(text: str, *, quiet: bool = False) -> None:
@@ -30,5 +31,23 @@ def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:
     say(
         f"{len(taken.plan.patterns)} photos of {taken.camera} with {taken.channels} "
         f"channel{'s' if taken.channels > 1 else ''} written to {output}",
+        quiet=quiet,
+    )
+
+
+def say_reconstructed(summary: "Summary", capture: "Capture", output: Path, *, quiet: bool) -> None:
+    """Print what was reconstructed, and warn of faults of the photos."""
+    from nearfar.faults.of_capture import find_faults
+
+    for fault in find_faults(capture, summary.provenance):
+        warn(str(fault))
+    if summary.provenance["square"]:
+        rows, whose = f"{capture.plan.projector} projector pixels", "the projector's"
+    else:
+        rows, whose = f"{capture.camera} camera pixels", "the camera's"
+    say(
+        f"transport of {rows} with {capture.channels} channel"
+        f"{'s' if capture.channels > 1 else ''}, {summary.lit / summary.pixels:.1%} of {whose} "
+        f"directly lit, written to {output}",
         quiet=quiet,
     )

@@ -32,7 +32,7 @@ def export_patterns(
         raise typer.BadParameter("--export needs the pattern grid.", param_hint="--projector")
     count = (method.count or 0) + 1
     with progress_bar("patterns", quiet=quiet) as report:
-        shown = export_to_separate(
+        layout = export_to_separate(
             output,
             method,
             projector,
@@ -42,8 +42,8 @@ def export_patterns(
             progress=counting(report, "patterns", count),
         )
     say(
-        f"{count} patterns of {shown.frame}, the last one black, written to {output}, a pattern "
-        f"pixel as {shown.scale} x {shown.scale}",
+        f"{count} patterns of {layout.frame}, the last one black, written to {output}, a pattern "
+        f"pixel as {layout.scale} x {layout.scale}",
         quiet=quiet,
     )
 

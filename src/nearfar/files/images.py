@@ -18,7 +18,7 @@ PICTURE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
 IMAGE_ENDINGS = (".npy", ".exr", ".tiff", ".tif", ".png")
 RAW_ENDINGS = (".dng", ".nef", ".cr2", ".cr3", ".arw", ".raf", ".orf", ".rw2", ".pef", ".raw")
 
-JPEG = b"\xff\xd8\xff"
+JPEG_SIGNATURE = b"\xff\xd8\xff"
 
 # A number in the middle of a name is compared as a number.
 _DIGITS = re.compile(r"([0-9]+)")
@@ -57,7 +57,7 @@ def decode_picture(data: bytes, path: Path) -> NDArray[Any]:
     """Decode the bytes of a picture that `path` names; as `read_picture`."""
     if is_raw(path):
         return decode_raw(data, path).levels
-    if data.startswith(JPEG):
+    if data.startswith(JPEG_SIGNATURE):
         raise UnreadableFileError(
             f"{path} is a JPEG, which has 8 bits and is not linear: save it as PNG or TIFF."
         )

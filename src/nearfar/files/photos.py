@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.errors import UnreadableFileError
-from nearfar.files.images import JPEG, decode_picture, full_scale_of, is_raw
+from nearfar.files.images import JPEG_SIGNATURE, decode_picture, full_scale_of, is_raw
 from nearfar.files.raw import decode_raw
 
 
@@ -37,7 +37,7 @@ def decode_camera_file(data: bytes, name: Path) -> CameraFile:
     UnreadableFileError, InputError, MissingPackageError
         As `nearfar.files.read_picture`.
     """
-    if data.startswith(JPEG):
+    if data.startswith(JPEG_SIGNATURE):
         try:
             levels = np.atleast_3d(np.asarray(imagecodecs.jpeg8_decode(data)))
         except (imagecodecs.Jpeg8Error, ValueError, RuntimeError):

@@ -23,7 +23,7 @@ EARLY_ENTRIES = {".jsonl", ".partial"}
 @contextmanager
 def resumable_output(
     path: Path,
-    worth: Callable[[Path, BaseException], bool],
+    is_worth_keeping: Callable[[Path, BaseException], bool],
     *,
     resume: bool = False,
     force: bool = False,
@@ -38,9 +38,9 @@ def resumable_output(
     ----------
     path : Path
         Folder to make; a link is followed.
-    worth : callable
-        From the unfinished folder and what stopped the body, whether the folder is worth
-        resuming; it is removed otherwise.
+    is_worth_keeping : callable
+        From the unfinished folder and the exception that stopped the body, returns whether the
+        folder is worth keeping; otherwise it is removed.
     resume : bool
         Resume what is not finished.
     force : bool
@@ -72,7 +72,7 @@ def resumable_output(
                 output.move_into_place(unfinished, target)
             except BaseException as error:
                 settle()
-                if unfinished.is_dir() and not worth(unfinished, error):
+                if unfinished.is_dir() and not is_worth_keeping(unfinished, error):
                     remove(unfinished)
                 raise
 

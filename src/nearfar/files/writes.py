@@ -12,7 +12,7 @@ from pathlib import Path
 from weakref import WeakSet
 
 # Seconds that writes under way may take to end; those to a disk that hangs are not waited for.
-PATIENCE = 2.0
+MAXIMUM_WAIT_SECONDS = 2.0
 
 _loops: WeakSet[asyncio.AbstractEventLoop] = WeakSet()
 _abandoned: set[Path] = set()
@@ -40,10 +40,10 @@ def settle() -> None:
     """Let writes that are under way end."""
     for loop in [loop for loop in _loops if loop.is_running()]:
         with contextlib.suppress(TimeoutError):
-            asyncio.run_coroutine_threadsafe(_others(), loop).result(2 * PATIENCE)
+            asyncio.run_coroutine_threadsafe(_others(), loop).result(2 * MAXIMUM_WAIT_SECONDS)
 
 
 async def _others() -> None:
     tasks = asyncio.all_tasks() - {asyncio.current_task()}
     if tasks:
-        await asyncio.wait(tasks, timeout=PATIENCE)
+        await asyncio.wait(tasks, timeout=MAXIMUM_WAIT_SECONDS)

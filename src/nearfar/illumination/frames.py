@@ -9,14 +9,14 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError
 
 
-class Shown(NamedTuple):
+class FrameLayout(NamedTuple):
     """Size of the frame, and the side in frame pixels of each pattern pixel."""
 
     frame: Size
     scale: int
 
 
-def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
+def fit_frame(projector: Size, scale: int | None, native: Size | None) -> FrameLayout:
     """Return the frame and scale at which a pattern grid is displayed.
 
     Parameters
@@ -35,22 +35,22 @@ def fit_frame(projector: Size, scale: int | None, native: Size | None) -> Shown:
     """
     if native is None:
         scale = scale or 1
-        return Shown(Size(projector.height * scale, projector.width * scale), scale)
+        return FrameLayout(Size(projector.height * scale, projector.width * scale), scale)
     largest = min(native.height // projector.height, native.width // projector.width)
     if largest < (scale or 1):
         raise InputError(
             f"a pattern of {projector} at `scale={scale or 1}` does not fit on "
             f"`native={tuple(native)}`: choose a larger frame or a smaller scale."
         )
-    return Shown(native, scale or largest)
+    return FrameLayout(native, scale or largest)
 
 
-def draw_frame(pattern: NDArray[np.uint8], shown: Shown) -> NDArray[np.uint8]:
+def draw_frame(pattern: NDArray[np.uint8], layout: FrameLayout) -> NDArray[np.uint8]:
     """Draw a pattern on a frame, each pixel as a block, centred, black around."""
-    enlarged = pattern.repeat(shown.scale, axis=0).repeat(shown.scale, axis=1)
-    frame = np.zeros(shown.frame, dtype=np.uint8)
+    enlarged = pattern.repeat(layout.scale, axis=0).repeat(layout.scale, axis=1)
+    frame = np.zeros(layout.frame, dtype=np.uint8)
     top, left = (
-        (outer - inner) // 2 for outer, inner in zip(shown.frame, enlarged.shape, strict=True)
+        (outer - inner) // 2 for outer, inner in zip(layout.frame, enlarged.shape, strict=True)
     )
     frame[top : top + enlarged.shape[0], left : left + enlarged.shape[1]] = enlarged
     return frame

@@ -31,7 +31,7 @@ def measured_frequencies(plan: Plan) -> set[Frequency]:
     return {pair.frequency for pair in find_pairs(plan)}
 
 
-def answered(plan: Plan) -> tuple[RealBasis, Floats]:
+def measured_basis(plan: Plan) -> tuple[RealBasis, Floats]:
     """Return what the photos of a plan will measure, before there are any.
 
     Returns

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from nearfar.files import new_output
 from nearfar.report.figures.style import LINES, new_figure, save, styled
-from nearfar.rigs.calibration import NAME
+from nearfar.rigs.calibration import CALIBRATION_NAME
 from nearfar.workflow.calibrate import Findings
 
 # Label, colour and line style; the colours also differ in lightness, for prints in grey.
@@ -34,7 +34,7 @@ def write_calibration(folder: Path, findings: Findings, *, force: bool = False) 
     """
     with new_output(folder, force=force, replaceable=is_calibration) as partial:
         partial.mkdir()
-        (partial / NAME).write_text(
+        (partial / CALIBRATION_NAME).write_text(
             findings.calibration.model_dump_json(indent=1), encoding="utf-8"
         )
         with styled():
@@ -77,7 +77,7 @@ def is_calibration(folder: Path) -> bool:
         names = {entry.name for entry in folder.iterdir()}
     except OSError:
         return False
-    return not names or NAME in names
+    return not names or CALIBRATION_NAME in names
 
 
 def _projector(findings: Findings) -> Figure:

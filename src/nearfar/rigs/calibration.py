@@ -10,10 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from nearfar.arrays import Floats
 from nearfar.errors import UnreadableFileError
 from nearfar.photometry.exposures import Sensor
-from nearfar.rigs.linear import LEVELS, PRIMARIES
+from nearfar.rigs.linear import LEVEL_COUNT, PRIMARY_COUNT
 
 FORMAT_VERSION = 1
-NAME = "calibration.json"
+CALIBRATION_NAME = "calibration.json"
 
 
 class Calibration(BaseModel):
@@ -69,7 +69,7 @@ class Calibration(BaseModel):
         cls, table: tuple[tuple[float, float, float], ...]
     ) -> tuple[tuple[float, float, float], ...]:
         values = np.asarray(table)
-        if values.shape != (LEVELS, PRIMARIES) or (np.diff(values, axis=0) < 0).any():
+        if values.shape != (LEVEL_COUNT, PRIMARY_COUNT) or (np.diff(values, axis=0) < 0).any():
             raise ValueError("the response has 256 levels of 3 primaries and never falls")
         return table
 
@@ -96,7 +96,7 @@ def read_calibration(folder: Path) -> Calibration | None:
     UnreadableFileError
         If it is damaged, or of another version.
     """
-    path = folder / NAME
+    path = folder / CALIBRATION_NAME
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         return Calibration.model_validate(data)

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
 from nearfar.errors import InputError
-from nearfar.illumination.frames import Shown
+from nearfar.illumination.frames import FrameLayout
 
-LEVELS = 256
-PRIMARIES = 3
+LEVEL_COUNT = 256
+PRIMARY_COUNT = 3
 # Fractional parts of their multiples fill the unit square evenly (Roberts' R2 sequence).
-EVEN = (0.7548776662466927, 0.5698402909980532)
+R2_STEPS = (0.7548776662466927, 0.5698402909980532)
 
 
 class LinearProjector:
@@ -26,7 +26,7 @@ class LinearProjector:
     ----------
     response : array, shape (256, 3)
         Light of each level and primary over that of the highest; 0 at level 0, never falling.
-    shown : Shown
+    layout : FrameLayout
         Frame and scale of a pattern pixel.
     brightness : float
         Light of a white pattern over the projector's full white.
@@ -36,30 +36,30 @@ class LinearProjector:
     InputError
     """
 
-    def __init__(self, response: Floats, shown: Shown, brightness: float = 1.0) -> None:
-        if response.shape != (LEVELS, PRIMARIES) or (np.diff(response, axis=0) < 0).any():
+    def __init__(self, response: Floats, layout: FrameLayout, brightness: float = 1.0) -> None:
+        if response.shape != (LEVEL_COUNT, PRIMARY_COUNT) or (np.diff(response, axis=0) < 0).any():
             raise InputError(
                 "a projector's response has 256 levels of 3 primaries and never falls."
             )
         if not 0 < brightness <= 1:
             raise InputError(f"the brightness {brightness} cannot be: choose more than 0, up to 1.")
-        self._shown = shown
-        wanted = brightness * np.arange(LEVELS) / (LEVELS - 1)
-        tables = [_steps(response[:, i], wanted) for i in range(PRIMARIES)]
+        self._layout = layout
+        wanted = brightness * np.arange(LEVEL_COUNT) / (LEVEL_COUNT - 1)
+        tables = [_steps(response[:, i], wanted) for i in range(PRIMARY_COUNT)]
         self._level = np.stack([level for level, _ in tables], axis=-1)
         self._share = np.stack([share for _, share in tables], axis=-1)
-        self._threshold = _thresholds(shown)
+        self._threshold = _thresholds(layout)
 
     def draw(self, pattern: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Draw the frame of an 8-bit pattern, black around."""
-        scale = self._shown.scale
+        scale = self._layout.scale
         blown = pattern.repeat(scale, axis=0).repeat(scale, axis=1)
         height, width = blown.shape
-        top, left = ((a - b) // 2 for a, b in zip(self._shown.frame, blown.shape, strict=True))
-        frame = np.zeros((*self._shown.frame, PRIMARIES), dtype=np.uint8)
+        top, left = ((a - b) // 2 for a, b in zip(self._layout.frame, blown.shape, strict=True))
+        frame = np.zeros((*self._layout.frame, PRIMARY_COUNT), dtype=np.uint8)
         inside = frame[top : top + height, left : left + width]
         threshold = self._threshold[:height, :width]
-        for primary in range(PRIMARIES):
+        for primary in range(PRIMARY_COUNT):
             more = self._share[:, primary][blown] > threshold
             inside[..., primary] = self._level[:, primary][blown] + more
         return frame
@@ -67,23 +67,23 @@ class LinearProjector:
 
 def identity() -> Floats:
     """Response of a projector that is taken to be linear, for want of a calibration."""
-    return np.repeat(np.linspace(0.0, 1.0, LEVELS)[:, np.newaxis], PRIMARIES, axis=1)
+    return np.repeat(np.linspace(0.0, 1.0, LEVEL_COUNT)[:, np.newaxis], PRIMARY_COUNT, axis=1)
 
 
 def _steps(response: Floats, wanted: Floats) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Return the level just below each wanted light, and the share of the level above."""
-    below = np.clip(np.searchsorted(response, wanted, side="right") - 1, 0, LEVELS - 2)
+    below = np.clip(np.searchsorted(response, wanted, side="right") - 1, 0, LEVEL_COUNT - 2)
     step = response[below + 1] - response[below]
     share = (wanted - response[below]) / np.where(step > 0, step, 1.0)
     return below.astype(np.uint8), np.clip(share, 0.0, 1.0).astype(np.float32)
 
 
-def _thresholds(shown: Shown) -> NDArray[np.float32]:
+def _thresholds(layout: FrameLayout) -> NDArray[np.float32]:
     """Thresholds of each pixel of the pattern: in each block the same, evenly spread."""
-    scale = shown.scale
+    scale = layout.scale
     y, x = np.mgrid[:scale, :scale]
-    order = (EVEN[0] * y + EVEN[1] * x) % 1.0
+    order = (R2_STEPS[0] * y + R2_STEPS[1] * x) % 1.0
     ranks = np.empty(scale * scale)
     ranks[np.argsort(order, axis=None)] = np.arange(scale * scale)
     block = ((ranks + 0.5) / scale**2).reshape(scale, scale)
-    return np.tile(block, [-(-side // scale) for side in shown.frame]).astype(np.float32)
+    return np.tile(block, [-(-side // scale) for side in layout.frame]).astype(np.float32)

@@ -26,7 +26,7 @@ KEYBOARD_INTERVAL_SECONDS = 0.01
 TIMED_REFRESHES = 24
 PERIOD_TOLERANCE = 0.02
 
-VERTICES = """
+VERTEX_SHADER = """
 #version 330
 void main() {
     vec2 corner = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
@@ -34,7 +34,7 @@ void main() {
 }
 """
 # Each pixel fetches its own value: no filter, no scaling; the first row is at the top.
-PIXELS = """
+FRAGMENT_SHADER = """
 #version 330
 uniform sampler2D frame;
 out vec4 colour;
@@ -278,7 +278,9 @@ class Window:
         glfw.set_monitor_callback(self._on_monitor)
         self._texture = self._context.texture((size.width, size.height), 3, alignment=1)
         self._triangles = moderngl.TRIANGLES
-        program = self._context.program(vertex_shader=VERTICES, fragment_shader=PIXELS)
+        program = self._context.program(
+            vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER
+        )
         self._pixels = self._context.vertex_array(program, [])
         self.period = self._timed(1.0 / self.monitor.refresh)
 

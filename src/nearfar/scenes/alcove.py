@@ -21,12 +21,12 @@ from nearfar.scenes.geometry import (
 
 RADIUS, DEPTH = 0.44, 0.62
 # Where the dome begins.
-SPRING = 0.62
+DOME_HEIGHT = 0.62
 
 
 def _flutes(position: Floats) -> Floats:
     """Eleven ribs that fan out from the foot of the dome at the back, as in a scallop shell."""
-    fan = np.arctan2(position[..., 1] - SPRING + 0.02, position[..., 0])
+    fan = np.arctan2(position[..., 1] - DOME_HEIGHT + 0.02, position[..., 0])
     return np.asarray(1 + 0.16 * np.cos(22 * fan))
 
 
@@ -54,9 +54,9 @@ VIEW = View((-0.3, 1.1, 2.75), (-0.005, 0.515, -0.1), 0.197)
 
 
 # The bust is drawn smaller than it stands there.
-SCALE = 1.2
+BUST_SCALE = 1.2
 # The bust in slices: height, half width, half depth and how far it stands forward, in metres.
-SLICES = np.array(
+BUST_SLICES = np.array(
     [
         (0.000, 0.060, 0.055, 0.000),
         (0.040, 0.085, 0.065, 0.000),
@@ -85,7 +85,7 @@ def _niche() -> list[Part]:
     across, upwards, inwards = np.eye(3) * (1, 1, -1)
     arc = RADIUS * np.cos(around) * across + DEPTH * np.sin(around) * inwards
     arch = RADIUS * (np.cos(around) * across + np.sin(around) * upwards)
-    spring = SPRING * upwards
+    spring = DOME_HEIGHT * upwards
     tilt = np.linspace(0, np.pi / 2, 97)[:, None, None]
     dome = arc * np.cos(tilt) + RADIUS * upwards * np.sin(tilt) + spring
     outline = np.concatenate([arc[:1], arch + spring, arc[-1:]])
@@ -102,8 +102,10 @@ def _niche() -> list[Part]:
 
 def _bust(move: Vector, turn: float) -> Part:
     """Carve the bust, 65 cm tall as drawn, turned about the y axis (radians)."""
-    y = np.linspace(0, SLICES[-1, 0], 120)[:, None]
-    wide, deep, ahead = np.moveaxis(PchipInterpolator(SLICES[:, 0], SLICES[:, 1:])(y), -1, 0)
+    y = np.linspace(0, BUST_SLICES[-1, 0], 120)[:, None]
+    wide, deep, ahead = np.moveaxis(
+        PchipInterpolator(BUST_SLICES[:, 0], BUST_SLICES[:, 1:])(y), -1, 0
+    )
     around = np.linspace(0, 2 * np.pi, 145)
     x, front = wide * np.sin(around), np.cos(around)
 
@@ -121,7 +123,7 @@ def _bust(move: Vector, turn: float) -> Part:
     points[..., [0, 2]] *= 1 + (locks + folds)[..., None]
     mesh = sheet(points)
     mesh.apply_transform(rotation(turn, (0.0, 1.0, 0.0)))
-    mesh.apply_scale(SCALE)
+    mesh.apply_scale(BUST_SCALE)
     return solid("bust", mesh, MARBLE, move=move)
 
 

@@ -15,7 +15,7 @@ from nearfar.arrays import Floats, Integers, Size
 from nearfar.scenes.geometry import Gloss, Part
 from nearfar.scenes.optics import Pinhole, pixel_of, sub_rays
 from nearfar.scenes.patches import Patches
-from nearfar.scenes.rays import OFFSET, Surface, blocked, hit
+from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked, hit
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def _patch_at(
     """
     eye, size = projector
     part, normal = where.part[face], where.normals[face]
-    raised = position + OFFSET * normal
+    raised = position + SURFACE_OFFSET * normal
     pixel, lit = pixel_of(eye, size, position)
     lit &= np.einsum("nx,nx->n", normal, eye.position - position) > 0
     if not coaxial:
@@ -133,5 +133,5 @@ def _highlight(
         cosine = np.einsum("nx,nx->n", half, normal[mine])
         cosine /= np.linalg.norm(half, axis=-1) * np.linalg.norm(normal[mine], axis=-1)
         lobe = np.maximum(cosine, 0) ** gloss.exponent
-        result[mine] = gloss.strength * (gloss.exponent + 8) / 8 * lobe
+        result[mine] = gloss.reflectance * (gloss.exponent + 8) / 8 * lobe
     return result

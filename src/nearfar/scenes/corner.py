@@ -13,7 +13,7 @@ def _planks(position: Floats) -> Floats:
     return np.asarray(1 + 0.16 * np.sin(12.9898 * board + 1.0))
 
 
-SIDE = 1.35
+WALL_LENGTH = 1.35
 CREAM = Material((0.74, 0.71, 0.62))
 SKY = Material((0.58, 0.66, 0.74))
 WOOD = Material((0.68, 0.42, 0.22), texture=_planks)
@@ -22,7 +22,7 @@ VIEW = View((1.75, 1.78, 1.75), (0.02, 0.05, 0.02), 0.175)
 
 def corner() -> Scene:
     """Describe the corner, under a coaxial camera."""
-    x, y, z = (SIDE, 0.0, 0.0), (0.0, SIDE, 0.0), (0.0, 0.0, SIDE)
+    x, y, z = (WALL_LENGTH, 0.0, 0.0), (0.0, WALL_LENGTH, 0.0), (0.0, 0.0, WALL_LENGTH)
     origin = (0.0, 0.0, 0.0)
     return Scene(
         name="corner",

@@ -12,7 +12,7 @@ from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.parallel import side_by_side
 from nearfar.scenes.geometry import Part
 from nearfar.scenes.patches import Patches
-from nearfar.scenes.rays import OFFSET, Surface, blocked
+from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked
 
 # Pairs nearer than this many of their radii are summed over their samples.
 NEAR_RADII = 3.0
@@ -232,8 +232,8 @@ def visible_share(i: Integers, j: Integers, patches: Patches, occluders: Surface
         # Samples in opposite order, so that the rays differ from parallel ones.
         a = (2 * turn + 1) * patches.counts[i] // (2 * RAYS_PER_PAIR)
         b = (2 * ((turn * 3 + 1) % RAYS_PER_PAIR) + 1) * patches.counts[j] // (2 * RAYS_PER_PAIR)
-        start = patches.positions[i, a] + OFFSET * patches.normals[i, a]
-        end = patches.positions[j, b] + OFFSET * patches.normals[j, b]
+        start = patches.positions[i, a] + SURFACE_OFFSET * patches.normals[i, a]
+        end = patches.positions[j, b] + SURFACE_OFFSET * patches.normals[j, b]
         way = end - start
         # What lies below a horizon is left out of the exchange already.
         above = (np.einsum("nx,nx->n", way, patches.normals[i, a]) > 0) & (
@@ -274,8 +274,8 @@ def crosses_any(start: Floats, end: Floats, boxes: Sequence[tuple[Floats, Floats
         enter = np.zeros(hits.shape, dtype=np.float32)
         leave = np.ones(hits.shape, dtype=np.float32)
         for axis in range(3):
-            first = np.float32(low[axis] - OFFSET) - origin[:, None, axis]
-            last = np.float32(high[axis] + OFFSET) - origin[:, None, axis]
+            first = np.float32(low[axis] - SURFACE_OFFSET) - origin[:, None, axis]
+            last = np.float32(high[axis] + SURFACE_OFFSET) - origin[:, None, axis]
             one, two = first * inverse[axis], last * inverse[axis]
             np.maximum(enter, np.minimum(one, two), out=enter)
             np.minimum(leave, np.maximum(one, two), out=leave)

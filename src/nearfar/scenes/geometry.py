@@ -26,13 +26,13 @@ class Gloss:
 
     Attributes
     ----------
-    strength : float
+    reflectance : float
         Share of the light that the lobe reflects, 0 to 1.
     exponent : float
         Sharpness of the lobe.
     """
 
-    strength: float
+    reflectance: float
     exponent: float
 
 

@@ -14,7 +14,7 @@ import trimesh
 from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.scenes.geometry import Part
 from nearfar.scenes.optics import Pinhole, pixel_of, sub_rays
-from nearfar.scenes.rays import OFFSET, Surface, blocked, hit
+from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked, hit
 
 # A surface seen at a glancing angle under one sub-ray: its area is no more than this allows.
 SMALLEST_COSINE = 0.05
@@ -136,7 +136,7 @@ def dark_samples(
     length = np.linalg.norm(crossed, axis=-1)
     normal, position = crossed / length[:, None], triangles.mean(axis=1)
 
-    raised = position + OFFSET * normal
+    raised = position + SURFACE_OFFSET * normal
     facing = np.einsum("nx,nx->n", normal, eye.position - position) > 0
     lit = facing & pixel_of(eye, size, position)[1]
     lit[lit] = ~blocked(where, raised[lit], np.broadcast_to(eye.position, raised[lit].shape))

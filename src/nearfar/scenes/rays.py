@@ -12,7 +12,7 @@ from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.scenes.geometry import Part
 
 # Embree works in float32: ends of a ray stand off the surface by this much (metres).
-OFFSET = 2e-4
+SURFACE_OFFSET = 2e-4
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from nearfar.transport.exact import ExactTransport
 # Sub-rays along each side of a projector pixel.
 SAMPLES_PER_SIDE = 4
 # The brightest camera pixel under full white.
-BRIGHTEST = 0.9
+WHITE_LEVEL = 0.9
 
 
 def render(
@@ -77,7 +77,7 @@ def render(
         float((d.sum(axis=1) + n.sum(axis=1) + f.sum(axis=1)).max())
         for d, n, f in zip(direct, near, far, strict=True)
     )
-    scale = np.float32(BRIGHTEST / brightest)
+    scale = np.float32(WHITE_LEVEL / brightest)
     far *= scale
     return ExactTransport(
         projector=projector,

@@ -59,7 +59,7 @@ YELLOW, ORANGE, VIOLET = (0.62, 0.44, 0.08), (0.60, 0.22, 0.05), (0.28, 0.08, 0.
 TEAL, BROWN, PINK = (0.08, 0.38, 0.42), (0.30, 0.16, 0.08), (0.60, 0.30, 0.36)
 WHITE, DARK = (0.64, 0.60, 0.52), (0.04, 0.04, 0.05)
 # Books from left to right: width, height, how far they stand back from the front, colour.
-ABOVE: tuple[tuple[float, float, float, Vector], ...] = (
+UPPER_BOOKS: tuple[tuple[float, float, float, Vector], ...] = (
     (0.075, 0.33, 0.14, RED),
     (0.055, 0.30, 0.13, WHITE),
     (0.065, 0.35, 0.12, BLUE),
@@ -69,7 +69,7 @@ ABOVE: tuple[tuple[float, float, float, Vector], ...] = (
     (0.050, 0.29, 0.12, ORANGE),
     (0.070, 0.32, 0.10, TEAL),
 )
-BELOW: tuple[tuple[float, float, float, Vector], ...] = (
+LOWER_BOOKS: tuple[tuple[float, float, float, Vector], ...] = (
     (0.070, 0.30, 0.12, BROWN),
     (0.055, 0.33, 0.08, PINK),
     (0.080, 0.28, 0.11, BLUE),
@@ -81,7 +81,7 @@ BELOW: tuple[tuple[float, float, float, Vector], ...] = (
 )
 
 # Books that touch are this far apart (metres): of two sides in one place a ray would meet either.
-GAP = 2e-5
+BOOK_GAP = 2e-5
 
 PROJECTOR = View((-0.25, 0.72, 2.5), (0.0, 0.415, -0.1), 0.268)
 CAMERA = View((0.32, 0.56, 2.4), (0.0, 0.415, -0.1), 0.255)
@@ -127,7 +127,7 @@ def _row(
     parts = []
     for index, (width, height, back, colour) in enumerate(books):
         texture = partial(_bands, foot=foot, height=height) if index % 3 else None
-        low, high = (start, foot, -DEPTH), (start + width - GAP, foot + height, -back)
+        low, high = (start, foot, -DEPTH), (start + width - BOOK_GAP, foot + height, -back)
         cover = Material(colour, texture=texture)
         name = f"book {foot} {index}"
         parts += _box(name, low, high, cover, PAGES, sides="left right top front")
@@ -179,8 +179,8 @@ def shelf() -> Scene:
         name="shelf",
         parts=(
             *_case(),
-            *_row(0.03 - HALF, UPPER[0], ABOVE),
-            *_row(HALF - sum(width for width, *_ in BELOW), LOWER[0], BELOW),
+            *_row(0.03 - HALF, UPPER[0], UPPER_BOOKS),
+            *_row(HALF - sum(width for width, *_ in LOWER_BOOKS), LOWER[0], LOWER_BOOKS),
             *_stray_books(),
             _vase((0.36, UPPER[0], -0.17)),
             *_duck((-0.4, 0.085, -0.155)),

@@ -34,7 +34,7 @@ SNOUT = Material((0.64, 0.54, 0.40))
 BLACK = Material((0.05, 0.05, 0.05))
 SCARF = Material((0.65, 0.12, 0.10))
 # The slope leans back from the upright.
-LEAN = np.radians(14)
+SLOPE_ANGLE = np.radians(14)
 VIEW = View((0.0, 1.77, 2.11), (0.0, 0.1, 0.12), 0.24)
 
 
@@ -77,7 +77,7 @@ def _bear(move: Vector, turn: float) -> list[Part]:
 
 def wedge() -> Scene:
     """Describe the wedge with the bear, under a coaxial camera."""
-    up = (0.0, 0.65 * float(np.cos(LEAN)), -0.65 * float(np.sin(LEAN)))
+    up = (0.0, 0.65 * float(np.cos(SLOPE_ANGLE)), -0.65 * float(np.sin(SLOPE_ANGLE)))
     planes = [
         quadrilateral("ground", (-0.75, 0.0, 0.8), (1.5, 0.0, 0.0), (0.0, 0.0, -0.8), GROUND),
         quadrilateral("slope", (-0.75, 0.0, 0.0), (1.5, 0.0, 0.0), up, SLOPE),

@@ -11,7 +11,7 @@ from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
 from nearfar.capture.observing import CaptureObserver, is_enough, with_predicate
 from nearfar.capture.replacing import replace_photos
-from nearfar.capture.unfinished import LOG, count_photos, require_same_rig
+from nearfar.capture.unfinished import LOG_NAME, count_photos, require_same_rig
 from nearfar.deprecation import warn_of
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.faults.while_capturing import FaultsWhileCapturing
@@ -131,7 +131,7 @@ def acquire(
             raise
         raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
     # Until the capture had its name, its photos could be resumed by the log alone.
-    (path.resolve() / LOG).unlink(missing_ok=True)
+    (path.resolve() / LOG_NAME).unlink(missing_ok=True)
     return open_capture(path)
 
 

@@ -27,7 +27,7 @@ from nearfar.rigs.linear import LinearProjector
 from nearfar.rigs.real.rig import RealRig
 
 # The ramp's levels: close together where a gamma is steep.
-RAMP = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
+RAMP_LEVELS = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
 # Levels at which the linearised ramp is checked.
 CHECK_LEVELS = (32, 64, 96, 128, 160, 192, 224)
 # Values from this share of full scale on are clipped.
@@ -107,13 +107,13 @@ def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
             f"aperture."
         )
     generator = np.random.default_rng(0)
-    ramp = generator.permutation(np.repeat(RAMP, 2))
-    photos: dict[int, list[Photo]] = {level: [] for level in RAMP}
+    ramp = generator.permutation(np.repeat(RAMP_LEVELS, 2))
+    photos: dict[int, list[Photo]] = {level: [] for level in RAMP_LEVELS}
     for i, level in enumerate(ramp):
         photos[int(level)].append(rig.photograph_levels((level, level, level)))
         report("grey ramp", (i + 1) / len(ramp))
     black_light = _light(photos[0], lit)
-    light = np.stack([_light(photos[level], lit) - black_light for level in RAMP])
+    light = np.stack([_light(photos[level], lit) - black_light for level in RAMP_LEVELS])
     primaries = []
     for primary in range(3):
         red, green, blue = (255 if p == primary else 0 for p in range(3))
@@ -124,7 +124,7 @@ def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
     white = light[-1]
     superposition = float(mixing.sum() / white.sum() - 1)
     notes = []
-    shown = np.asarray(RAMP)
+    projected = np.asarray(RAMP_LEVELS)
     if abs(superposition) > MAXIMUM_SUPERPOSITION_ERROR:
         notes.append(
             f"red, green and blue together give {1 + superposition:.1%} of white: turn the "
@@ -134,9 +134,9 @@ def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
     channels = len(white)
     apart = channels >= 3 and np.linalg.cond(mixing) < MAXIMUM_CONDITION_NUMBER
     if apart and abs(superposition) <= MAXIMUM_SUPERPOSITION_ERROR:
-        response = unmix_response(shown, light, mixing)
+        response = unmix_response(projected, light, mixing)
     else:
-        response = np.repeat(fit_response(shown, light.sum(axis=-1))[:, np.newaxis], 3, axis=1)
+        response = np.repeat(fit_response(projected, light.sum(axis=-1))[:, np.newaxis], 3, axis=1)
     line, exposures = _camera_line(rig, lit, light.sum(axis=-1) / white.sum(), report)
     black = line.black if line else 0.0
     dark = _dark_pair(rig)
@@ -179,7 +179,7 @@ def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
         superposition=superposition,
         residual=residual,
     )
-    return Findings(calibration, shown, light / white, checked, exposures, noise, tuple(notes))
+    return Findings(calibration, projected, light / white, checked, exposures, noise, tuple(notes))
 
 
 def _lit(contrast: Floats) -> NDArray[np.bool_]:
@@ -200,7 +200,7 @@ def _camera_line(
     camera, shortest = rig.camera, rig.camera.exposure
     if shortest is None or camera.exposure_limits is None:
         return None, np.zeros((0, 2))
-    level = RAMP[max(1, int(np.searchsorted(light, 1 / (1.2 * EXPOSURE_FACTORS[-1]))) - 1)]
+    level = RAMP_LEVELS[max(1, int(np.searchsorted(light, 1 / (1.2 * EXPOSURE_FACTORS[-1]))) - 1)]
     lengths = [n * shortest for n in EXPOSURE_FACTORS if n * shortest <= camera.exposure_limits[1]]
     seconds, photos = [], []
     try:

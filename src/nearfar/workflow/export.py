@@ -4,7 +4,7 @@ from pathlib import Path
 
 from nearfar.arrays import Size
 from nearfar.files import encode_png, new_output
-from nearfar.illumination.frames import Shown, draw_frame, fit_frame
+from nearfar.illumination.frames import FrameLayout, draw_frame, fit_frame
 from nearfar.plan import Plan
 from nearfar.progress import Report, ignore_progress
 
@@ -19,7 +19,7 @@ def export_patterns(
     native: Size | None = None,
     force: bool = False,
     progress: Report = ignore_progress,
-) -> Shown:
+) -> FrameLayout:
     """Write ``pattern-00000.png`` and so on, 8-bit grey, and the plan beside them.
 
     Parameters
@@ -38,7 +38,7 @@ def export_patterns(
 
     Returns
     -------
-    Shown
+    FrameLayout
 
     Raises
     ------
@@ -50,15 +50,15 @@ def export_patterns(
         As `nearfar.files.new_output`.
     """
     plan.require_real("export")
-    shown = fit_frame(plan.projector, scale, native)
+    layout = fit_frame(plan.projector, scale, native)
     with new_output(folder, force=force, replaceable=_is_export) as partial:
         partial.mkdir()
         for number in range(len(plan.patterns)):
-            frame = draw_frame(plan.draw(number), shown)
+            frame = draw_frame(plan.draw(number), layout)
             (partial / f"pattern-{number:05d}.png").write_bytes(encode_png(frame))
             progress("patterns", (number + 1) / len(plan.patterns))
         (partial / PLAN_NAME).write_text(plan.to_json(), encoding="utf-8")
-    return shown
+    return layout
 
 
 def _is_export(folder: Path) -> bool:

@@ -14,19 +14,19 @@ from nearfar.baselines.separation_photos import PhotosToSeparate, spread_of_grou
 from nearfar.errors import InputError
 from nearfar.faults.of_capture import find_saturation
 from nearfar.files import encode_png, new_output, write_picture
-from nearfar.illumination.frames import Shown, draw_frame, fit_frame
+from nearfar.illumination.frames import FrameLayout, draw_frame, fit_frame
 from nearfar.release import version
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import snr
 
-NUMBERS = "numbers.json"
-PICTURES = ("direct", "global")
+NUMBERS_NAME = "numbers.json"
+PICTURE_NAMES = ("direct", "global")
 ENDINGS = (".npy", ".exr", ".png")
 # Groups of photos that should sum to one white, and differ by a larger share of it, are at fault.
 MAXIMUM_DIFFERENCE_OF_SUMS = 0.05
 # Channels that picture files hold besides .npy, which holds any number.
-DRAWABLE = (1, 3)
+PICTURE_CHANNELS = (1, 3)
 
 
 def export_to_separate(
@@ -38,7 +38,7 @@ def export_to_separate(
     native: Size | None = None,
     force: bool = False,
     progress: Callable[[int], None] | None = None,
-) -> Shown:
+) -> FrameLayout:
     """Write ``pattern-00000.png`` and so on, the last one black, and the method beside them.
 
     Parameters
@@ -54,7 +54,7 @@ def export_to_separate(
 
     Returns
     -------
-    Shown
+    FrameLayout
 
     Raises
     ------
@@ -65,23 +65,23 @@ def export_to_separate(
     """
     assert method.draw is not None
     patterns = method.draw(projector)
-    shown = fit_frame(projector, scale, native)
+    layout = fit_frame(projector, scale, native)
     numbers = {
         **method.settings,
         "patterns": len(patterns),
         "projector": list(projector),
-        "frame": list(shown.frame),
-        "scale": shown.scale,
+        "frame": list(layout.frame),
+        "scale": layout.scale,
     }
     with new_output(folder, force=force, replaceable=is_separation) as partial:
         partial.mkdir()
         for number, pattern in enumerate([*patterns, np.zeros_like(patterns[0])]):
-            frame = draw_frame(pattern, shown)
+            frame = draw_frame(pattern, layout)
             (partial / f"pattern-{number:05d}.png").write_bytes(encode_png(frame))
             if progress is not None:
                 progress(number + 1)
         _write_numbers(partial, numbers)
-    return shown
+    return layout
 
 
 def describe_separation(
@@ -156,10 +156,10 @@ def write_separation(
     NearfarError
         As `nearfar.files.new_output`.
     """
-    endings = ENDINGS if found.direct.shape[2] in DRAWABLE else ENDINGS[:1]
+    endings = ENDINGS if found.direct.shape[2] in PICTURE_CHANNELS else ENDINGS[:1]
     with new_output(folder, force=force, replaceable=is_separation) as partial:
         partial.mkdir()
-        for name, picture in zip(PICTURES, found, strict=True):
+        for name, picture in zip(PICTURE_NAMES, found, strict=True):
             for ending in endings:
                 write_picture(partial / f"{name}{ending}", picture.astype(np.float32))
         _write_numbers(partial, numbers)
@@ -167,20 +167,20 @@ def write_separation(
 
 def _write_numbers(folder: Path, numbers: Mapping[str, Any]) -> None:
     text = json.dumps(numbers, indent=2, allow_nan=False)
-    (folder / NUMBERS).write_text(text + "\n", encoding="utf-8")
+    (folder / NUMBERS_NAME).write_text(text + "\n", encoding="utf-8")
 
 
 def is_separation(folder: Path) -> bool:
     """Return whether a folder is empty, or holds pictures or patterns of a separation alone."""
     entries = list(folder.iterdir())
     ours = all(
-        entry.name == NUMBERS
-        or (entry.stem in PICTURES and entry.suffix in ENDINGS)
+        entry.name == NUMBERS_NAME
+        or (entry.stem in PICTURE_NAMES and entry.suffix in ENDINGS)
         or (entry.name.startswith("pattern-") and entry.suffix == ".png")
         for entry in entries
     )
     # Photos may be named as the patterns that they show; the numbers are ours alone.
-    return ours and (not entries or (folder / NUMBERS).is_file())
+    return ours and (not entries or (folder / NUMBERS_NAME).is_file())
 
 
 def compare_to_truth(
@@ -238,5 +238,5 @@ def _snr_of(found: Separation, known: Separation, what: str) -> dict[str, float]
             f"the photos are {ours}, the {what}'s camera is {theirs}: compare two of the same "
             f"scene and sizes."
         )
-    pairs = zip(PICTURES, known, found, strict=True)
+    pairs = zip(PICTURE_NAMES, known, found, strict=True)
     return {name: snr(values, mine) for name, values, mine in pairs}

@@ -12,7 +12,7 @@ from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_stripes
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import standard_lights
-from nearfar.photometry.measure import answered, measure
+from nearfar.photometry.measure import measure, measured_basis
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.plan.checks import ends
 from nearfar.progress import ignore_progress
@@ -290,7 +290,7 @@ def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
 
 @pytest.mark.parametrize("plan", PLANS)
 def test_what_is_measured_is_known_before(rig, plan):
-    basis, multiplicity = answered(PLANS[plan])
+    basis, multiplicity = measured_basis(PLANS[plan])
     measurements = measure(acquire_in_memory(PLANS[plan], rig), slice(0, 1))
     assert basis.frequencies == measurements.basis.frequencies
     np.testing.assert_array_equal(multiplicity, measurements.multiplicity)

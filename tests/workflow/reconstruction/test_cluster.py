@@ -25,7 +25,7 @@ from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.job import tiling_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
-from nearfar.workflow.reconstruction.sinks import LOG
+from nearfar.workflow.reconstruction.sinks import LOG_NAME
 from tests.absent import said_without
 from tests.waiting import LONGEST_WAIT
 from tests.workflow.reconstruction.memory import memory_for
@@ -171,7 +171,7 @@ def test_a_scheduler_that_is_lost_costs_what_was_not_written(cluster, world, tmp
     monkeypatch.setattr("nearfar.workflow.reconstruction.cluster.CONNECTION_SECONDS", 2)
     capture, memory = _capture("joint", world, tmp_path)
     _reconstruct(capture, tmp_path / "local.zarr", memory=memory)
-    log = tmp_path / "t.zarr.unfinished" / LOG
+    log = tmp_path / "t.zarr.unfinished" / LOG_NAME
     with _cluster(2) as address:
         with distributed.Client(address, set_as_default=False) as client:
             host = client.run_on_scheduler(os.getpid)

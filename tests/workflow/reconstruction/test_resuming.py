@@ -24,7 +24,7 @@ from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.job import tiling_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
-from nearfar.workflow.reconstruction.sinks import LOG
+from nearfar.workflow.reconstruction.sinks import LOG_NAME
 from tests.absent import NEEDS_PYTORCH
 from tests.cli.conftest import run_nearfar
 from tests.worlds import model_transport
@@ -108,7 +108,7 @@ def _stop_after(count):
 def test_it_is_cut_into_many_blocks(capture, whole, memory):
     tiling = tiling_of(capture, ReconstructionOptions(memory=memory), given=False)
     assert len(list(tiling.tiles())) >= 25
-    assert not (whole / LOG).exists()
+    assert not (whole / LOG_NAME).exists()
 
 
 def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
@@ -176,10 +176,10 @@ def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
         folder = Path(f"{path}.unfinished")
         with pytest.raises(KeptInterrupt):
             into(path, capture, memory=memory, progress=_stop_after(5))
-        first, *_ = (folder / LOG).read_bytes().splitlines(keepends=True)
+        first, *_ = (folder / LOG_NAME).read_bytes().splitlines(keepends=True)
         shutil.rmtree(folder)
         folder.mkdir()
-        (folder / LOG).write_bytes(first)
+        (folder / LOG_NAME).write_bytes(first)
         into(path, capture, memory=memory, **again)
         _check_same(whole, path)
 
@@ -188,7 +188,7 @@ def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
 def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path):
     generator = random.Random(0)
     path = tmp_path / "t.zarr"
-    log = Path(f"{path}.unfinished") / LOG
+    log = Path(f"{path}.unfinished") / LOG_NAME
     command = [sys.executable, "-c", SLOW, str(capture.path), str(path), str(memory)]
     kills = 0
     while kills < 20:
@@ -226,7 +226,7 @@ def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):
     assert "nothing to go on with" in ran.err
     with pytest.raises(KeptInterrupt):
         into(path, open_capture(capture.path), memory=memory, progress=_stop_after(30))
-    log = tmp_path / "t.zarr.unfinished" / LOG
+    log = tmp_path / "t.zarr.unfinished" / LOG_NAME
     log.write_bytes(log.read_bytes()[:-9])
     ran = run_nearfar("reconstruct", *options, "--resume")
     assert ran.status == 0, ran.err

@@ -26,16 +26,16 @@ from nearfar.rigs.cameras.driver import (
 from nearfar.rigs.cameras.pixel_formats import parse_pixel_format
 
 NAME = "aravis"
-CONTINUOUS = 0
-WHOLE = 0  # ARV_BUFFER_STATUS_SUCCESS
-STATUSES = {
+CONTINUOUS_ACQUISITION = 0
+STATUS_SUCCESS = 0  # ARV_BUFFER_STATUS_SUCCESS
+REASON_OF_STATUS = {
     2: "it did not come in time",
     3: "packets were lost",
     4: "packets were out of order",
     5: "it was of another size",
     7: "the camera stopped",
 }
-BUFFERS = 4
+BUFFER_COUNT = 4
 # A frame must be here within the exposure and so many seconds.
 FRAME_TIMEOUT_SECONDS = 2.0
 MICROSECONDS_PER_SECOND = 1e6
@@ -219,8 +219,8 @@ class AravisCamera(Camera):
             )
         try:
             status = self._library.plain("arv_buffer_get_status", buffer)
-            if status != WHOLE:
-                why = STATUSES.get(status, f"status {status}")
+            if status != STATUS_SUCCESS:
+                why = REASON_OF_STATUS.get(status, f"status {status}")
                 raise LostPhotoError(
                     f"a photo of {self.name} did not arrive whole ({why}): check its cable, and on "
                     f"Ethernet the packet size."
@@ -273,7 +273,7 @@ class AravisCamera(Camera):
         assert chosen is not None
         self._bits, self._cell = chosen
         self._region = self._set_region(region)
-        self._call("arv_camera_set_acquisition_mode", self._camera, CONTINUOUS)
+        self._call("arv_camera_set_acquisition_mode", self._camera, CONTINUOUS_ACQUISITION)
         if self._trigger == "free":
             self._call("arv_camera_clear_triggers", self._camera)
         else:
@@ -281,7 +281,7 @@ class AravisCamera(Camera):
             self._call("arv_camera_set_trigger", self._camera, source.encode())
         self._stream = self._call("arv_camera_create_stream", self._camera, None, None)
         payload = self._call("arv_camera_get_payload", self._camera)
-        for _ in range(BUFFERS):
+        for _ in range(BUFFER_COUNT):
             buffer = self._library.plain("arv_buffer_new_allocate", payload)
             self._library.plain("arv_stream_push_buffer", self._stream, buffer)
         self._call("arv_camera_start_acquisition", self._camera)

@@ -21,11 +21,11 @@ SETTINGS = """\
 # settings = { iso = "100", "f-number" = "f/8" }
 """
 # Names of the same setting on cameras of several makers.
-SHUTTER = ("shutterspeed", "shutterspeed2")
-QUALITY = ("imageformat", "imagequality")
-RAW = re.compile(r"^(raw|nef|nef \(raw\)|arw)$", re.IGNORECASE)
-TARGET = ("capturetarget", re.compile(r"internal ram|sdram", re.IGNORECASE))
-SPEED = re.compile(r"^(?P<over>[\d.]+)(/(?P<under>[\d.]+))?\s*s?$")
+EXPOSURE_SETTINGS = ("shutterspeed", "shutterspeed2")
+FORMAT_SETTINGS = ("imageformat", "imagequality")
+RAW_FORMAT = re.compile(r"^(raw|nef|nef \(raw\)|arw)$", re.IGNORECASE)
+TRANSFER_TARGET = ("capturetarget", re.compile(r"internal ram|sdram", re.IGNORECASE))
+EXPOSURE_CHOICE = re.compile(r"^(?P<over>[\d.]+)(/(?P<under>[\d.]+))?\s*s?$")
 # Error codes after which another try may succeed.
 TRANSIENT_ERRORS = (-1, -7, -10, -110)
 
@@ -141,22 +141,22 @@ class GphotoCamera(Camera):
     def _set_up(self) -> None:
         with self._in_sentences():
             # Nothing on the way slows the card down, and nothing is left on it.
-            self._choose_matching(*TARGET)
-            for name in QUALITY:
-                self._choose_matching(name, RAW)
+            self._choose_matching(*TRANSFER_TARGET)
+            for name in FORMAT_SETTINGS:
+                self._choose_matching(name, RAW_FORMAT)
         for name, value in self._settings.items():
             self._set(name, str(value))
 
     def _set_exposure(self, seconds: float) -> float:
         speeds = self._speeds()
         nearest = min(speeds, key=lambda speed: abs(speed - seconds))
-        name = next(n for n in SHUTTER if self._widget(n) is not None)
+        name = next(n for n in EXPOSURE_SETTINGS if self._widget(n) is not None)
         self._set(name, speeds[nearest])
         return nearest
 
     def _speeds(self) -> dict[float, str]:
         """Exposures of the dial in seconds, and what it calls them."""
-        for name in SHUTTER:
+        for name in EXPOSURE_SETTINGS:
             widget = self._widget(name)
             if widget is not None:
                 return {
@@ -226,7 +226,7 @@ class GphotoCamera(Camera):
 
 def seconds_of(choice: str) -> float | None:
     """Read an exposure as cameras write it: 1/250, 0.0040s, 2.5, 10/25; None if it is none."""
-    match = SPEED.match(choice.strip())
+    match = EXPOSURE_CHOICE.match(choice.strip())
     if match is None:
         return None
     over, under = float(match["over"]), float(match["under"] or 1)

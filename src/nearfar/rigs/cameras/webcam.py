@@ -33,7 +33,7 @@ SETTINGS = """\
 """
 # Video4Linux counts exposures in units of 100 microseconds.
 EXPOSURE_UNITS_PER_SECOND = 1e4
-MANUAL = 1
+MANUAL_EXPOSURE = 1
 EXPOSURE_LIMITS_SECONDS = (1e-4, 1.0)
 
 
@@ -150,7 +150,11 @@ class OpencvCamera(Camera):
     def _set_up(self, size: Size | None) -> None:
         cv2, capture = self._opencv, self._capture
         # Where a device has no such property, nothing happens.
-        for automatic, manual in (("AUTO_EXPOSURE", MANUAL), ("AUTO_WB", 0), ("BUFFERSIZE", 1)):
+        for automatic, manual in (
+            ("AUTO_EXPOSURE", MANUAL_EXPOSURE),
+            ("AUTO_WB", 0),
+            ("BUFFERSIZE", 1),
+        ):
             capture.set(getattr(cv2, f"CAP_PROP_{automatic}"), manual)
         if size is not None:
             capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size.height)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Size
 from nearfar.faults.records import ExposureBeats, NotLinearLight
-from nearfar.illumination.frames import Shown, fit_frame
+from nearfar.illumination.frames import FrameLayout, fit_frame
 from nearfar.rigs.base import Photo
 from nearfar.rigs.calibration import Calibration
 from nearfar.rigs.cameras.base import Camera
@@ -57,7 +57,7 @@ class RealRig:
     Attributes
     ----------
     camera : Camera
-    layout : Shown
+    layout : FrameLayout
         Where the pattern grid lies on the screen.
 
     Raises
@@ -84,7 +84,7 @@ class RealRig:
     ) -> None:
         self._screen, self.camera, self._projector = screen, camera, projector
         self._alarms, self._on_start = AlarmLog(on_alarm), on_start
-        self.layout: Shown = fit_frame(projector, scale, screen.monitor.size)
+        self.layout: FrameLayout = fit_frame(projector, scale, screen.monitor.size)
         self._calibration, self._brightness = calibration, brightness
         response = calibration.response_table() if calibration else identity()
         self._linear = LinearProjector(response, self.layout, brightness)

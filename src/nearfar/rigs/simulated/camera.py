@@ -8,7 +8,7 @@ from nearfar.arrays import Floats
 from nearfar.rigs.simulated.drift import SimulatedDrift
 
 # Far above any full well, below what a generator of counts takes.
-MOST_ELECTRONS = 1e18
+MAXIMUM_ELECTRONS = 1e18
 
 
 class SimulatedCamera(BaseModel):
@@ -56,7 +56,7 @@ class SimulatedCamera(BaseModel):
     def noise(self, electrons: Floats, generator: np.random.Generator) -> Floats:
         """Return the electrons that are read: counted by chance, read with an error."""
         # A measured transport may answer a little below zero, and a generator counts only so far.
-        expected = np.clip(electrons, 0.0, MOST_ELECTRONS)
+        expected = np.clip(electrons, 0.0, MAXIMUM_ELECTRONS)
         counted = generator.poisson(expected) if self.shot_noise else electrons
         if self.read_noise == 0.0:
             return np.asarray(counted, dtype=np.float64)

@@ -15,7 +15,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 
 # Patterns lit at once: a matrix product, not a pass over T for each.
-BATCH = 32
+PATTERNS_AT_ONCE = 32
 
 
 class World(Protocol):
@@ -101,10 +101,10 @@ class SimulatedRig:
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
         """Yield a photo for each pattern, in order; `first` is the number of the first."""
         number = first
-        for batch in _batches(patterns, BATCH, first):
+        for batch in _batches(patterns, PATTERNS_AT_ONCE, first):
             # Dark lights before the first: pictures depend in their last digit on how many are
             # made at once, and photos must not on where a capture was taken up again.
-            before = number % BATCH
+            before = number % PATTERNS_AT_ONCE
             lights = np.zeros((before + len(batch), *self.projector), dtype=np.float32)
             for i, pattern in enumerate(batch):
                 lights[before + i] = self.optics.emit(pattern, number + i)

@@ -20,7 +20,7 @@ import mitsuba as mi
 
 # A path goes on with at most this probability once Russian roulette plays.
 MAXIMUM_SURVIVAL = 0.95
-ENDLESS = 2**31
+UNLIMITED_DEPTH = 2**31
 
 
 class Rules(NamedTuple):
@@ -31,7 +31,7 @@ class Rules(NamedTuple):
     volumetric : bool
         Whether media scatter, and null boundaries let shadow rays through and cost no depth.
     max_depth : int
-        Vertices of the longest path, camera left out, light included; `ENDLESS` for no limit.
+        Vertices of the longest path, without the camera, with the light; or `UNLIMITED_DEPTH`.
     rr_depth : int
         Vertices before Russian roulette begins.
     hide_emitters : bool

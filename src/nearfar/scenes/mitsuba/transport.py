@@ -17,11 +17,11 @@ from nearfar.scenes.mitsuba.photos import SAMPLES_AT_ONCE, projector_of, require
 from nearfar.transport.exact import ExactTransport
 
 # Samples per camera pixel where none are given.
-SAMPLES = 4096
+DEFAULT_SAMPLES = 4096
 # Bytes of a block of T while it is summed.
 BLOCK_BYTES = 256 * 2**20
 # What Mitsuba turns linear RGB into a grey film's value with (Rec. 709 luminance).
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+LUMINANCE_WEIGHTS = np.array([0.212671, 0.715160, 0.072169])
 
 # Integrators whose paths can be followed, and their own longest path and start of roulette.
 INTEGRATORS = {
@@ -34,7 +34,7 @@ INTEGRATORS = {
 
 def render_transport(
     loaded: MitsubaScene,
-    samples: int = SAMPLES,
+    samples: int = DEFAULT_SAMPLES,
     seed: int = 0,
     *,
     progress: Callable[[str, float], None] | None = None,
@@ -90,7 +90,7 @@ def render_transport(
 
 
 def _rules(loaded: MitsubaScene) -> Any:
-    from nearfar.scenes.mitsuba.paths import ENDLESS, Rules
+    from nearfar.scenes.mitsuba.paths import UNLIMITED_DEPTH, Rules
 
     if loaded.integrator not in INTEGRATORS:
         raise InputError(
@@ -102,7 +102,7 @@ def _rules(loaded: MitsubaScene) -> Any:
     longest = int(loaded.settings.get("max_depth", longest))
     return Rules(
         volumetric=volumetric,
-        max_depth=ENDLESS if longest < 0 else longest,
+        max_depth=UNLIMITED_DEPTH if longest < 0 else longest,
         rr_depth=int(loaded.settings.get("rr_depth", roulette)) + volumetric,
         hide_emitters=bool(loaded.settings.get("hide_emitters", False)),
     )
@@ -120,7 +120,7 @@ def _light_fully(loaded: MitsubaScene) -> None:
 
 def _film_values(total: Floats, channels: int) -> Floats:
     """Turn sums (rows, P, 3) into channels: (channels, rows, P)."""
-    values = total if channels == 3 else (total @ LUMINANCE)[..., None]
+    values = total if channels == 3 else (total @ LUMINANCE_WEIGHTS)[..., None]
     return np.moveaxis(values, 2, 0)
 
 

@@ -20,7 +20,7 @@ FORMAT = "nearfar figure data"
 FORMAT_VERSION = 1
 ABOUT = "about"
 # Layers that only show what was measured.
-SHOWING = ("cli", "report")
+DISPLAY_LAYERS = ("cli", "report")
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ def code_fingerprint() -> str:
     home = Path(__file__).parents[2]
     for source in sorted(home.rglob("*.py")):
         place = source.relative_to(home)
-        if place.parts[0] in SHOWING:
+        if place.parts[0] in DISPLAY_LAYERS:
             continue
         digest.update(place.as_posix().encode())
         digest.update(source.read_bytes())

@@ -23,7 +23,7 @@ from nearfar.workflow.experiments.acquired import Report, relit, savings_in_theo
 from nearfar.workflow.experiments.data import Data
 
 # Which natural picture.
-PICTURE = 1
+PICTURE_SEED = 1
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def lights(projector: Size) -> dict[str, Floats]:
     """Return the four lights of figure 6, each (Py, Px)."""
     return {
         "white": white(projector),
-        "picture": natural_picture(projector, PICTURE),
+        "picture": natural_picture(projector, PICTURE_SEED),
         "letters": lettering(projector),
         "random": random_pattern(projector, 0),
     }

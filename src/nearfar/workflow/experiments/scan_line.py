@@ -19,7 +19,7 @@ from nearfar.workflow.experiments.acquired import Acquisition, Report, thin
 from nearfar.workflow.experiments.data import Data
 
 # Singular values above this share of the largest of T count towards a rank.
-RANK = 1e-3
+RANK_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,10 @@ def components_along_a_line(case: Acquisition, report: Report) -> Data:
         "window": case.window,
         "far": list(case.far),
         "line": y,
-        "rank_above": RANK,
+        "rank_above": RANK_TOLERANCE,
         "ranks": {
-            name: int(np.sum(values > RANK * strongest)) for name, values in singular.items()
+            name: int(np.sum(values > RANK_TOLERANCE * strongest))
+            for name, values in singular.items()
         },
         "energy": {name: float(np.sum(values**2)) for name, values in singular.items()},
         # Cycles along the line, as the paper counts k.

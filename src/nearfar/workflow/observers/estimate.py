@@ -25,7 +25,7 @@ from nearfar.estimate.joint import Choices, choose_components
 from nearfar.estimate.joint.estimator import JOINT, JointEstimator
 from nearfar.estimate.joint.problem import build_model
 from nearfar.photometry.in_memory import PhotosInMemory
-from nearfar.photometry.measure import answered, measure
+from nearfar.photometry.measure import measure, measured_basis
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import ends
 from nearfar.progress import ignore_progress
@@ -251,7 +251,7 @@ class EstimateObserver:
             measurements, q, plan.window, device=self._options.device, progress=self._stop_if_ended
         )
         # The estimate from all photos finds its matrices in the cache.
-        basis, multiplicity = answered(self._plan)
+        basis, multiplicity = measured_basis(self._plan)
         build_model(basis, multiplicity, plan.window, self._options.device, unlit=True)
         return _EarlyChoice(taken, components, time.monotonic() - start)
 

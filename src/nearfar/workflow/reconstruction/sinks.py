@@ -24,7 +24,7 @@ from nearfar.workflow.reconstruction.summary import Summary
 from nearfar.workflow.reconstruction.tiles import Tiling
 
 # A line for the job and one for each tile that is written; removed in the end.
-LOG = "blocks.jsonl"
+LOG_NAME = "blocks.jsonl"
 
 
 class Store(Protocol):
@@ -136,7 +136,7 @@ class FileSink:
 
     def note(self, tile: slice, summary: Summary) -> None:
         """Add a tile that is written to the log."""
-        note(self._folder / LOG, {"start": tile.start, **summary._asdict()})
+        note(self._folder / LOG_NAME, {"start": tile.start, **summary._asdict()})
 
     def finish(self, whole: Summary) -> None:
         """Write the provenance, and remove what lost workers left half-written."""
@@ -184,7 +184,7 @@ def resumable_file(
             if lines := _lines(folder):
                 _require_same(folder, lines[0], identity)
             else:
-                note(folder / LOG, identity)
+                note(folder / LOG_NAME, identity)
             # What was being written when the job was killed.
             for left in folder.rglob(".*.partial"):
                 left.unlink()
@@ -197,7 +197,7 @@ def resumable_file(
         if kept := _kept(output):
             raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
         raise
-    (output.resolve() / LOG).unlink(missing_ok=True)
+    (output.resolve() / LOG_NAME).unlink(missing_ok=True)
 
 
 @contextmanager
@@ -206,7 +206,7 @@ def new_file(output: Path, tiling: Tiling, *, force: bool) -> Iterator[FileSink]
     with new_output(output, force=force) as folder:
         folder.mkdir()
         yield FileSink(folder, tiling)
-        (folder / LOG).unlink(missing_ok=True)
+        (folder / LOG_NAME).unlink(missing_ok=True)
 
 
 def identity_of(
@@ -248,7 +248,7 @@ def stored_tiles(folder: Path) -> dict[int, Summary]:
 
 def _lines(folder: Path) -> list[Mapping[str, Any]]:
     """Read the log: the identity, and then the tiles."""
-    return read_notes(folder / LOG, lambda line: line)
+    return read_notes(folder / LOG_NAME, lambda line: line)
 
 
 def _digest(correspondence: Correspondence | None) -> str:

@@ -13,13 +13,13 @@ from nearfar.plan import Plan
 # Bytes that Python and the libraries take.
 LIBRARY_BYTES = 4 * 10**8
 # Arrays that come and go take so many times the bytes of those that are counted.
-TEMPORARIES = 1.5
+TEMPORARY_FACTOR = 1.5
 # Tiles of so many rows twice over, or more, are of a multiple of them: chunks in a file divide
 # tiles, and need not be small.
 ROWS_MULTIPLE = 8
 # Bytes of each value of the camera that references take: mean white and black, and whether white
 # is saturated.
-REFERENCE_BYTES = 9
+REFERENCE_BYTES_PER_VALUE = 9
 
 
 class Tiling(NamedTuple):
@@ -75,7 +75,7 @@ def tile_rows(
     if rows + beside >= camera.height:
         return Tiling(camera.height, camera.height, halo)
     if rows < 1:
-        least = shared + row * min(beside + 1, camera.height)
+        least = memory_of_tile(plan, camera, channels, estimator, min(1, camera.height - beside))
         raise InputError(
             f"{memory / 1e6:.0f} MB of memory are too few for one row of these photos: give "
             f"`memory={int(np.ceil(least / 1e8)) * 10**8}` or more."
@@ -102,7 +102,7 @@ def rows_to_measure(
 
 def reference_bytes(plan: Plan, camera: Size, channels: int) -> int:
     """Return the bytes of what references tell of the whole camera, none for other plans."""
-    return REFERENCE_BYTES * camera.pixels * channels if plan.offset == "reference" else 0
+    return REFERENCE_BYTES_PER_VALUE * camera.pixels * channels if plan.offset == "reference" else 0
 
 
 def _shared_and_row(
@@ -111,7 +111,7 @@ def _shared_and_row(
     """Return the bytes that all rows share, and those of a row."""
     shared, pixel = estimator.memory(plan, channels)
     shared += LIBRARY_BYTES + reference_bytes(plan, camera, channels)
-    return shared, TEMPORARIES * pixel * camera.width
+    return shared, TEMPORARY_FACTOR * pixel * camera.width
 
 
 def _rows_beside(estimator: Estimator) -> int:

@@ -2,12 +2,15 @@
 
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from nearfar.cli.commands import COMMANDS
+from nearfar.plan import paper_plan
+from nearfar.rigs.tables import RealTable, SimulatedTable
 from nearfar.scenes.cache import cached_scene
 from tests.rigs.displays import one_monitor
 from tests.rigs.test_loop import CAMERA, PROJECTOR, Bench
@@ -32,7 +35,8 @@ def fences(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_block_of_a_page_is_run(page):
     for kind, text in fences(page):
-        if kind in {"run", "on-a-rig", "toctree", "eval-rst"}:
+        # Tables of a RIG.toml are read by test_the_rig_files_that_are_shown_are_read.
+        if kind in {"run", "on-a-rig", "toctree", "eval-rst", "toml"}:
             continue
         assert kind == "", f"{page.name}: a block of {kind}"
         for line in text.splitlines():
@@ -44,6 +48,34 @@ def test_every_block_of_a_page_is_run(page):
 def test_commands_that_are_named_in_passing_are_there(page):
     for shown in re.findall(r"`nearfar ([a-z]+)[^`]*`", page.read_text()):
         assert shown in COMMANDS
+
+
+def test_the_rig_files_that_are_shown_are_read():
+    shown = {page.name: [text for kind, text in fences(page) if kind == "toml"] for page in PAGES}
+    assert {name for name, texts in shown.items() if texts} == {"real-rig.md", "scenes.md"}
+    (real,), (text,) = shown["real-rig.md"], shown["scenes.md"]
+    assert RealTable.model_validate(tomllib.loads(real)).camera.driver == "aravis"
+    table = SimulatedTable.model_validate(tomllib.loads(text))
+    assert table.camera.bits == 14
+    # Uncommented lines too.
+    SimulatedTable.model_validate(tomllib.loads(text.replace("# exposure", "exposure")))
+
+
+def test_the_counts_of_the_papers_plans():
+    page = (DOCS / "howto" / "window-and-band.md").read_text()
+    rows = re.findall(r"\| (\d+)x(\d+) \| (\d+) \| (\d+)x(\d+) \| (\d+) \| ([\d.]+) times", page)
+    assert len(rows) == 3
+    for height, width, window, far_height, far_width, photos, times in rows:
+        theory = photos == "423"
+        plan = paper_plan(
+            (int(height), int(width)),
+            int(window),
+            (int(far_height), int(far_width)),
+            dropped=(3, 3) if theory else None,
+            offset="none" if theory else "inverse",
+        )
+        assert plan.transport_photos == int(photos)
+        assert f"{plan.savings:.2f}" == times
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What the README shows works as it stands."""
+"""What README and CONTRIBUTING show works as it stands."""
 
 import re
 import shlex
@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from nearfar.cli.commands import COMMANDS
-from nearfar.plan import Plan, paper_plan
-from nearfar.rigs.tables import RealTable, SimulatedTable
+from nearfar.plan import Plan
 from nearfar.transport.model import Transport
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def _blocks(language: str) -> list[str]:
@@ -38,47 +38,32 @@ def test_the_quick_start_runs(tmp_path: Path, monkeypatch):
     assert names["operator"].shape == (4096, 4096)
 
 
-def test_every_command_it_shows_is_one():
-    known = set(COMMANDS)
-    shown = [
-        shlex.split(line.split("#")[0])
-        for block in _blocks("")
-        for line in block.splitlines()
-        if line.startswith("nearfar ")
-    ]
-    assert {words[1] for words in shown} >= {
-        "plan", "export", "import", "reconstruct", "relight", "evaluate", "acquire", "render",
-        "info", "convert", "figures", "check", "separate",
-    }  # fmt: skip
-    assert {words[1] for words in shown} <= known
+def test_every_command_is_shown_and_what_it_shows_is_one():
+    in_blocks = [line for block in _blocks("") for line in block.splitlines()]
+    shown = {
+        shlex.split(line.split("#")[0])[1] for line in in_blocks if line.startswith("nearfar ")
+    }
+    assert shown >= {"plan", "acquire", "reconstruct", "relight"}
+    named = set(re.findall(r"`nearfar ([a-z]+)[^`]*`", README))
+    assert shown | named == set(COMMANDS.own)
 
 
-def test_the_rig_files_it_shows_are_read():
-    text, real = _blocks("toml")
-    assert RealTable.model_validate(tomllib.loads(real)).camera.driver == "aravis"
-    table = SimulatedTable.model_validate(tomllib.loads(text))
-    assert table.camera.bits == 14
-    # Uncommented lines too.
-    SimulatedTable.model_validate(tomllib.loads(text.replace("# exposure", "exposure")))
+def test_it_fits_on_a_screen_and_a_half():
+    assert len(README.splitlines()) <= 110
 
 
-def test_the_counts_it_states():
-    rows = re.findall(r"\| (\d+)x(\d+) \| (\d+) \| (\d+)x(\d+) \| (\d+) \| ([\d.]+) times", README)
-    assert len(rows) == 3
-    for height, width, window, far_height, far_width, photos, times in rows:
-        theory = photos == "423"
-        plan = paper_plan(
-            *_sizes((height, width)),
-            int(window),
-            *_sizes((far_height, far_width)),
-            dropped=_sizes((3, 3))[0] if theory else None,
-            offset="none" if theory else "inverse",
-        )
-        assert plan.transport_photos == int(photos)
-        assert f"{plan.savings:.2f}" == times
+def test_the_files_it_links_to_are_there():
+    links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", README)
+    assert len(links) > 10
+    for link in links:
+        assert (ROOT / link).is_file(), link
 
 
-def _sizes(*pairs):
-    from nearfar.arrays import Size
-
-    return [Size(int(height), int(width)) for height, width in pairs]
+def test_layers_are_those_that_are_checked():
+    contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    (listed,) = re.findall(r"^```\n(cli  .*?)^```$", contributing, flags=re.DOTALL | re.MULTILINE)
+    rows = [re.split(r" {2,}", line)[0].split(", ") for line in listed.splitlines()]
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    (layers,) = [contract["layers"] for contract in contracts if contract["type"] == "layers"]
+    assert rows == [layer.split(" : ") for layer in layers if layer != "__main__"]

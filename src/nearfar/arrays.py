@@ -1,4 +1,4 @@
-"""Array types, sizes and the walk over camera pixels in blocks.
+"""Array types, sizes, and slices that divide camera pixels or rows.
 
 Everywhere: images are [y, x] or [y, x, channel], a size AxB is height x width, and camera or
 projector pixels are flattened row by row.
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nearfar.errors import InputError
 
-# Where a file is, for functions that users call.
+# What public functions take as the path of a file.
 AnyPath = str | os.PathLike[str]
 
 Floats = NDArray[np.floating[Any]]
@@ -175,27 +175,27 @@ def namespace(*values: Any) -> Any:
 
 
 def beside(constant: NDArray[Any], values: Any) -> Any:
-    """Return a NumPy array as one of the kind of `values`, on the same device."""
+    """Return a NumPy array as an array of the library and on the device of `values`."""
     if is_numpy_array(values):
         return constant
     return namespace(values).asarray(constant, device=device(values))
 
 
 def fetch(values: Any) -> NDArray[Any]:
-    """Return an array as NumPy's."""
+    """Return an array of any library as a NumPy array."""
     if is_numpy_array(values):
         return np.asarray(values)
     return np.from_dlpack(to_device(values, "cpu"))
 
 
 def product(values: Floats, matrix: Floats) -> Floats:
-    """Return (..., a) times (a, b) as one product, where NumPy makes one for each first axis."""
+    """Return (..., a) @ (a, b) as one matrix product; NumPy computes one for each leading index."""
     flat = values.reshape((math.prod(values.shape[:-1]), values.shape[-1])) @ matrix
     return flat.reshape((*values.shape[:-1], matrix.shape[1]))
 
 
 def blocks(count: int, length: int) -> Iterator[slice]:
-    """Cut ``range(count)`` into slices of at most `length`."""
+    """Divide ``range(count)`` into slices of at most `length`."""
     for start in range(0, count, max(1, length)):
         yield slice(start, min(count, start + max(1, length)))
 
@@ -203,6 +203,6 @@ def blocks(count: int, length: int) -> Iterator[slice]:
 def middles(count: int, length: int) -> Integers:
     """Return the middle of each slice of ``blocks(count, length)``, int64.
 
-    What is shown of a picture that is thinned out stands where its cell is.
+    Thinning a picture to them keeps each pixel in the middle of its cell.
     """
     return np.array([(b.start + b.stop - 1) // 2 for b in blocks(count, length)], dtype=np.int64)

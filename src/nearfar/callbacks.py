@@ -1,4 +1,4 @@
-"""The callback that reports progress, without what draws it: see `nearfar.progress`."""
+"""Callbacks that report progress; `nearfar.progress` draws them."""
 
 from collections.abc import Callable
 from inspect import signature
@@ -6,20 +6,20 @@ from typing import Any, cast
 
 from nearfar.deprecation import warn_of
 
-# What every function that takes long calls as `progress`: with what is being done, and the share
-# of it that is done, 0 to 1.
+# The type of `progress` of every function that takes long. It is called with the step and the share
+# of the step that is done, 0 to 1.
 Report = Callable[[str, float], None]
-# A callback of before: called with a count, or with a share.
+# The deprecated type of `progress`: called with a count or a share alone.
 OldReport = Callable[[Any], None]
 
 
 def counting(report: Report, what: str, total: int) -> Callable[[int], None]:
-    """Return a function that takes the number of things done, and reports the share of `total`."""
+    """Return a function that takes a count and reports its share of `total`."""
     return lambda done: report(what, done / max(1, total))
 
 
 def counted(report: Report, what: str, total: int) -> Callable[..., None]:
-    """Return a callback that takes a count; every function now takes a report of shares as it is.
+    """Return a callback that takes a count and reports the share done.
 
     .. deprecated:: 0.1
         Give `report` itself as `progress`.
@@ -27,16 +27,16 @@ def counted(report: Report, what: str, total: int) -> Callable[..., None]:
     Parameters
     ----------
     report : callable
-        Takes what is being done and the share of it that is done.
+        Takes the step and the share of it that is done.
     what : str
-        What is counted.
+        The step.
     total : int
-        The count at which all is done.
+        The count at which the step is done.
 
     Returns
     -------
     callable
-        Takes a count, or what is being done and its share.
+        Takes a count, or a step and its share.
     """
 
     def report_either(*done: Any) -> None:
@@ -48,15 +48,15 @@ def counted(report: Report, what: str, total: int) -> Callable[..., None]:
 def as_report(
     progress: Report | OldReport | None, total: float = 1.0, *, stacklevel: int = 4
 ) -> Report:
-    """Return a callback of shares, whichever callback a user gave.
+    """Return a callback of a step and a share from either type of callback.
 
     Parameters
     ----------
     progress : callable, optional
-        A report of shares; or, with a warning, a callback of one argument as before.
+        A callback of a step and a share; or, with a warning, the deprecated one of one argument.
     total : float
-        What a callback of one argument is called with when all is done: a count as an int, or
-        a share as a float.
+        What a callback of one argument is called with at the end: a count as an int, or a share as
+        a float.
     stacklevel : int
         As `warnings.warn` takes it; 4 is the caller of the function that calls this one.
     """
@@ -75,7 +75,7 @@ def as_report(
             return lambda _what, share: of_one(round(share * total))
         return lambda _what, share: of_one(share * total)
     except ValueError:
-        # A built-in that does not tell its arguments.
+        # A built-in function without a signature.
         pass
     return cast("Report", progress)
 

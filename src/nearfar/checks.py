@@ -1,4 +1,4 @@
-"""Checks of what public functions are given; sizes are checked by `nearfar.arrays.as_size`.
+"""Checks of the arguments of public functions; `nearfar.arrays.as_size` checks sizes.
 
 Each returns the argument in the form that the code behind works with, or raises `InputError`
 naming the argument, what is wrong with it, and the cure.

@@ -1,7 +1,7 @@
-"""Where arrays are worked at: NumPy's on the processor, PyTorch's on an accelerator.
+"""Devices for arrays: NumPy on the processor, PyTorch on an accelerator.
 
-Estimators and prepared transports are written in the functions of the Python array API; which
-library they run in follows from the arrays that they are given.
+Estimators and prepared transports use the functions of the Python array API; the library that
+computes is that of the arrays they are given.
 """
 
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from nearfar.errors import InputError, MissingPackageError
 
-# "torch" is PyTorch on the processor: the accelerator's code without one.
+# "torch" is PyTorch on the processor: the code for an accelerator, without an accelerator.
 Device = Literal["cpu", "cuda", "torch"]
 
 
 def mover(device: Device) -> Callable[[NDArray[Any]], Any]:
-    """Return what puts NumPy arrays onto a device.
+    """Return a function that copies NumPy arrays to a device.
 
     Raises
     ------
     MissingPackageError
-        If PyTorch is not installed, and needed.
+        If the device needs PyTorch and it is not installed.
     InputError
         If there is no such device.
     """
@@ -47,5 +47,5 @@ def mover(device: Device) -> Callable[[NDArray[Any]], Any]:
 
 
 def require_device(device: Device) -> None:
-    """Refuse a device that is not there; raises as `mover`."""
+    """Raise the error of `mover` if a device is not there."""
     mover(device)

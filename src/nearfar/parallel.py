@@ -1,4 +1,4 @@
-"""Pieces of work side by side in threads: NumPy lets go of the interpreter while it computes."""
+"""Threads for NumPy's work: it releases the interpreter lock while it computes."""
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -8,34 +8,36 @@ from threadpoolctl import threadpool_limits
 
 from nearfar.arrays import processors
 
-Part = TypeVar("Part")
-Found = TypeVar("Found")
+Item = TypeVar("Item")
+Fetched = TypeVar("Fetched")
 
-# Each part holds some hundred megabytes at the largest sizes.
-MOST = 8
+# Each item takes some hundred megabytes at the largest sizes.
+MAXIMUM_THREADS = 8
 
 
-def side_by_side(work: Callable[[Part], None], parts: Iterable[Part]) -> None:
-    """Do the work for every part, on all processors; the parts write to places of their own.
+def side_by_side(work: Callable[[Item], None], items: Iterable[Item]) -> None:
+    """Call `work` with every item, in threads on all processors; no two may write the same data.
 
-    Matrix products within a part stay on its processor, so that what comes out does not depend
-    on how many there are.
+    A matrix product within `work` runs on one processor, so the result does not depend on the
+    number of processors.
     """
-    workers = min(MOST, processors())
+    workers = min(MAXIMUM_THREADS, processors())
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(max_workers=workers) as pool:
-        # Reading the results raises what a part raised.
-        for _ in pool.map(work, parts):
+        # Reading the results raises the errors of the threads.
+        for _ in pool.map(work, items):
             pass
 
 
-def ahead(fetch: Callable[[Part], Found], parts: Iterable[Part]) -> Iterator[tuple[Part, Found]]:
-    """Yield each part with what is fetched for it; the next is fetched while one is worked at."""
+def ahead(
+    fetch: Callable[[Item], Fetched], items: Iterable[Item]
+) -> Iterator[tuple[Item, Fetched]]:
+    """Yield each item with what `fetch` returns for it; the next is fetched in the meantime."""
     with ThreadPoolExecutor(max_workers=1) as pool:
-        before: tuple[Part, Future[Found]] | None = None
-        for part in parts:
-            under_way = part, pool.submit(fetch, part)
+        before: tuple[Item, Future[Fetched]] | None = None
+        for item in items:
+            pending = item, pool.submit(fetch, item)
             if before is not None:
                 yield before[0], before[1].result()
-            before = under_way
+            before = pending
         if before is not None:
             yield before[0], before[1].result()

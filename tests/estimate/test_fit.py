@@ -44,7 +44,7 @@ def test_no_other_n_and_f_fit_better():
     rows = exact.rows(slice(None))[:, 0] - fitted.component_rows(slice(None)).direct[:, 0]
     centres = near.centre(fitted.correspondence, PROJECTOR)
     inside = near.inside(centres, WINDOW, PROJECTOR)
-    places = near.places_on(centres, WINDOW, PROJECTOR)
+    places = near.window_pixels(centres, WINDOW, PROJECTOR)
     for c in range(0, CAMERA.pixels, 5):
         identity = np.eye(PROJECTOR.pixels)[places[c][inside[c]]]
         basis = np.concatenate([identity, world.far_basis.patterns])

@@ -21,7 +21,7 @@ from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import TRUSTED, of_pixels, of_rows, stacked, thinned_blocks
+from nearfar.transport.rows import QUALITY_FIELDS, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.store import (
     FACTORS,
     POSTERIOR_FIELDS,
@@ -87,7 +87,7 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
         values = getattr(loaded, name)
         np.testing.assert_array_equal(values, getattr(transport.posterior, name))
         assert values.dtype == getattr(transport.posterior, name).dtype
-    for name in TRUSTED:
+    for name in QUALITY_FIELDS:
         values = getattr(load_transport(tmp_path / "t.zarr").quality, name)
         np.testing.assert_array_equal(values, getattr(transport.quality, name))
         assert values.dtype == getattr(transport.quality, name).dtype
@@ -176,7 +176,7 @@ def test_rows_are_read_in_blocks(tmp_path, generator, size):
     for name in POSTERIOR_FIELDS:
         got = getattr(whole.posterior, name)
         np.testing.assert_array_equal(got, getattr(transport.posterior, name))
-    for name in TRUSTED:
+    for name in QUALITY_FIELDS:
         got = getattr(whole.quality, name)
         np.testing.assert_array_equal(got, getattr(transport.quality, name))
     assert (stored.camera, stored.channels) == (transport.camera, transport.channels)

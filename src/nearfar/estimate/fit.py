@@ -54,27 +54,27 @@ def fit_model(
     d = np.zeros((pixels, channels), dtype=np.float32)
     n = np.zeros((pixels, channels, window**2), dtype=np.float32)
     f = np.zeros((pixels, channels, far_basis.count), dtype=np.float32)
-    for block in blocks(pixels, BATCH_PIXELS):
-        rows = truth.rows(block)
-        corners = direct.Footprint(where.pixels[block], where.weights[block])
-        d[block] = _direct(truth, rows, block, corners)
+    for batch in blocks(pixels, BATCH_PIXELS):
+        rows = truth.rows(batch)
+        corners = direct.Footprint(where.pixels[batch], where.weights[batch])
+        d[batch] = _direct(truth, rows, batch, corners)
         number = np.arange(len(rows))[:, None]
         for i in range(channels):
             # At the border two corners may be one pixel: subtract each on its own.
-            taken = corners.weights * d[block, i, None]
+            taken = corners.weights * d[batch, i, None]
             np.subtract.at(rows[:, i], (number, corners.pixels), taken)
-        inside = near.inside(centres[block], window, truth.projector) & lit[block, None]
-        places = near.places_on(centres[block], window, truth.projector)
-        within = rows[number[:, :, None], np.arange(channels)[:, None], places[:, None]]
+        inside = near.inside(centres[batch], window, truth.projector) & lit[batch, None]
+        entries = near.window_pixels(centres[batch], window, truth.projector)
+        within = rows[number[:, :, None], np.arange(channels)[:, None], entries[:, None]]
         within = within * inside[:, None]
-        f[block] = _far(rows, within, inside, centred, centres[block])
+        f[batch] = _far(rows, within, inside, centred, centres[batch])
         seen: Floats = (
-            centred.recentre(f[block] * far_basis.weights, centres[block]) @ centred.on_window
+            centred.recentre(f[batch] * far_basis.weights, centres[batch]) @ centred.on_window
         )
-        n[block] = (within - seen) * inside[:, None]
+        n[batch] = (within - seen) * inside[:, None]
         # The paper's own far step: what D and N leave at the far frequencies is f's.
-        responses = centred.uncentre(n[block] @ centred.on_window.T, centres[block])
-        f[block] = rows @ far_basis.patterns.T - responses
+        responses = centred.uncentre(n[batch] @ centred.on_window.T, centres[batch])
+        f[batch] = rows @ far_basis.patterns.T - responses
     shape = (*truth.camera, channels)
     return Transport(
         projector=truth.projector,
@@ -88,10 +88,10 @@ def fit_model(
     )
 
 
-def _direct(truth: ExactTransport, rows: Floats, block: slice, corners: direct.Footprint) -> Floats:
+def _direct(truth: ExactTransport, rows: Floats, batch: slice, corners: direct.Footprint) -> Floats:
     """Known d, or the row's own values at q."""
     if truth.is_apart:
-        return np.stack([part[block].sum(axis=1) for part in truth.direct], axis=1)
+        return np.stack([part[batch].sum(axis=1) for part in truth.direct], axis=1)
     number = np.arange(len(rows))[:, None]
     return np.stack(
         [

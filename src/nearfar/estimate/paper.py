@@ -87,7 +87,7 @@ def estimate(
         Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
         processor.
     progress : callable, optional
-        Called with the number of camera pixels done after each block.
+        Called with the number of camera pixels done after each batch.
 
     Returns
     -------
@@ -116,13 +116,13 @@ def estimate(
     low = np.empty((number, channels, matrices.far.basis.count), dtype=np.float32)
     done = [0]
 
-    def work(block: slice) -> None:
-        batch = _gather(measurements, where, lit, centres, block, matrices, errors)
+    def work(selected: slice) -> None:
+        batch = _gather(measurements, where, lit, centres, selected, matrices, errors)
         batch = _PixelBatch._make(map(move, batch))
-        found = _estimate_block(batch, there, rounds)
+        found = _estimate_batch(batch, there, rounds)
         for values, own in ((direct, found.direct), (windows, found.near), (low, found.far)):
-            values[block] = fetch(own)
-        done[0] += block.stop - block.start
+            values[selected] = fetch(own)
+        done[0] += selected.stop - selected.start
         if progress is not None:
             progress(done[0])
 
@@ -148,7 +148,7 @@ class _QuantisationErrors(NamedTuple):
 
 
 class _PixelBatch(NamedTuple):
-    """A block of camera pixels; each field's first axis runs over them."""
+    """A batch of camera pixels; each field's first axis runs over them."""
 
     centres: NDArray[np.int64]
     lit: Booleans
@@ -186,7 +186,7 @@ class _Estimate(NamedTuple):
             values[selected] = new
 
 
-def _estimate_block(batch: _PixelBatch, matrices: Matrices, rounds: int) -> _Estimate:
+def _estimate_batch(batch: _PixelBatch, matrices: Matrices, rounds: int) -> _Estimate:
     """Alternate near and far; each camera pixel stops when its own leaks have settled.
 
     Where a scene does not obey the model, or the near set reaches into the far band, the rounds
@@ -279,16 +279,16 @@ def _gather(
     where: Footprint,
     lit: Booleans,
     centres: NDArray[np.int64],
-    block: slice,
+    selected: slice,
     matrices: Matrices,
     errors: _QuantisationErrors,
 ) -> _PixelBatch:
-    """Gather what the rounds of a block need."""
+    """Gather the data of a batch of camera pixels."""
     projector = measurements.projector
-    where = Footprint(where.pixels[block], where.weights[block])
-    centres = centres[block]
+    where = Footprint(where.pixels[selected], where.weights[selected])
+    centres = centres[selected]
     weights = _footprint_weights(where, centres, projector.width)
-    responses = measurements.responses[block]
+    responses = measurements.responses[selected]
 
     def of_error(error: Floats) -> Floats:
         """Return responses (n, 1, R) of unit direct light to quantisation errors."""
@@ -301,10 +301,10 @@ def _gather(
     near_error = near_basis.recentre(of_error(errors.near), centres)
     return _PixelBatch(
         centres=centres,
-        lit=lit[block],
+        lit=lit[selected],
         inside=near.inside(centres, matrices.window, projector),
         weights=weights,
-        noise=measurements.noise[block],
+        noise=measurements.noise[selected],
         light=np.abs(responses).max(axis=(1, 2)),
         checkerboard=checkerboard.recentre(responses[..., checkerboard.places], centres),
         near=near_basis.recentre(responses[..., near_basis.places], centres),

@@ -1,4 +1,4 @@
-"""What is known of any transport whose components are apart, measured or exact."""
+"""The common attributes of measured and exact transports with separate components."""
 
 from typing import Protocol
 
@@ -6,7 +6,7 @@ from nearfar.arrays import Floats, Size
 
 
 class Apart(Protocol):
-    """A transport whose components are known apart."""
+    """A transport whose components are known separately."""
 
     @property
     def projector(self) -> Size:

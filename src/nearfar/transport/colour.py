@@ -1,4 +1,4 @@
-"""Colour lights: what each channel of the camera sees of red, green and blue."""
+"""Colour lights, converted into one light for each channel of the camera."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,17 +9,17 @@ from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import luminance
 
-# Where a rig's description keeps what its calibration found.
+# Entry of a rig's description with the colour mixing that its calibration found.
 MIXING = "colour_mixing"
 
 
 def as_channels_see(light: Floats, channels: int, provenance: Mapping[str, Any]) -> Floats:
-    """Turn a colour light into one for each channel of the camera.
+    """Convert a colour light into one light for each channel of the camera.
 
-    Patterns are white, so a channel's transport is that of white light. Of red, green and blue
-    alone it responds with the shares that the calibration found, taken to be the same all over the
-    scene. Without a calibration red goes to the first channel and so on, and a camera of one
-    channel sees luminance.
+    Patterns are white, so a channel's transport is that of white light. A calibration finds which
+    share of a channel's response to white is due to red, green and blue; the shares are assumed to
+    be the same all over the scene. Without a calibration, a camera of three channels sees red,
+    green and blue, and a camera of one channel sees luminance.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ def as_channels_see(light: Floats, channels: int, provenance: Mapping[str, Any])
     Raises
     ------
     InputError
-        If what the calibration found is of another number of channels, or there is none and the
-        camera has neither one channel nor three.
+        If the calibration has another number of channels than the transport, or there is none and
+        the camera has neither one channel nor three.
     """
     if light.ndim == 2:
         return light

@@ -13,24 +13,24 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, Size, namespace
 
-# q closer than this to a whole pixel is taken as that pixel.
-WHOLE = 1e-4
+# A q closer than this to a whole pixel is rounded to it.
+WHOLE_PIXEL_TOLERANCE = 1e-4
 
 
 class Footprint(NamedTuple):
-    """Where direct light comes from: flat projector pixels and their weights, both (C, 4)."""
+    """Projector pixels that direct light comes from, flat, and their weights, both (C, 4)."""
 
     pixels: NDArray[np.int64]
     weights: NDArray[np.float32]
 
 
 def footprint(correspondence: Floats, projector: Size) -> Footprint:
-    """Spread each q over the 2 x 2 projector pixels around it.
+    """Return the 2 x 2 projector pixels around each q, and their bilinear weights.
 
     Parameters
     ----------
     correspondence : ndarray, shape (..., 2)
-        q as (y, x), NaN where there is no direct light; those get weight 0.
+        q as (y, x), NaN where there is no direct light, which gets weights of 0.
     projector : Size
 
     Returns
@@ -43,7 +43,7 @@ def footprint(correspondence: Floats, projector: Size) -> Footprint:
     limit = np.array(projector, dtype=np.float64) - 1
     q = np.clip(np.where(lit[:, None], q, 0.0), 0.0, limit)
     nearest = np.rint(q)
-    q = np.where(np.abs(q - nearest) < WHOLE, nearest, q)
+    q = np.where(np.abs(q - nearest) < WHOLE_PIXEL_TOLERANCE, nearest, q)
     low = np.floor(q).astype(np.int64)
     high = np.minimum(low + 1, limit.astype(np.int64))
     part = q - low
@@ -60,14 +60,21 @@ def footprint(correspondence: Floats, projector: Size) -> Footprint:
 
 
 def look_up(light: Floats, where: Footprint) -> Floats:
-    """Read a light (..., P) at each camera pixel's footprint: shape (..., C)."""
+    """Return the weighted sum of a light (..., P) over each footprint: shape (..., C)."""
     return np.asarray(np.einsum("...ck,ck->...c", light[..., where.pixels], where.weights))
 
 
 def look_up_each(responses: Floats, pixels: Integers, weights: Floats) -> Floats:
-    """Read the responses (P, R) of every projector pixel at footprints, both (n, 4): (n, R).
+    """Return the weighted sums of responses (P, R) over footprints, shape (n, R).
 
-    What a camera pixel asks for lies side by side; corners that nobody weighs are not read.
+    Corners whose weights are all 0 are skipped.
+
+    Parameters
+    ----------
+    responses : array, shape (P, R)
+        Of each projector pixel; one row holds all that a corner needs.
+    pixels, weights : arrays, shape (n, 4)
+        Of the footprints.
     """
     found: Floats = responses[pixels[:, 0]] * weights[:, :1]
     xp = namespace(responses)
@@ -84,8 +91,8 @@ def spread(image: Floats, where: Footprint, projector: Size) -> Floats:
     return np.asarray(summed, dtype=np.float64)
 
 
-def footprint_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats:
-    """Return weights of direct light at q about the rounded q, and their derivatives by q.
+def direct_weights(correspondence: Floats, centres: NDArray[np.int64]) -> Floats:
+    """Return the weights of direct light on the 3 x 3 pixels around q, and their derivatives by q.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A transport that is known: dense or sparse components, per channel, without a model."""
+"""A transport that is known exactly: its components as dense or sparse matrices per channel."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,12 +33,12 @@ class ExactTransport(NoArray):
     projector, camera : Size or (height, width)
         Sizes of the pattern grid and of the photo.
     direct, near : tuple of scipy.sparse.csr_array, one per channel
-        D and N, shape (C, P), float32. Empty tuples where the components are not known apart;
-        then `far` holds all of T.
+        D and N, shape (C, P), float32. Empty tuples if the components are not known separately;
+        then `far` is all of T.
     far : ndarray, shape (channels, C, P), float32
         F, or all of T.
     name : str
-        What scene or file this is.
+        Scene or file.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class ExactTransport(NoArray):
                 if matrix.shape != (rows, columns):
                     raise InputError(f"{self.name}: its components differ in their sizes.")
                 finite_numbers(matrix.data, f"{self.name}: its components")
-        # Row by row: all of it at once would take another fourth of its memory.
+        # Row by row: checking all of it at once would take another fourth of its memory.
         for row in far.reshape(-1, columns):
             finite_numbers(row, f"{self.name}: far")
 
@@ -91,7 +91,7 @@ class ExactTransport(NoArray):
 
     @property
     def is_apart(self) -> bool:
-        """Whether direct, near and far are known apart."""
+        """Whether direct, near and far are known separately."""
         return bool(self.direct)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Exact transports on the disk: what ``nearfar render`` writes, and plain arrays."""
+"""Exact transports in files: what ``nearfar render`` writes, and plain arrays."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,13 +24,13 @@ from nearfar.transport.store import listed, write_in_rows
 
 KIND = "nearfar exact transport"
 FORMAT_VERSION = 1
-# A last axis of at most this is channels, not projector pixels.
-MOST_CHANNELS = 4
+# A longer last axis is not one of channels.
+MAXIMUM_CHANNELS = 4
 
 
 @path_after_content
 def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False) -> None:
-    """Write an exact transport, its components apart, as a Zarr group.
+    """Write an exact transport, each component by itself, as a Zarr group.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _write_sparse(group: Any, name: str, matrix: sparse.csr_array) -> None:
         ("indices", matrix.indices.astype(np.int64)),
         ("starts", matrix.indptr.astype(np.int64)),
     ):
-        # Zarr keeps no empty array: one value more that nobody reads.
+        # Zarr stores no empty array: append one value, which reading drops.
         padded = np.append(values, values.dtype.type(0))
         add_array(group, f"{name}-{suffix}", padded.shape, padded.dtype, padded.shape)[:] = padded
 
@@ -95,19 +95,19 @@ def load_exact(
     Parameters
     ----------
     path : str or Path
-        A dense T is (C, P) or (C, P, channels), or with its axes apart (Cy, Cx, Py, Px) or
+        A dense T is (C, P) or (C, P, channels), or unflattened (Cy, Cx, Py, Px) or
         (Cy, Cx, Py, Px, channels). An .npz holds it as ``T``, or as ``direct``, ``near`` and
         ``far``, and may hold ``projector`` and ``camera`` as (height, width).
     projector, camera : Size or (height, width), optional
-        Sizes for a dense T that does not hold them. A camera that is left out is as large as the
-        projector, or a whole number of times finer on both axes.
+        Sizes for a dense T whose file has none. By default the camera has the projector's size
+        times the whole number that gives the rows of T.
 
     Raises
     ------
     MissingFileError, UnreadableFileError
         If it is not there, damaged or of another kind.
     InputError
-        If its sizes do not follow from it, or do not fit.
+        If its sizes are not known, or do not fit the matrix.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def _stored_size(arrays: Mapping[str, NDArray[Any]], name: str, path: Path) -> S
 def _as_matrices(
     dense: Floats, projector: Size | None, camera: Size | None, source: str
 ) -> tuple[Floats, Size, Size]:
-    """Bring a dense T to (channels, C, P) and tell its sizes."""
+    """Return a dense T as (channels, C, P), with the sizes of projector and camera."""
     dense = np.asarray(dense)
     if dense.dtype.kind not in "fiu":
         raise InputError(f"{source} holds {dense.dtype}, not numbers: save T as floats.")
@@ -195,7 +195,7 @@ def _as_matrices(
         dense = dense.reshape(camera.pixels, projector.pixels, *dense.shape[4:])
     if dense.ndim == 2:
         dense = dense[..., None]
-    if dense.ndim != 3 or dense.shape[2] > MOST_CHANNELS:
+    if dense.ndim != 3 or dense.shape[2] > MAXIMUM_CHANNELS:
         raise InputError(
             f"{source} has shape {dense.shape}: a dense transport is (C, P) or (C, P, channels)."
         )

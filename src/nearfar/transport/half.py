@@ -1,7 +1,7 @@
-"""Windows and bands in half precision: half the bytes, where the noise is above the rounding.
+"""n and f in half precision, which takes half the bytes, and the rounding error beside the noise.
 
-float16 keeps 11 binary digits, so rounding strays by 2^-12 / sqrt(3) of a value at the most and
-0.8 times that on average over a power of 2.
+float16 has 11 significant bits: the root mean square of its rounding error is at most
+2^-12 / sqrt(3) of a value, and 0.8 times that on average over a power of 2.
 """
 
 from dataclasses import replace
@@ -11,14 +11,14 @@ import numpy as np
 from nearfar.arrays import Floats, blocks
 from nearfar.transport.model import Transport
 
-# Camera pixels at once.
-BLOCK = 8192
+# Camera pixels of a batch.
+BATCH_PIXELS = 8192
 
 
 def in_half(transport: Transport) -> Transport:
-    """Return a transport whose n and f are float16; all that is computed of it is float32.
+    """Return a transport whose n and f are float16; what is computed from them is float32.
 
-    What lies beyond float16's range of 65504 becomes infinite, which photo units never reach.
+    Values above 65504 would become infinite, but photo units never reach them.
     """
     return replace(
         transport,
@@ -28,14 +28,15 @@ def in_half(transport: Transport) -> Transport:
 
 
 def rounding_over_noise(transport: Transport) -> float:
-    """Tell how far float16 strays from n and f, beside the noise that they have anyway.
+    """Return the rounding error of n and f in float16 as a share of their noise.
 
     Returns
     -------
     float
-        The larger of two ratios of root mean squares over the camera: of a window entry's rounding
-        to its noise, sqrt(2) / W of a measurement's, and of an answer of f's to a measurement's.
-        0 where nothing is rounded, infinite where there is rounding and no noise.
+        The larger of two ratios of root mean squares over the camera. For n it is the rounding
+        error of a window entry over its noise, which is sqrt(2) / W times that of a measurement;
+        for f the rounding error of a response over the noise of a measurement. 0 where no value
+        is rounded, infinite where values are rounded and have no noise.
     """
     noise = float(np.sqrt(np.mean(transport.noise.astype(np.float64) ** 2)))
     entry_noise = noise * np.sqrt(2.0) / transport.window
@@ -48,10 +49,10 @@ def rounding_over_noise(transport: Transport) -> float:
 
 
 def _rounding(values: Floats) -> float:
-    """Root mean square of what rounding to float16 changes."""
+    """Return the root mean square of the rounding error in float16."""
     flat = values.reshape(-1, values.shape[-1])
     total = 0.0
-    for block in blocks(len(flat), BLOCK):
-        off = flat[block].astype(np.float16).astype(np.float32) - flat[block]
+    for batch in blocks(len(flat), BATCH_PIXELS):
+        off = flat[batch].astype(np.float16).astype(np.float32) - flat[batch]
         total += float(np.sum(off.astype(np.float64) ** 2))
     return float(np.sqrt(total / max(1, flat.size)))

@@ -1,4 +1,4 @@
-"""The transport that was measured: T = D + N + F as factors, a linear operator."""
+"""A measured transport T = D + N + F, kept as factors and applied as a linear operator."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -32,8 +32,8 @@ from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 
-# Camera pixels whose windows are gathered at once: some tens of megabytes at W = 19.
-BLOCK = 8192
+# Camera pixels of a batch: their windows take some tens of megabytes at W = 19.
+BATCH_PIXELS = 8192
 # Pixels along the longer side of a picture that a notebook shows.
 THUMBNAIL = 256
 
@@ -72,11 +72,11 @@ class Transport(NoArray):
     noise : ndarray, shape (Cy, Cx, channels), float32
         Standard deviation of one response to a cosine or sine.
     provenance : mapping
-        Plan, estimator, exposure and version: whatever JSON holds.
+        How it was made: plan, estimator, exposure, version. Of JSON types.
     posterior : Posterior, optional
-        What error bars follow from, where the estimate gives them.
+        State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it.
     quality : Quality, optional
-        How far each camera pixel is to be trusted, where the photos show it.
+        Confidence in q and saturation of each camera pixel, where the photos show them.
 
     Examples
     --------
@@ -136,7 +136,7 @@ class Transport(NoArray):
 
     @property
     def plot(self) -> Plots:
-        """Drawings of it, as matplotlib axes; see `nearfar.transport.plots`."""
+        """Drawings of the transport, as matplotlib axes; see `nearfar.transport.plots`."""
         return Plots(self)
 
     def __repr__(self) -> str:
@@ -181,7 +181,7 @@ class Transport(NoArray):
         return AdjointTransport(self)
 
     def components(self, light: Floats) -> Components:
-        """Relight each component apart.
+        """Relight each component by itself.
 
         Parameters
         ----------
@@ -330,7 +330,7 @@ class Transport(NoArray):
         inside = windows.inside(centres, self.window, self.projector)
         # Entries beyond the border go to a column of their own, which is cut off.
         beyond = self.projector.pixels
-        flat = np.where(inside, windows.places_on(centres, self.window, self.projector), beyond)
+        flat = np.where(inside, windows.window_pixels(centres, self.window, self.projector), beyond)
         direct_values = self.direct.reshape(-1, self.channels)[pixels]
         near_values = self.near.reshape(-1, self.channels, self.window**2)[pixels]
         d = np.zeros_like(f)
@@ -405,7 +405,7 @@ class Transport(NoArray):
         return LinearOperator(shape, matvec=matvec, rmatvec=rmatvec, dtype=np.float64)
 
     def lights(self, light: Floats) -> Floats:
-        """Check a light and lay it flat: (1, P) for all channels, or (channels, P).
+        """Check a light and flatten it to (1, P) for all channels, or (channels, P).
 
         Raises
         ------
@@ -416,7 +416,7 @@ class Transport(NoArray):
 
     @staticmethod
     def _flat(light: Floats) -> Floats:
-        """Lay a light flat: (1, P) for all channels, or (channels, P)."""
+        """Flatten a light to (1, P) for all channels, or (channels, P)."""
         if light.ndim == 2:
             return light.reshape(1, -1)
         return np.moveaxis(light, 2, 0).reshape(light.shape[2], -1)
@@ -427,7 +427,7 @@ class Transport(NoArray):
         return picture[..., 0] if self.channels == 1 else picture
 
     def _components(self, lights: Floats) -> Components:
-        """Pictures (L, C, channels) under lights (L, 1 or channels, P)."""
+        """Return pictures (L, C, channels) under lights (L, 1 or channels, P)."""
         count, channels = self.camera.pixels, self.channels
         return Components(
             direct_pictures(self.direct.reshape(count, channels), self._footprint, lights),
@@ -443,9 +443,9 @@ class Transport(NoArray):
         f = self.far.reshape(-1, self.channels, self.far_basis.count)[:, channel]
         back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
         back = back + self.far_basis.synthesise(image @ f).reshape(self.projector)
-        for block in blocks(self.camera.pixels, BLOCK):
-            values = n[block] * image[block, None]
-            back += windows.spread(values, self._centres[block], self.window, self.projector)
+        for batch in blocks(self.camera.pixels, BATCH_PIXELS):
+            values = n[batch] * image[batch, None]
+            back += windows.spread(values, self._centres[batch], self.window, self.projector)
         return np.asarray(back)
 
 

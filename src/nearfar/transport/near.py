@@ -12,13 +12,13 @@ from nearfar.illumination.centred_basis import window_offsets
 
 
 def centre(correspondence: Floats, projector: Size) -> NDArray[np.int64]:
-    """Round q to whole projector pixels, shape (C, 2); (0, 0) where there is no direct light."""
+    """Return q rounded to whole projector pixels, shape (C, 2); (0, 0) without direct light."""
     q = np.nan_to_num(np.asarray(correspondence).reshape(-1, 2), nan=0.0)
     return np.clip(np.rint(q), 0, np.array(projector) - 1).astype(np.int64)
 
 
 def line_through(q: Floats, projector: Size) -> int:
-    """Row of the projector nearest to one q, shape (2,); the middle one without direct light."""
+    """Return the projector row nearest to one q, shape (2,); the middle row if q is NaN."""
     lit = bool(np.isfinite(q).all())
     return int(centre(q, projector)[0, 0]) if lit else projector.height // 2
 
@@ -34,15 +34,15 @@ def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans
     return both.reshape((len(centres), window**2))
 
 
-def places_on(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
-    """Flat projector pixels (C, W^2) of the window entries; 0 for those beyond the border."""
-    places = centres[:, None, :] + window_offsets(window)
-    flat = places[..., 0] * projector.width + places[..., 1]
+def window_pixels(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
+    """Return the flat projector pixel of each window entry, (C, W^2); 0 beyond the border."""
+    entries = centres[:, None, :] + window_offsets(window)
+    flat = entries[..., 0] * projector.width + entries[..., 1]
     return np.asarray(np.where(inside(centres, window, projector), flat, 0))
 
 
-def _places(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
-    """Flat places (C, W^2) of the window entries on a projector with a border of W."""
+def _padded_pixels(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:
+    """Return the flat pixel of each window entry, (C, W^2), on a projector padded by W."""
     y, x = (centres + window).T
     dy, dx = window_offsets(window).T
     width = projector.width + 2 * window
@@ -50,24 +50,24 @@ def _places(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray
 
 
 def look_up(light: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:
-    """Read a light (Py, Px) over every window, shape (C, W^2); 0 beyond the border."""
+    """Return a light (Py, Px) over every window, shape (C, W^2); 0 beyond the border."""
     return read(pad(light.reshape(projector), window), centres, window)
 
 
 def pad(lights: Floats, window: int) -> Floats:
-    """Lay a dark border of W around lights (..., Py, Px), for `read`."""
+    """Pad lights (..., Py, Px) with a dark border of W, for `read`."""
     return np.pad(lights, [(0, 0)] * (lights.ndim - 2) + [(window, window)] * 2)
 
 
 def read(padded: Floats, centres: NDArray[np.int64], window: int) -> Floats:
-    """Read one padded light over every window, shape (C, W^2)."""
+    """Return a padded light over every window, shape (C, W^2)."""
     views = np.lib.stride_tricks.sliding_window_view(padded, (window, window))
     first = centres + window - window // 2
     return np.asarray(views[first[:, 0], first[:, 1]].reshape(len(centres), -1))
 
 
 def reached(padded: Booleans, centres: NDArray[np.int64], window: int) -> Booleans:
-    """Return whether any pixel of a padded light (bool) is lit in each window, shape (C,)."""
+    """Return whether each window has a lit pixel, shape (C,); the padded light is bool."""
     counts = np.pad(np.cumsum(np.cumsum(padded, axis=0), axis=1), [(1, 0), (1, 0)])
     y, x = (centres + window - window // 2).T
     inside = counts[y + window, x + window] + counts[y, x]
@@ -77,7 +77,7 @@ def reached(padded: Booleans, centres: NDArray[np.int64], window: int) -> Boolea
 def spread(values: Floats, centres: NDArray[np.int64], window: int, projector: Size) -> Floats:
     """Adjoint of `look_up`: scatter window values (C, W^2) over the projector, (Py, Px)."""
     height, width = projector.height + 2 * window, projector.width + 2 * window
-    places = _places(centres, window, projector).ravel()
-    padded = np.bincount(places, weights=values.ravel(), minlength=height * width)
+    pixels = _padded_pixels(centres, window, projector).ravel()
+    padded = np.bincount(pixels, weights=values.ravel(), minlength=height * width)
     on_projector = padded.reshape(height, width)[window:-window, window:-window]
     return np.asarray(on_projector, dtype=np.float64)

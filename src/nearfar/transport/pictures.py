@@ -1,4 +1,4 @@
-"""Pictures under many lights: each factor is read once for all of them.
+"""Pictures of d, n and f under many lights, for which each factor is read once.
 
 Index convention: c runs over camera pixels, i over channels, l over lights, w over window entries;
 lights are (L, 1, P) for all channels, or (L, channels, P); pictures are (L, C, channels).
@@ -14,38 +14,39 @@ from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.direct import Footprint
 
-# Camera pixels at once: their windows stay near the processor while lights change.
-BLOCK = 1024
-# Where fewer windows see light than this share, the rest are left out: they are copied for it.
-MOSTLY = 0.6
-# Fewer lights are done before threads have started.
-FEW = 8
+# Camera pixels of a batch: their windows stay in the processor's cache while lights change.
+BATCH_PIXELS = 1024
+# With a smaller share of lit windows, the lit ones are copied and multiplied alone; with a larger
+# one, copying takes longer than multiplying the dark ones too.
+DENSE_SHARE = 0.6
+# With fewer lights, starting threads takes longer than the work.
+MINIMUM_LIGHTS_FOR_THREADS = 8
 
 
 def direct_pictures(direct: Floats, where: Footprint, lights: Floats) -> Floats:
-    """Pictures of d, shape (C, channels), spread over footprints."""
+    """Return the pictures (L, C, channels) of d, shape (C, channels), at footprints."""
     return np.asarray(np.moveaxis(footprints.look_up(lights, where), 1, 2) * direct)
 
 
 def near_pictures(
     near: Floats, centres: NDArray[np.int64], projector: Size, lights: Floats
 ) -> Floats:
-    """Pictures of n, shape (C, channels, W^2), over windows about centres."""
+    """Return the pictures (L, C, channels) of n, shape (C, channels, W^2), around centres."""
     window = round(np.sqrt(near.shape[2]))
     found = np.empty((len(lights), *near.shape[:2]), dtype=np.result_type(lights, near))
     padded = windows.pad(lights.reshape(*lights.shape[:2], *projector), window)
     lit = [windows.reached(light.any(axis=0), centres, window) for light in padded]
 
-    def work(block: slice) -> None:
+    def work(batch: slice) -> None:
         for number, light in enumerate(padded):
-            chosen: slice | NDArray[np.int64] = block
-            reached = lit[number][block]
-            if np.count_nonzero(reached) < MOSTLY * reached.size:
+            chosen: slice | NDArray[np.int64] = batch
+            reached = lit[number][batch]
+            if np.count_nonzero(reached) < DENSE_SHARE * reached.size:
                 # A small light: most windows are dark.
-                found[number, block] = 0.0
+                found[number, batch] = 0.0
                 if not reached.any():
                     continue
-                chosen = block.start + np.flatnonzero(reached)
+                chosen = batch.start + np.flatnonzero(reached)
             seen = [windows.read(channel, centres[chosen], window) for channel in light]
             if len(seen) == 1:
                 found[number, chosen] = np.einsum("ciw,cw->ci", near[chosen], seen[0])
@@ -53,16 +54,16 @@ def near_pictures(
                 for i, own in enumerate(seen):
                     found[number, chosen, i] = np.einsum("cw,cw->c", near[chosen, i], own)
 
-    if len(lights) < FEW:
-        for block in blocks(len(near), BLOCK):
-            work(block)
+    if len(lights) < MINIMUM_LIGHTS_FOR_THREADS:
+        for batch in blocks(len(near), BATCH_PIXELS):
+            work(batch)
     else:
-        side_by_side(work, blocks(len(near), BLOCK))
+        side_by_side(work, blocks(len(near), BATCH_PIXELS))
     return found
 
 
 def far_pictures(far: Floats, basis: RealBasis, lights: Floats) -> Floats:
-    """Pictures of f, shape (C, channels, M), the responses to a basis."""
+    """Return the pictures (L, C, channels) of f, its responses (C, channels, M) to a basis."""
     overlaps = basis.analyse(lights).astype(np.result_type(lights, far), copy=False)
     if lights.shape[1] == 1:
         flat = far.reshape(-1, basis.count) @ overlaps[:, 0].T

@@ -1,6 +1,6 @@
 """Drawings of a transport: ``transport.plot.relit(light)`` and others, as matplotlib axes.
 
-Each draws on the axes that it is given, or on new ones, and returns them, for titles and the rest.
+Each method draws on the given axes, or on new ones, and returns the axes.
 """
 
 from typing import TYPE_CHECKING, Any, Protocol
@@ -18,15 +18,15 @@ from nearfar.transport.posterior import deviation_of_mean
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Decades of a logarithmic scale.
-DECADES = 5.0
-# Decades below its largest value at which a line of a row ends.
-DEEPEST = 6.0
+# Decades of the colour scale of a logarithmic picture.
+COLOUR_SCALE_DECADES = 5.0
+# Decades of the vertical axis of a line, below its largest value.
+LINE_DECADES = 6.0
 PARTS = ("direct", "near", "far")
 
 
 class Drawable(Apart, Protocol):
-    """What is drawn of a transport, as `nearfar.Transport` has it."""
+    """The attributes of `nearfar.Transport` that the drawings need."""
 
     @property
     def far_basis(self) -> RealBasis:
@@ -45,21 +45,21 @@ class Drawable(Apart, Protocol):
 
 
 class _ErrorsAlong(Protocol):
-    """What tells standard deviations along a row of the projector, as `nearfar.ErrorBars` does."""
+    """Standard deviations along a row of the projector, as `nearfar.ErrorBars` returns them."""
 
     def along(self, pixel: int, line: int) -> Any:
-        """Return those of D, N and F, each (channels, Px)."""
+        """Return the standard deviations of D, N and F, each (channels, Px)."""
 
 
 def colours(picture: Floats) -> Floats:
-    """Turn a picture of any number of channels into one that can be shown, of 1 or 3."""
+    """Convert a picture with any number of channels into one with 1 or 3, for display."""
     if picture.ndim == 2 or picture.shape[2] == 3:
         return picture
     return picture[..., :3] if picture.shape[2] > 3 else np.asarray(picture.mean(axis=-1))
 
 
 class Plots:
-    """Drawings of one transport; `Transport.plot` gives them.
+    """Drawings of one transport, as `Transport.plot`.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Plots:
         ----------
         light : ndarray, shape (Py, Px) or (Py, Px, channels)
         exposure : float
-            Photo units are shown this many times as bright.
+            Factor on the photo units.
         ax : Axes, optional
         """
         return _show(_axes(ax), exposure * (self._transport @ light), "relit")
@@ -121,7 +121,8 @@ class Plots:
         y, x : int
             Camera pixel.
         errors : ErrorBars, optional
-            Draws a band of one standard deviation, of channels that err independently.
+            Adds a band of one standard deviation of the mean over channels, whose errors are taken
+            to be independent.
         ax : Axes, optional
         """
         transport, pixel = self._transport, self._pixel(y, x)
@@ -141,20 +142,20 @@ class Plots:
                 )
         drawn.set(xlabel=f"projector column, row {line}", ylabel="answer, photo units")
         most = max(float(np.abs(part).max()) for part in rows)
-        drawn.set_ylim(bottom=most * 10.0**-DEEPEST if most > 0 else None)
+        drawn.set_ylim(bottom=most * 10.0**-LINE_DECADES if most > 0 else None)
         drawn.set_title(f"camera pixel ({y}, {x})")
         drawn.legend()
         return drawn
 
     def transport_row(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw a camera pixel's row of T over the projector, log scale."""
+        """Draw a camera pixel's row of T over the projector, in a logarithmic scale."""
         transport = self._transport
         row = transport.rows(self._pixel(y, x))[0].mean(axis=0).reshape(transport.projector)
         drawn = _logarithm(_axes(ax), row)
         return _bare(drawn, f"row of camera pixel ({y}, {x})")
 
     def spectrum(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw the spectrum of a camera pixel's row, DC in the middle, and k_far around it."""
+        """Draw the spectrum of a camera pixel's row, DC in the middle, with a frame at k_far."""
         transport = self._transport
         height, width = transport.projector
         row = transport.rows(self._pixel(y, x))[0].mean(axis=0).reshape(height, width)
@@ -173,7 +174,7 @@ class Plots:
         return drawn
 
     def column(self, y: int, x: int, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw what a projector pixel lights, log scale."""
+        """Draw the picture under one projector pixel, in a logarithmic scale."""
         picture = self._transport.column(y, x)
         picture = picture if picture.ndim == 2 else picture.mean(axis=-1)
         return _bare(_logarithm(_axes(ax), picture), f"lit by projector pixel ({y}, {x})")
@@ -201,7 +202,7 @@ def _show(ax: "Axes", picture: Floats, title: str) -> "Axes":
 def _logarithm(ax: "Axes", values: Floats) -> "Axes":
     shown = np.log10(np.maximum(np.abs(values), 1e-30))
     high = float(shown.max())
-    image = ax.imshow(shown, cmap="magma", vmin=high - DECADES, vmax=high)
+    image = ax.imshow(shown, cmap="magma", vmin=high - COLOUR_SCALE_DECADES, vmax=high)
     ax.figure.colorbar(image, ax=ax, label="log10 of the answer")
     return ax
 

@@ -1,11 +1,12 @@
-"""A transport laid out on a device, to be relit again and again.
+"""A transport prepared on a device for relighting under many lights.
 
-Where every window entry lies is looked up once, and n and f are kept in float16 where that strays
-by less than their noise: an accelerator then reads half the bytes for each light. On the processor
-`Transport` itself is as fast as memory, and NumPy faster with float32 than with float16.
+The projector pixels of all window entries are computed once. n and f are float16 where the rounding
+error is well below their noise, so that an accelerator reads half the bytes for each light. On the
+processor `Transport` itself is as fast as memory allows, and NumPy is faster with float32 than with
+float16.
 
 Index convention: c runs over camera pixels, i over channels, l over lights, w over window entries;
-a light is a column, its channels side by side: (P + 1, L, 1 or channels), the last pixel dark.
+lights are (P + 1, L, 1 or channels), whose last projector pixel is dark.
 """
 
 from dataclasses import dataclass
@@ -23,15 +24,16 @@ from nearfar.transport.direct import footprint
 from nearfar.transport.half import rounding_over_noise
 from nearfar.transport.model import Transport, as_gains
 
-# Values gathered at once: few enough to lie near the processor; many, where each call takes a way.
-HELD: dict[Device, int] = {"cpu": 2**19, "torch": 2**19, "cuda": 2**26}
-# Rounding of less than this share of the noise does not show.
-UNSEEN = 0.25
+# Values gathered at once: on a processor as many as its cache holds, on an accelerator enough to
+# outweigh the time that a call takes.
+GATHERED_VALUES: dict[Device, int] = {"cpu": 2**19, "torch": 2**19, "cuda": 2**26}
+# A rounding error of less than this share of the noise is negligible.
+NEGLIGIBLE_ROUNDING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedTransport(NoArray):
-    """A transport laid out for relighting; make one by `prepare_transport`.
+    """A transport prepared for relighting; make one by `prepare_transport`.
 
     Attributes
     ----------
@@ -39,15 +41,15 @@ class PreparedTransport(NoArray):
     channels : int
     direct : array, shape (C, channels)
     corners, shares : arrays, shape (C, 4)
-        Pixels that direct light comes from, and how much of it.
+        Projector pixels that direct light comes from, and their weights.
     near : array, shape (C, channels, W^2)
     entries : array of int, shape (C, W^2)
-        Pixels of the window entries; P for those beyond the border.
+        Projector pixels of the window entries; P for those beyond the border.
     far : array, shape (C, channels, M)
     patterns : array, shape (M, P)
-        The far basis, weighted.
+        The far basis, times its weights.
     held : int
-        Values gathered at once.
+        How many values are gathered at once.
     """
 
     projector: Size
@@ -64,7 +66,7 @@ class PreparedTransport(NoArray):
 
     @property
     def nbytes(self) -> int:
-        """Bytes that it takes on its device."""
+        """Bytes that the prepared transport takes on its device."""
         arrays = (self.direct, self.corners, self.shares, self.near, self.entries, self.far)
         return sum(int(a.nbytes) for a in (*arrays, self.patterns))
 
@@ -76,7 +78,7 @@ class PreparedTransport(NoArray):
         Parameters
         ----------
         lights : array, shape (L, Py, Px) or (L, Py, Px, channels), float32
-            NumPy's, or of the device's library and already there, which saves the way.
+            Of NumPy, or of the device's library and already on the device, which saves a copy.
 
         Returns
         -------
@@ -90,27 +92,27 @@ class PreparedTransport(NoArray):
             other channels; if a gain is not a finite number.
         """
         direct, near, far = as_gains(direct, near, far)
-        lights = self._there(lights)
+        lights = self._on_device(lights)
         xp, count = namespace(lights), len(lights)
-        kinds = lights.shape[3] if lights.ndim == 4 else 1
-        flat = lights.reshape((count, self.projector.pixels, kinds))
+        light_channels = lights.shape[3] if lights.ndim == 4 else 1
+        flat = lights.reshape((count, self.projector.pixels, light_channels))
         overlaps = xp.permute_dims(self.patterns @ flat, (1, 0, 2))
-        columns = xp.permute_dims(flat, (1, 0, 2))
-        dark = xp.zeros((1, *columns.shape[1:]), dtype=xp.float32, device=device_of(lights))
-        columns = xp.concat([columns, dark], axis=0)
+        padded = xp.permute_dims(flat, (1, 0, 2))
+        dark = xp.zeros((1, *padded.shape[1:]), dtype=xp.float32, device=device_of(lights))
+        padded = xp.concat([padded, dark], axis=0)
         found = xp.empty(
             (self.camera.pixels, self.channels, count),
             dtype=xp.float32,
             device=device_of(lights),
         )
-        length = self.held // max(1, self.entries.shape[1] * count * kinds)
-        for block in blocks(self.camera.pixels, length):
-            at_q = columns[self.corners[block]] * self.shares[block][..., None, None]
+        length = self.held // max(1, self.entries.shape[1] * count * light_channels)
+        for batch in blocks(self.camera.pixels, length):
+            at_q = padded[self.corners[batch]] * self.shares[batch][..., None, None]
             lit = xp.permute_dims(xp.sum(at_q, axis=1), (0, 2, 1))
-            part = direct * self.direct[block][..., None] * lit
-            part = part + near * _weighed(self.near[block], columns[self.entries[block]])
-            part = part + far * _weighed(self.far[block], overlaps)
-            found[block] = part
+            part = direct * self.direct[batch][..., None] * lit
+            part = part + near * _weighted_sums(self.near[batch], padded[self.entries[batch]])
+            part = part + far * _weighted_sums(self.far[batch], overlaps)
+            found[batch] = part
         return xp.permute_dims(found, (2, 0, 1)).reshape((count, *self.camera, self.channels))
 
     def __matmul__(self, light: Any) -> Floats:
@@ -122,7 +124,7 @@ class PreparedTransport(NoArray):
         picture: Floats = fetch(self.pictures(lights)[0])
         return picture[..., 0] if self.channels == 1 else picture
 
-    def _there(self, lights: Any) -> Any:
+    def _on_device(self, lights: Any) -> Any:
         checked = as_lights(lights, self.projector, self.channels)
         if is_numpy_array(checked):
             return beside(np.ascontiguousarray(checked, dtype=np.float32), self.direct)
@@ -130,28 +132,28 @@ class PreparedTransport(NoArray):
         return xp.astype(checked, xp.float32, copy=False)
 
 
-def _weighed(values: Any, seen: Any) -> Any:
-    """Sum values (n, channels, w) times what is seen (w or n w, L, 1 or channels)."""
+def _weighted_sums(values: Any, lights: Any) -> Any:
+    """Return sums of values (n, channels, w) times lights ((n,) w, L, 1 or channels) over w."""
     xp = namespace(values)
     values = xp.astype(values, xp.float32)
-    if seen.shape[-1] == 1:
-        return values @ seen[..., 0]
+    if lights.shape[-1] == 1:
+        return values @ lights[..., 0]
     # Each channel its own light: (n, channels, 1, w) times (channels, w, L).
-    own = xp.moveaxis(seen, -1, -3)
+    own = xp.moveaxis(lights, -1, -3)
     return (values[:, :, None, :] @ own)[:, :, 0]
 
 
 def prepare_transport(
     transport: Transport, device: Device = "cpu", *, half: bool | None = None
 ) -> PreparedTransport:
-    """Lay a transport out on a device.
+    """Prepare a transport on a device for relighting under many lights.
 
     Parameters
     ----------
     transport : Transport
     device : {"cpu", "cuda", "torch"}
     half : bool, optional
-        Whether n and f are kept in float16; by default on an accelerator, where the rounding is
+        Whether n and f are float16. By default they are on an accelerator, if the rounding error is
         well below their noise.
 
     Raises
@@ -168,14 +170,14 @@ def prepare_transport(
     """
     move = mover(device)
     if half is None:
-        half = device == "cuda" and rounding_over_noise(transport) < UNSEEN
-    kind = np.float16 if half else np.float32
+        half = device == "cuda" and rounding_over_noise(transport) < NEGLIGIBLE_ROUNDING
+    dtype = np.float16 if half else np.float32
     count, channels = transport.camera.pixels, transport.channels
     where = footprint(transport.correspondence, transport.projector)
     centres = windows.centre(transport.correspondence, transport.projector)
     entries = np.where(
         windows.inside(centres, transport.window, transport.projector),
-        windows.places_on(centres, transport.window, transport.projector),
+        windows.window_pixels(centres, transport.window, transport.projector),
         transport.projector.pixels,
     )
     basis = transport.far_basis
@@ -187,9 +189,9 @@ def prepare_transport(
         direct=move(transport.direct.reshape(count, channels)),
         corners=move(where.pixels.astype(np.int32)),
         shares=move(where.weights),
-        near=move(transport.near.reshape(count, channels, -1).astype(kind, copy=False)),
+        near=move(transport.near.reshape(count, channels, -1).astype(dtype, copy=False)),
         entries=move(entries.astype(np.int32)),
-        far=move(transport.far.reshape(count, channels, -1).astype(kind, copy=False)),
+        far=move(transport.far.reshape(count, channels, -1).astype(dtype, copy=False)),
         patterns=move(weighted),
-        held=HELD[device],
+        held=GATHERED_VALUES[device],
     )

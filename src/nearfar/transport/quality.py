@@ -1,4 +1,4 @@
-"""What the photos tell of how far each camera pixel is to be trusted."""
+"""How far each camera pixel of a transport can be trusted, by its photos."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ from nearfar.arrays import Booleans, Floats
 
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """Seen while a transport was reconstructed, and kept with it.
+    """Confidence in the correspondence, and saturation, of each camera pixel.
 
     Attributes
     ----------
     confidence : ndarray, shape (Cy, Cx), float32
-        Of the correspondence, between 0 and 1; see `nearfar.Correspondence`.
+        Confidence in q, between 0 and 1; see `nearfar.Correspondence`.
     saturated : ndarray of bool, shape (Cy, Cx)
-        Whether a channel is at full scale under white.
+        Whether any channel is at full scale under white.
     """
 
     confidence: Floats

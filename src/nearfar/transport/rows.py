@@ -1,4 +1,4 @@
-"""Transports of some camera pixels: cut out of one, and put together again."""
+"""Select camera pixels of a transport, and join transports of camera rows."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ import numpy as np
 from nearfar.arrays import Integers, middles
 from nearfar.transport.model import Transport
 
-# What each camera pixel has its own of.
+# Attributes of a transport with a value for each camera pixel.
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
 POSTERIOR_FIELDS = (
     "prior_component",
@@ -19,9 +19,9 @@ POSTERIOR_FIELDS = (
     "light_noise",
     "share_of_white",
 )
-TRUSTED = ("confidence", "saturated")
-# Parts that a transport may lack, and what each camera pixel has of them.
-OPTIONAL = {"posterior": POSTERIOR_FIELDS, "quality": TRUSTED}
+QUALITY_FIELDS = ("confidence", "saturated")
+# Attributes that may be None, and their own attributes with a value for each camera pixel.
+OPTIONAL_PARTS = {"posterior": POSTERIOR_FIELDS, "quality": QUALITY_FIELDS}
 
 
 def of_rows(transport: Transport, rows: slice) -> Transport:
@@ -30,7 +30,9 @@ def of_rows(transport: Transport, rows: slice) -> Transport:
 
 
 def thinned_blocks(blocks: Iterable[Transport], height: int, step: int) -> Iterator[Transport]:
-    """Thin blocks of a camera's rows out as the whole camera would be; some may be left empty.
+    """Thin out blocks of camera rows, to the same pixels as thinning the whole camera.
+
+    A block none of whose rows is kept becomes a transport of no rows.
 
     Parameters
     ----------
@@ -55,7 +57,7 @@ def of_pixels(transport: Transport, rows: Integers, columns: Integers) -> Transp
 
 def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:
     changes = {name: choose(getattr(transport, name)) for name in FACTORS}
-    for part, names in OPTIONAL.items():
+    for part, names in OPTIONAL_PARTS.items():
         owner: Any = getattr(transport, part)
         if owner is not None:
             own = {name: choose(getattr(owner, name)) for name in names}
@@ -64,7 +66,7 @@ def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:
 
 
 def stacked(parts: Sequence[Transport]) -> Transport:
-    """Put transports of blocks of camera rows together, in order; provenance is the last's."""
+    """Join transports of blocks of camera rows, in order; the provenance is that of the last."""
     if len(parts) == 1:
         return parts[0]
 
@@ -72,7 +74,7 @@ def stacked(parts: Sequence[Transport]) -> Transport:
         return {name: np.concatenate([getattr(one, name) for one in owners]) for name in names}
 
     changes = joined(parts, FACTORS)
-    for name, names in OPTIONAL.items():
+    for name, names in OPTIONAL_PARTS.items():
         owners: list[Any] = [getattr(part, name) for part in parts]
         if owners[-1] is not None:
             changes[name] = replace(owners[-1], **joined(owners, names))

@@ -1,4 +1,4 @@
-"""Transports on the disk: factors in chunks of camera rows."""
+"""Transports in files: factors in chunks of camera rows."""
 
 import json
 import math
@@ -28,9 +28,9 @@ from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import (
     FACTORS,
-    OPTIONAL,
+    OPTIONAL_PARTS,
     POSTERIOR_FIELDS,
-    TRUSTED,
+    QUALITY_FIELDS,
     stacked,
     thinned_blocks,
 )
@@ -40,11 +40,11 @@ FORMAT_VERSION = 1
 # Bytes of a chunk: large enough for the disk, small enough to read a few rows.
 CHUNK_BYTES = 8 * 2**20
 
-# Bytes of a transport that are read at once where it is gone through in blocks.
+# Memory of a block of a transport that is read block by block.
 READ_BYTES = 2**28
 
-# Parts that a transport may lack: in the file, a mapping of their own in the attributes, and
-# arrays PART_FIELD. The format has older names for the posterior and some of its fields.
+# An optional part of a transport is stored as a mapping in the attributes and as arrays named
+# PART_FIELD. The posterior and some of its fields have older names in the format.
 POSTERIOR, QUALITY = "belief", "quality"
 STORED_PARTS = {"posterior": POSTERIOR, "quality": QUALITY}
 STORED_FIELDS = {"prior_component": "kind", "prior_scale": "strength"}
@@ -77,14 +77,14 @@ def save_transport(transport: Transport, path: AnyPath, *, force: bool = False) 
 def write_transport(
     path: AnyPath, parts: Iterable[Transport], height: int, *, force: bool = False
 ) -> None:
-    """Write a transport block by block, whole or not at all; each is asked for in its turn.
+    """Write a whole transport or nothing, block by block; `parts` may compute them one at a time.
 
     Parameters
     ----------
     path : str or Path
     parts : iterable of Transport
-        Blocks of camera rows, in order, at least one, all but the last of one height. Provenance
-        is the last one's.
+        Blocks of camera rows, in order, at least one. All but the last have the same height. The
+        provenance is that of the last.
     height : int
         Rows of the whole camera.
     force : bool
@@ -107,29 +107,29 @@ def write_transport(
 def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: int) -> None:
     """Write some rows of a transport into a folder within `nearfar.files.new_output`.
 
-    Several may do so at once, from other processes and machines too: whoever is first lays the
-    arrays out, all in the same way, and every chunk belongs to one block of rows.
+    Several processes, on several machines, may write at the same time: every chunk belongs to one
+    block of rows, and the first to write creates the arrays, which are the same for all.
 
     Parameters
     ----------
     folder : Path
     part : Transport
     first : int
-        Its first row, a multiple of `rows`.
+        First row of `part`, a multiple of `rows`.
     rows : int
-        Rows of all blocks but the last.
+        Rows of every block but the last.
     height : int
         Rows of the whole camera.
     """
     values = {name: _as_stored(getattr(part, name)) for name in FACTORS}
-    for optional, names in OPTIONAL.items():
+    for optional, names in OPTIONAL_PARTS.items():
         owner = getattr(part, optional)
         if owner is not None:
             part_name = STORED_PARTS[optional]
             values |= {_array_name(part_name, name): getattr(owner, name) for name in names}
     group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
     for name, one in values.items():
-        # A single block has its chunks to itself, whatever their rows.
+        # The chunks of a single block need not divide it.
         most = min(height, rows_of_chunk(one))
         chunk = (most if rows >= height else _dividing(rows, most), *one.shape[1:])
         array = add_array(group, name, (height, *one.shape[1:]), one.dtype, chunk)
@@ -137,7 +137,7 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
 
 
 def _array_name(part: str, field: str) -> str:
-    """Return the name in the file of a field of a part that may be lacking."""
+    """Return the name in the file of a field of an optional part."""
     return f"{part}_{STORED_FIELDS.get(field, field)}"
 
 
@@ -152,7 +152,7 @@ def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
 
 
 def _attributes(transport: Transport) -> dict[str, Any]:
-    """Lay out for JSON what all camera pixels share."""
+    """Return what all camera pixels share, as JSON types."""
     attributes = {
         "projector": list(transport.projector),
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
@@ -165,7 +165,7 @@ def _attributes(transport: Transport) -> dict[str, Any]:
 
 
 def _described(posterior: Posterior) -> dict[str, Any]:
-    """Lay what all camera pixels share of a posterior out for JSON."""
+    """Return what all camera pixels share of a posterior, as JSON types."""
     return {
         "kinds": [list(component) for component in posterior.prior_components],
         "frequencies": [frequency_to_text(k) for k in posterior.frequencies],
@@ -174,7 +174,7 @@ def _described(posterior: Posterior) -> dict[str, Any]:
 
 
 def rows_of_chunk(values: Floats) -> int:
-    """Rows of an array that make some megabytes."""
+    """Return how many rows of an array fit in a chunk."""
     return max(1, CHUNK_BYTES // max(1, values[:1].nbytes))
 
 
@@ -184,14 +184,14 @@ def _dividing(rows: int, most: int) -> int:
 
 
 def write_in_rows(group: Any, name: str, values: Floats) -> None:
-    """Write an array in chunks of rows of some megabytes."""
+    """Write an array in chunks of rows."""
     rows = min(len(values), rows_of_chunk(values))
     add_array(group, name, values.shape, values.dtype, (rows, *values.shape[1:]))[:] = values
 
 
 @dataclass(frozen=True)
 class StoredTransport:
-    """A transport on the disk, of which rows of the camera are read when asked for.
+    """A transport in a file, whose camera rows are read on demand.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ class StoredTransport:
         Raises
         ------
         UnreadableFileError
-            If what belongs to them is damaged.
+            If their chunks are damaged.
         """
         read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
         posterior_fields: dict[str, Any] = {
@@ -229,8 +229,10 @@ class StoredTransport:
             if self._posterior is not None
             else None
         )
-        trusted: dict[str, Any] = {
-            name: read.pop(f"{QUALITY}_{name}") for name in TRUSTED if f"{QUALITY}_{name}" in read
+        quality_fields: dict[str, Any] = {
+            name: read.pop(f"{QUALITY}_{name}")
+            for name in QUALITY_FIELDS
+            if f"{QUALITY}_{name}" in read
         }
         if posterior is not None:
             last = int(posterior.prior_component.max(initial=0))
@@ -241,13 +243,13 @@ class StoredTransport:
             far_basis=self.far_basis,
             provenance=self.provenance,
             posterior=posterior,
-            quality=Quality(**trusted) if trusted else None,
+            quality=Quality(**quality_fields) if quality_fields else None,
             **read,
         )
 
     @property
     def nbytes(self) -> int:
-        """Bytes that all of it takes in memory."""
+        """Bytes that the whole transport takes in memory."""
         return self.camera.height * self._row_bytes
 
     @property
@@ -257,7 +259,7 @@ class StoredTransport:
         )
 
     def blocks(self, size: int = READ_BYTES) -> Iterator[Transport]:
-        """Read the camera row by row in blocks of so many bytes, each when it is asked for."""
+        """Yield the transport in blocks of camera rows of at most `size` bytes."""
         for rows in blocks(self.camera.height, size // self._row_bytes):
             yield self.rows(rows)
 
@@ -266,7 +268,7 @@ class StoredTransport:
         return read_selection(self._arrays["black"], (slice(None),))
 
     def thinned(self, step: int) -> Transport:
-        """Read the middle of each cell of `step` rows and columns, block by block of the camera."""
+        """Read the middle camera pixel of each cell of `step` rows and columns."""
         return stacked(list(thinned_blocks(self.blocks(), self.camera.height, step)))
 
 
@@ -317,10 +319,12 @@ def open_transport(path: AnyPath) -> StoredTransport:
         if not _posterior_fits(posterior, arrays, basis.projector, each):
             raise _misfit(path)
     if QUALITY in group.attrs:
-        quality = {f"{QUALITY}_{name}": open_array(group, f"{QUALITY}_{name}") for name in TRUSTED}
+        quality = {
+            f"{QUALITY}_{name}": open_array(group, f"{QUALITY}_{name}") for name in QUALITY_FIELDS
+        }
         arrays |= quality
-        sorts = [(array.shape, array.dtype.kind) for array in quality.values()]
-        if sorts != [(each[:2], "f"), (each[:2], "b")]:
+        layouts = [(array.shape, array.dtype.kind) for array in quality.values()]
+        if layouts != [(each[:2], "f"), (each[:2], "b")]:
             raise UnreadableFileError(
                 f"{path} is damaged: what tells how far to trust it does not fit the transport; "
                 f"reconstruct it again."

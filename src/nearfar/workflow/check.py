@@ -218,7 +218,7 @@ class _Totals:
     def _windows(self, centres: NDArray[np.int64]) -> NDArray[np.bool_]:
         mask = np.zeros((len(centres), self.projector.pixels), dtype=bool)
         inside = near.inside(centres, self.window, self.projector)
-        places = near.places_on(centres, self.window, self.projector)
+        places = near.window_pixels(centres, self.window, self.projector)
         number, entry = np.nonzero(inside)
         mask[number, places[number, entry]] = True
         return mask.reshape(-1, *self.projector)

@@ -5,7 +5,7 @@ import numpy as np
 from nearfar.arrays import Size
 from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_scale
 from nearfar.estimate.joint.clipped import solve_clipped
-from nearfar.estimate.joint.nuisance import columns, prior_precision
+from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.frequencies import DC
@@ -61,7 +61,7 @@ def drawn_rows(count, centres, scale, seed=0):
     )
     rows = np.zeros((count, PROJECTOR.pixels))
     inside = near.inside(centres, WINDOW, PROJECTOR)
-    places = near.places_on(centres, WINDOW, PROJECTOR)
+    places = near.window_pixels(centres, WINDOW, PROJECTOR)
     for c in range(count):
         np.add.at(rows[c], places[c], windows[c] * inside[c])
         rows[c, centres[c] @ [PROJECTOR.width, 1]] += 0.5
@@ -112,7 +112,7 @@ def dense(measurements, batch, centred, scale, component=COMPONENT):
         white, noise = float(batch.white[c, 0]), float(batch.noise[c, 0])
         patterns = centred.on_window * batch.inside[c]
         s = (scale * white) ** 2
-        design = columns(batch, centred)[c].T.astype(np.float64)
+        design = amplitude_responses(batch, centred)[c].T.astype(np.float64)
         precision = prior_precision(batch)[c, 0]
         covariance = (
             s * (patterns @ window @ patterns.T + np.diag(variance))

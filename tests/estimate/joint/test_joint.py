@@ -9,7 +9,7 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.clipped import solve_clipped
-from nearfar.estimate.joint.nuisance import columns, prior_precision
+from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole
 from nearfar.estimate.joint.spikes import with_spike
 from nearfar.illumination.patterns import exponential
@@ -99,7 +99,7 @@ def test_clipped_windows_of_every_component_are_those_of_dense_algebra(component
     for c in range(len(centres)):
         clipped = centred.on_window * batch.inside[c]
         squared = (0.05 * float(batch.white[c, 0])) ** 2
-        direct = columns(batch, centred)[c, 0].astype(np.float64)
+        direct = amplitude_responses(batch, centred)[c, 0].astype(np.float64)
         covariance = squared * (clipped @ window @ clipped.T + np.diag(power))
         covariance += float(batch.noise[c, 0]) ** 2 * spread
         covariance += np.outer(direct, direct) / prior_precision(batch)[c, 0, 0]

@@ -75,7 +75,7 @@ def test_an_estimate_has_no_negative_transport_in_its_windows(noise):
     centres = near.centre(found.correspondence, PROJECTOR)
     inside = near.inside(centres, WINDOW, PROJECTOR)
     apart = np.abs(window_offsets(WINDOW)).max(axis=1) > 1
-    places = near.places_on(centres, WINDOW, PROJECTOR)
+    places = near.window_pixels(centres, WINDOW, PROJECTOR)
     entries = np.where(inside & apart, np.take_along_axis(rows, places, axis=1), 0.0)
     # A window that noise leaves no light at all has none to give.
     light = entries.sum(axis=1) > 0

@@ -6,9 +6,9 @@ Index convention: arrays are (C, channels, ...); w runs over window entries.
 import numpy as np
 
 from nearfar.arrays import Floats, Size, beside, blocks, fetch, namespace, product
-from nearfar.estimate.joint.batch import dc_place
+from nearfar.estimate.joint.batch import dc_index
 from nearfar.estimate.joint.positive import raise_to
-from nearfar.estimate.joint.problem import Problem, Rows
+from nearfar.estimate.joint.problem import EstimatedRows, Problem
 from nearfar.estimate.joint.spikes import away_from_q
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.frequencies import DC, far_frequencies
@@ -24,7 +24,7 @@ from nearfar.transport.posterior import Posterior
 BATCH_PIXELS = 2048
 
 
-def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
+def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     """Put the factors together: f at the far band's frequencies, its DC what d and n leave."""
     measurements, centred, pixels = problem.measurements, problem.model.centred, problem.pixels
     wanted = set(far_frequencies(far, measurements.projector))
@@ -34,13 +34,13 @@ def assemble(problem: Problem, rows: Rows, far: Size) -> Transport:
     kept = np.flatnonzero(np.isin(measured.index, [measured.frequencies.index(k) for k in low]))
     share_of_white = _share_of_white(measurements).astype(np.float32)
     xp = namespace(rows.near)
-    white, share, places = (
+    white, share, far_indices = (
         beside(values, rows.near)
-        for values in (measurements.responses[..., dc_place(measurements)], share_of_white, kept)
+        for values in (measurements.responses[..., dc_index(measurements)], share_of_white, kept)
     )
     direct = xp.clip(rows.amplitudes[..., 1], min=0.0) * pixels.lit[:, None]
     rest = white - share * rows.amplitudes[..., 0] - direct - xp.sum(rows.near, axis=-1)
-    far_range = xp.concat([rest[..., None], rows.far[..., places]], axis=-1)
+    far_range = xp.concat([rest[..., None], rows.far[..., far_indices]], axis=-1)
     of_far = centred_basis(basis, window_offsets(problem.window))
     of_far = of_far.put(lambda one: beside(one, rows.near))
     windows = _positive(problem, rows.near, far_range, of_far)
@@ -86,12 +86,12 @@ def _positive(
     found: Floats = xp.empty_like(windows)
     weights = beside(centred.basis.weights.astype(np.float32), windows)
 
-    def work(block: slice) -> None:
-        coefficients = far_range[block] * weights
-        recentred = centred.recentre(coefficients, problem.pixels.centres[block])
+    def work(batch: slice) -> None:
+        coefficients = far_range[batch] * weights
+        recentred = centred.recentre(coefficients, problem.pixels.centres[batch])
         least = -product(recentred, centred.on_window)
-        mine = xp.broadcast_to(free[block, None], least.shape)
-        found[block] = raise_to(windows[block], least, mine)
+        mine = xp.broadcast_to(free[batch, None], least.shape)
+        found[batch] = raise_to(windows[batch], least, mine)
 
     side_by_side(work, blocks(len(windows), BATCH_PIXELS))
     return found

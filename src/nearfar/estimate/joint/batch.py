@@ -15,7 +15,7 @@ from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.direct import footprint, footprint_weights, look_up
+from nearfar.transport.direct import direct_weights, footprint, look_up
 
 # A camera pixel darker than this share of the brightest is scaled as if it had as much light.
 WHITE_FLOOR = 1e-3
@@ -38,7 +38,7 @@ class PixelBatch(NamedTuple):
         Window entries on the projector.
     responses : ndarray, shape (n, channels, R)
         To all frequencies but DC, re-centred.
-    footprint : ndarray, shape (n, 1 or 3, 9)
+    direct_weights : ndarray, shape (n, 1 or 3, 9)
         Unit direct light over `FOOTPRINT_OFFSETS`, and its derivatives by q down and across, which
         are left out where all q are whole; 0 at unlit camera pixels.
     of_offset : ndarray, shape (n, 0 or 1, R)
@@ -59,7 +59,7 @@ class PixelBatch(NamedTuple):
     lit: Booleans
     inside: Booleans
     responses: Floats
-    footprint: Floats
+    direct_weights: Floats
     of_offset: Floats
     spikes: NDArray[np.int64]
     noise: Floats
@@ -72,14 +72,14 @@ class PixelBatch(NamedTuple):
         return PixelBatch._make(values[selected] for values in self)
 
 
-def dc_place(measurements: Measurements) -> int:
-    """Return the place of the response to white among the measurements."""
+def dc_index(measurements: Measurements) -> int:
+    """Return the index of the response to white."""
     return int(measurements.places([DC])[0])
 
 
 def white_scale(measurements: Measurements) -> Floats:
     """Return light under white, the scale of all transport, (C, channels); always above 0."""
-    white = measurements.responses[..., dc_place(measurements)]
+    white = measurements.responses[..., dc_index(measurements)]
     brightest = measurements.brightest or float(np.abs(white).max(initial=0.0))
     least = max(WHITE_FLOOR * brightest, float(np.finfo(np.float32).tiny))
     return np.asarray(np.maximum(white, np.float32(least)))
@@ -106,8 +106,8 @@ def responses_of_direct(correspondence: Floats, lights: Floats, projector: Size)
         where direct light is all one projector pixel's.
     """
 
-    def responses_at(places: Floats) -> Floats:
-        return look_up(lights, footprint(places, projector)).T
+    def responses_at(q: Floats) -> Floats:
+        return look_up(lights, footprint(q, projector)).T
 
     found = np.zeros((len(correspondence), 3, len(lights)), dtype=np.float32)
     found[:, 0] = responses_at(correspondence)
@@ -168,7 +168,7 @@ def gather(
     """
     some = AllPixels._make(values[selected] for values in pixels)
     responses = some.responses if known is None else some.responses - known
-    weights = footprint_weights(some.correspondence, some.centres)
+    weights = direct_weights(some.correspondence, some.centres)
     xp = namespace(some.responses)
     if not bool(xp.any(weights[:, 1:] != 0)):
         weights = weights[:, :1]
@@ -179,7 +179,7 @@ def gather(
         lit=some.lit,
         inside=near.inside(some.centres, round(some.spike_expected.shape[1] ** 0.5), projector),
         responses=centred.recentre(responses, some.centres),
-        footprint=weights,
+        direct_weights=weights,
         of_offset=centred.recentre(ones, some.centres),
         spikes=some.centres[:, :0],
         noise=some.noise,

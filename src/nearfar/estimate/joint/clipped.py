@@ -48,7 +48,7 @@ def solve_clipped(
     far_variance, deviation = (
         beside(values, batch.responses) for values in (prior.far_variance, prior.factors.deviation)
     )
-    columns = nuisance.columns(batch, centred)
+    per_amplitude = nuisance.amplitude_responses(batch, centred)
     precision = nuisance.prior_precision(batch)
     patterns = xp.astype(centred.on_window, xp.float64) * deviation
     clippings = _clippings(fetch(batch.inside))
@@ -64,7 +64,9 @@ def solve_clipped(
         weight = 1.0 / (float(value) * far_variance + 1.0 / multiplicity)
         of, channel = np.nonzero(ratio_of_pair == value)
         c, i = beside(of, precision), beside(channel, precision)
-        y = xp.astype(xp.concat([batch.responses[c, i, None], columns[c]], axis=1), xp.float64)
+        y = xp.astype(
+            xp.concat([batch.responses[c, i, None], per_amplitude[c]], axis=1), xp.float64
+        )
         weighted = y * weight
         right = product(weighted, patterns)
         solved = _solved(right, clippings, of, prior, float(value), weight, centred)
@@ -73,7 +75,7 @@ def solve_clipped(
         variance = xp.astype(batch.noise[c, i], xp.float64)[:, None] ** 2
         products /= variance[..., None]
         amplitudes[c, i] = nuisance.solve(products[:, 1:, 1:], products[:, 1:, 0], precision[c, i])
-        # y less the columns times their amplitudes.
+        # y less the responses to the amplitudes.
         factors = xp.concat([xp.ones_like(amplitudes[c, i][:, :1]), -amplitudes[c, i]], axis=1)
         window = (factors[:, None] @ solved)[:, 0]
         rest = ((factors[:, None] @ y)[:, 0] - window @ patterns.T) * weight

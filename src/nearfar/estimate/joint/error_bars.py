@@ -22,7 +22,7 @@ from nearfar.illumination.real_basis import real_basis
 from nearfar.priors.covariance import spectral_density
 from nearfar.priors.responses import ResponsePrior, response_prior
 from nearfar.transport import near
-from nearfar.transport.direct import footprint, footprint_weights
+from nearfar.transport.direct import direct_weights, footprint
 from nearfar.transport.model import Components, Transport
 from nearfar.transport.posterior import Posterior
 
@@ -60,7 +60,7 @@ class _Functionals(NamedTuple):
 class _PixelState(NamedTuple):
     """The posterior's state at camera pixels, the transport's own units."""
 
-    columns: Floats  # (n, R, 4), of o, d and shifts
+    amplitude_responses: Floats  # (n, R, 4), to unit o, d and shifts
     precision: Floats  # (n, channels, 4), of the same before any photo
     noise: Floats  # (n, channels)
     scale: Floats  # prior scale s in photo units, (n, channels)
@@ -133,21 +133,21 @@ class ErrorBars:
         found = np.empty((number, channels), dtype=np.float32)
         for place, flat in enumerate(lights):
             truncated = self._truncated(flat) * far**2
-            for block in blocks(number, BATCH_PIXELS):
-                functionals = self._of_light(block, flat, truncated, (direct, near, far))
-                deviation = np.sqrt(self._variance(block, functionals))
+            for batch in blocks(number, BATCH_PIXELS):
+                functionals = self._of_light(batch, flat, truncated, (direct, near, far))
+                deviation = np.sqrt(self._variance(batch, functionals))
                 if len(lights) == 1:
-                    found[block] = deviation
+                    found[batch] = deviation
                 else:
-                    found[block, place] = deviation[:, place]
+                    found[batch, place] = deviation[:, place]
         return transport.picture(found)
 
     def direct(self) -> Floats:
         """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light."""
         transport = self._transport
         found = np.empty((transport.camera.pixels, transport.channels), dtype=np.float32)
-        for block in blocks(len(found), BATCH_PIXELS):
-            found[block] = np.sqrt(self._variance(block, self._of_direct(len(found[block]))))
+        for batch in blocks(len(found), BATCH_PIXELS):
+            found[batch] = np.sqrt(self._variance(batch, self._of_direct(len(found[batch]))))
         found *= transport.lit.reshape(-1, 1)
         return found.reshape(*transport.camera, transport.channels)
 
@@ -208,10 +208,12 @@ class ErrorBars:
             corners, weights = self._where.pixels[c], self._where.weights[c]
             here = (corners >= first) & (corners < last)
             np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
-            places = near.places_on(self._centres[one], transport.window, transport.projector)[0]
-            entries = np.flatnonzero(inside & (places >= first) & (places < last))
+            pixels = near.window_pixels(self._centres[one], transport.window, transport.projector)[
+                0
+            ]
+            entries = np.flatnonzero(inside & (pixels >= first) & (pixels < last))
             variance = self._variance(one, self._of_entries(entries))
-            n[:, places[entries] - first] = np.sqrt(variance).T
+            n[:, pixels[entries] - first] = np.sqrt(variance).T
         for some in blocks(lines.stop - lines.start, max(1, ENTRIES_AT_ONCE // width)):
             on_grid = slice(lines.start + some.start, lines.start + some.stop)
             variance = self._variance(one, self._of_far(one, inside, on_grid))
@@ -255,19 +257,19 @@ class ErrorBars:
         )
 
     def _of_light(
-        self, block: slice, light: Floats, truncated: Floats, gains: tuple[float, float, float]
+        self, batch: slice, light: Floats, truncated: Floats, gains: tuple[float, float, float]
     ) -> _Functionals:
         """Return the functional that is the picture under a light (P,)."""
         transport, centred = self._transport, self._centred
         gain_direct, gain_near, gain_far = gains
-        projector, centres = transport.projector, self._centres[block]
-        q = transport.correspondence.reshape(-1, 2)[block]
+        projector, centres = transport.projector, self._centres[batch]
+        q = transport.correspondence.reshape(-1, 2)[batch]
         mean = gain_far * float(light.mean())
         in_window = near.look_up(light.reshape(projector), centres, transport.window, projector)
         inside = near.inside(centres, transport.window, projector)
         overlap = (gain_far * centred.basis.analyse(light) * self._is_held).astype(np.float32)
         overlaps = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
-        lit = transport.lit.ravel()[block]
+        lit = transport.lit.ravel()[batch]
         direct = gain_direct * responses_of_direct(q, light[None], projector)[..., 0]
         direct[:, 0] -= mean * lit
         return _Functionals(
@@ -299,32 +301,32 @@ class ErrorBars:
         ]
         return np.array(total) / projector.pixels**2
 
-    def _state(self, block: slice) -> _PixelState:
+    def _state(self, batch: slice) -> _PixelState:
         """Gather the posterior's state at camera pixels."""
         transport, posterior, centred = self._transport, self._posterior, self._centred
         channels = transport.channels
-        white = posterior.white.reshape(-1, channels)[block]
-        centres = self._centres[block]
-        q = transport.correspondence.reshape(-1, 2)[block]
-        direct = footprint_weights(q, centres) @ centred.on_footprint.T
+        white = posterior.white.reshape(-1, channels)[batch]
+        centres = self._centres[batch]
+        q = transport.correspondence.reshape(-1, 2)[batch]
+        direct = direct_weights(q, centres) @ centred.on_footprint.T
         ones = centred.recentre(np.ones_like(direct[:, :1]), centres)
-        offset_noise = posterior.offset_noise.reshape(-1, channels)[block]
-        share_of_white = posterior.share_of_white.reshape(-1, channels)[block]
-        light_noise = posterior.light_noise.reshape(-1, channels)[block]
-        noise = transport.noise.reshape(-1, channels)[block]
+        offset_noise = posterior.offset_noise.reshape(-1, channels)[batch]
+        share_of_white = posterior.share_of_white.reshape(-1, channels)[batch]
+        light_noise = posterior.light_noise.reshape(-1, channels)[batch]
+        noise = transport.noise.reshape(-1, channels)[batch]
         return _PixelState(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
             nuisance.common_precision(white, offset_noise),
             np.maximum(noise, RELATIVE_NOISE_FLOOR * white),
-            posterior.prior_scale.ravel()[block, None] * white,
+            posterior.prior_scale.ravel()[batch, None] * white,
             np.maximum(light_noise**2 - (share_of_white * offset_noise) ** 2, 0.0),
             share_of_white,
-            posterior.prior_component.ravel()[block].astype(np.int64),
+            posterior.prior_component.ravel()[batch].astype(np.int64),
         )
 
-    def _variance(self, block: slice, functionals: _Functionals) -> Floats:
+    def _variance(self, batch: slice, functionals: _Functionals) -> Floats:
         """Return posterior variances, (n, channels), of each pixel's or of one pixel's many."""
-        state = self._state(block)
+        state = self._state(batch)
         if len(state.prior_component) == 1:
             (place,) = state.prior_component
             its = functionals._replace(truncated=functionals.truncated[place])
@@ -366,9 +368,11 @@ def _posterior_variance(
         + functionals.truncated
     )
     given = squared[..., 0] * (before[:, None] - np.sum(squared * weight * covariance**2, axis=-1))
-    columns = np.matmul(state.columns.transpose(0, 2, 1), prior.eigenvectors)[:, None]
-    weighted = columns * weight[:, :, None]
-    normal = np.matmul(weighted, columns.transpose(0, 1, 3, 2))
+    per_amplitude = np.matmul(state.amplitude_responses.transpose(0, 2, 1), prior.eigenvectors)[
+        :, None
+    ]
+    weighted = per_amplitude * weight[:, :, None]
+    normal = np.matmul(weighted, per_amplitude.transpose(0, 1, 3, 2))
     # Weights of o through white's error, of d and the shifts through direct light.
     shape = given.shape
     own = np.stack(

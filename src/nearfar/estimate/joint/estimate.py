@@ -14,7 +14,7 @@ from nearfar.arrays import Floats, Size, beside, namespace
 from nearfar.devices import Device
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
-from nearfar.estimate.joint.problem import ComponentChoice, Problem, Rows, lay_out
+from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport.model import Transport
@@ -101,7 +101,7 @@ def choose_components(
 
 def _sweep(
     problem: Problem, sweeps: int, chosen: Choices, progress: Callable[[float], None]
-) -> tuple[Problem, Rows]:
+) -> tuple[Problem, EstimatedRows]:
     """Sweep so many times, q moved after each."""
     rows = None
     for number, choice in zip_longest(range(sweeps), chosen[:sweeps]):
@@ -116,7 +116,7 @@ def _sweep(
     return problem, rows
 
 
-def _moved(problem: Problem, rows: Rows) -> Floats:
+def _moved(problem: Problem, rows: EstimatedRows) -> Floats:
     """Move q by what it was found to be off, but no further than its rounding allows."""
     xp = namespace(rows.amplitudes)
     amplitudes = xp.astype(rows.amplitudes, xp.float64)

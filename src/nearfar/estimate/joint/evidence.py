@@ -22,7 +22,7 @@ from array_api_compat import device
 
 from nearfar.arrays import Floats, Integers, beside, fetch, namespace
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.nuisance import DIRECT_DEVIATION
+from nearfar.estimate.joint.nuisance import DIRECT_PRIOR_DEVIATION
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.fitted import PRIOR_SCALES
 from nearfar.priors.responses import Eigenbasis, ResponsePrior
@@ -129,7 +129,7 @@ class WhitenedResponses(NamedTuple):
         First step of the row's table, rising.
     pixel : ndarray of int, shape (m,)
         Number of the camera pixel in the batch.
-    footprint : ndarray, shape (n, 9)
+    direct_weights : ndarray, shape (n, 9)
         Unit direct light around q.
     of_offset : ndarray, shape (n or 0, R)
         Responses to a unit error of the references; none where they have no noise.
@@ -140,13 +140,13 @@ class WhitenedResponses(NamedTuple):
     offset_ratio: Floats
     table_step: Integers
     pixel: Integers
-    footprint: Floats
+    direct_weights: Floats
     of_offset: Floats
 
     def only(self, selected: Integers) -> "WhitenedResponses":
         """Return the rows of some camera pixels."""
         xp, here = namespace(selected), device(selected)
-        place = xp.full(len(self.footprint), -1, dtype=xp.int64, device=here)
+        place = xp.full(len(self.direct_weights), -1, dtype=xp.int64, device=here)
         place[selected] = xp.arange(len(selected), dtype=xp.int64, device=here)
         pixel = place[self.pixel]
         (rows,) = xp.nonzero(pixel >= 0)
@@ -156,7 +156,7 @@ class WhitenedResponses(NamedTuple):
             self.offset_ratio[rows],
             self.table_step[rows],
             pixel[rows],
-            self.footprint[selected],
+            self.direct_weights[selected],
             self.of_offset[selected] if len(self.of_offset) else self.of_offset,
         )
 
@@ -176,7 +176,7 @@ def whiten(batch: PixelBatch) -> WhitenedResponses:
         offset_ratio=(batch.offset_noise.reshape((-1, 1)) / noise)[order],
         table_step=xp.astype(table_step[order], xp.int64),
         pixel=order // batch.white.shape[1],
-        footprint=batch.footprint[:, 0],
+        direct_weights=batch.direct_weights[:, 0],
         of_offset=batch.of_offset.reshape((-1, flat.shape[1])),
     )
 
@@ -196,7 +196,7 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
         The sum over channels, up to a constant of the camera pixel.
     """
     y = whitened.responses @ eigenbasis.eigenvectors
-    u = whitened.footprint @ eigenbasis.of_footprint
+    u = whitened.direct_weights @ eigenbasis.of_footprint
     v = whitened.of_offset @ eigenbasis.eigenvectors
     xp, table_step = namespace(y), fetch(whitened.table_step)
     found = xp.empty((len(y), len(PRIOR_SCALES)), dtype=xp.float32, device=device(y))
@@ -222,7 +222,7 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
             )
             log_determinant = log_determinant + xp.log(factor)
         # d in units of the noise has a prior of its own.
-        direct_variance = (DIRECT_DEVIATION * whitened.white_ratio[start:stop]) ** 2
+        direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio[start:stop]) ** 2
         factor = 1.0 + direct_variance * uu
         squares = yy - direct_variance * uy**2 / factor
         found[start:stop] = -0.5 * (squares + log_determinant + xp.log(factor))

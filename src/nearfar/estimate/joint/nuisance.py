@@ -2,8 +2,8 @@
 
 o is the error that the references add to every response; d is direct light at q, and with it go how
 far q is off down and across, times d; d2 ... are spikes, direct light of other surfaces at single
-window entries. Each amplitude adds a column of responses, which is the same for all camera pixels
-but for re-centring. Where a column is 0 for a whole batch, it is left out.
+window entries. The responses to a unit amplitude are the same for all camera pixels but for
+re-centring. An amplitude whose responses are 0 for a whole batch is left out.
 
 Their prior precision follows from the references' noise, from direct light being about as bright as
 white at most, and from how well q is found.
@@ -19,7 +19,7 @@ from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
 
 # Prior standard deviation of direct light, as a share of white: so wide that it hardly matters.
-DIRECT_DEVIATION = 4.0
+DIRECT_PRIOR_DEVIATION = 4.0
 # Prior standard deviation of q, in projector pixels, times direct light as a share of white. Under
 # a random light of cornell-aside at 58, 234 and 468 photos 0.015 gives 45.3, 48.3 and 49.3 dB,
 # 0.008 45.1, 49.2 and 50.5, no shift 44.5, 48.5 and 50.1: where no prior component fits well, q
@@ -32,23 +32,23 @@ COMMON_AMPLITUDES = 4
 OFFSET_DEVIATION_FLOOR = 1e-12
 
 
-def columns(batch: PixelBatch, centred: CentredBasis) -> Floats:
+def amplitude_responses(batch: PixelBatch, centred: CentredBasis) -> Floats:
     """Return responses a_g to unit o, d, shifts, d2 ..., without those left out: (n, G, R)."""
     return _side_by_side(
         [
             batch.of_offset,
-            product(batch.footprint, centred.on_footprint.T),
+            product(batch.direct_weights, centred.on_footprint.T),
             centred.on_window.T[batch.spikes],
         ]
     )
 
 
-def projected_columns(batch: PixelBatch, prior: ResponsePrior) -> Floats:
-    """Return the columns projected onto a prior's eigenvectors, (n, G, R)."""
+def projected_amplitude_responses(batch: PixelBatch, prior: ResponsePrior) -> Floats:
+    """Return the responses to unit amplitudes, projected onto a prior's eigenvectors, (n, G, R)."""
     return _side_by_side(
         [
             product(batch.of_offset, prior.eigenvectors),
-            product(batch.footprint, prior.of_footprint),
+            product(batch.direct_weights, prior.of_footprint),
             prior.of_window[batch.spikes],
         ]
     )
@@ -63,7 +63,7 @@ def prior_precision(batch: PixelBatch) -> Floats:
     """Return the prior precision of the amplitudes not left out, (n, channels, G), float64."""
     common = common_precision(batch.white, batch.offset_noise)
     spikes = [1] * batch.spikes.shape[1]
-    return common[..., _places(batch) + spikes]
+    return common[..., _amplitude_indices(batch) + spikes]
 
 
 def common_precision(white: Floats, offset_noise: Floats) -> Floats:
@@ -78,7 +78,7 @@ def common_precision(white: Floats, offset_noise: Floats) -> Floats:
     white = xp.astype(white, xp.float64)
     deviation = xp.maximum(xp.astype(offset_noise, xp.float64), OFFSET_DEVIATION_FLOOR * white)
     offset = 1.0 / deviation**2
-    direct = 1.0 / (DIRECT_DEVIATION * white) ** 2
+    direct = 1.0 / (DIRECT_PRIOR_DEVIATION * white) ** 2
     shift = 1.0 / (SHIFT_DEVIATION * white) ** 2
     found: Floats = xp.stack([offset, direct, shift, shift], axis=-1)
     return found
@@ -86,19 +86,19 @@ def common_precision(white: Floats, offset_noise: Floats) -> Floats:
 
 def in_full(amplitudes: Floats, batch: PixelBatch) -> Floats:
     """Return o, d, two shifts, d2 ..., with 0 for those left out, float32."""
-    places = _places(batch)
+    indices = _amplitude_indices(batch)
     xp = namespace(amplitudes)
     shape = (*amplitudes.shape[:2], COMMON_AMPLITUDES + batch.spikes.shape[1])
     found: Floats = xp.zeros(shape, dtype=xp.float32, device=device(amplitudes))
     spikes = list(range(COMMON_AMPLITUDES, shape[-1]))
-    found[..., places + spikes] = xp.astype(amplitudes, xp.float32)
+    found[..., indices + spikes] = xp.astype(amplitudes, xp.float32)
     return found
 
 
-def _places(batch: PixelBatch) -> list[int]:
-    """Return the places of those of o, d and the shifts that are not left out."""
+def _amplitude_indices(batch: PixelBatch) -> list[int]:
+    """Return the indices of the amplitudes o, d and shifts that are not left out."""
     offset = [0] if batch.of_offset.shape[1] else []
-    return offset + list(range(1, 1 + batch.footprint.shape[1]))
+    return offset + list(range(1, 1 + batch.direct_weights.shape[1]))
 
 
 def solve(normal: Floats, right: Floats, precision: Floats) -> Floats:

@@ -41,7 +41,7 @@ class ComponentChoice(NamedTuple):
     Attributes
     ----------
     prior_component : ndarray of int, shape (C,)
-        Place in LIT_COMPONENTS + UNLIT_COMPONENTS.
+        Index into LIT_COMPONENTS + UNLIT_COMPONENTS.
     prior_scale : ndarray, shape (C,), float32
         Share of white.
     """
@@ -54,7 +54,7 @@ class ComponentChoice(NamedTuple):
         return ComponentChoice(self.prior_component[selected] - first, self.prior_scale[selected])
 
 
-class Rows(NamedTuple):
+class EstimatedRows(NamedTuple):
     """Estimated rows of all camera pixels, photo units."""
 
     amplitudes: Floats  # o, d and d times what q is off by, (C, channels, 4)
@@ -112,12 +112,12 @@ def build_model(
         )
     # Pairs of a cosine and a sine side by side, those without a sine at the end.
     frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
-    places = measured.places(frequencies)
-    centred = replace(_centred(tuple(frequencies), measured.projector, window), places=places)
-    key = (tuple(frequencies), measured.projector, window, tuple(multiplicity[places].tolist()))
+    indices = measured.places(frequencies)
+    centred = replace(_centred(tuple(frequencies), measured.projector, window), places=indices)
+    key = (tuple(frequencies), measured.projector, window, tuple(multiplicity[indices].tolist()))
     return Model(
         centred.put(move),
-        move(multiplicity[places]),
+        move(multiplicity[indices]),
         _prior_set(LIT_COMPONENTS, *key, device),
         _prior_set(UNLIT_COMPONENTS, *key, device) if unlit else None,
     )

@@ -79,11 +79,11 @@ def solve_whole(
     prior_variance = xp.astype(ratio[..., None], xp.float32) * noise
     weight = 1.0 / (prior_variance * prior.eigenvalues + noise)
     y = product(batch.responses, prior.eigenvectors)
-    columns = nuisance.projected_columns(batch, prior)
-    transposed = xp.permute_dims(columns, (0, 2, 1))
+    per_amplitude = nuisance.projected_amplitude_responses(batch, prior)
+    transposed = xp.permute_dims(per_amplitude, (0, 2, 1))
     normal, right = [], []
     for i in range(y.shape[1]):
-        weighted = columns * weight[:, i, None]
+        weighted = per_amplitude * weight[:, i, None]
         normal.append(weighted @ transposed)
         right.append((weighted @ y[:, i, :, None])[..., 0])
     solved = nuisance.solve(
@@ -92,7 +92,7 @@ def solve_whole(
         nuisance.prior_precision(batch),
     )
     amplitudes = xp.astype(solved, xp.float32)
-    y -= amplitudes @ columns
+    y -= amplitudes @ per_amplitude
     y *= weight
     score = product(y, prior.of_window.T)
     y *= prior_variance

@@ -19,7 +19,7 @@ from nearfar.estimate.joint.clipped import rounded_ratio, solve_clipped
 from nearfar.estimate.joint.evidence import PriorSet, most_probable
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
-from nearfar.estimate.joint.problem import ComponentChoice, Problem, Rows
+from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
 from nearfar.estimate.joint.spikes import (
     LEAST_GAIN,
@@ -42,23 +42,23 @@ CLIPPED_BATCH_PIXELS = 512
 class _Start(NamedTuple):
     """What a sweep but the first starts from."""
 
-    before: Rows
-    expected: Rows  # from the neighbours
+    before: EstimatedRows
+    expected: EstimatedRows  # from the neighbours
     of_quantisation: Callable[[slice | NDArray[np.int64]], Floats]  # see `_of_quantisation`
 
 
 def sweep_once(
     problem: Problem,
-    before: Rows | None,
+    before: EstimatedRows | None,
     report: Callable[[float], None],
     chosen: ComponentChoice | None = None,
-) -> Rows:
+) -> EstimatedRows:
     """Estimate every camera pixel once.
 
     Parameters
     ----------
     problem : Problem
-    before : Rows, optional
+    before : EstimatedRows, optional
         Of the sweep before; none in the first.
     report : callable
         Called with the share done.
@@ -83,9 +83,9 @@ def sweep_once(
 
     done = [0]
 
-    def choose(block: slice) -> None:
+    def choose(selected: slice) -> None:
         """Choose prior components, and estimate the camera pixels whose windows are whole."""
-        batch = gather(pixels, block, centred, projector, _explained(problem, start, block))
+        batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
         for lit, first, candidates in (
             (True, 0, model.lit),
             (False, len(LIT_COMPONENTS), model.unlit),
@@ -93,21 +93,21 @@ def sweep_once(
             (mine,) = xp.nonzero(batch.lit == lit)
             if not len(mine) or candidates is None:
                 continue
-            given = chosen and chosen.of(block.start + mine, first)
+            given = chosen and chosen.of(selected.start + mine, first)
             component, scale = _choose(batch.only(mine), candidates, given)
-            choice.prior_component[block.start + mine] = component + first
-            choice.prior_scale[block.start + mine] = scale
-            whole = ~clipped[block.start + mine]
+            choice.prior_component[selected.start + mine] = component + first
+            choice.prior_scale[selected.start + mine] = scale
+            whole = ~clipped[selected.start + mine]
             for place in np.unique(fetch(component[whole])).tolist():
                 (alike,) = xp.nonzero(whole & (component == place))
                 some = batch.only(mine[alike])
                 ratio = variance_ratio(some, scale[alike])
                 put(
-                    block.start + mine[alike],
+                    selected.start + mine[alike],
                     some,
                     _with_spikes(some, candidates.priors[place], ratio, solve_whole, centred),
                 )
-        done[0] += block.stop - block.start
+        done[0] += selected.stop - selected.start
         report(done[0] / count)
 
     def estimate_clipped(part: NDArray[np.int64]) -> None:
@@ -140,7 +140,7 @@ def _explained(
     return responses
 
 
-def _empty_rows(problem: Problem, before: Rows | None) -> Rows:
+def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows:
     """Make room for what a sweep finds, behind the choices of the sweeps before."""
     responses = problem.pixels.responses
     xp, (number, channels, count) = namespace(responses), responses.shape
@@ -148,7 +148,7 @@ def _empty_rows(problem: Problem, before: Rows | None) -> Rows:
     def zeros(*shape: int, dtype: Any = xp.float32) -> Any:
         return xp.zeros(shape, dtype=dtype, device=device(responses))
 
-    return Rows(
+    return EstimatedRows(
         zeros(number, channels, COMMON_AMPLITUDES),
         zeros(number, channels, problem.window**2),
         zeros(number, channels, count),
@@ -163,7 +163,7 @@ def _empty_rows(problem: Problem, before: Rows | None) -> Rows:
 def _choose(
     batch: PixelBatch, candidates: PriorSet, given: ComponentChoice | None
 ) -> tuple[Integers, Floats]:
-    """Choose prior components, places among the candidates, where they are not given."""
+    """Choose prior components, indices of candidates, where they are not given."""
     if given is None:
         component, scale, _ = most_probable(batch, candidates)
         return component, namespace(scale).astype(scale, namespace(scale).float32)
@@ -194,12 +194,12 @@ def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], 
     # A row for each projector pixel, so that what a camera pixel reads lies side by side.
     errors = problem.measurements.quantisation_error[problem.model.centred.places]
     where = footprint(fetch(problem.pixels.correspondence), problem.measurements.projector)
-    error, places, shares = (
+    error, pixels, weights = (
         beside(np.ascontiguousarray(values), problem.pixels.responses)
         for values in (errors.T, where.pixels, where.weights)
     )
 
-    return lambda selected: look_up_each(error, places[selected], shares[selected])
+    return lambda selected: look_up_each(error, pixels[selected], weights[selected])
 
 
 def _with_spikes(
@@ -233,7 +233,7 @@ def _with_spikes(
     return mean
 
 
-def _expected(problem: Problem, rows: Rows) -> Rows:
+def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     """Return what is expected of each camera pixel from its neighbours."""
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels

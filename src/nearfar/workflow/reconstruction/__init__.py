@@ -1,1 +1,1 @@
-"""From a capture to a transport: one job, in tiles of camera rows."""
+"""Reconstruction of a transport from a capture, in tiles of camera rows."""

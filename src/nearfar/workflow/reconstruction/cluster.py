@@ -1,8 +1,8 @@
 """Reconstruction on many machines, by Dask: tiles of camera rows as tasks.
 
-The capture and the transport lie where all workers see them under the same name. Each tile is
-read, reconstructed and written by one worker, in chunks of its own, so that a worker that is lost
-costs its tile, and doing it over again writes the same. The transport is that of one process with
+All workers see the capture and the transport under the same names. One worker reads, reconstructs
+and writes a tile, in chunks that belong to this tile alone. If the worker is lost, another one
+reconstructs the tile again and writes the same bytes. The transport equals that of one process with
 the same memory, to the bit.
 """
 
@@ -23,7 +23,7 @@ from nearfar.errors import ClusterError, MissingPackageError
 from nearfar.files.writes import abandon, admit
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
-from nearfar.workflow.reconstruction.executors import TileReport, Work, one_processor_a_product
+from nearfar.workflow.reconstruction.executors import TileReport, Work, single_threaded_products
 from nearfar.workflow.reconstruction.job import Job, prepare, reconstruct_tile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.sinks import Store, TileWriter
@@ -38,18 +38,20 @@ except ImportError as error:
         f"pip install 'nearfar[dask]'."
     ) from error
 
-# Seconds in which a scheduler answers, and has a worker.
+# Time in which a scheduler must answer, and then have a worker.
 CONNECTION_SECONDS = 10
 
-# Holds the token of the run that may write into the folder; gone once the run has ended.
+# File in the output's folder with the token of the run that may write there. It is removed when the
+# run ends.
 RUN_MARKER = ".run.partial"
 
-# One tile at a time in a process, however many threads it has: that is what memory is for.
-_at_work = threading.Lock()
+# A worker process reconstructs one tile at a time, however many threads it has: the memory of the
+# options is for one tile.
+_one_tile = threading.Lock()
 
 
 class DaskExecutor:
-    """The workers of a Dask scheduler, one tile at a time in each process.
+    """Reconstructs tiles on the workers of a Dask scheduler, one at a time in each process.
 
     Parameters
     ----------
@@ -68,13 +70,14 @@ class DaskExecutor:
         report: Report,
         tile_report: TileReport,
     ) -> Iterator[tuple[slice, Summary]]:
-        """Reconstruct and store tiles; yield each with its summary, as they come.
+        """Reconstruct and store tiles; yield each with its summary when it is done.
 
         Raises
         ------
         ClusterError
-            If there is no such scheduler, it has no workers, these lack nearfar, another version
-            of it, memory or the files, or are lost again and again.
+            If there is no such scheduler, if it has no workers, or if workers have no nearfar,
+            another version of it, too little memory or no access to the files, or are lost again
+            and again.
         """
         assert isinstance(store, TileWriter), "workers write into a folder that all see"
         source, scheduler = work.capture.path.resolve(), self._scheduler
@@ -105,7 +108,7 @@ class DaskExecutor:
                     f"and its workers run, and reconstruct again."
                 ) from error
             finally:
-                # Tiles that are under way end, but write no more.
+                # Tiles that are being reconstructed run to their end, but write nothing more.
                 marker.unlink(missing_ok=True)
                 with suppress(OSError, CancelledError):
                     client.cancel([job, *tasks])
@@ -122,18 +125,18 @@ def _prepared(
 def _reconstructed(
     job: Job, tile: slice, known: Correspondence | None, store: TileWriter, run: str
 ) -> Summary:
-    """On a worker: reconstruct a tile, and write it."""
-    with _at_work, one_processor_a_product():
+    """On a worker: reconstruct and write a tile."""
+    with _one_tile, single_threaded_products():
         _require_run(store.folder, run)
         part = reconstruct_tile(job, tile, known)
-        # In this order, so that a run that ends meanwhile is seen here or drops the writes.
+        # In this order, a run that ends meanwhile is either noticed here, or drops the writes.
         admit(store.folder)
         _require_run(store.folder, run)
         return store.put(tile, part)
 
 
 def _require_run(folder: Path, run: str) -> None:
-    """Refuse to work for a run that has ended, or that another has taken the place of."""
+    """Raise an error if the run has ended, or another run has replaced it."""
     try:
         current = (folder / RUN_MARKER).read_text()
     except FileNotFoundError:
@@ -144,8 +147,8 @@ def _require_run(folder: Path, run: str) -> None:
 
 @contextmanager
 def _connected(scheduler: str) -> Iterator[Client]:
-    """Connect to a scheduler that has workers."""
-    # Correspondence goes with each tile; how much is too much is left to the options' memory.
+    """Connect to a scheduler."""
+    # The correspondence of a tile travels with its task, and may exceed what Dask warns of.
     with config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
         try:
             client = Client(scheduler, timeout=CONNECTION_SECONDS, set_as_default=False)
@@ -158,8 +161,8 @@ def _connected(scheduler: str) -> Iterator[Client]:
             yield client
 
 
-class _Reach(NamedTuple):
-    """What a process reaches of a reconstruction's files.
+class _Access(NamedTuple):
+    """The version of nearfar in a process, and its access to the files of a reconstruction.
 
     Attributes
     ----------
@@ -176,19 +179,19 @@ class _Reach(NamedTuple):
     output: bool
 
 
-def _reach(source: Path, folder: Path) -> _Reach:
-    """On a worker, or here: return what this process reaches."""
+def _access(source: Path, folder: Path) -> _Access:
+    """On a worker, or here: return the access of this process."""
     try:
         capture = hashlib.sha256((source / "zarr.json").read_bytes()).hexdigest()
     except OSError as error:
         capture = error.strerror or str(error)
-    return _Reach(version(), capture, os.access(folder, os.W_OK | os.X_OK))
+    return _Access(version(), capture, os.access(folder, os.W_OK | os.X_OK))
 
 
 def _require_workers(
     client: Client, scheduler: str, source: Path, folder: Path, memory: int
 ) -> None:
-    """Refuse workers that cannot do the work, before any is given out."""
+    """Raise an error, before any tile is submitted, if a worker could not reconstruct one."""
     try:
         client.wait_for_workers(1, timeout=CONNECTION_SECONDS)
     except TimeoutError as error:
@@ -201,27 +204,27 @@ def _require_workers(
                 f"the worker at {address} has {worker['memory_limit'] / 1e9:.1f} GB: give a "
                 f"smaller `memory`, or start it with {memory / 1e9:.1f} GB or more."
             )
-    # Our own functions travel by name: first see that workers know any.
+    # Dask sends our functions by name, so workers must be able to import nearfar.
     for address, fault in client.run(exec, "import nearfar", on_error="return").items():
         if fault is not None:
             raise ClusterError(
                 f"the worker at {address} cannot import nearfar ({fault}): install nearfar "
                 f"{version()} where the workers run."
             )
-    reaches: dict[str, _Reach] = client.run(_reach, source, folder)
-    here = _reach(source, folder)
-    for address, reach in reaches.items():
-        if reach.version != here.version:
+    accesses: dict[str, _Access] = client.run(_access, source, folder)
+    here = _access(source, folder)
+    for address, access in accesses.items():
+        if access.version != here.version:
             raise ClusterError(
-                f"the worker at {address} has nearfar {reach.version}, and this is "
+                f"the worker at {address} has nearfar {access.version}, and this is "
                 f"{here.version}: install the same everywhere."
             )
-        if reach.capture != here.capture:
+        if access.capture != here.capture:
             raise ClusterError(
                 f"the worker at {address} does not see {source} as it is here: put it where all "
                 f"workers see it under the same name."
             )
-        if not reach.output:
+        if not access.output:
             raise ClusterError(
                 f"the worker at {address} cannot write to {folder.parent}: put the transport in "
                 f"a folder that all workers see under the same name."

@@ -1,4 +1,4 @@
-"""Who works at the tiles of a reconstruction: this process, one or several tiles at a time."""
+"""Executors within this process: one tile after another, or several tiles at a time."""
 
 from collections.abc import Callable, Container, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -18,23 +18,23 @@ from nearfar.workflow.reconstruction.sources import without_light
 from nearfar.workflow.reconstruction.summary import Summary
 from nearfar.workflow.reconstruction.tiles import Tiling
 
-# Called with the first row of a tile, and the share of it that is done.
+# Called with the first row of a tile and the share of the tile that is done.
 TileReport = Callable[[int, float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """A reconstruction to be executed.
+    """What an executor needs to reconstruct a transport.
 
     Attributes
     ----------
     capture : Capture
     options : ReconstructionOptions
     correspondence : Correspondence, optional
-        Of the whole camera, if it is given.
+        Of the whole camera, if it is given and not to be found.
     tiling : Tiling
     prepare : callable
-        Returns the job, in this process; called with a report.
+        Called with a report; reads what all tiles share, and returns the job.
     """
 
     capture: Capture
@@ -44,14 +44,14 @@ class Work:
     prepare: Callable[[Report], Job]
 
     def known_of(self, tile: slice) -> Correspondence | None:
-        """Return the correspondence of a tile and its halo, if tiles are given any."""
+        """Return the given correspondence of a tile and its halo; None where the job finds it."""
         if self.correspondence is None or self.options.square:
             return None
         return self.correspondence.of_rows(self.tiling.with_halo(tile))
 
 
 class Executor(Protocol):
-    """Who works at the tiles."""
+    """Reconstructs and stores tiles."""
 
     def run(
         self,
@@ -67,18 +67,18 @@ class Executor(Protocol):
         ----------
         work : Work
         tiles : sequence of slice
-            Those that are not stored yet.
+            Rows of the tiles that are not stored yet.
         store : Store
         report : callable
             Called while the job is prepared.
         tile_report : callable
-            Called while a tile is worked at, where that is known.
+            Called while a tile is reconstructed; not by executors of other processes.
         """
         ...
 
 
 class SerialExecutor:
-    """One tile after another, the camera pixels of each on all processors."""
+    """One tile after another, on all processors."""
 
     def run(
         self,
@@ -90,17 +90,17 @@ class SerialExecutor:
     ) -> Iterator[tuple[slice, Summary]]:
         """Reconstruct the tiles in their order."""
         job = work.prepare(report)
-        with one_processor_a_product():
+        with single_threaded_products():
             for tile in tiles:
                 yield tile, _reconstructed(job, tile, work, store, tile_report)
 
 
 @dataclass(frozen=True)
 class ThreadExecutor:
-    """Several tiles at a time in this process, which share its memory.
+    """Several tiles at a time, in threads that share the memory of the options.
 
-    Reading and measuring use one processor for a tile, so several tiles keep more of them busy.
-    The tiles are smaller in return, and more of their rows are halo.
+    A single tile is read and measured on one processor, so several tiles at a time use more
+    processors. Each tile is smaller in return, and more of its rows are halo.
 
     Attributes
     ----------
@@ -117,28 +117,28 @@ class ThreadExecutor:
         report: Report,
         tile_report: TileReport,
     ) -> Iterator[tuple[slice, Summary]]:
-        """Reconstruct the tiles as threads come free."""
+        """Reconstruct each tile as soon as a thread is free."""
         job = work.prepare(report)
         waiting = iter(tiles)
         with (
-            one_processor_a_product(),
+            single_threaded_products(),
             ThreadPoolExecutor(max_workers=self.tiles_at_once) as pool,
         ):
-            under_way: dict[Future[Summary], slice] = {}
+            pending: dict[Future[Summary], slice] = {}
             try:
                 while True:
                     for tile in waiting:
                         future = pool.submit(_reconstructed, job, tile, work, store, tile_report)
-                        under_way[future] = tile
-                        if len(under_way) == self.tiles_at_once:
+                        pending[future] = tile
+                        if len(pending) == self.tiles_at_once:
                             break
-                    if not under_way:
+                    if not pending:
                         return
-                    done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+                    done, _ = wait(pending, return_when=FIRST_COMPLETED)
                     for future in done:
-                        yield under_way.pop(future), future.result()
+                        yield pending.pop(future), future.result()
             finally:
-                for future in under_way:
+                for future in pending:
                     future.cancel()
 
 
@@ -152,22 +152,22 @@ def _reconstructed(
     return store.put(tile, part)
 
 
-def one_processor_a_product() -> threadpool_limits:
-    """Keep every matrix product on one processor, within the context that is returned.
+def single_threaded_products() -> threadpool_limits:
+    """Return a context in which each matrix product runs on one processor.
 
-    Several products run side by side instead, so that what comes out does not depend on how many
-    processors there are.
+    Several products run at the same time instead, so the result does not depend on the number of
+    processors.
     """
     return threadpool_limits(1, "blas")
 
 
 def execute(work: Work, executor: Executor, sink: Sink, report: Report) -> Summary:
-    """Reconstruct the tiles that a sink lacks, and conclude.
+    """Reconstruct the tiles that a sink does not have yet, and complete the transport.
 
     Raises
     ------
     InputError
-        If no camera pixel is directly lit.
+        If no camera pixel has direct light.
     NearfarError
         As the executor and the sink.
     """
@@ -188,7 +188,7 @@ def execute(work: Work, executor: Executor, sink: Sink, report: Report) -> Summa
 
 
 class _Progress:
-    """The share of all rows that is done, from the shares of tiles in any thread."""
+    """Adds up the progress of tiles, which threads report, to that of all rows."""
 
     def __init__(self, tiling: Tiling, stored: Container[int], report: Report) -> None:
         self._rows = {tile.start: tile.stop - tile.start for tile in tiling.tiles()}
@@ -196,7 +196,7 @@ class _Progress:
         self._height, self._report, self._lock = tiling.height, report, Lock()
 
     def of_tile(self, first: int, share: float) -> None:
-        """Report that a share of the tile that begins with a row is done."""
+        """Report the share done of the tile whose first row is `first`."""
         with self._lock:
             self._shares[first] = share
             done = sum(self._shares[row] * count for row, count in self._rows.items())

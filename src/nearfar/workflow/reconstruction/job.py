@@ -1,4 +1,4 @@
-"""The job of a reconstruction: what all tiles share, and the work on one tile."""
+"""A reconstruction job: what all tiles share, and how one tile is reconstructed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -46,10 +46,10 @@ class Job:
     options : ReconstructionOptions
     estimator : Estimator
     source : Source
-        What the tiles are estimated from.
+        Measurements and correspondence of the rows of a tile.
     tiling : Tiling
     correspondence : Correspondence, optional
-        Of the whole camera, where it is there before the tiles: for a square T.
+        Of the whole camera, for a square T, which needs it before the first tile.
     """
 
     capture: Capture
@@ -62,14 +62,14 @@ class Job:
 
 
 def tiling_of(capture: Capture, options: ReconstructionOptions, *, given: bool) -> Tiling:
-    """Cut the rows of the transport into tiles that fit in the memory.
+    """Divide the rows of the transport into tiles that fit in the memory.
 
     Parameters
     ----------
     capture : Capture
     options : ReconstructionOptions
     given : bool
-        Whether the correspondence is given and not to be found.
+        Whether the correspondence is given, so that it need not be found.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def prepare(
     estimator: Estimator | None = None,
     photos: Photos | None = None,
 ) -> Job:
-    """Read what all tiles share: references, the brightest white, and all that a square T is of.
+    """Read what all tiles share: references, the brightest white, and measurements of a square T.
 
     Parameters
     ----------
@@ -105,11 +105,11 @@ def prepare(
     correspondence : Correspondence, optional
         Of the whole camera, if it is given.
     report : callable
-        Called with what is being done and the share done.
+        Called with the step and the share of it that is done.
     estimator : Estimator, optional
-        Instead of the one that the options name.
+        Used instead of the one that the options name.
     photos : Photos, optional
-        The capture's, where they are in memory already.
+        The capture's, if they are in memory already.
 
     Raises
     ------
@@ -120,16 +120,16 @@ def prepare(
     if correspondence is not None and not correspondence.lit.any():
         raise without_light(capture)
     tiling = tiling_of(capture, options, given=correspondence is not None)
-    steady = photos_without_drift(photos or capture, report)
+    drift_free = photos_without_drift(photos or capture, report)
     chosen = estimator or options.estimator
     if not options.square:
-        source = camera_source(capture, steady)
-        return Job(capture, steady, options, chosen, source, tiling)
-    at_once = rows_to_measure(
+        source = camera_source(capture, drift_free)
+        return Job(capture, drift_free, options, chosen, source, tiling)
+    rows_at_once = rows_to_measure(
         capture.plan, capture.camera, capture.channels, chosen, options.memory
     )
-    averaged, found = square_source(capture, steady, correspondence, at_once, report)
-    return Job(capture, steady, options, chosen, averaged, tiling, found)
+    averaged, found = square_source(capture, drift_free, correspondence, rows_at_once, report)
+    return Job(capture, drift_free, options, chosen, averaged, tiling, found)
 
 
 def reconstruct_tile(
@@ -153,7 +153,7 @@ def reconstruct_tile(
     Returns
     -------
     Part
-        The provenance's ``excess_of_sums`` and ``rounding`` are the tile's own.
+        With ``excess_of_sums`` and ``rounding`` of this tile in its provenance.
     """
     around = job.tiling.with_halo(tile)
     core = slice(tile.start - around.start, tile.stop - around.start)

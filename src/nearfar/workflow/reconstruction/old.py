@@ -23,8 +23,8 @@ def reconstruct_on(
 ) -> Summary:
     """Call `nearfar.reconstruct_to_file` with a scheduler, which replaces this function.
 
-    Parameters and errors are those of `nearfar.reconstruct_to_file`, and the fields of its options
-    as keywords.
+    Parameters and errors are those of `nearfar.reconstruct_to_file`; keywords are fields of its
+    options.
     """
     return reconstruct_to_file(
         capture,

@@ -1,4 +1,4 @@
-"""What a reconstruction is asked for, said once."""
+"""The options of a reconstruction."""
 
 from dataclasses import dataclass
 from numbers import Integral
@@ -8,7 +8,7 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.base import ESTIMATORS, Estimator
 
-# Bytes of memory that a reconstruction takes at most, unless told otherwise.
+# Default of `ReconstructionOptions.memory`.
 DEFAULT_MEMORY = 2 * 10**9
 
 
@@ -21,19 +21,20 @@ class ReconstructionOptions:
     method : str
         Name of the estimator: ``"joint"``, ``"paper"``, or one that another package adds.
     square : bool
-        Whether to make the paper's square T, with a row for each projector pixel: the mean over
-        the camera pixels that it lights.
+        Whether to estimate the paper's square T, with a row for each projector pixel: the mean
+        over the camera pixels that it lights.
     memory : int
-        Bytes to work in, above what is returned. The camera is worked at in tiles of rows that
-        fit; only a square T holds the measurements of the whole camera.
+        Memory in bytes for the work, not counting the result. The camera is reconstructed in
+        tiles of as many rows as fit. A square T is the exception: it needs the measurements of the
+        whole camera at once.
     device : {"cpu", "cuda", "torch"}
         Where the estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
         processor.
     half : bool
-        Whether n and f are kept as float16, half the bytes. The provenance's ``rounding`` is the
-        error that this adds, as a share of their noise.
+        Whether n and f are stored as float16, in half the bytes. The provenance's ``rounding`` is
+        the rounding error as a share of their noise.
     tiles_at_once : int
-        Tiles that are worked at side by side in this process; they share the memory.
+        Tiles that this process reconstructs at the same time; they share the memory.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From a capture to a transport, in memory or in a file; here or on many machines."""
+"""Reconstruct the transport of a capture, in memory or into a file, here or on many machines."""
 
 from functools import partial
 from pathlib import Path
@@ -40,12 +40,12 @@ def reconstruct(
     ----------
     capture : Capture
     correspondence : Correspondence, optional
-        By default it is found in the capture: in its stripes or Gray code, or without them by the
-        phase of the transport's own photos.
+        By default it is found from the capture: from its stripes or Gray code, or without them
+        from the phase of the photos of transport.
     method, square, memory, device, half
         As `ReconstructionOptions` describes them.
     progress : callable, optional
-        Called with what is being done and the share done, 0 to 1.
+        Called with the step and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -58,9 +58,9 @@ def reconstruct(
     PlanError
         If the plan's patterns are complex, or the method needs other patterns.
     InputError
-        If there is no correspondence to be had, no direct light in the photos, a plan by reference
-        has too few whites and blacks, a row of the camera does not fit in the memory, or the
-        device is not there.
+        If no correspondence can be found, the photos show no direct light, a plan by reference has
+        too few whites and blacks, a row of the camera does not fit in the memory, or the device is
+        not there.
 
     Examples
     --------
@@ -90,8 +90,9 @@ def reconstruct_to_file(
 ) -> Summary:
     """Reconstruct the transport of a capture into a file, tile by tile of camera rows.
 
-    Until the last tile they lie in a folder of the output's name with ``.unfinished`` behind it.
-    Whatever stops the work, kill -9 too, the tiles that were written stay there for `resume`.
+    Until the last tile is written, the tiles lie in a folder with the output's name and
+    ``.unfinished`` appended. Whatever stops the work, kill -9 included, the written tiles stay
+    there for `resume`.
 
     Parameters
     ----------
@@ -102,15 +103,17 @@ def reconstruct_to_file(
         As `nearfar.reconstruct` takes it.
     options : ReconstructionOptions, optional
     scheduler : str, optional
-        Address of a Dask scheduler, for instance ``tcp://10.0.0.1:8786``, whose workers do the
-        work. They read the capture and write the output under the same names as this process;
-        the options' memory is that of each worker process. The transport is the same to the bit.
+        Address of a Dask scheduler, for instance ``tcp://10.0.0.1:8786``, whose workers
+        reconstruct the tiles. They read the capture and write the output under the same paths as
+        this process. The options' memory is that of each worker process. The transport is the same
+        to the bit.
     resume : bool
-        Go on with the tiles that are there, of the same capture and options.
+        Keep the tiles of a stopped job, and reconstruct the others; capture and options must be
+        the same.
     force : bool
-        Replace a transport that is there and, without `resume`, what was not finished.
+        Replace a transport that is there and, without `resume`, the tiles of a stopped job.
     progress : callable, optional
-        Called with what is being done and the share done, 0 to 1.
+        Called with the step and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -120,16 +123,16 @@ def reconstruct_to_file(
     Raises
     ------
     PlanError, InputError
-        As `nearfar.reconstruct`; if what is there is of another capture or other options.
+        As `nearfar.reconstruct`; if the tiles to resume are of another capture or other options.
     MissingPackageError
-        If there is a scheduler and Dask is not installed.
+        If a scheduler is given and Dask is not installed.
     ClusterError
-        If there is no such scheduler, it has no workers, these lack nearfar, another version of
-        it, memory or the files, or are lost again and again.
+        If there is no such scheduler, if it has no workers, or if workers have no nearfar, another
+        version of it, too little memory or no access to the files, or are lost again and again.
     NearfarError
-        As `nearfar.files.resumable_output`. What was written is kept, and the message says where.
+        As `nearfar.files.resumable_output`. The message says where the written tiles are kept.
     KeptInterrupt
-        If it was interrupted; likewise.
+        If it was interrupted; the message says the same.
 
     Examples
     --------
@@ -160,7 +163,7 @@ def reconstruct_to_file(
 
 
 def executor_of(options: ReconstructionOptions) -> Executor:
-    """Return what works at the tiles in this process."""
+    """Return the executor that the options ask for in this process."""
     if options.tiles_at_once == 1:
         return SerialExecutor()
     return ThreadExecutor(options.tiles_at_once)

@@ -1,4 +1,4 @@
-"""Where the tiles of a transport go: into memory, or into a file that can be resumed."""
+"""Sinks for the tiles of a transport: memory, or a file of which a stopped job can be resumed."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -23,41 +23,42 @@ from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.summary import Summary
 from nearfar.workflow.reconstruction.tiles import Tiling
 
-# A line for the job and one for each tile that is written; removed in the end.
+# Its first line is the identity of the job; each further line is the summary of a written tile. It
+# is removed once the transport is complete.
 LOG_NAME = "blocks.jsonl"
 
 
 class Store(Protocol):
-    """What takes in the tiles, wherever they are made: several at once, on other machines too."""
+    """Stores tiles, from several threads at a time."""
 
     def put(self, tile: slice, part: Part) -> Summary:
-        """Store a tile, and return what is said of it."""
+        """Store a tile and return its summary."""
         ...
 
 
 class Sink(Protocol):
-    """Where a transport goes."""
+    """Collects the tiles of one transport."""
 
     @property
     def store(self) -> Store:
-        """What takes in the tiles."""
+        """Where executors store tiles."""
         ...
 
     def stored(self) -> Mapping[int, Summary]:
-        """Return the summaries of the tiles that are there already, by their first row."""
+        """Return the summaries of the tiles that are stored already, by their first row."""
         ...
 
     def note(self, tile: slice, summary: Summary) -> None:
-        """Take note of a tile that is stored."""
+        """Record that a tile is stored."""
         ...
 
     def finish(self, whole: Summary) -> None:
-        """Take in what is said of the whole transport, all tiles of which are stored."""
+        """Complete the transport with its summary, once all tiles are stored."""
         ...
 
 
 class MemorySink:
-    """A transport in memory."""
+    """Keeps a transport in memory."""
 
     def __init__(self) -> None:
         self._parts: dict[int, Part] = {}
@@ -74,18 +75,18 @@ class MemorySink:
         return summary_of(part)
 
     def stored(self) -> Mapping[int, Summary]:
-        """Return nothing: there are no tiles before the job."""
+        """Return an empty mapping: no tile is there before the job."""
         return {}
 
     def note(self, tile: slice, summary: Summary) -> None:
-        """Do nothing: tiles are kept as they come."""
+        """Do nothing: the tile itself is the record."""
 
     def finish(self, whole: Summary) -> None:
         """Keep the provenance of the whole."""
         self._provenance = whole.provenance
 
     def collected(self) -> tuple[Transport, Correspondence]:
-        """Return the transport and the correspondence of all tiles, put together."""
+        """Return the transport and the correspondence of all tiles."""
         parts = [self._parts[first] for first in sorted(self._parts)]
         transport = stacked([part.transport for part in parts])
         transport = replace(transport, provenance=self._provenance)
@@ -94,7 +95,7 @@ class MemorySink:
 
 @dataclass(frozen=True)
 class TileWriter:
-    """Writes tiles into the folder of a transport, from any process that sees it.
+    """Writes tiles into the folder of a transport, from any process that has access to it.
 
     Attributes
     ----------
@@ -106,19 +107,19 @@ class TileWriter:
     tiling: Tiling
 
     def put(self, tile: slice, part: Part) -> Summary:
-        """Write a tile; the first that is written lays the transport out."""
+        """Write a tile; the first one also creates the arrays of the transport."""
         rows, height = self.tiling.rows, self.tiling.height
         write_rows(self.folder, part.transport, tile.start, rows=rows, height=height)
         return summary_of(part)
 
 
 class FileSink:
-    """A transport in a folder, tile by tile; one that was stopped can be gone on with.
+    """Writes a transport into a folder, tile by tile, and records the tiles that are there.
 
     Parameters
     ----------
     folder : Path
-        Where the tiles are written: it becomes the transport once all are there.
+        Where the tiles are written; it becomes the transport once all of them are.
     tiling : Tiling
     """
 
@@ -131,15 +132,15 @@ class FileSink:
         return TileWriter(self._folder, self._tiling)
 
     def stored(self) -> Mapping[int, Summary]:
-        """Read from the log which tiles are written."""
+        """Read the summaries of the written tiles from the log."""
         return stored_tiles(self._folder)
 
     def note(self, tile: slice, summary: Summary) -> None:
-        """Add a tile that is written to the log."""
+        """Add a written tile to the log."""
         note(self._folder / LOG_NAME, {"start": tile.start, **summary._asdict()})
 
     def finish(self, whole: Summary) -> None:
-        """Write the provenance, and remove what lost workers left half-written."""
+        """Write the provenance, and remove chunks that lost workers left half-written."""
         for left in self._folder.rglob(".*.partial"):
             left.unlink()
         write_provenance(self._folder, whole.provenance)
@@ -149,9 +150,10 @@ class FileSink:
 def resumable_file(
     output: Path, tiling: Tiling, identity: Mapping[str, Any], *, resume: bool, force: bool
 ) -> Iterator[FileSink]:
-    """Give a sink that writes a transport; the tiles of one that was stopped are kept.
+    """Yield a sink that writes a transport; if the body is stopped, its tiles are kept.
 
-    Until the last tile they lie in a folder of the output's name with ``.unfinished`` behind it.
+    Until the last tile is written, the tiles lie in a folder with the output's name and
+    ``.unfinished`` appended.
 
     Parameters
     ----------
@@ -159,21 +161,21 @@ def resumable_file(
         Transport to write.
     tiling : Tiling
     identity : mapping
-        What tiles of one transport have in common; see `identity_of`.
+        What all tiles of a transport must have in common; see `identity_of`.
     resume : bool
-        Go on with the tiles that are there, of the same identity.
+        Keep the tiles that are there, and write the others; the identity must be the same.
     force : bool
-        Replace a transport that is there and, without `resume`, what was not finished.
+        Replace a transport that is there and, without `resume`, the tiles of a stopped job.
 
     Raises
     ------
     InputError
         If the tiles that are there have another identity.
     NearfarError
-        As `nearfar.files.resumable_output`, and what the body raises; the message says which tiles
+        As `nearfar.files.resumable_output`, and as the body raises. The message adds how many tiles
         are kept, and where.
     KeptInterrupt
-        If the body was interrupted; likewise.
+        If the body was interrupted; the message says the same.
     """
 
     def is_worth_keeping(folder: Path, _fault: BaseException) -> bool:
@@ -185,7 +187,7 @@ def resumable_file(
                 _require_same(folder, lines[0], identity)
             else:
                 note(folder / LOG_NAME, identity)
-            # What was being written when the job was killed.
+            # Chunks that were being written when the job was killed.
             for left in folder.rglob(".*.partial"):
                 left.unlink()
             yield FileSink(folder, tiling)
@@ -202,7 +204,7 @@ def resumable_file(
 
 @contextmanager
 def new_file(output: Path, tiling: Tiling, *, force: bool) -> Iterator[FileSink]:
-    """Give a sink that writes a transport whole or not at all; see `nearfar.files.new_output`."""
+    """Yield a sink that writes a whole transport or nothing; see `nearfar.files.new_output`."""
     with new_output(output, force=force) as folder:
         folder.mkdir()
         yield FileSink(folder, tiling)
@@ -215,11 +217,11 @@ def identity_of(
     options: ReconstructionOptions,
     tiling: Tiling,
 ) -> dict[str, Any]:
-    """Return what tiles of one transport have in common, as JSON holds it."""
-    described = (capture.path / "zarr.json").read_bytes()
+    """Return what all tiles of a transport must have in common, as JSON types."""
+    metadata = (capture.path / "zarr.json").read_bytes()
     return {
         # Photos that were taken again have other times.
-        "capture": hashlib.sha256(described + capture.times.tobytes()).hexdigest(),
+        "capture": hashlib.sha256(metadata + capture.times.tobytes()).hexdigest(),
         "correspondence": _digest(correspondence),
         "method": options.method,
         "square": options.square,
@@ -231,13 +233,13 @@ def identity_of(
 
 
 def summary_of(part: Part) -> Summary:
-    """Return what is said of a tile."""
+    """Return the summary of a tile."""
     lit = part.correspondence.lit
     return Summary(int(lit.sum()), int(lit.size), dict(part.transport.provenance))
 
 
 def stored_tiles(folder: Path) -> dict[int, Summary]:
-    """Read the summaries of the tiles that are written into a folder, by their first row."""
+    """Read the summaries of the tiles written into a folder, by their first row."""
     fields = Summary._fields
     return {
         line["start"]: Summary(*(line[name] for name in fields))
@@ -247,7 +249,7 @@ def stored_tiles(folder: Path) -> dict[int, Summary]:
 
 
 def _lines(folder: Path) -> list[Mapping[str, Any]]:
-    """Read the log: the identity, and then the tiles."""
+    """Read the lines of the log: the identity, then the tiles."""
     return read_notes(folder / LOG_NAME, lambda line: line)
 
 
@@ -267,7 +269,7 @@ def _require_same(folder: Path, before: Mapping[str, Any], identity: Mapping[str
 
 
 def _kept(output: Path) -> str:
-    """Say which tiles of a stopped job are kept, and where; empty if none are."""
+    """Describe in words which tiles of a stopped job are kept, and where; empty if none are."""
     folder = output.resolve().with_name(f"{output.resolve().name}{UNFINISHED}")
     count = len(stored_tiles(folder))
     again = "`resume=True, force=True`" if output.exists() else "`resume=True`"

@@ -1,9 +1,9 @@
-"""What a tile is estimated from: measurements and correspondence, of the camera or of a square T.
+"""Measurements and correspondence of the rows of a tile, for the camera's T or a square T.
 
-Where a tile depends on rows beside it, its measurements are taken of both tiles, so a tile depends
-on how the rest of the camera is cut in two things only, which are estimated over its own rows: the
-noise of inverse pairs, and the usual step of q from one camera pixel to the next (by which
-correspondence by phase sees mirrored surfaces).
+A tile is measured together with its halo. Two quantities are estimated from these rows alone, so
+they depend on how the camera is divided into tiles: the noise of inverse pairs, and the usual step
+of q from one camera pixel to the next, by which correspondence by phase recognises mirrored
+surfaces.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,14 +27,14 @@ from nearfar.photometry.measurements import Measurements, join
 from nearfar.photometry.photos import Photos
 from nearfar.progress import Report
 
-Worked = TypeVar("Worked")
+Result = TypeVar("Result")
 
-# Bytes of white and black photos that are read at once.
+# Memory of the white and black photos that are read at once.
 READ_BYTES = 2**26
 
 
 class Source(Protocol):
-    """What the rows of a transport are estimated from."""
+    """Measurements and correspondence from which the rows of a transport are estimated."""
 
     def read(
         self, rows: slice, known: Correspondence | None
@@ -45,7 +45,7 @@ class Source(Protocol):
         ----------
         rows : slice
         known : Correspondence, optional
-            Of these rows, if it was given and not to be found.
+            Of these rows, if it is given and need not be found.
         """
         ...
 
@@ -56,7 +56,7 @@ class Source(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class CameraSource:
-    """The camera's own pixels.
+    """Rows of the camera.
 
     Attributes
     ----------
@@ -74,15 +74,15 @@ class CameraSource:
     def read(
         self, rows: slice, known: Correspondence | None
     ) -> tuple[Measurements, Correspondence]:
-        """Measure some rows, and find their correspondence unless it is known."""
+        """Measure some rows, and find their correspondence unless it is given."""
         measurements = replace(measure(self.photos, rows), brightest=self.brightest)
         if known is not None:
             return measurements, known
-        with _naming(self.capture):
+        with _with_capture_named(self.capture):
             return measurements, find_correspondence(self.photos, measurements, rows)
 
     def saturated(self, rows: slice) -> Booleans | None:
-        """Look at the white photo: no pattern is brighter."""
+        """Return which camera pixels are at full scale under white, the brightest pattern."""
         found = white_and_black(self.capture.plan)
         if found is None:
             return None
@@ -92,21 +92,23 @@ class CameraSource:
 
 @dataclass(frozen=True, eq=False)
 class SquareSource:
-    """The camera pixels that each projector pixel lights, averaged (section 5.1).
+    """Rows of a square T: camera pixels averaged by the projector pixel that lights them.
+
+    Section 5.1 of the paper.
 
     Attributes
     ----------
     measurements : Measurements
-        As of a camera with the projector's size.
+        Averaged, as those of a camera with the projector's size.
     correspondence : Correspondence
-        Each projector pixel's own place, NaN where it lights no camera pixel.
-    full : ndarray of bool, shape (Py, Px), optional
-        Whether one of its camera pixels is at full scale under white.
+        The coordinates of each projector pixel, NaN where it lights no camera pixel.
+    any_saturated : ndarray of bool, shape (Py, Px), optional
+        Whether any of its camera pixels is at full scale under white.
     """
 
     measurements: Measurements
     correspondence: Correspondence
-    full: Booleans | None
+    any_saturated: Booleans | None
 
     def read(
         self, rows: slice, known: Correspondence | None
@@ -118,12 +120,12 @@ class SquareSource:
         return self.measurements.of_pixels(size, pixels), self.correspondence.of_rows(rows)
 
     def saturated(self, rows: slice) -> Booleans | None:
-        """Return which rows of T a saturated camera pixel went into."""
-        return self.full[rows] if self.full is not None else None
+        """Return for each row of T whether any of its camera pixels is saturated."""
+        return self.any_saturated[rows] if self.any_saturated is not None else None
 
 
 def camera_source(capture: Capture, photos: Photos) -> CameraSource:
-    """Return what the camera's own pixels are estimated from."""
+    """Return the source of the rows of the camera."""
     return CameraSource(capture, photos, brightest_white(photos))
 
 
@@ -134,7 +136,7 @@ def square_source(
     rows_at_once: int,
     report: Report,
 ) -> tuple[SquareSource, Correspondence]:
-    """Measure the whole camera, and average the camera pixels that each projector pixel lights.
+    """Measure the whole camera, and average camera pixels by the projector pixel that lights them.
 
     Parameters
     ----------
@@ -156,26 +158,25 @@ def square_source(
     Raises
     ------
     InputError
-        If there is no correspondence to be had, or no direct light.
+        If no correspondence can be found, or there is no direct light.
     """
     tiles = list(blocks(photos.camera.height, rows_at_once))
-    measured = _each(tiles, lambda rows: measure(photos, rows), "measuring", report)
+    measured = _for_each_tile(tiles, lambda rows: measure(photos, rows), "measuring", report)
     found = known
     if found is None:
-        with _naming(capture):
-            found = _found(photos, tiles, measured, report)
+        with _with_capture_named(capture):
+            found = _find_correspondence(photos, tiles, measured, report)
     if not found.lit.any():
         raise without_light(capture)
     whole, q = onto_projector(measured, found)
-    # The largest of all tiles, as of the whole camera.
     excess = max((part.excess_of_sums for part in measured), key=abs)
     whole = replace(whole, excess_of_sums=excess, brightest=_largest_white(whole))
-    seen = camera_source(capture, photos).saturated(slice(0, photos.camera.height))
-    confidence, full = quality_on_projector(found, seen, whole.camera)
-    return SquareSource(whole, Correspondence(q, confidence), full), found
+    saturated = camera_source(capture, photos).saturated(slice(0, photos.camera.height))
+    confidence, any_saturated = quality_on_projector(found, saturated, whole.camera)
+    return SquareSource(whole, Correspondence(q, confidence), any_saturated), found
 
 
-def _found(
+def _find_correspondence(
     photos: Photos, tiles: Sequence[slice], measured: Sequence[Measurements], report: Report
 ) -> Correspondence:
     """Find the correspondence of the whole camera, tile by tile where the method allows it."""
@@ -184,7 +185,7 @@ def _found(
         return method.find(photos, slice(0, photos.camera.height), lambda: join(measured))
     measured_of = {tile.start: part for tile, part in zip(tiles, measured, strict=True)}
     return joined(
-        _each(
+        _for_each_tile(
             tiles,
             lambda tile: method.find(photos, tile, lambda: measured_of[tile.start]),
             "correspondence",
@@ -193,10 +194,10 @@ def _found(
     )
 
 
-def _each(
-    tiles: Sequence[slice], work: Callable[[slice], Worked], what: str, report: Report
-) -> list[Worked]:
-    """Do the work for each tile, and report the share done."""
+def _for_each_tile(
+    tiles: Sequence[slice], work: Callable[[slice], Result], what: str, report: Report
+) -> list[Result]:
+    """Return the result of the work on each tile, and report the share done."""
     done = []
     for tile in tiles:
         done.append(work(tile))
@@ -205,7 +206,7 @@ def _each(
 
 
 def photos_without_drift(photos: Photos, report: Report) -> Photos:
-    """Return photos by reference without the drift of lamp and ambient light, others as they are.
+    """Remove the drift of lamp and ambient light from photos by reference; return others unchanged.
 
     Raises
     ------
@@ -220,7 +221,7 @@ def photos_without_drift(photos: Photos, report: Report) -> Photos:
 
 
 def brightest_white(photos: Photos) -> float:
-    """Return the largest white less black of the whole camera; 0 without a white photo."""
+    """Return the largest difference of white and black of the whole camera; 0 without a white."""
     found = white_and_black(photos.plan)
     if found is None:
         return 0.0
@@ -233,8 +234,8 @@ def brightest_white(photos: Photos) -> float:
 
 
 @contextmanager
-def _naming(capture: Capture) -> Iterator[None]:
-    """Name the capture, and a cure, in what is wrong with its photos for correspondence."""
+def _with_capture_named(capture: Capture) -> Iterator[None]:
+    """Add the capture's path and a cure to an error about its photos for correspondence."""
     try:
         yield
     except InputError as error:
@@ -243,7 +244,7 @@ def _naming(capture: Capture) -> Iterator[None]:
 
 
 def without_light(capture: Capture) -> InputError:
-    """Return the fault of a capture that shows no direct light."""
+    """Return the error for a capture that shows no direct light."""
     return InputError(
         f"{capture.path} shows no direct light at any camera pixel: check that the camera "
         f"sees the projector's light, or give `correspondence`."
@@ -254,5 +255,5 @@ def _largest_white(measurements: Measurements) -> float:
     """Return the largest response to white, 0 where it was not measured."""
     if DC not in measurements.basis.frequencies:
         return 0.0
-    (place,) = measurements.places([DC])
-    return float(np.abs(measurements.responses[..., place]).max(initial=0.0))
+    (index,) = measurements.places([DC])
+    return float(np.abs(measurements.responses[..., index]).max(initial=0.0))

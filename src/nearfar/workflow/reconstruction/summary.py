@@ -1,4 +1,4 @@
-"""What is said of a reconstruction, tile by tile and as a whole."""
+"""Summaries of a reconstruction: of each tile and of the whole camera."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -9,19 +9,20 @@ from nearfar.photometry.photos import Photos
 from nearfar.release import version
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
-# Entries of the provenance of which the whole camera has the largest of its tiles.
+# Entries of the provenance that are, for the whole camera, the largest of its tiles.
 LARGEST_OF_TILES = ("excess_of_sums", "rounding")
 
 
 class Summary(NamedTuple):
-    """What is said of rows of a transport that were reconstructed.
+    """Camera pixels and provenance of some rows of a reconstructed transport.
 
     Attributes
     ----------
     lit, pixels : int
-        Camera pixels that are lit directly, and all; of a square T, its rows.
+        Camera pixels with direct light, and all camera pixels; of a square T, rows of T.
     provenance : mapping
-        How they were made. ``excess_of_sums`` and ``rounding`` are the largest of all tiles.
+        How the rows were reconstructed. ``excess_of_sums`` and ``rounding`` are the largest of all
+        tiles.
     """
 
     lit: int = 0
@@ -41,7 +42,7 @@ class Summary(NamedTuple):
 def provenance_of(
     capture: Capture, photos: Photos, options: ReconstructionOptions
 ) -> dict[str, Any]:
-    """Describe what a transport is made of, as JSON holds it."""
+    """Return the provenance of a transport as JSON types: options, plan, photos, rig and drift."""
     plan = capture.plan
     drift = photos.drift if isinstance(photos, PhotosWithoutDrift) else None
     return {

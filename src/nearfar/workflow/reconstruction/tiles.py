@@ -1,4 +1,4 @@
-"""Tiles of camera rows: as many rows as fit in the memory, and those beside them that they need."""
+"""Tiles of camera rows: how many rows fit in the memory, and the halo that a tile needs."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -10,20 +10,20 @@ from nearfar.errors import InputError
 from nearfar.estimate.base import Estimator
 from nearfar.plan import Plan
 
-# Bytes that Python and the libraries take.
+# Memory of Python and the libraries.
 LIBRARY_BYTES = 4 * 10**8
-# Arrays that come and go take so many times the bytes of those that are counted.
+# Memory at its peak, with temporary arrays, over that of the arrays that an estimator counts.
 TEMPORARY_FACTOR = 1.5
-# Tiles of so many rows twice over, or more, are of a multiple of them: chunks in a file divide
-# tiles, and need not be small.
+# Tiles of at least twice this many rows have a multiple of it: the rows of a chunk in the file must
+# divide those of a tile, and a prime number of rows would leave chunks of one row.
 ROWS_MULTIPLE = 8
-# Bytes of each value of the camera that references take: mean white and black, and whether white
-# is saturated.
+# Memory of the references for each camera pixel and channel: mean white and black as float32, and
+# a flag of saturated white.
 REFERENCE_BYTES_PER_VALUE = 9
 
 
 class Tiling(NamedTuple):
-    """How the camera's rows are cut into tiles.
+    """How the rows of the camera are divided into tiles.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Tiling(NamedTuple):
     rows : int
         Rows of a tile.
     halo : int
-        Rows on either side of a tile that its result depends on.
+        Rows on each side of a tile that its result also depends on.
     """
 
     height: int
@@ -51,7 +51,7 @@ class Tiling(NamedTuple):
 def tile_rows(
     plan: Plan, camera: Size, channels: int, estimator: Estimator, halo: int, memory: int
 ) -> Tiling:
-    """Cut a camera's rows into tiles that may be worked at in so many bytes.
+    """Divide the rows of a camera into tiles, each of which is reconstructed within `memory`.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ def tile_rows(
     channels : int
     estimator : Estimator
     halo : int
-        Rows on either side of a tile that its result depends on.
+        Rows on each side of a tile that its result also depends on.
     memory : int
-        Bytes.
+        In bytes.
 
     Raises
     ------
@@ -70,12 +70,12 @@ def tile_rows(
         If not even one row fits.
     """
     shared, row = _shared_and_row(plan, camera, channels, estimator)
-    beside = _rows_beside(estimator)
-    rows = int((memory - shared) / row) - beside
-    if rows + beside >= camera.height:
+    halo_rows = _halo_rows(estimator)
+    rows = int((memory - shared) / row) - halo_rows
+    if rows + halo_rows >= camera.height:
         return Tiling(camera.height, camera.height, halo)
     if rows < 1:
-        least = memory_of_tile(plan, camera, channels, estimator, min(1, camera.height - beside))
+        least = memory_of_tile(plan, camera, channels, estimator, min(1, camera.height - halo_rows))
         raise InputError(
             f"{memory / 1e6:.0f} MB of memory are too few for one row of these photos: give "
             f"`memory={int(np.ceil(least / 1e8)) * 10**8}` or more."
@@ -87,33 +87,34 @@ def tile_rows(
 def memory_of_tile(
     plan: Plan, camera: Size, channels: int, estimator: Estimator, rows: int
 ) -> float:
-    """Return the bytes in which a tile of so many rows is worked at."""
+    """Return the memory in bytes in which a tile of so many rows is reconstructed."""
     shared, row = _shared_and_row(plan, camera, channels, estimator)
-    return shared + row * (rows + _rows_beside(estimator))
+    return shared + row * (rows + _halo_rows(estimator))
 
 
 def rows_to_measure(
     plan: Plan, camera: Size, channels: int, estimator: Estimator, memory: int
 ) -> int:
-    """Return how many camera rows are measured at once in so many bytes, at least one."""
+    """Return how many camera rows can be measured at once within `memory` bytes, at least one."""
     shared, row = _shared_and_row(plan, camera, channels, estimator)
     return min(camera.height, max(1, int((memory - shared) / row)))
 
 
 def reference_bytes(plan: Plan, camera: Size, channels: int) -> int:
-    """Return the bytes of what references tell of the whole camera, none for other plans."""
+    """Return the memory in bytes of the references of the whole camera; 0 without references."""
     return REFERENCE_BYTES_PER_VALUE * camera.pixels * channels if plan.offset == "reference" else 0
 
 
 def _shared_and_row(
     plan: Plan, camera: Size, channels: int, estimator: Estimator
 ) -> tuple[float, float]:
-    """Return the bytes that all rows share, and those of a row."""
+    """Return the memory in bytes that all rows share, and that of one row."""
     shared, pixel = estimator.memory(plan, channels)
     shared += LIBRARY_BYTES + reference_bytes(plan, camera, channels)
     return shared, TEMPORARY_FACTOR * pixel * camera.width
 
 
-def _rows_beside(estimator: Estimator) -> int:
-    # One more on either side for correspondence by phase.
+def _halo_rows(estimator: Estimator) -> int:
+    """Return the rows that are measured besides those of a tile."""
+    # One more on each side for correspondence by phase.
     return 2 * (estimator.halo + 1) if estimator.halo else 0

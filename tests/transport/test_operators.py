@@ -275,7 +275,7 @@ def test_an_exact_transport_is_the_sum_of_its_components(generator):
     )
 
 
-def test_footprint_weights_are_the_centroid(generator):
+def test_direct_weights_are_the_centroid(generator):
     q = _places(generator)
     where = direct.footprint(q, PROJECTOR)
     y, x = np.divmod(where.pixels, PROJECTOR.width)

@@ -112,7 +112,7 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, afterwards, 
     assert np.mean([found[name] - best[name] for name in lights]) > -0.15
 
 
-def test_kinds_are_those_that_were_chosen_on_the_way(rig, tmp_path):
+def test_components_are_those_of_the_early_choice(rig, tmp_path):
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
     chosen = estimate._choice.components[0]
     np.testing.assert_array_equal(
@@ -121,7 +121,7 @@ def test_kinds_are_those_that_were_chosen_on_the_way(rig, tmp_path):
     np.testing.assert_array_equal(part.transport.posterior.prior_scale.ravel(), chosen.prior_scale)
 
 
-def test_kinds_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, monkeypatch):
+def test_components_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, monkeypatch):
     plan = PLANS["pairs and stripes"]
     dark = (3, 4)
 
@@ -187,13 +187,13 @@ def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path
         )
         part = _made(estimate, capture)
     assert len(capture.plan.patterns) == end
-    # Kinds that were chosen by enough of the photos that there are.
+    # Components were chosen from enough of the photos that there are.
     assert observing.SUFFICIENT_SHARE * end < estimate.chosen_by < end
     expected, _ = reconstruct(capture)
     assert part.transport.provenance == expected.provenance
 
 
-def test_kinds_by_too_few_photos_are_chosen_again(rig, afterwards, tmp_path, monkeypatch):
+def test_components_from_too_few_photos_are_chosen_again(rig, afterwards, tmp_path, monkeypatch):
     # Photos come too fast for more than the first choice, by half of them.
     monkeypatch.setattr(Patient, "_ends_in_time", lambda *_: False)
     part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
@@ -203,7 +203,7 @@ def test_kinds_by_too_few_photos_are_chosen_again(rig, afterwards, tmp_path, mon
     np.testing.assert_array_equal(part.transport.near, expected.near)
 
 
-def test_a_small_camera_is_not_followed(tmp_path):
+def test_a_small_camera_has_no_early_choice(tmp_path):
     world = model_transport(SIZE, Size(1, 1), window=5, far=Size(3, 3), channels=1)
     rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
     for plan in ("reference", "pairs"):
@@ -226,7 +226,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
             _made(estimate, capture)
 
 
-def test_what_is_pending_choice_ends_with_the_capture(rig, tmp_path, monkeypatch):
+def test_a_pending_choice_ends_with_the_capture(rig, tmp_path, monkeypatch):
     begun, before = threading.Event(), threading.active_count()
 
     def endless(*_arguments, progress, **_options):

@@ -1,4 +1,4 @@
-"""Captures that end when they are good enough, and what is said to limit them."""
+"""Captures that end at a target SNR, and what limits those that do not reach it."""
 
 from dataclasses import replace
 
@@ -41,57 +41,57 @@ def _rig(scene, **camera):
 def _run(scene, path, photos, target, **camera):
     plan = with_checks(choose_plan(scene.projector, photos)[0])
     rig = _rig(scene, **camera)
-    told = []
-    check = QualityObserver(plan, target, rig.full_scale, told.append)
+    qualities = []
+    check = QualityObserver(plan, target, rig.full_scale, qualities.append)
     capture = acquire(plan, path, rig, observers=[check])
-    return plan, capture, told
+    return plan, capture, qualities
 
 
 def test_a_capture_ends_when_it_is_good_enough_and_is_whole(scene, tmp_path):
-    plan, capture, told = _run(scene, tmp_path / "c.zarr", 150, 39.0)
+    plan, capture, qualities = _run(scene, tmp_path / "c.zarr", 150, 39.0)
     assert len(capture.plan.patterns) < len(plan.patterns)
-    assert told[-1].snr >= 39.0
-    assert all(quality.snr < 39.0 for quality in told[:-1])
-    assert told[-1].photos == len(capture.plan.patterns) == capture.photos.shape[0]
+    assert qualities[-1].snr >= 39.0
+    assert all(quality.snr < 39.0 for quality in qualities[:-1])
+    assert qualities[-1].photos == len(capture.plan.patterns) == capture.photos.shape[0]
     # On the disk it is a capture like any other.
     again = open_capture(tmp_path / "c.zarr")
-    assert again.plan == plan.first(told[-1].photos)
+    assert again.plan == plan.first(qualities[-1].photos)
     transport, _ = reconstruct(again)
     # What was said is what the estimate does under pictures that it never saw.
     values = []
     for numbers in check_photos(plan).values():
         light = plan.draw(numbers[0]) / np.float32(255)
         values.append(snr(scene @ light, transport @ light))
-    assert np.mean(values) == pytest.approx(told[-1].snr, abs=1.0)
+    assert np.mean(values) == pytest.approx(qualities[-1].snr, abs=1.0)
 
 
 def test_the_check_is_not_fooled_by_noise(scene, tmp_path):
-    # The photos of the checks are far noisier than the SNR that is told.
-    _, capture, told = _run(scene, tmp_path / "c.zarr", 150, 90.0, full_well=1000.0)
+    # The photos of the checks are far noisier than the SNR of the estimate.
+    _, capture, qualities = _run(scene, tmp_path / "c.zarr", 150, 90.0, full_well=1000.0)
     transport, _ = reconstruct(capture)
     values = []
     for numbers in check_photos(capture.plan).values():
         light = capture.plan.draw(numbers[0]) / np.float32(255)
         values.append(snr(scene @ light, transport @ light))
-    assert np.mean(values) == pytest.approx(told[-1].snr, abs=1.0)
-    assert told[-1].photos == len(capture.plan.patterns)
-    assert told[-1].limit == "noise"
+    assert np.mean(values) == pytest.approx(qualities[-1].snr, abs=1.0)
+    assert qualities[-1].photos == len(capture.plan.patterns)
+    assert qualities[-1].limit == "noise"
 
 
-def test_too_few_photos_are_said_to_limit(scene, tmp_path):
-    _, _, told = _run(scene, tmp_path / "c.zarr", 30, 90.0, full_well=3e7)
-    assert told[-1].limit == "photos"
+def test_too_few_photos_are_the_limit(scene, tmp_path):
+    _, _, qualities = _run(scene, tmp_path / "c.zarr", 30, 90.0, full_well=3e7)
+    assert qualities[-1].limit == "photos"
 
 
-def test_a_scene_that_the_model_does_not_hold_is_said_to_limit(tmp_path):
+def test_a_scene_outside_the_model_is_the_limit(tmp_path):
     # Rows of pure chance: no direct light, window or band holds them.
     projector = Size(16, 16)
     generator = np.random.default_rng(0)
     base = cached_scene("cornell", projector)
     rough = replace(base, far=base.far + 2e-3 * generator.random(base.far.shape, dtype=np.float32))
-    _, _, told = _run(rough, tmp_path / "c.zarr", 120, 90.0, full_well=3e6)
-    assert told[-1].limit == "model"
-    assert told[-1].snr < 35
+    _, _, qualities = _run(rough, tmp_path / "c.zarr", 120, 90.0, full_well=3e6)
+    assert qualities[-1].limit == "model"
+    assert qualities[-1].snr < 35
 
 
 def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_not(scene, tmp_path):
@@ -103,19 +103,19 @@ def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_no
     # The lamp fails after the first look: every photo is asked for all the same.
     plan = with_checks(choose_plan(scene.projector, 60)[0])
     rig = _rig(scene)
-    told = []
-    check = QualityObserver(plan, 90.0, rig.full_scale, told.append)
+    qualities = []
+    check = QualityObserver(plan, 90.0, rig.full_scale, qualities.append)
     shown = (plan.draw(i) for i in range(len(plan.patterns)))
     for number, photo in enumerate(rig.shoot(shown)):
-        failed = told and number < len(plan.patterns)
+        failed = qualities and number < len(plan.patterns)
         verdict = check.after_photo(number, np.zeros_like(photo) if failed else photo)
         assert verdict is Verdict.CONTINUE
-    assert told[0].fault is None
-    assert told[-1].fault.endswith(".")
-    assert told[-1].photos == len(plan.patterns)
+    assert qualities[0].fault is None
+    assert qualities[-1].fault.endswith(".")
+    assert qualities[-1].photos == len(plan.patterns)
 
 
-def test_looks_grow_rarer_as_the_target_is_far(scene, tmp_path):
+def test_estimates_are_rarer_the_farther_the_target(scene, tmp_path):
     _, _, far = _run(scene, tmp_path / "far.zarr", 100, 90.0)
     _, _, close = _run(scene, tmp_path / "close.zarr", 100, 43.5)
     assert len(far) < len(close)

@@ -1,4 +1,4 @@
-"""Captures that were stopped and are gone on with: as if they had never been stopped."""
+"""Captures that were stopped and resumed: as if they had never been stopped."""
 
 import errno
 import json

@@ -64,7 +64,7 @@ def test_photos_that_may_be_spoilt_are_named():
     text = str(LightChanged(LightChange("any", -0.03), None, 3))
     assert "before the first comparison" in text
     assert text.endswith("by `shoot_again(numbers=range(0, 4))`.")
-    assert "before photo 8: see" in str(LightChangedBefore(change, 8))
+    assert "before photo 8: check" in str(LightChangedBefore(change, 8))
 
 
 def test_a_reason_may_be_a_sentence_or_not():

@@ -130,7 +130,7 @@ def test_a_camera_that_repeats_for_ever_is_named(table, plan):
         next(frames)
     old = camera.before
     camera.from_now_on = lambda _picture: old
-    with pytest.raises(DeviceError, match=r"photo 10 cannot be had: it is the photo before"):
+    with pytest.raises(DeviceError, match=r"photo 10 could not be taken: it is the photo before"):
         list(frames)
 
 

@@ -1,4 +1,4 @@
-"""How strongly to regularise compressive light transport, chosen fairly.
+"""Choose how strongly compressive light transport is regularised.
 
 `best_share` compares with the truth and so favours the rival. `held_out_share` needs no truth: it
 holds some patterns out and takes the lambda that predicts their responses best. Both try every
@@ -21,7 +21,7 @@ from nearfar.errors import InputError
 from nearfar.transport.exact import ExactTransport
 
 ROWS_TRIED = 200
-# One pattern in so many is held out.
+# One pattern in this many is held out.
 PATTERNS_PER_HELD_OUT = 10
 # Fitting noise costs time: the search ends where the score is this far below the best, dB.
 MAXIMUM_DROP_DECIBELS = 1.5
@@ -31,15 +31,15 @@ ENERGY_FLOOR = 1e-30
 
 @dataclass(frozen=True)
 class Choice:
-    """What was tried and what came out.
+    """The shares that were tried, and the SNR of each.
 
     Attributes
     ----------
     shares : tuple of float
-        lambda as a share of the least that leaves a row without wavelets; those that were tried,
-        down to where the score has fallen by `MAXIMUM_DROP_DECIBELS`.
+        Values of lambda that were tried, each as a share of the least lambda that leaves a row
+        without wavelets; down to where the SNR has fallen by `MAXIMUM_DROP_DECIBELS`.
     plain, refitted : tuple of float
-        SNR of each share, as the l1 norm has it and refitted, dB.
+        SNR of each share in dB, without the refit and with it.
     """
 
     shares: tuple[float, ...]

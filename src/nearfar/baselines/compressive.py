@@ -34,7 +34,7 @@ from nearfar.baselines.sensing import Sensing, sense
 from nearfar.errors import InputError
 from nearfar.transport.exact import ExactTransport
 
-# What the method needs from first to last.
+# The whole method, with the steps that lie in other modules.
 __all__ = [
     "DEFAULT_PENALTY_SHARE",
     "PENALTY_SHARES",
@@ -46,12 +46,12 @@ __all__ = [
     "refit_few",
 ]
 
-# lambda as a share of the least that leaves nothing: what is tried, and what is taken unasked.
+# lambda as a share of the least that leaves a row without wavelets: those tried, and the default.
 PENALTY_SHARES = tuple(10 ** (-0.5 - 0.25 * i) for i in range(13))
 DEFAULT_PENALTY_SHARE = 1e-3
-# Least squares on the support is trusted with at most one coefficient for this many patterns.
+# A row is refitted by least squares if it keeps at most one coefficient for this many patterns.
 PATTERNS_PER_COEFFICIENT = 2
-# Rows solved together.
+# Rows that are solved together.
 ROWS_AT_ONCE = 512
 
 Progress = Callable[[float], None]
@@ -87,7 +87,7 @@ def reconstruct_compressive(
     Raises
     ------
     InputError
-        If the share is no share.
+        If the share is not in (0, 1].
     """
     if not 0.0 < share <= 1.0:
         raise InputError(f"a share of {share} gives no lambda: choose one above 0 and up to 1.")
@@ -123,7 +123,7 @@ def _reconstruct(
         return len(pictures)
 
     done = 0
-    # One thread of linear algebra in each of ours: more would only wait for each other.
+    # One BLAS thread in each of these threads: more would only wait for each other.
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(processors()) as pool:
         for count in pool.map(one, blocks(len(rows), ROWS_AT_ONCE)):
             done += count

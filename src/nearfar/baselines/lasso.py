@@ -6,7 +6,8 @@ Each row i minimises over its coefficients x
 
 Only a few coefficients differ from 0, so a row works on few columns at a time: those in use and
 those whose overlap with the residual exceeds lambda, which are looked for among all columns, for
-a block of rows in one matrix product. A row whose duality gap over all columns is small leaves.
+a block of rows in one matrix product. A row has converged once its duality gap over all columns is
+small.
 
 Index convention: i runs over rows, n over the N columns of the problem, k over the K responses.
 """
@@ -19,31 +20,32 @@ import numpy as np
 from nearfar.arrays import Floats, Integers, blocks
 from nearfar.baselines.working_sets import relative_gap, solve_small
 
-# Duality gap at which a row leaves, as a share of its objective: at the end, and before.
+# Duality gap at which a row has converged, as a share of its objective: at the wanted lambda, and
+# at the larger ones before it.
 GAP_TOLERANCE = 1e-3
 ROUGH_GAP_TOLERANCE = 1e-2
-# From one lambda to the next on the way down.
+# Each lambda on the way down, as a share of the one before.
 PENALTY_RATIO = 0.3
-# A working set is solved to this share of the gap that is asked for.
+# A working set is solved to this share of the tolerance, ...
 INNER_TOLERANCE_SHARE = 0.3
-# and no further than this share of the gap that there is.
+# ... or to this share of the row's present gap, whichever is larger.
 INNER_GAP_SHARE = 0.3
 MAXIMUM_ROUNDS = 20
-# Columns that a row may take up at once: as many as it uses, and at least these.
+# A row may add as many columns at once as it uses, or this many if it uses fewer.
 MINIMUM_NEW_COLUMNS = 16
-# Rows of working sets within this factor of each other are solved together.
+# Rows whose working sets differ in size by no more than this factor are solved together.
 MAXIMUM_SIZE_RATIO = 1.4
-# Numbers in the matrices that are solved at once.
+# Entries of the matrices that are solved at once.
 ENTRIES_AT_ONCE = 2**24
 
 
 class Rows(NamedTuple):
-    """Where the rows stand.
+    """Coefficients of the rows so far, and their residuals.
 
     Attributes
     ----------
     coefficients : ndarray, shape (I, N + 1), float32
-        x; the last, of no column, is 0.
+        x; the last belongs to no column and is 0.
     residual : ndarray, shape (I, K), float32
         b - x A.
     overlap : ndarray, shape (I, N + 1), float32
@@ -56,7 +58,7 @@ class Rows(NamedTuple):
 
 
 def start(columns: Floats, responses: Floats) -> Rows:
-    """Return rows of zeros.
+    """Return rows whose coefficients are all 0.
 
     Parameters
     ----------
@@ -71,14 +73,14 @@ def start(columns: Floats, responses: Floats) -> Rows:
 
 
 def highest_penalty(rows: Rows) -> Floats:
-    """Return the least lambda at which rows of zeros stay so, (I,): of `start`'s rows."""
+    """Return the least lambda at which the rows of `start` stay 0, shape (I,)."""
     return np.asarray(np.abs(rows.overlap).max(axis=1, initial=0.0))
 
 
 def solve(
     columns: Floats, responses: Floats, penalty: Floats, tolerance: float = GAP_TOLERANCE
 ) -> Floats:
-    """Minimise for one lambda per row, by way of larger ones.
+    """Minimise at one lambda per row, after a sequence of larger ones.
 
     Parameters
     ----------
@@ -87,12 +89,12 @@ def solve(
     penalty : ndarray, shape (I,)
         lambda; 0 only where the responses are 0.
     tolerance : float
-        Duality gap at which a row leaves, as a share of its objective.
+        Duality gap at which a row has converged, as a share of its objective.
 
     Returns
     -------
     ndarray, shape (I, N + 1), float32
-        x, and a 0.
+        x, and a 0 for the row of zeros.
     """
     rows = start(columns, responses)
     everything = np.arange(len(responses))
@@ -109,7 +111,7 @@ def solve(
 def refit(columns: Floats, responses: Floats, coefficients: Floats, most: int) -> Floats:
     """Fit the coefficients that are not 0 by least squares, where there are at most `most`.
 
-    The l1 norm pulls every coefficient towards 0; this takes the pull back.
+    The l1 norm shrinks every coefficient towards 0; the refit undoes this.
 
     Parameters
     ----------
@@ -125,12 +127,12 @@ def refit(columns: Floats, responses: Floats, coefficients: Floats, most: int) -
     counts = used.sum(axis=1)
     found = coefficients.copy()
     for group in _groups(np.where(counts <= most, counts, 0), columns.shape[1]):
-        # A place unused points at the column of zeros.
+        # Unused places point at the column of zeros.
         places = _first_places(np.where(used[group], np.inf, 0.0), counts[group])
         chosen = columns[places].astype(np.float64)
         matrix = chosen @ chosen.transpose(0, 2, 1)
         diagonal = np.arange(places.shape[1])
-        # Squares as small as this against a column's own cannot be told from rounding.
+        # A ridge no larger than rounding, for columns that depend on each other.
         matrix[:, diagonal, diagonal] *= 1.0 + 1e-9
         matrix[:, diagonal, diagonal] += places == len(columns) - 1
         right = chosen @ responses[group].astype(np.float64)[..., None]
@@ -156,13 +158,13 @@ def settle(
     columns, responses
         As `start`.
     rows : Rows
-        Where to start; best at the minimum of a lambda a few times as large.
+        The start, best the minimum at a lambda a few times as large.
     penalty : ndarray, shape (I,)
         lambda of every row, chosen or not.
     chosen : ndarray of int
     tolerance : float
-        Duality gap at which a row leaves, as a share of its objective. After
-        `MAXIMUM_ROUNDS` rounds it stays where it is.
+        Duality gap at which a row has converged, as a share of its objective. After
+        `MAXIMUM_ROUNDS` rounds a row is left as it is.
     """
     penalty = penalty.astype(np.float32)
     active = chosen
@@ -182,7 +184,7 @@ def settle(
 def _one_round(
     columns: Floats, rows: Rows, active: Integers, penalty: Floats, tolerance: Floats
 ) -> None:
-    """Solve each active row on its working set; only the coefficients are brought up to date."""
+    """Solve each active row on its working set, and update its coefficients only."""
     used = rows.coefficients[active] != 0
     steep = np.abs(rows.overlap[active])
     steep[steep <= penalty[active, None]] = 0.0
@@ -231,7 +233,7 @@ def _groups(sizes: Integers, responses: int) -> Iterator[Integers]:
 
 
 def _first_places(scores: Floats, sizes: Integers) -> Integers:
-    """List each row's places of highest score, `sizes` of them, the rest the last place."""
+    """List the `sizes` places of highest score in each row, filled up with the last place."""
     largest = int(sizes.max())
     places = np.argpartition(-scores, largest - 1, axis=1)[:, :largest]
     order = np.argsort(-np.take_along_axis(scores, places, axis=1), axis=1)

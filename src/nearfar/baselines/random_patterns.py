@@ -87,7 +87,7 @@ class CompressiveMeasurements:
 
 
 def measure_without_noise(truth: ExactTransport, patterns: Booleans) -> CompressiveMeasurements:
-    """Measure a known transport without noise, black level or steps of a sensor: b = T l.
+    """Measure a known transport without noise, black level or quantisation: b = T l.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def measure_without_noise(truth: ExactTransport, patterns: Booleans) -> Compress
 
 
 def measure_by_rig(rig: Rig, patterns: Booleans) -> CompressiveMeasurements:
-    """Show random patterns, and black once, which is subtracted.
+    """Measure responses on a rig: project the patterns, and black once to subtract.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from nearfar.transport.exact import ExactTransport
 
 # Bytes of photos and of decoded rows in memory at once, the result aside.
 DEFAULT_MEMORY_BYTES = 2**29
-# What a decoder needs for each photo and each column of a row, at the most.
+# Largest memory that a decoder takes for each photo and each column of a row.
 BYTES_PER_NUMBER = 64
 
 Progress = Callable[[str, float], None]
@@ -35,7 +35,7 @@ class Acquisition(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called in tables."""
+        """Name in tables."""
         ...
 
     @property
@@ -90,8 +90,8 @@ def acquire_reference(
         Where T goes, for instance an np.memmap, for a T larger than memory; a new array by
         default. It becomes `far` of the result, which `nearfar.save_exact` can then keep.
     folder : Path, optional
-        Where photos that are more than `memory` wait in a file, removed in the end; the system's
-        folder for such files by default.
+        Folder of a temporary file that holds the photos if they take more than `memory`; by default
+        the system's folder for temporary files.
     progress : callable, optional
         Called with what is being done and the share done.
 
@@ -154,15 +154,15 @@ def _shoot(
 
 
 def _room(photo: Photo, count: int, memory: int, folder: Path | None) -> NDArray[Any]:
-    """Return room for photos, in memory where they take at most a quarter of the bytes allowed."""
+    """Return an empty array for photos, in memory if they take at most a quarter of `memory`."""
     shape = (count, photo.shape[0] * photo.shape[1], photo.shape[2])
     if count * photo.nbytes <= memory // 4:
         return np.empty(shape, dtype=photo.dtype)
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
-            # A map of a file with holes would end the process on a full disk.
+            # On a full disk, writing to the map of a sparse file would kill the process.
             os.posix_fallocate(file.fileno(), 0, count * photo.nbytes)
-            # The map keeps the nameless file alive; it is gone with the map.
+            # The file has no name and lives as long as its map.
             return np.memmap(file, dtype=photo.dtype, mode="w+", shape=shape)
     except OSError as error:
         raise StorageError(

@@ -23,7 +23,8 @@ class Sensing:
     mean : ndarray, shape (K,)
         Unit vector along the scaling function's column.
     level : ndarray, shape (P,)
-        What the mean's coefficient loses for each wavelet's: overlap of the columns with `mean`.
+        Overlap of each column with `mean`, to take the wavelets' part out of the mean's
+        coefficient.
     gain : float
         Length of the scaling function's column, scaled.
     scale : float
@@ -38,7 +39,7 @@ class Sensing:
     scale: float
 
     def project(self, rows: Floats) -> tuple[Floats, Floats]:
-        """Split responses (I, K) into what wavelets explain, and the part along the means."""
+        """Split responses (I, K) into the part that wavelets explain, and that along `mean`."""
         along = (rows @ self.mean) / self.scale
         return (rows / self.scale - along[:, None] * self.mean).astype(np.float32), along
 

@@ -10,8 +10,8 @@ the projector's pixel lit (+) or not (-), and without ambient light,
     L+ = (1 + B) D + (1/2 + B) G,    L- = B D + (1/2 + B) G,
 
 which is the paper's L+ = L_d + (1 + b) L_g / 2, L- = b L_d + (1 + b) L_g / 2 (its equation 7, half
-of the pixels lit) with L_d = (1 + B) D and L_g = (1 + B) G, the light under full white with what
-the projector cannot hold back. Photos less the *ambient* light alone (projector covered or off)
+of the pixels lit) with L_d = (1 + B) D and L_g = (1 + B) G, the light under full white, the
+projector's own black included. Photos less the *ambient* light alone (projector covered or off)
 have these values. Photos less the photo *under black* have B (D + G) less, and b = 0 serves
 whatever the projector's black is: the better way where black can be projected.
 
@@ -115,8 +115,8 @@ def separate_by_phase(photos: Floats, shifts: int, black_level: float = 0.0) -> 
     Photo j of an axis is o + a cos(theta + 2 pi j / shifts); with equally spaced phases the fit
     is the discrete Fourier transform over j. a = D / 2 and o = (1/2 + B) (D + G). The phase theta
     is that of all channels together, and each channel's amplitude is taken at that phase: a
-    modulus would be too large under noise. D is the mean over the axes, of those that do not
-    straddle (see `STRADDLING_SHARE`).
+    modulus would be too large under noise. D is the mean over the axes along which the camera pixel
+    does not straddle an edge (see `STRADDLING_SHARE`).
 
     Parameters
     ----------

@@ -253,7 +253,7 @@ def separate(
 
 
 def spread_of_groups(taken: PhotosToSeparate, groups: int) -> float:
-    """Return the root-mean-square deviation of groups of photos from their mean, as its share.
+    """Return the root-mean-square deviation of the groups' means, as a share of their mean.
 
     Each group's patterns sum to the same grey: a pair of a pattern and its inverse, all phases
     of a sinusoid. Photos out of order, a lamp that drifts and a response that is not linear

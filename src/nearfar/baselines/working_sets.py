@@ -5,9 +5,9 @@ Each row i minimises over x, given the columns that it works on,
     1/2 |b - x A|^2 + lambda |x|_1,
 
 from their Gram matrix alone. Sweeps of coordinate descent (Friedman et al. 2007) run over all rows
-at once; where a row is slow, its equations on the entries that are not 0 are solved, and the way
-there is walked as far as the first entry that would change its sign. Neither step raises the
-objective. A row stops by its duality gap.
+at once; where a row converges slowly, its equations on the nonzero entries are solved, and x moves
+towards that solution up to the first entry that would change its sign. Neither step raises the
+objective. A row stops once its duality gap is small.
 
 Index convention: i runs over rows, j and l over places in a row's working set.
 """
@@ -18,7 +18,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 
-# Sweeps between two checks of the gap, checks at most, and the check after which Newton steps run.
+# Sweeps between two checks of the gap, the most checks, and the checks before Newton steps begin.
 SWEEPS_PER_CHECK = 4
 MAXIMUM_CHECKS = 30
 CHECKS_BEFORE_NEWTON = 1
@@ -28,7 +28,7 @@ DIVISOR_FLOOR = 1e-30
 
 
 class Small(NamedTuple):
-    """Lasso problems of the rows that have not settled.
+    """Lasso problems of the rows that have not converged.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def solve_small(
     Returns
     -------
     ndarray, shape (I, J), float32
-        x. A row that has not settled after `MAXIMUM_CHECKS` checks is returned as it is.
+        x. A row that has not converged after `MAXIMUM_CHECKS` checks is returned as it is.
     """
     found = entries.copy()
     rows = np.arange(len(entries))
@@ -94,7 +94,7 @@ def solve_small(
         found[rows] = small.entries
         if not going.any():
             break
-        # Cutting costs a copy of the Gram matrices, so it waits until it is worth one.
+        # Leaving rows out copies the Gram matrices, so this waits until enough rows have converged.
         if going.mean() < 0.7:
             rows, small = rows[going], small.only(going)
         if check >= CHECKS_BEFORE_NEWTON:
@@ -131,7 +131,7 @@ def _settled(small: Small, tolerance: Floats) -> Booleans:
 
 
 def _sweep(small: Small) -> None:
-    """Minimise over each entry in turn, all rows at once, a few times over."""
+    """Minimise over each entry in turn, all rows at once, in a few sweeps."""
     gram, x, slopes, penalty = small[:4]
     squared = np.einsum("jij->ji", gram).copy()
     for _ in range(SWEEPS_PER_CHECK):
@@ -145,7 +145,7 @@ def _sweep(small: Small) -> None:
 
 
 def _newton(small: Small) -> None:
-    """Go to the minimum under the present signs, or to the first change of a sign on the way."""
+    """Move to the minimum for the present signs, or to the first change of a sign on the way."""
     x, slopes, penalty = small.entries, small.slopes, small.penalty
     used = x != 0
     most = int(used.sum(axis=1).max(initial=0))
@@ -170,7 +170,7 @@ def _newton(small: Small) -> None:
     there = here + step
     crossed = reach <= 1.0
     there[row[crossed], first[crossed]] = 0.0
-    # What was really walked, rounding included, is what the slopes must follow.
+    # The slopes follow the step that was really taken, rounding included.
     walked = np.zeros_like(x)
     np.put_along_axis(walked, place, there - here, axis=1)
     np.put_along_axis(x, place, there, axis=1)

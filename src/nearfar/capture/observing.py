@@ -17,7 +17,7 @@ class Verdict(Enum):
 
 
 class CaptureObserver(Protocol):
-    """Hears of every photo of a capture, in order."""
+    """Is called with every photo of a capture, in order."""
 
     def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict | None:
         """Take in a photo.
@@ -59,7 +59,7 @@ def with_predicate(
     enough: Callable[[int, NDArray[Any]], bool] | None,
     function: str,
 ) -> Sequence[CaptureObserver]:
-    """Add what was given as `enough` of before to the observers, with a warning.
+    """Add a predicate, given as the deprecated `enough`, to the observers; warn of it.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def with_predicate(
     enough : callable, optional
         Returns whether the capture ends with a photo, by its number and the photo.
     function : str
-        The public function that took it.
+        The public function that it was given to.
     """
     if enough is None:
         return observers

@@ -95,7 +95,7 @@ def replace_photos(
 
 
 def _link(source: str, target: str) -> None:
-    """Give a file a second name; copy it where the disk knows no such thing."""
+    """Give a file a second name; copy it where the file system has no hard links."""
     try:
         os.link(source, target)
     except OSError:

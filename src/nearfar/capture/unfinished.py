@@ -15,7 +15,7 @@ LOG_NAME = "photos.jsonl"
 
 
 class Taken(NamedTuple):
-    """What is noted of a photo; the names are those of the log."""
+    """What the log keeps of a photo; the fields are named as in the log."""
 
     time: float
     saturated: float
@@ -52,7 +52,7 @@ class UnfinishedCapture(NamedTuple):
 
 
 def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
-    """Return what is known of a capture that was started and not finished; of none, no photos.
+    """Return what is known of a capture that was not finished; no photos if there is none.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
 
 
 def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
-    """Return a message that a plan is another, or which option made it so."""
+    """Return the message that refuses another plan; it names the option if that differs alone."""
 
     def patterns_of(plan: object) -> list[Any]:
         patterns = plan.get("patterns") if isinstance(plan, Mapping) else None
@@ -82,11 +82,13 @@ def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
         checked = len(patterns_of(before)) > len(of_transport(before))
         if checked:
             return (
-                f"{folder} was begun with `with_checks(plan)`: give `with_checks(plan)` with "
+                f"{folder} was started with `with_checks(plan)`: give `with_checks(plan)` with "
                 f"`resume=True`."
             )
-        return f"{folder} was begun without `with_checks(plan)`: leave out `with_checks(plan)`."
-    return f"{folder} was begun with another plan: give that one, or begin anew with `force=True`."
+        return f"{folder} was started without `with_checks(plan)`: leave out `with_checks(plan)`."
+    return (
+        f"{folder} was started with another plan: give that one, or start anew with `force=True`."
+    )
 
 
 def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwise: str) -> None:
@@ -97,7 +99,7 @@ def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwi
     path : Path
         The capture.
     before, now : mapping
-        What the rig says of itself.
+        Descriptions of the rig.
     otherwise : str
         What else can be done, in words.
 
@@ -108,8 +110,8 @@ def require_same_rig(path: Path, before: object, now: Mapping[str, Any], otherwi
     now = json.loads(json.dumps(now))
     if before != now:
         raise InputError(
-            f"{path} was begun with another rig ({_different(before, now)}): set it up as it was, "
-            f"or {otherwise}."
+            f"{path} was started with another rig ({_different(before, now)}): set it up as it "
+            f"was, or {otherwise}."
         )
 
 

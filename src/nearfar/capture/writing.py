@@ -117,12 +117,12 @@ class CaptureWriter:
         rig: Mapping[str, Any] | None = None,
         exposure: float | None = None,
     ) -> Self:
-        """Go on with a capture that another writer left.
+        """Resume a capture that another writer started.
 
         Parameters
         ----------
         folder : Path
-            Where it is.
+            The unfinished capture.
         plan, full_scale, rig, exposure
             As they were.
 
@@ -140,7 +140,7 @@ class CaptureWriter:
 
     @property
     def taken(self) -> int:
-        """How many photos there are."""
+        """Number of photos on the disk."""
         return len(self._taken)
 
     @property
@@ -199,7 +199,7 @@ class CaptureWriter:
         self._photos[number] = photo
         mean = float(photo.mean(dtype=np.float64))
         self._means[number] = mean
-        # What is no good is not noted, so that it is taken again.
+        # A photo that is refused here is not noted, so it is taken again.
         check_white_and_black(self._white_black, self._means, self._called)
         check_order(self._white_black, self._means, self._called)
         saturated = float(np.mean(photo >= scale))
@@ -233,7 +233,7 @@ class CaptureWriter:
                 f"the camera sees them."
             )
         if count < len(self._plan.patterns):
-            # First of all: whoever goes on with this knows by it that no photo is missing.
+            # The plan first: by it, a writer that resumes here sees that no photo is missing.
             self._group.attrs["plan"] = json.loads(self._plan.first(count).to_json())
             self._photos.resize((count, *self._photos.shape[1:]))
         names = {name for taken in self._taken for name in taken.conditions}
@@ -247,10 +247,10 @@ class CaptureWriter:
             add_array(self._group, name, (count,), np.float64, (count,))[:] = values
 
     def _take_up(self, group: zarr.Group) -> None:
-        """Go on from what another writer left."""
+        """Resume from the photos on the disk."""
         folder, before = self._folder, dict(group.attrs)
         self._taken = read_notes(folder / LOG_NAME, lambda words: Taken(**words))
-        # Files that were being written when it was killed.
+        # Files that were being written when the other writer was killed.
         for left in folder.rglob(".*.partial"):
             left.unlink()
         now = json.loads(json.dumps(self._attributes))
@@ -258,11 +258,11 @@ class CaptureWriter:
         ended = json.loads(self._plan.first(self.taken).to_json())
         if before.get("plan") not in (now["plan"], ended):
             raise InputError(other_plan(folder, before.get("plan"), now["plan"]))
-        require_same_rig(folder, before.get("rig"), now["rig"], "begin anew with `force=True`")
+        require_same_rig(folder, before.get("rig"), now["rig"], "start anew with `force=True`")
         photos, scale = open_array(group, "photos"), before.get("full_scale")
         many = self.taken > min(photos.shape[0], len(self._plan.patterns))
         if many or not is_positive(scale):
-            raise UnreadableFileError(f"{folder} is damaged: begin anew with `force=True`.")
+            raise UnreadableFileError(f"{folder} is damaged: start anew with `force=True`.")
         self._scale = float(scale)
         self._means[: self.taken] = [taken.mean for taken in self._taken]
         if self._taken:
@@ -316,8 +316,8 @@ def write_capture(
     progress : callable, optional
         Called with "photos" and the share of them that is written, 0 to 1, after each.
     observers : sequence of CaptureObserver
-        Each hears of every photo; where one says that it is enough, the capture ends there, and
-        its plan with it.
+        Each is called with every photo; where one returns ``Verdict.ENOUGH``, the capture and its
+        plan end with that photo.
     enough : callable, optional
         .. deprecated:: 0.1
             Use `observers`.
@@ -347,7 +347,7 @@ def write_capture(
     observers = with_predicate(observers, enough, "nearfar.write_capture")
     path = Path(path)
     count = len(plan.patterns)
-    # A frame more than elsewhere: the function that accepts either order of arguments.
+    # One stack frame more than elsewhere: the decorator that accepts either order of arguments.
     report = as_report(progress, count, stacklevel=5)
     with new_output(path, force=force) as partial:
         writer = CaptureWriter(

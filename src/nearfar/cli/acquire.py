@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.observers.estimate import EstimateObserver
     from nearfar.workflow.observers.quality import CaptureQuality
 
-# No photo of a real camera reaches this.
+# No photo of a real camera reaches this SNR.
 MAXIMUM_DECIBELS = 120.0
 CURE_OF_LIMIT = {
     "noise": "Most of the error is the photos' noise: expose longer, or plan for more photos",
@@ -110,7 +110,7 @@ def acquire(
 
     if reshoot is not None:
         given = {"--until": until, "--transport": transport, "--resume": resume, "--force": force}
-        _refuse(given, "goes not with --reshoot.")
+        _refuse(given, "does not go with --reshoot.")
         take_again(plan_file, output, rig, photo_numbers(reshoot), quiet=quiet)
         return
     if transport is None:
@@ -132,14 +132,16 @@ def acquire(
             exposure=exposure,
             progress=report,
             on_alarm=warn,
-            on_start=partial(_tell_time, len(made.patterns) - before, quiet=quiet),
+            on_start=partial(_say_time, len(made.patterns) - before, quiet=quiet),
         )
         stack.enter_context(opened)
         for note in opened.notes:
             warn(note)
         check = estimate = None
         if until is not None:
-            check = QualityObserver(made, until, opened.full_scale, partial(_tell, quiet=quiet))
+            check = QualityObserver(
+                made, until, opened.full_scale, partial(_say_quality, quiet=quiet)
+            )
         if transport is not None:
             estimate = stack.enter_context(EstimateObserver(made, opened.full_scale, options))
         taken = shoot(
@@ -191,7 +193,7 @@ def _finish(
     say(f"{time.monotonic() - start:.1f} s after the last photo", quiet=quiet)
 
 
-def _tell_time(photos: int, seconds: float, *, quiet: bool) -> None:
+def _say_time(photos: int, seconds: float, *, quiet: bool) -> None:
     """Print before the first photo how long all of them will take."""
     minutes, rest = divmod(round(photos * seconds), 60)
     long = f"{minutes} min {rest} s" if minutes else f"{rest} s"
@@ -225,7 +227,7 @@ def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool)
     check_output(transport, force=force)
 
 
-def _tell(quality: "CaptureQuality", *, quiet: bool) -> None:
+def _say_quality(quality: "CaptureQuality", *, quiet: bool) -> None:
     if quality.fault is not None:
         text = with_flags(quality.fault)
     elif quality.snr > 0:

@@ -22,7 +22,7 @@ from nearfar.workflow.rivals import RIVALS
 
 
 def method_names(start: str) -> list[str]:
-    """Return the methods whose names start so, for shells to complete."""
+    """Return the methods whose names start with `start`, for shells to complete."""
     return [name for name in RIVALS if name.startswith(start)]
 
 

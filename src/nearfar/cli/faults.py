@@ -33,7 +33,7 @@ def faults_in_sentences() -> Iterator[None]:
     except KeyboardInterrupt as stopped:
         _interrupted(stopped)
     except BrokenPipeError:
-        # The reader of our output has gone; the interpreter must not complain of it at exit.
+        # Whoever read our output has gone; the interpreter must not complain of it at exit.
         _discard_stdout()
         sys.exit(1)
     except MemoryError as error:

@@ -1,4 +1,4 @@
-"""The command line's words for the Python in a message of the library.
+"""Options of the command line in place of the Python in a message of the library.
 
 A message of the library puts what one writes in Python in backticks: a parameter, as `window`; an
 argument, as `offset='inverse'`; or a call, as `acquire(resume=True)`. Here they become options:
@@ -45,7 +45,7 @@ def with_flags(message: str) -> str:
 
 
 def in_flags(code: str) -> str | None:
-    """Return what code is on the command line; None where it is nothing there."""
+    """Return the options that stand for some code; None if there are none."""
     for text in (code, f"_({code})"):
         try:
             parsed = ast.parse(text, mode="eval").body
@@ -94,7 +94,7 @@ def _call(function: str, arguments: list[ast.keyword]) -> str | None:
 
 
 def _value(code: ast.expr) -> object:
-    """Return what a literal, or a range of literals, is; None for other code."""
+    """Return the value of a literal or of a range of literals; None for other code."""
     try:
         if isinstance(code, ast.Call) and ast.unparse(code.func) == "range":
             return range(*map(ast.literal_eval, code.args))

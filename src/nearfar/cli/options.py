@@ -20,7 +20,7 @@ def size(text: str | Size) -> Size:
 
 
 def scene_names(start: str) -> list[str]:
-    """Return the scenes whose names start so; where there are none, shells complete files."""
+    """Return the scenes whose names start with `start`; without any, shells complete files."""
     from nearfar.scenes import SCENES
 
     return [name for name in SCENES if name.startswith(start)]

@@ -154,9 +154,9 @@ def _refuse_with_photos(
     offset: str | None,
     correspondence: str | None,
 ) -> None:
-    """Refuse what only the paper's plan has a use for."""
+    """Refuse options that only the paper's plan has."""
     if far is not None or drop is not None:
-        raise typer.BadParameter("--far and --drop are of the paper's plan: leave --photos out")
+        raise typer.BadParameter("--far and --drop belong to the paper's plan: leave --photos out")
     if offset not in (None, "reference"):
         raise typer.BadParameter("--photos chooses plans by reference: leave --offset out")
     if correspondence not in (None, "phase"):

@@ -18,7 +18,7 @@ def say(text: str, *, quiet: bool = False) -> None:
 
 
 def warn(text: str) -> None:
-    """Print a warning on stderr, the Python in it as options; see `nearfar.cli.flags`."""
+    """Print a warning on stderr, with options for the Python in it; see `nearfar.cli.flags`."""
     print(f"warning: {with_flags(text)}", file=sys.stderr)
 
 

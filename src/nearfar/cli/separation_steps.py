@@ -25,7 +25,7 @@ def export_patterns(
     force: bool,
     quiet: bool,
 ) -> None:
-    """Write the patterns of a method, and say so."""
+    """Write the patterns of a method, and print what was written."""
     from nearfar.workflow.separate import export_to_separate
 
     if projector is None:
@@ -102,7 +102,7 @@ def compare(
     exposure: float,
     projector: Size | None,
 ) -> dict[str, dict[str, float]]:
-    """Return the SNR, in dB, of direct and global against what else is known of the scene."""
+    """Return the SNR of direct and global against a truth or a reconstruction, in dB."""
     from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
     from nearfar.workflow.separate import compare_to_transport, compare_to_truth

@@ -63,7 +63,7 @@ def onto_projector(
 def quality_on_projector(
     correspondence: Correspondence, saturated: Booleans | None, projector: Size
 ) -> tuple[Floats, Booleans | None]:
-    """Return how far each row of the square T is to be trusted.
+    """Return the quality of each row of the square T: its confidence, and whether it is saturated.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from nearfar.faults.records import (
     RoundedToHalf,
 )
 
-# Each fault is one beyond this.
+# Limits above which each is a fault.
 SATURATED_SHARE_OF_VALUES = 1e-4
 DRIFT_SHARE_OF_WHITE = 0.05
 ROUNDING_SHARE_OF_NOISE = 0.5

@@ -45,8 +45,8 @@ class NotLinearLight:
 
     def __str__(self) -> str:
         return (
-            f"{self.camera} gives JPEGs, whose 8 bits are a screen's and not the light's: set it "
-            f"to raw."
+            f"{self.camera} gives JPEGs, whose 8 bits are encoded for a screen and not linear in "
+            f"light: set it to raw."
         )
 
 
@@ -72,8 +72,8 @@ class LightDoesNotAdd:
         when = "again" if self.is_calibrated else "first"
         return (
             f"light does not add up: {self.patterns} together give {self.share:.1%} of white; turn "
-            f"what makes the projector's picture livelier and the camera's automatics off, and "
-            f"run nearfar calibrate {when}."
+            f"off the projector's picture enhancement and the camera's automatic settings, and run "
+            f"nearfar calibrate {when}."
         )
 
 
@@ -97,8 +97,8 @@ class PatternsIndistinguishable:
     def __str__(self) -> str:
         return (
             f"up to photo {self.photo} many photos are like the ones before, though their patterns "
-            f"differ: the camera hardly resolves them, and photos are not told apart from here on; "
-            f"focus it, or move closer."
+            f"differ: the camera hardly resolves them, and repeated photos are not noticed from "
+            f"here on; focus it, or move closer."
         )
 
 
@@ -119,9 +119,9 @@ class InverseDoesNotAdd:
 
     def __str__(self) -> str:
         return (
-            f"photo {self.photo} and that of the inverse pattern give {self.share:+.1%} of white "
-            f"too much or too little, while black and white are as they were: the response is not "
-            f"linear, or something is saturated; run nearfar calibrate."
+            f"photo {self.photo} and that of the inverse pattern sum to {self.share:+.1%} of white "
+            f"off white and black, which have not changed: the response is not linear, or "
+            f"something is saturated; run nearfar calibrate."
         )
 
 
@@ -134,7 +134,8 @@ class LightChange:
     light : {"lamp", "ambient", "any"}
         Exposure or lamp; ambient light; or either, for a while.
     share : float
-        By how much: of what it was, or for ambient light of white.
+        Size of the change, as a share of the light before it; of ambient light, as a share of
+        white.
     """
 
     light: Literal["lamp", "ambient", "any"]
@@ -179,13 +180,13 @@ class LightChanged:
 
 @dataclass(frozen=True)
 class LightChangedBefore:
-    """Light was seen to have changed before a photo, and since when is not known."""
+    """Light had changed before a photo; since when is not known."""
 
     change: LightChange
     photo: int
 
     def __str__(self) -> str:
-        return f"{self.change}, before photo {self.photo}: see whether photos before it are good."
+        return f"{self.change}, before photo {self.photo}: check the photos before it."
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ class PhotoSaturated:
 
 @dataclass(frozen=True)
 class LightChangedWhileStopped:
-    """White or black of a capture that is gone on with is not what it was before.
+    """White or black of a resumed capture differs from that before it was stopped.
 
     Attributes
     ----------
@@ -221,8 +222,8 @@ class LightChangedWhileStopped:
     def __str__(self) -> str:
         return (
             f"photo {self.photo}, of {self.pattern}, is {self.share:+.1%} of white off that of "
-            f"before the capture was gone on with: lamp, exposure or ambient light are others; see "
-            f"that they are as they were, or begin anew with `force=True`."
+            f"before the capture was resumed: lamp, exposure or ambient light have changed; set "
+            f"them as they were, or start anew with `force=True`."
         )
 
 

@@ -1,4 +1,4 @@
-"""Faults that the photos of a capture show while they are taken, and it can still be mended.
+"""Faults that photos show while a capture is taken, when they can still be mended.
 
 Index convention: photos are (Cy, Cx, channels), raw levels.
 """
@@ -33,8 +33,8 @@ LIGHT_CHANGE_SHARE_OF_WHITE = 0.02
 # Modulation is measured at camera pixels where white adds this share of what it adds to the
 # brightest.
 LIT_SHARE_OF_BRIGHTEST = 0.2
-# Modulations are averaged over so many neighbours, or fewer where that leaves fewer than so many
-# groups.
+# Modulations are averaged over this many neighbours, or over fewer, so that at least this many
+# groups are left.
 MAXIMUM_NEIGHBOURS = 16
 MINIMUM_GROUPS = 200
 # Pairs of cosine and sine that are kept until white and black have been photographed.
@@ -63,7 +63,7 @@ class FaultsWhileCapturing:
         self._is_resumed = False
 
     def recall(self, read: Callable[[int], NDArray[Any]], taken: int) -> None:
-        """Take up white and black of a capture that is gone on with.
+        """Read white and black of a capture that is resumed.
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class FaultsWhileCapturing:
         return PhotoSaturated(number, share) if share > SATURATED_SHARE_OF_VALUES else None
 
     def _light_change(self, number: int, photo: NDArray[Any]) -> Fault | None:
-        """Compare white and black with those of before the capture was stopped."""
+        """Compare white and black with those before the capture was stopped."""
         pattern = self._plan.patterns[number]
         if not isinstance(pattern, Sinusoid) or pattern.frequency != DC:
             return None

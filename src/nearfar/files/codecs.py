@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Pixels = NDArray[Any]
 
-# tifffile says on stderr what is turned into a sentence here.
+# tifffile would print to stderr what is turned into a sentence here.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 # What the decoders were seen to raise when fed files cut or changed at every byte.
@@ -38,7 +38,7 @@ DAMAGE = (
 
 
 class UnsupportedPictureError(Exception):
-    """A sound picture of a kind that is not read; the message ends a sentence."""
+    """A valid picture of a kind that is not read; its message completes a sentence."""
 
 
 def decode_png(data: bytes) -> Pixels:
@@ -53,7 +53,7 @@ def _without_alpha(pixels: Pixels) -> Pixels:
 
 
 def _critical_chunks(data: bytes) -> bytes:
-    # The rest (profiles, gamma, text) changes no stored number, and libpng comments on it aloud.
+    # The rest (profiles, gamma, text) changes no stored number, and libpng warns of it on stderr.
     kept, position, kind = [data[:8]], 8, b""
     while kind != b"IEND":
         length, kind = struct.unpack_from(">I4s", data, position)
@@ -162,8 +162,8 @@ def decode_exr(data: bytes) -> Pixels:
 
 
 def _check_exr_rows(data: bytes) -> None:
-    # OpenEXR answers a cut file with an empty one, and chats on stderr; so look first whether
-    # every block of rows of a plain file is there.
+    # OpenEXR reads a truncated file as an empty one and prints to stderr, so check first that every
+    # block of rows of a plain file is there.
     if len(data) < 9 or data[5] & 0x1A:  # tiles, deep data, several parts: OpenEXR's own checks
         return
     position, header = 8, {}

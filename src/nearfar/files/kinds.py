@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def kind_of_store(path: Path) -> str | None:
-    """Return what a Zarr says it holds, such as ``"nearfar capture"``; None if it is none."""
+    """Return the kind that a Zarr names, such as ``"nearfar capture"``; None if it names none."""
     try:
         metadata = json.loads((path / "zarr.json").read_bytes())
         return str(metadata["attributes"]["format"])

@@ -1,4 +1,4 @@
-"""Logs: a line of JSON for each thing that is on the disk, whole or not there."""
+"""Logs: one line of JSON for each thing that is on the disk, whole or absent."""
 
 import json
 import os
@@ -11,26 +11,26 @@ from nearfar.files.output import synchronise_entry
 T = TypeVar("T")
 
 
-def note(log: Path, words: Mapping[str, Any]) -> None:
+def note(log: Path, entry: Mapping[str, Any]) -> None:
     """Add a line to a log, and wait for the disk."""
     is_new = not log.exists()
     with log.open("ab") as file:
-        file.write((json.dumps(words) + "\n").encode())
+        file.write((json.dumps(entry) + "\n").encode())
         file.flush()
         os.fsync(file.fileno())
     if is_new:
         synchronise_entry(log.parent)
 
 
-def read_notes(log: Path, understood: Callable[[Mapping[str, Any]], T]) -> list[T]:
-    """Read a log; what a crash tore off its last line is cut away.
+def read_notes(log: Path, convert: Callable[[Mapping[str, Any]], T]) -> list[T]:
+    """Read a log; a last line that a crash left incomplete is cut away.
 
     Parameters
     ----------
     log : Path
-    understood : callable
-        Makes of a line's words what is returned; where it raises ValueError or TypeError the
-        log ends.
+    convert : callable
+        Turns the JSON object of a line into what is returned; where it raises ValueError or
+        TypeError, the log ends.
 
     Returns
     -------
@@ -45,10 +45,10 @@ def read_notes(log: Path, understood: Callable[[Mapping[str, Any]], T]) -> list[
     whole = 0
     for line in data.splitlines(keepends=True):
         try:
-            words = json.loads(line)
-            if not (line.endswith(b"\n") and isinstance(words, dict)):
+            entry = json.loads(line)
+            if not (line.endswith(b"\n") and isinstance(entry, dict)):
                 break
-            notes.append(understood(words))
+            notes.append(convert(entry))
         except (ValueError, TypeError):
             break
         whole += len(line)

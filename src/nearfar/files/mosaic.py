@@ -17,7 +17,7 @@ CELLS = ("RGGB", "GRBG", "GBRG", "BGGR")
 def bin_mosaic(mosaic: NDArray[Any], cell: str, full_scale: float | None = None) -> NDArray[Any]:
     """Make each 2x2 cell of a mosaic a pixel of red, green and blue.
 
-    Linear, exact, and without a trace of a neighbouring cell. The two greens are averaged, halves
+    Linear and exact, and no cell affects another. The two greens are averaged, halves
     rounded to even; an odd last row or column is left out.
 
     Parameters
@@ -26,7 +26,7 @@ def bin_mosaic(mosaic: NDArray[Any], cell: str, full_scale: float | None = None)
     cell : str
         Colours of a cell, row by row, such as ``RGGB``.
     full_scale : float, optional
-        Level at which a value is saturated; a green of two of which one is stays so.
+        Level at which a value is saturated. A cell with a saturated green keeps it, unaveraged.
 
     Returns
     -------

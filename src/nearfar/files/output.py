@@ -183,7 +183,7 @@ def move_into_place(partial: Path, target: Path) -> None:
 
 def remove(path: Path) -> None:
     """Remove a file or folder, if it is there."""
-    # Others than our own stores may still be adding to the folder: look again.
+    # Another program may still be adding to the folder: try again.
     for _ in range(100):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)

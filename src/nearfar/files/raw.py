@@ -50,7 +50,7 @@ def decode_raw(data: bytes, name: str | Path) -> RawPhoto:
             pattern: Any = raw.raw_pattern
             colours = raw.color_desc.decode()
             white = max(int(raw.white_level), 1)
-            # Some sensors reach beyond, where they are no longer linear.
+            # Some sensors give levels above this, where they are no longer linear.
             mosaic = np.minimum(raw.raw_image_visible, white).astype(np.uint16)
     except (rawpy.LibRawError, ValueError) as error:
         detail = error.args[0] if error.args else error

@@ -1,4 +1,4 @@
-"""Outputs that take long: whatever stops them, what is written so far is kept to be resumed."""
+"""Outputs that take long: whatever stops them, what was written is kept and can be resumed."""
 
 import os
 import sys
@@ -56,7 +56,8 @@ def resumable_output(
     MissingFileError
         If there is nothing to go on with.
     ExistingOutputError
-        If there is something, and neither `resume` nor `force`; or if another is at work on it.
+        If there is something, and neither `resume` nor `force`; or if another process is at work on
+        it.
     NearfarError
         As `new_output`.
     """
@@ -94,7 +95,7 @@ def _checked(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
         if not force:
             raise ExistingOutputError(
                 f"{unfinished} holds what was not finished: go on with it by `resume=True`, or "
-                f"begin anew by `force=True`."
+                f"start anew with `force=True`."
             )
         checked_target(unfinished, force=True, replaceable=_is_unfinished)
     return target, unfinished
@@ -120,7 +121,7 @@ def _locked(folder: Path) -> Iterator[None]:
     try:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # It may have got its name meanwhile.
+            # Another process may have given the folder its final name meanwhile.
             alone = os.fstat(lock).st_ino == folder.stat().st_ino
         except (BlockingIOError, FileNotFoundError):
             alone = False

@@ -176,7 +176,7 @@ def add_array(
 def _laid_out(
     group: zarr.Group, name: str, shape: tuple[int, ...], chunks: tuple[int, ...]
 ) -> zarr.Array[Any]:
-    """Open an array that is laid out so already."""
+    """Return the array if it exists already, in the same layout."""
     found = group[name]
     if not isinstance(found, zarr.Array) or (found.shape, found.chunks) != (shape, chunks):
         raise ValueError(f"{name} is laid out otherwise in {_root(group.store)}")

@@ -1,4 +1,4 @@
-"""The frame that a projector displays: a pattern in blocks of its pixels, centred, black around."""
+"""Frames that a projector displays: a pattern, each pixel as a block, centred on black."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from nearfar.errors import InputError
 
 
 class FrameLayout(NamedTuple):
-    """Size of the frame, and the side in frame pixels of each pattern pixel."""
+    """How a frame shows a pattern: its size, and the side of a pattern pixel in frame pixels."""
 
     frame: Size
     scale: int

@@ -27,7 +27,7 @@ class Frequency(NamedTuple):
 
     @property
     def is_own_negative(self) -> bool:
-        """Whether k and -k are one: DC, the checkerboard, (0, 1/2), (1/2, 0)."""
+        """Whether k and -k are the same: DC, the checkerboard, (0, 1/2) and (1/2, 0)."""
         return self == -self
 
 
@@ -47,7 +47,7 @@ def frequency_from_text(parts: Iterable[str]) -> Frequency:
     Raises
     ------
     ValueError
-        If the parts are no two fractions in [-1/2, 1/2).
+        If the parts are not two fractions in [-1/2, 1/2).
     """
     try:
         fy, fx = (Fraction(part) for part in parts)
@@ -64,7 +64,7 @@ def frequency_to_text(frequency: Frequency) -> list[str]:
 
 
 def representative(frequency: Frequency) -> Frequency:
-    """Of k and -k, the one that comes last in order; it stands for both."""
+    """Return the later of k and -k in order, which stands for both."""
     return max(frequency, -frequency)
 
 
@@ -110,7 +110,7 @@ def near_frequencies(window: int, dropped: Size) -> list[Frequency]:
 
 
 def default_dropped(window: int, far: Size, projector: Size) -> Size:
-    """Block of near frequencies with both |k| <= k_far: at least DC (section 4.2)."""
+    """Return the block of near frequencies with |k| <= k_far: at least DC (section 4.2)."""
 
     def side(far_side: int, projector_side: int) -> int:
         highest = int(window * Fraction(far_side // 2, projector_side))
@@ -120,10 +120,10 @@ def default_dropped(window: int, far: Size, projector: Size) -> Size:
 
 
 def representatives(frequencies: Iterable[Frequency]) -> list[Frequency]:
-    """One of each +-k, in the order of first appearance."""
+    """Return one of each +-k, in the order of first appearance."""
     return list(dict.fromkeys(representative(k) for k in frequencies))
 
 
 def as_array(frequencies: Iterable[Frequency]) -> NDArray[np.float64]:
-    """Frequencies as an array, shape (K, 2), in cycles per pixel."""
+    """Return frequencies as an array, shape (K, 2), in cycles per pixel."""
     return np.array([[float(k.fy), float(k.fx)] for k in frequencies]).reshape(-1, 2)

@@ -56,7 +56,7 @@ def black_column(index: int, size: Size) -> NDArray[np.float64]:
 
 
 def gray_bits(length: int) -> int:
-    """Return the number of bits of Gray code for so many rows or columns."""
+    """Return the number of bits of Gray code for a number of rows or columns."""
     return (length - 1).bit_length()
 
 

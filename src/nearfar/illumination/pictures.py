@@ -216,7 +216,7 @@ def lettering(size: Size) -> Floats:
     line = np.concatenate([np.pad(letter, ((1, 1), (0, 1))) for letter in dots], axis=1)
     repeated = np.tile(line, (1, size.width // line.shape[1] + 2))
     lines = [
-        # Each line starts elsewhere, so that no two are alike.
+        # Each line starts at another letter, so that no two are alike.
         repeated[:, 36 * number % line.shape[1] :][:, : size.width]
         for number in range(size.height // len(line) + 1)
     ]

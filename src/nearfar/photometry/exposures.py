@@ -16,7 +16,7 @@ LARGEST_TRUSTED_SHARE = 0.98
 
 
 class Sensor(NamedTuple):
-    """What a camera's levels are made of: level = black + gain * electrons, with noise.
+    """Model of a camera's levels: level = black + gain * electrons, with noise.
 
     Attributes
     ----------

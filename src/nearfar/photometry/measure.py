@@ -32,7 +32,7 @@ def measured_frequencies(plan: Plan) -> set[Frequency]:
 
 
 def measured_basis(plan: Plan) -> tuple[RealBasis, Floats]:
-    """Return what the photos of a plan will measure, before there are any.
+    """Return the basis that the photos of a plan measure, and how often, without any photo.
 
     Returns
     -------

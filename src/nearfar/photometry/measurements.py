@@ -1,4 +1,4 @@
-"""Measurements: what the photos say about each frequency, in photo units."""
+"""Measurements: the response of each camera pixel to each frequency, in photo units."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

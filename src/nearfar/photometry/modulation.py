@@ -1,4 +1,4 @@
-"""How strongly sinusoids modulate a camera pixel, which is bounded where all is linear.
+"""How strongly sinusoids modulate a camera pixel: by 1 at most, if all is linear.
 
 Transport is never negative, so no camera pixel responds to a sinusoid by more than to white. Its
 modulation, the response's amplitude over half of what white adds to black, is 1 at most. Above it
@@ -9,7 +9,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 
-# Modulation above this, ...
+# A modulation above this, ...
 LARGEST_MODULATION = 1.05
 # ... at more than this share of lit camera pixels, is an alarm.
 LARGEST_SHARE_ABOVE = 0.02
@@ -32,5 +32,5 @@ def of_pair(cosine: Floats, sine: Floats, black: Floats, white: Floats) -> Float
 
 
 def share_above_one(modulation: Floats, lit: Booleans) -> float:
-    """Share of lit camera pixels with a modulation that is impossible if all is linear."""
+    """Return the share of lit camera pixels with a modulation impossible in a linear system."""
     return float((modulation[lit] > LARGEST_MODULATION).mean()) if lit.any() else 0.0

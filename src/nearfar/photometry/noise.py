@@ -7,8 +7,8 @@ import numpy as np
 
 from nearfar.arrays import Floats
 
-# Variances this many times the mean of the lower nine tenths are no noise: something moved. Those
-# of two photos each scatter most, and fewer than one in ten thousand of them exceed it.
+# Variances above this many times the mean of the lower nine tenths are not noise: something moved.
+# Variances of two photos each scatter most; fewer than one in ten thousand of them exceed it.
 OUTLIER_FACTOR = 30.0
 
 
@@ -48,9 +48,9 @@ def fit_noise(
     mean, variance : ndarray
         Mean and variance at each camera pixel, photo units.
     dark : float
-        What a photo under black reads. Part of it may be a black level, which has no noise, so
-        the floor may be as low as that much less shot noise, and no lower: a flickering lamp,
-        whose variance grows with the square of the light, would ask for less.
+        Level of a photo under black. All of it may be a black level, which has no shot noise; the
+        floor is therefore at least ``-gain * dark``. A flickering lamp, whose variance grows with
+        the square of the light, would push the fit below that.
     photos : int
         How many photos each value sums.
     least : float
@@ -79,7 +79,7 @@ def fit_noise(
 
 
 def mean_of_few(variances: Floats) -> float:
-    """Return the mean of variances of a few photos each, without those of what moved.
+    """Return the mean of variances of a few photos each, without those of moving things.
 
     Their median would be far below their mean, the more so where the camera rounds coarsely.
     """

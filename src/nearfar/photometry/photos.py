@@ -1,4 +1,4 @@
-"""What measuring by pairs and by reference share: photos in batches, places of responses, levels.
+"""Parts that measuring by pairs and by reference share: batches of photos, places, levels.
 
 Index convention: arrays are (photos, C, channels) with C camera pixels row by row; r runs over
 real responses.

@@ -72,7 +72,7 @@ def unmix_response(
     light : array, shape (n, channels)
         Light of each grey, above black's.
     mixing : array, shape (channels, 3)
-        What each primary alone, at its highest level, adds in each channel.
+        Light that each primary alone, at its highest level, adds in each channel.
 
     Returns
     -------

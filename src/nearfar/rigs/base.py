@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 
 Photo = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
-# A photo that is lost or wrong is taken so often before the rig gives up.
+# A photo that is lost or wrong is taken up to this often before the rig gives up.
 MAXIMUM_TRIES = 6
 
 

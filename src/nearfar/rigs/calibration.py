@@ -1,4 +1,4 @@
-"""What a calibration found out about a rig, kept in a folder beside its RIG.toml."""
+"""The calibration of a rig, kept in a folder beside its RIG.toml."""
 
 import json
 from pathlib import Path

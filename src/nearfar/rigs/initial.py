@@ -8,7 +8,7 @@ from nearfar.rigs.cameras.registry import CAMERAS
 from nearfar.rigs.screens import Monitor
 
 ADVICE = """\
-# Exposure in seconds, rounded to whole refreshes of the projector; "auto" takes white's photo.
+# Exposure in seconds, rounded to whole refreshes of the projector; "auto" fits it to white.
 exposure = "auto"
 # Frames that are averaged to a photo.
 # average = 4
@@ -42,7 +42,7 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
         "# Name or index, as nearfar devices lists them.",
     ]
     if monitors:
-        # The first is where people work.
+        # The first monitor is usually the one that people work at.
         chosen = monitors[min(1, len(monitors) - 1)]
         named = [m.name for m in monitors].count(chosen.name) == 1
         lines.append(f"monitor = {_quoted(chosen.name) if named else chosen.index}  # {chosen}")
@@ -55,7 +55,7 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
         "# scale = 8",
         "# Light of a white pattern over the projector's full white.",
         "# brightness = 0.5",
-        "# Refreshes from a pattern's appearance to the exposure; found to be more where it is.",
+        "# Refreshes from a pattern's display to the exposure; raised where photos show the need.",
         "# settle = 2",
         "",
         "[camera]",
@@ -77,7 +77,7 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
             'driver = "folder"',
             'path = "photos"',
         ]
-        # Nobody but the camera's owner sets the exposure then, so there is no bracket.
+        # The exposure of such a camera is set by hand, so there is no bracket.
         general, own = ADVICE, CAMERAS["folder"].settings
     return "\n".join(lines) + "\n" + general + own
 

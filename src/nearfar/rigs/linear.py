@@ -12,15 +12,16 @@ from nearfar.illumination.frames import FrameLayout
 
 LEVEL_COUNT = 256
 PRIMARY_COUNT = 3
-# Fractional parts of their multiples fill the unit square evenly (Roberts' R2 sequence).
+# Roberts' R2 sequence: fractional parts of multiples of these fill the unit square evenly.
 R2_STEPS = (0.7548776662466927, 0.5698402909980532)
 
 
 class LinearProjector:
     """Draws frames for a projector of known response.
 
-    A pattern pixel is a block of the projector's. Of its pixels some show one level and some the
-    next, so that the block's light is the wanted one, exact to a step over the block's pixels.
+    A pattern pixel is a block of the projector's. Some of its pixels show one level and the others
+    the next, so that the block's mean light is the wanted one, to within one step over the number
+    of its pixels.
 
     Parameters
     ----------
@@ -42,7 +43,9 @@ class LinearProjector:
                 "a projector's response has 256 levels of 3 primaries and never falls."
             )
         if not 0 < brightness <= 1:
-            raise InputError(f"the brightness {brightness} cannot be: choose more than 0, up to 1.")
+            raise InputError(
+                f"the brightness {brightness} is not valid: choose more than 0, up to 1."
+            )
         self._layout = layout
         wanted = brightness * np.arange(LEVEL_COUNT) / (LEVEL_COUNT - 1)
         tables = [_steps(response[:, i], wanted) for i in range(PRIMARY_COUNT)]
@@ -66,7 +69,7 @@ class LinearProjector:
 
 
 def identity() -> Floats:
-    """Response of a projector that is taken to be linear, for want of a calibration."""
+    """Return the response of a linear projector, which a rig without a calibration is taken for."""
     return np.repeat(np.linspace(0.0, 1.0, LEVEL_COUNT)[:, np.newaxis], PRIMARY_COUNT, axis=1)
 
 

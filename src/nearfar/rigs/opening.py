@@ -1,4 +1,4 @@
-"""Open whatever names a rig, simulated or real."""
+"""Open a rig by its name or file, simulated or real."""
 
 import os
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.rigs.tables import RealTable, SceneTable, SimulatedTable, read_rig_table
 from nearfar.scenes import SCENES
 
-# A camera that is not aimed yet begins with this exposure, if it can.
+# First exposure of a camera that is not aimed yet, if the camera has it.
 PREVIEW_EXPOSURE_SECONDS = 1 / 30
 
 
@@ -145,7 +145,7 @@ def open_real_rig(
     path : Path
         Its RIG.toml; the calibration lies beside it.
     table : RealTable
-        What `path` says.
+        Contents of `path`.
     projector, exposure, on_alarm, on_start
         As `open_rig`.
 
@@ -245,6 +245,6 @@ def _open_devices(
         # The camera first: it fails more often, and leaves the monitor alone meanwhile.
         camera = stack.enter_context(table.camera.open(path.parent))
         rig = set_up(stack.enter_context(Window(table.projector.monitor)), camera)
-        # The rig has them now.
+        # The rig closes them from here on.
         stack.pop_all()
     return rig

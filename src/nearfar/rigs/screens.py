@@ -73,7 +73,7 @@ class Monitor:
 
 
 class Screen(Protocol):
-    """Whatever shows frames."""
+    """A display of frames."""
 
     @property
     def monitor(self) -> Monitor:
@@ -129,7 +129,7 @@ def choose_monitor(monitors: tuple[Monitor, ...], wanted: str | int | None) -> M
     if not monitors:
         raise DeviceError("no monitor is connected: connect the projector and turn it on.")
     if wanted is None:
-        # The first is where people work.
+        # The first monitor is usually the one that people work at.
         return monitors[min(1, len(monitors) - 1)]
     found = [m for m in monitors if wanted in {m.index, m.name}]
     if len(found) == 1:

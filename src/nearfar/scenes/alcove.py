@@ -20,7 +20,7 @@ from nearfar.scenes.geometry import (
 )
 
 RADIUS, DEPTH = 0.44, 0.62
-# Where the dome begins.
+# Height at which the dome begins, in metres.
 DOME_HEIGHT = 0.62
 
 
@@ -53,7 +53,7 @@ MARBLE = Material(
 VIEW = View((-0.3, 1.1, 2.75), (-0.005, 0.515, -0.1), 0.197)
 
 
-# The bust is drawn smaller than it stands there.
+# Size of the bust in the niche over that of its slices.
 BUST_SCALE = 1.2
 # The bust in slices: height, half width, half depth and how far it stands forward, in metres.
 BUST_SLICES = np.array(

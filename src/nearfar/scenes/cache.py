@@ -46,21 +46,21 @@ def cached_scene(
         As `nearfar.scenes.build`.
     """
     projector, camera = sizes(name, projector, camera)
-    # The names of another package's scenes may hold what the name of a file cannot.
+    # A scene of another package may have a name with characters that a file name cannot have.
     known_as = re.sub(r"[^A-Za-z0-9_-]", "_", name)
     path = cache_folder() / f"{known_as}-{projector}-{camera}-{_fingerprint(name)}.zarr"
     if path.exists():
         try:
             return load_exact(path)
         except NearfarError:
-            # A damaged entry costs its time again, no more.
+            # A damaged entry is computed again.
             pass
     transport = build(name, projector, camera, progress=progress)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         save_exact(transport, path, force=True)
     except (NearfarError, OSError):
-        # A full or read-only cache must not cost the scene that was just computed.
+        # On a full or read-only disk the scene is returned all the same.
         pass
     return transport
 

@@ -24,7 +24,7 @@ class SceneDescription:
     Attributes
     ----------
     summary : str
-        What is to be seen in it, in a few words for a table.
+        What it shows, in a few words for a table.
     projector : Size
         Pattern grid, where none is asked for.
     camera_scale : int

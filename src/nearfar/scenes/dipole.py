@@ -71,7 +71,7 @@ def diffuse_profile(source: Dipole, square: Floats) -> Floats:
     total = np.zeros_like(square)
     for depth in (source.real, source.virtual):
         far = np.sqrt(square + depth**2)
-        # Products: a power of 3 is many times slower.
+        # Products, since a power of 3 takes many times as long.
         cube = far * far * far
         far *= -source.attenuation
         total += depth * (1 - far) / cube * np.exp(far)

@@ -1,4 +1,4 @@
-"""Exchange of light between patches: G = A_i F_ij, symmetric, with what stands between.
+"""Exchange of light between patches: G = A_i F_ij, symmetric, with occlusion.
 
 Index convention: i, j are patches, a, b their samples. F_ij is the share of the light that leaves
 i and arrives at j; the irradiance at i under radiosities B is sum_j F_ij B_j.
@@ -77,7 +77,7 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
 
 
 def _at_most_all(form: Floats, area: Floats) -> Floats:
-    """Scale down, symmetrically and in place, what would send out more than all light.
+    """Scale rows of form factors down to `MAXIMUM_ROW_SUM`, symmetrically and in place.
 
     Where parts run into each other a sliver may be counted with more than its true area.
     """

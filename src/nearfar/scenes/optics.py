@@ -31,7 +31,7 @@ class Pinhole:
 
 
 def pinhole(view: View, aspect: Size) -> Pinhole:
-    """Aim a pinhole, its field of view shaped like the grid `aspect`, longer side as given."""
+    """Return the pinhole of a view, its field of view shaped like the grid `aspect`."""
     position = np.asarray(view.position, dtype=float)
     forward = np.asarray(view.target) - position
     forward /= np.linalg.norm(forward)
@@ -42,7 +42,7 @@ def pinhole(view: View, aspect: Size) -> Pinhole:
 
 
 def sub_rays(eye: Pinhole, size: Size, samples: int) -> tuple[Floats, Floats, Integers]:
-    """Rays through the s x s cells of every pixel.
+    """Return the rays through the s x s cells of every pixel.
 
     Parameters
     ----------

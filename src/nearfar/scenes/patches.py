@@ -16,13 +16,14 @@ from nearfar.scenes.geometry import Part
 from nearfar.scenes.optics import Pinhole, pixel_of, sub_rays
 from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked, hit
 
-# A surface seen at a glancing angle under one sub-ray: its area is no more than this allows.
+# Smaller cosines count as this, which bounds the area of a surface that one sub-ray grazes.
 SMALLEST_COSINE = 0.05
-# Cells of the surfaces without light: in projector pixels, and at most so many metres.
+# Side of the cells that unlit surfaces are cut into: in projector pixels, and at most in metres.
 CELL_PIXELS = 2.5
 LARGEST_CELL = 0.08
-# About so many of them at most: a share of the projector's pixels, but enough for a room.
+# Unlit surfaces have at most about one cell for this many projector pixels, ...
 PIXELS_PER_CELL = 8
+# ... but may have this many in any case.
 FEWEST_CELLS = 300
 
 
@@ -89,13 +90,14 @@ class Patches:
 
 
 def lit_samples(where: Surface, eye: Pinhole, size: Size, samples: int) -> Samples:
-    """Points that the projector lights, s x s of them per pixel.
+    """Return the points that the projector lights, s x s per pixel.
 
     The projector has the same radiant intensity in all directions, so a sub-ray's flux is its
     solid angle, and the irradiance that it brings is cos(theta) / r^2.
     """
     direction, solid_angle, pixel = sub_rays(eye, size, samples)
-    # Shared evenly within a pixel, as a coaxial camera weighs it: transport is then reciprocal.
+    # Shared evenly within a pixel, as a coaxial camera weighs its sub-rays: transport is
+    # reciprocal.
     flux = (np.bincount(pixel, solid_angle) / samples**2)[pixel]
     hits = hit(where, eye.position, direction)
     cosine = -np.einsum("nx,nx->n", direction, where.normals[hits.face])
@@ -123,7 +125,7 @@ def lit_samples(where: Surface, eye: Pinhole, size: Size, samples: int) -> Sampl
 def dark_samples(
     where: Surface, parts: Sequence[Part], eye: Pinhole, size: Size, cell: float
 ) -> tuple[Samples, Integers]:
-    """Points on the surfaces that the projector does not light, and the patch of each.
+    """Return points on the surfaces that the projector does not light, and the patch of each.
 
     Surfaces are cut by a cubic grid of edge `cell` (metres) into patches, and by one three times
     finer into samples. What lies inside another part is left out.
@@ -256,7 +258,7 @@ def _merged(
 
 
 def _numbered(*columns: Floats | Integers) -> tuple[Integers, Integers]:
-    """Give numbers to distinct rows of integer columns: where each occurs first, and each row's.
+    """Find distinct rows of integer columns: where each occurs first, and each row's number.
 
     Columns are packed into one, which sorts far quicker than rows.
     """

@@ -81,7 +81,7 @@ def _between(factor: ReflectionFactor, block: Floats, matrix: Floats) -> None:
 
 
 def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
-    """L (K - I) L^T of the module's equations: from the light that falls on patches to far-range.
+    """Return L (K - I) L^T, which takes the light that falls on patches to far-range light.
 
     Parameters
     ----------

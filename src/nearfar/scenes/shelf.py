@@ -80,7 +80,7 @@ LOWER_BOOKS: tuple[tuple[float, float, float, Vector], ...] = (
     (0.085, 0.32, 0.10, TEAL),
 )
 
-# Books that touch are this far apart (metres): of two sides in one place a ray would meet either.
+# Gap between books that touch (metres): a ray would meet either of two sides in one plane.
 BOOK_GAP = 2e-5
 
 PROJECTOR = View((-0.25, 0.72, 2.5), (0.0, 0.415, -0.1), 0.268)

@@ -32,17 +32,17 @@ RAMP_LEVELS = tuple(int(v) for v in np.unique(np.rint(np.linspace(0, 255, 33))))
 CHECK_LEVELS = (32, 64, 96, 128, 160, 192, 224)
 # Values from this share of full scale on are clipped.
 CLIPPED_SHARE = 0.98
-# Multiples of the exposure at which the camera's own line is measured, of a light that fits.
+# Multiples of the exposure at which the camera's own linearity is measured, under a dim light.
 EXPOSURE_FACTORS = (1, 2, 3, 4, 5, 6, 8)
 # Camera pixels take part where white adds this share of what it adds to the brightest.
 LIT_SHARE_OF_BRIGHTEST = 0.1
-# The user is told of errors of the camera's line, as a share of full scale; of primaries that do
-# not add up to white, of the linearised ramp, and of ambient light, as shares of white.
+# Errors above these are reported: of the camera's linearity, as a share of full scale; and, as
+# shares of white, of the sum of the primaries, of the linearised ramp, and of ambient light.
 MAXIMUM_LINE_ERROR = 0.01
 MAXIMUM_SUPERPOSITION_ERROR = 0.02
 MAXIMUM_RAMP_ERROR = 0.01
 MAXIMUM_AMBIENT_SHARE = 0.1
-# A camera tells primaries apart whose mixing matrix has a smaller condition number.
+# A camera resolves the primaries if its mixing matrix has a smaller condition number.
 MAXIMUM_CONDITION_NUMBER = 30.0
 
 
@@ -76,13 +76,13 @@ class Findings(NamedTuple):
 def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
     """Calibrate a rig before a scene that does not move.
 
-    Every light is photographed with the pattern grid full of it, in an order by chance, so that a
-    lamp that drifts does not look like a response.
+    Every light is photographed with the pattern grid full of it, in random order, so that a lamp
+    that drifts does not look like a response.
 
     Parameters
     ----------
     rig : RealRig
-        Not calibrated yet: its levels go out as they are.
+        Without a calibration, so that levels are displayed as they are.
     progress : callable, optional
         Called with what is being done and the share of it that is done, 0 to 1.
 
@@ -156,7 +156,7 @@ def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
     if residual > MAXIMUM_RAMP_ERROR:
         notes.append(
             f"the linearised ramp still misses a line by up to {residual:.1%} of white: the "
-            f"projector's response depends on the picture, so turn what makes it livelier off."
+            f"projector's response depends on the picture, so turn its picture enhancement off."
         )
     ambient = float(max(0.0, (black_light.mean() - black) / full))
     if ambient > MAXIMUM_AMBIENT_SHARE * float(white.mean()) / full:
@@ -210,7 +210,7 @@ def _camera_line(
             report("exposures", (i + 1) / len(lengths))
     finally:
         camera.set_exposure(shortest)
-    # A glint is saturated long before the rest: the same camera pixels at every exposure.
+    # The same camera pixels at every exposure: a glint is saturated long before the rest.
     while len(photos) > 1:
         below = np.all(
             [photo < CLIPPED_SHARE * camera.full_scale for photo in photos], axis=(0, -1)
@@ -227,7 +227,7 @@ def _camera_line(
 
 
 def _dark_pair(rig: RealRig) -> list[Photo]:
-    """Two photos of as little light as there is: their noise is the reading's alone."""
+    """Return two photos of as little light as there is, whose noise is read noise alone."""
     camera, usual = rig.camera, rig.camera.exposure
     if usual is None or camera.exposure_limits is None:
         return []

@@ -32,7 +32,7 @@ Report = Callable[[str, float], None]
 
 
 class Trial(NamedTuple):
-    """How one method fared.
+    """Result of one method at one budget.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Comparison:
     equal_photos : tuple of Trial
         Each photo exposed alike.
     equal_exposure : tuple of Trial
-        Of plans of one length for each method, the total exposure being that of a budget.
+        Each method's longest plan, at each budget of total exposure.
     """
 
     scene: str
@@ -105,9 +105,9 @@ def compare(
 ) -> Comparison:
     """Run methods on a scene at several budgets of photos, and of total exposure.
 
-    The rivals are given their best: the paper's method the better of several bands at each budget,
-    compressive light transport the regularisation that the truth likes best. Correspondence is
-    found by each method itself.
+    The rivals are given their best: at each budget, the paper's method has the best of several far
+    bands, and compressive light transport the regularisation that fits the truth best.
+    Correspondence is found by each method itself.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ def export_patterns(
 
 
 def _is_export(folder: Path) -> bool:
-    """Tell whether a folder holds an export and nothing else, or nothing at all."""
+    """Return whether a folder is empty, or holds an export and nothing else."""
     names = [entry.name for entry in folder.iterdir()]
     # Pictures alone may be someone's own.
     return not names or (

@@ -142,8 +142,7 @@ def beside_photos(
         A pair whose light is all black gives the photo under black; without one the black that
         was measured with the transport is taken.
     full_scale : float, optional
-        Value of full scale of the photos; by default the capture's, for photos of its kind of
-        numbers.
+        Value of full scale of the photos; by default the capture's, for photos of the same dtype.
 
     Returns
     -------

@@ -23,9 +23,9 @@ from nearfar.workflow.evaluate import snr
 NUMBERS_NAME = "numbers.json"
 PICTURE_NAMES = ("direct", "global")
 ENDINGS = (".npy", ".exr", ".png")
-# Groups of photos that should sum to one white, and differ by a larger share of it, are at fault.
+# Groups of photos should sum to the same light; a difference above this share is a fault.
 MAXIMUM_DIFFERENCE_OF_SUMS = 0.05
-# Channels that picture files hold besides .npy, which holds any number.
+# Numbers of channels that .exr and .png hold; .npy holds any.
 PICTURE_CHANNELS = (1, 3)
 
 
@@ -59,7 +59,7 @@ def export_to_separate(
     Raises
     ------
     InputError
-        If the pattern does not fit the projector, or that `native`.
+        If the pattern does not fit the projector, or the projector does not fit on `native`.
     NearfarError
         As `nearfar.files.new_output`.
     """
@@ -199,7 +199,7 @@ def compare_to_truth(
     Raises
     ------
     InputError
-        If its components are not known, or its camera or channels are others.
+        If its components are not known, or its camera or channels differ from those of `found`.
     """
     if not truth.is_apart:
         raise InputError(
@@ -220,7 +220,7 @@ def compare_to_transport(found: Separation, transport: Transport) -> dict[str, f
     Raises
     ------
     InputError
-        If its camera or channels are others.
+        If its camera or channels differ from those of `found`.
     """
     parts = transport.components(np.ones(transport.projector, dtype=np.float32))
     shape = (*transport.camera, transport.channels)

@@ -1,4 +1,4 @@
-"""Reconstructions that were stopped: gone on with, they are to the bit what was never stopped."""
+"""Reconstructions that were stopped and resumed: equal to the bit to those never stopped."""
 
 import random
 import shutil
@@ -127,7 +127,7 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
         {**given, "correspondence": Correspondence(
             np.ones((*CAMERA, 2), np.float32), np.ones(CAMERA, np.float32))},
     ):  # fmt: skip
-        with pytest.raises(InputError, match="was begun with another"):
+        with pytest.raises(InputError, match="was started with another"):
             into(path, capture, resume=True, **other)
     done = []
     into(
@@ -146,7 +146,7 @@ def test_another_device_does_not_go_on_with_it(capture, memory, tmp_path):
     path = tmp_path / "t.zarr"
     with pytest.raises(KeptInterrupt):
         into(path, capture, memory=memory, progress=_stop_after(20))
-    with pytest.raises(InputError, match="was begun with another"):
+    with pytest.raises(InputError, match="was started with another"):
         into(path, capture, memory=memory, device="torch", resume=True)
 
 

@@ -36,7 +36,7 @@ REASON_OF_STATUS = {
     7: "the camera stopped",
 }
 BUFFER_COUNT = 4
-# A frame must be here within the exposure and so many seconds.
+# A frame must arrive within its exposure and this many seconds more.
 FRAME_TIMEOUT_SECONDS = 2.0
 MICROSECONDS_PER_SECOND = 1e6
 # How the library names the types of features that take a Python value.
@@ -83,7 +83,7 @@ class AravisCamera(Camera):
     Parameters
     ----------
     device : str, optional
-        As `find` tells it, or an address; the first that is found if left out.
+        As `find` returns it, or an address; the first that is found if left out.
     region : Size, optional
         Rows and columns to read, from the middle of the sensor; all if left out.
     pixel_format : str, optional
@@ -124,7 +124,8 @@ class AravisCamera(Camera):
         self._full_scale = full_scale
         self._trigger, self._features = trigger, dict(features or {})
         try:
-            # On machines of several networks, cameras opened without this may send nothing.
+            # On a machine with several networks, a camera that is opened without this may send
+            # nothing.
             self._library.plain("arv_update_device_list")
             self._camera = self._call("arv_camera_new", device.encode() if device else None)
             words = [
@@ -193,18 +194,18 @@ class AravisCamera(Camera):
         DeviceError
             If the camera does not answer.
         """
-        # What came unasked belongs to no pattern.
+        # A frame that came without a trigger belongs to no pattern.
         while old := self._library.plain("arv_stream_try_pop_buffer", self._stream):
             self._library.plain("arv_stream_push_buffer", self._stream, old)
         if self._trigger == "software":
             self._call("arv_camera_software_trigger", self._camera)
         elif self._trigger == "free":
-            # This one began before.
+            # The exposure of this one began before the call.
             self._pop()
         return self._pop()
 
     def _stop(self) -> None:
-        # It may be gone, or at rest and mind being stopped; what matters comes after.
+        # The camera may be gone, or may refuse to stop when it is idle: neither matters here.
         with suppress(DeviceError):
             self._library.call("arv_camera_stop_acquisition", self._camera)
 
@@ -257,9 +258,9 @@ class AravisCamera(Camera):
         )
 
     def _set_up(self, region: Size | None, pixel_format: str | None) -> None:
-        # A program that was killed leaves it sending, and it would go on sending there.
+        # A program that was killed leaves the camera sending to it.
         self._stop()
-        # What decides by itself would change between photos.
+        # Automatic settings would change between photos.
         for automatic in ("ExposureAuto", "GainAuto", "BalanceWhiteAuto", "GammaEnable"):
             if self._has(automatic):
                 self._set_feature(automatic, False if automatic == "GammaEnable" else "Off")
@@ -313,7 +314,7 @@ class AravisCamera(Camera):
         self._call("arv_camera_get_sensor_size", self._camera, *map(ctypes.byref, sides))
         sensor = Size(sides[1].value, sides[0].value)
         if wanted is None and self._has("OffsetX"):
-            # Whatever another program has left.
+            # Another program may have left a region set.
             self._call("arv_camera_set_region", self._camera, 0, 0, sensor.width, sensor.height)
         elif wanted is not None:
             if wanted.height > sensor.height or wanted.width > sensor.width:

@@ -94,7 +94,7 @@ class _GError(ctypes.Structure):
 
 
 class Aravis:
-    """The loaded library; every fault it tells of is a `DeviceError`.
+    """The loaded library; every error that it reports is raised as a `DeviceError`.
 
     Raises
     ------

@@ -21,7 +21,7 @@ from nearfar.rigs.base import MAXIMUM_TRIES, Photo
 BRIGHT_SHARE = 0.8
 # ... all but this share of values, which may be glints.
 GLINTS_SHARE = 1e-3
-# From this share of full scale on values are clipped, and the light can only be guessed.
+# Values from this share of full scale on are clipped: their light can only be guessed.
 CLIPPED_SHARE = 0.98
 MAXIMUM_EXPOSURE_STEPS = 10
 # An exposure this close to the wanted one, as a share of it, will do.
@@ -46,17 +46,18 @@ class Camera(ABC):
         Exposures of a photo over the first, which is the shortest: (1, 4, 16) takes three.
     """
 
-    # What levels are made of, for the weights of a bracket; a calibration knows.
+    # Black level, gain and read noise, for the weights of a bracket; known from a calibration.
     sensor = Sensor()
-    # False once a photo came whose levels are a screen's and not the light's, as a JPEG's.
+    # False once a photo's levels were encoded for a screen, as a JPEG's are: not linear in light.
     linear = True
 
     def __init__(self, name: str, *, frames: int = 1, bracket: tuple[float, ...] = (1.0,)) -> None:
         if frames < 1:
-            raise InputError(f"a photo of {frames} frames cannot be: average 1 or more.")
+            raise InputError(f"a photo cannot be the average of {frames} frames: give 1 or more.")
         if not bracket or bracket[0] != 1 or list(bracket) != sorted(set(bracket)):
             raise InputError(
-                f"the bracket {list(bracket)} is none: begin with 1, the shortest, and go up."
+                f"the bracket {list(bracket)} is not valid: give 1, the shortest, first, "
+                f"then longer ones."
             )
         self.name = name
         self.exposure: float | None = None
@@ -164,7 +165,7 @@ class Camera(ABC):
         return self.take()
 
     def expose_for_light(self, rounded: Callable[[float], float] = float) -> float:
-        """Choose the exposure at which the light there is now just fits the sensor.
+        """Choose the exposure at which the present light just fits the sensor.
 
         Parameters
         ----------
@@ -219,7 +220,7 @@ class Camera(ABC):
     def _averaged(self) -> Photo:
         if self._frames == 1:
             return self.take()
-        # Some cameras know their full scale by a photo.
+        # Some cameras know their full scale only after a photo.
         first = self.take()
         others = (self.take() for _ in range(self._frames - 1))
         return average(chain([first], others), self.full_scale)

@@ -1,4 +1,4 @@
-"""Any camera that drops its photos into a folder: tethered, by a card in the air, by a script."""
+"""Any camera that drops its photos into a folder: by a cable, a wireless card, or a script."""
 
 import os
 import shlex
@@ -25,7 +25,7 @@ SETTINGS = """\
 ENDINGS = (*PICTURE_ENDINGS, *RAW_ENDINGS, ".jpg", ".jpeg")
 # Seconds between listings of the folder; network folders do not notify of new files.
 LISTING_INTERVAL_SECONDS = 0.05
-# A file that has kept its size for so many listings is whole.
+# A file that has kept its size for this many listings is complete.
 LISTINGS_OF_ONE_SIZE = 3
 
 

@@ -16,7 +16,7 @@ from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, PositiveLevel
 from nearfar.rigs.cameras.pixel_formats import parse_pixel_format
 
 NAME = "harvesters"
-# A frame must be here within the exposure and so many seconds.
+# A frame must arrive within its exposure and this many seconds more.
 FRAME_TIMEOUT_SECONDS = 2.0
 MICROSECONDS_PER_SECOND = 1e6
 
@@ -107,7 +107,7 @@ class HarvestersCamera(Camera):
 
     def close(self) -> None:
         """Give the camera back."""
-        # It may be gone; what matters is that it is let go of.
+        # The camera may be gone already.
         with suppress(*self._faults):
             if self._acquirer is not None:
                 self._acquirer.destroy()

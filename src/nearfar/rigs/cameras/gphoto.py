@@ -109,7 +109,7 @@ class GphotoCamera(Camera):
 
     def close(self) -> None:
         """Give the camera back."""
-        # It may be gone; what matters is that it is let go of.
+        # The camera may be gone already.
         with suppress(self._gphoto.GPhoto2Error):
             self._camera.exit()
 
@@ -129,7 +129,7 @@ class GphotoCamera(Camera):
             file = self._camera.file_get(path.folder, path.name, gphoto.GP_FILE_TYPE_NORMAL)
             data = bytes(memoryview(file.get_data_and_size()))
         with self._in_sentences():
-            # Left there, nine hundred photos fill the card.
+            # Nine hundred photos would fill the card.
             self._camera.file_delete(path.folder, path.name)
         try:
             photo = decode_camera_file(data, Path(path.name))
@@ -140,7 +140,7 @@ class GphotoCamera(Camera):
 
     def _set_up(self) -> None:
         with self._in_sentences():
-            # Nothing on the way slows the card down, and nothing is left on it.
+            # Photos go through the camera's memory: its card cannot slow them down or fill up.
             self._choose_matching(*TRANSFER_TARGET)
             for name in FORMAT_SETTINGS:
                 self._choose_matching(name, RAW_FORMAT)
@@ -155,7 +155,7 @@ class GphotoCamera(Camera):
         return nearest
 
     def _speeds(self) -> dict[float, str]:
-        """Exposures of the dial in seconds, and what it calls them."""
+        """Return the exposures of the dial in seconds, with its names of them."""
         for name in EXPOSURE_SETTINGS:
             widget = self._widget(name)
             if widget is not None:

@@ -64,7 +64,8 @@ def _found_by(name: str) -> list[FoundCamera]:
     except MissingPackageError:
         raise
     except Exception as error:
-        # Other packages fail in ways of their own, and hide no other camera by it.
+        # Another package's driver may raise anything; the other drivers' cameras are listed all the
+        # same.
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ExtensionError(
             f"the camera driver {name!r} cannot search for cameras ({reason}): update or uninstall "

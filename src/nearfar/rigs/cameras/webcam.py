@@ -48,7 +48,7 @@ def find() -> list[FoundCamera]:
     _opencv()
     found = []
     for path in sorted(Path("/sys/class/video4linux").glob("video*")):
-        # Of a camera's devices the first gives pictures.
+        # Of the devices of one camera, the first gives pictures.
         if (path / "index").read_text().strip() == "0":
             name = (path / "name").read_text().strip()
             found.append(FoundCamera(NAME, f"/dev/{path.name}", name))
@@ -58,9 +58,9 @@ def find() -> list[FoundCamera]:
 class OpencvCamera(Camera):
     """A webcam or anything else that OpenCV opens: a device, an address, a file.
 
-    Webcams run by themselves and keep frames in a queue: before each photo so many are skipped that
-    what is left was exposed afterwards. Their 8 bits are those of a screen unless the camera's
-    gamma can be set to 1.
+    Webcams run by themselves and keep frames in a queue: before each photo, enough are skipped that
+    the next was exposed afterwards. Their 8 bits are those of a screen unless the camera's gamma
+    can be set to 1.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class OpencvCamera(Camera):
         number = self._opencv.CAP_PROP_EXPOSURE
         if not self._capture.set(number, round(seconds * EXPOSURE_UNITS_PER_SECOND)):
             raise DeviceError(f"{self.name} does not let its exposure be set.")
-        # The exposure of the next frame had started before.
+        # The exposure of the next frame started before this one was set.
         time.sleep(seconds)
         return float(self._capture.get(number)) / EXPOSURE_UNITS_PER_SECOND
 

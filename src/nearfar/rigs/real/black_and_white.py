@@ -12,11 +12,11 @@ from nearfar.arrays import Floats
 from nearfar.errors import DeviceError
 from nearfar.faults.records import LightChange
 
-# Photos are of the same light where they differ by this factor of their noise's variance, beside
-# what a lamp's flicker, as a share of what white adds to black, may set them apart by.
+# Two photos are of the same light if their mean squared difference is below this multiple of their
+# noise's variance, plus the square of a lamp's flicker, a share of what white adds to black.
 SAME_LIGHT_VARIANCE_RATIO = 2.5
 FLICKER_SHARE = 0.005
-# White is seen where it is so many standard deviations above black.
+# White is visible where it is this many standard deviations above black.
 VISIBLE_DEVIATIONS = 6.0
 # No variance is below this, as a share of the square of what white adds to black.
 RELATIVE_VARIANCE_FLOOR = 1e-10
@@ -57,7 +57,7 @@ class BlackAndWhite(NamedTuple):
         """Return the noise's variance at some levels, by a line through black and white."""
         slope = (self.white_variance - self.black_variance) / max(self.contrast, 1e-9)
         above = np.clip(levels - self.black.mean(), 0.0, None)
-        # What is clipped has no noise at all.
+        # Clipped values have no noise at all.
         least = max(self.rounding_variance, RELATIVE_VARIANCE_FLOOR * self.contrast**2)
         return np.asarray(np.maximum(self.black_variance + max(slope, 0.0) * above, least))
 
@@ -109,7 +109,7 @@ def measure_black_and_white(blacks: list[Levels], whites: list[Levels]) -> Black
 
 
 def agree_in_mean(blacks: list[Levels], whites: list[Levels]) -> bool:
-    """Return whether the photos of black are equally light, and those of white."""
+    """Return whether the photos of black have the same mean, and those of white."""
     both = (blacks, whites)
     pairs = np.array([[photo.mean(dtype=np.float64) for photo in pair] for pair in both])
     contrast = abs(float(np.ptp(pairs.mean(axis=1))))

@@ -17,12 +17,12 @@ DIM_MEAN_LEVEL = 64
 
 
 class Deviation(NamedTuple):
-    """A photo whose mean is not what earlier photos say.
+    """A photo whose mean is not what earlier photos predict.
 
     Attributes
     ----------
     last_good : int or None
-        The last photo whose mean was; None if there is none in the whole capture.
+        The last photo whose mean was as predicted; None if there is none in the whole capture.
     share : float
         Excess over what was expected, as a share of what white adds to black.
     is_by_inverse : bool
@@ -35,7 +35,7 @@ class Deviation(NamedTuple):
 
 
 class ExpectedLight:
-    """Compares the mean of each photo of a shoot with what earlier photos say.
+    """Compares the mean of each photo of a shoot with what earlier photos predict.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ class ExpectedLight:
         return None
 
     def ignore_inverses(self) -> None:
-        """Compare patterns with their inverses no more: they do not add up on this rig."""
+        """Stop comparing patterns with their inverses: they do not add up on this rig."""
         self._compares_inverses = False
 
     def start_again(self, levels: BlackAndWhite) -> None:
-        """Go on from light that has changed."""
+        """Forget earlier photos, after the light has changed."""
         self._levels = levels
         self._means.clear()

@@ -152,7 +152,7 @@ class RealRig:
             "camera": self.camera.describe(),
             "exposure": self.camera.exposure,
             "calibration": calibration.made if calibration else None,
-            # Relighting in colour goes by it.
+            # Relighting in colour uses it.
             "colour_mixing": [list(row) for row in calibration.mixing] if calibration else None,
         }
 
@@ -226,7 +226,7 @@ class RealRig:
     def whole_refreshes(self, seconds: float) -> float:
         """Round an exposure to whole refreshes of the projector, one at least."""
         if _is_whole(seconds, self.refresh):
-            # To the digit as it was asked for, or as the capture was started.
+            # Exactly as it was asked for, or as the capture was started with.
             return seconds
         return max(1, round(seconds / self.refresh)) * self.refresh
 

@@ -1,4 +1,4 @@
-"""A shoot of patterns whose photos are checked: taken again if stale, and their light followed.
+"""A shoot of patterns: stale photos are taken again, and changes of light are followed.
 
 Index convention: patterns are (Py, Px), photos (Cy, Cx, channels) in raw levels.
 """
@@ -104,7 +104,7 @@ class CheckedShoot:
         self, number: int, pattern: NDArray[np.uint8], suspect: Photo, reason: str
     ) -> Photo:
         shutter = self._shutter
-        # From the other end of the scale, the photo of any pattern differs all over.
+        # After black or white, whichever is unlike the pattern, a photo of it differs everywhere.
         is_bright = pattern.mean() > 127
         away = self._draw(self._black if is_bright else self._white)
         for _ in range(MAXIMUM_TRIES):
@@ -125,7 +125,7 @@ class CheckedShoot:
                 self._alarms.add(PhotoTakenAgain(number, reason))
             return photo
         raise DeviceError(
-            f"photo {number} cannot be had: {reason}, {MAXIMUM_TRIES + 1} times: look at the "
+            f"photo {number} could not be taken: {reason}, {MAXIMUM_TRIES + 1} times: look at the "
             f"projector's picture and at the camera's."
         )
 
@@ -134,7 +134,7 @@ class CheckedShoot:
         try:
             now = self._measure_levels()
         except DeviceError:
-            # A camera that repeats one picture for ever shows neither.
+            # A camera that repeats one photo for ever shows neither black nor white.
             return
         change = self._levels.change_to(now)
         if change is not None:

@@ -16,7 +16,7 @@ from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.real.alarms import AlarmLog
 from nearfar.rigs.screens import Screen
 
-# Refreshes in which a frame or a photo that is still on its way passes by.
+# Refreshes after which no older frame or photo is still on its way.
 FLUSH_REFRESHES = 12
 
 

@@ -14,17 +14,17 @@ from nearfar.arrays import blocks
 from nearfar.rigs.real.black_and_white import BlackAndWhite, Levels
 
 MAXIMUM_BANDS = 16
-# A band tells patterns apart where white and black differ by so many times their variance.
+# A band resolves patterns if white and black differ by this many times their variance.
 CONTRAST_VARIANCE_RATIO = 100.0
 # A band sees direct light where the left half of white and the right differ by this share of white
-# less black: what is lit by the scene alone hardly knows which half is lit.
+# less black: light from the scene alone hardly depends on which half is lit.
 DIRECT_SHARE = 0.5
-# Two patterns differ everywhere if in each of so many groups of their rows and of their columns at
-# least this share of pixels differs by so many levels.
+# Two patterns differ everywhere if, in each of this many groups of their rows and of their columns,
+# at least this share of pixels differs by this many levels.
 GROUPS_PER_AXIS = 4
 DIFFERING_SHARE = 0.1
 DIFFERING_LEVELS = 25
-# The camera is too coarse to tell patterns apart after so many photos, and this share of all, that
+# The camera is too coarse to resolve patterns if at least this many photos, and this share of all,
 # only looked stale.
 MINIMUM_FALSE_SUSPICIONS = 8
 FALSE_SUSPICION_SHARE = 0.25
@@ -54,11 +54,11 @@ class StalePhotos:
 
     @property
     def is_too_coarse(self) -> bool:
-        """Whether the camera does not tell patterns apart, so that no photo is suspected more."""
+        """Whether the camera does not resolve patterns, so that photos are no longer suspected."""
         return self._is_too_coarse
 
     def learn_direct_bands(self, left: Levels, right: Levels) -> None:
-        """Keep to the rows that see direct light, by photos of the left half of white and right."""
+        """Choose the rows that see direct light, by photos of the two halves of white."""
         halves = (left.astype(np.float32) - right) ** 2
         contrast = (self.levels.white - self.levels.black) ** 2
         direct = [b for b in self._bands if halves[b].mean() > DIRECT_SHARE**2 * contrast[b].mean()]
@@ -98,7 +98,7 @@ class StalePhotos:
         ----------
         before, photo : array
         everywhere : bool
-            Whether they should differ everywhere, so that a part that is equal tells of a tear.
+            Whether they should differ everywhere, so that an equal part shows a tear.
         """
         same = [self.levels.is_same_light(before[band], photo[band]) for band in self._bands]
         if not same or not any(same):

@@ -14,7 +14,7 @@ from nearfar.rigs.real.black_and_white import (
     measure_black_and_white,
 )
 
-# Any projector and camera have settled after so many refreshes.
+# Any projector and camera have settled after this many refreshes.
 MAXIMUM_SETTLE_REFRESHES = 32
 
 

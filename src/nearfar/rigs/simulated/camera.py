@@ -49,13 +49,13 @@ class SimulatedCamera(BaseModel):
 
     def expose(self, light: Floats, number: int = 0) -> Floats:
         """Return electrons from light in photo units, ambient light of photo `number` added."""
-        # A transport that was measured may answer a dark light with a little less than nothing.
+        # A measured transport may turn a dark light into a picture slightly below 0.
         ambient = self.ambient * self.ambient_drift.at(number)
         return np.asarray(np.maximum(light + ambient, 0.0) * self.full_well)
 
     def noise(self, electrons: Floats, generator: np.random.Generator) -> Floats:
         """Return the electrons that are read: counted by chance, read with an error."""
-        # A measured transport may answer a little below zero, and a generator counts only so far.
+        # A measured transport may give slightly less than 0, and the generator has an upper limit.
         expected = np.clip(electrons, 0.0, MAXIMUM_ELECTRONS)
         counted = generator.poisson(expected) if self.shot_noise else electrons
         if self.read_noise == 0.0:

@@ -102,8 +102,8 @@ class SimulatedRig:
         """Yield a photo for each pattern, in order; `first` is the number of the first."""
         number = first
         for batch in _batches(patterns, PATTERNS_AT_ONCE, first):
-            # Dark lights before the first: pictures depend in their last digit on how many are
-            # made at once, and photos must not on where a capture was taken up again.
+            # Dark lights fill the batch up to the first: the last digit of a picture depends on how
+            # many are computed at once, and photos must not depend on where a capture was resumed.
             before = number % PATTERNS_AT_ONCE
             lights = np.zeros((before + len(batch), *self.projector), dtype=np.float32)
             for i, pattern in enumerate(batch):

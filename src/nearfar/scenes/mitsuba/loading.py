@@ -1,10 +1,10 @@
 """Read a Mitsuba scene and put a pattern grid into its projector.
 
-Only four things of the scene are replaced: the projector's picture (by a grid of pixels held
-constant over each, ``raw`` and ``nearest``), the film (same size and field of view, or another
-size; float32; linear), its reconstruction filter (by a box, so that a camera pixel is the mean
-over its own area and T has a row for each), and the sampler (by independent samples, so that
-photos can be averaged). The geometry, the materials, the other lights and the integrator stay.
+Only four things of the scene are replaced: the projector's picture (by the pattern grid, constant
+over each pixel: ``raw`` and ``nearest``), the film (same size and field of view, or another size;
+float32; linear), its reconstruction filter (by a box, so that a camera pixel is the mean over its
+own area and T has a row for each), and the sampler (by independent samples, so that photos can be
+averaged). The geometry, the materials, the other lights and the integrator stay.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ from nearfar.scenes.mitsuba.nodes import (
 )
 from nearfar.scenes.mitsuba.variant import choose_variant
 
-# Mitsuba's own where a scene does not say.
+# Mitsuba's defaults for what a scene leaves out.
 DEFAULT_FILM = Size(576, 768)
 DEFAULT_SAMPLES = 4
 GREY_FILMS = ("luminance", "luminance_alpha")
@@ -153,7 +153,7 @@ def load_scene(
 
 @contextmanager
 def _mitsuba_sentences(path: Path) -> Iterator[None]:
-    """Let a scene name files in its own folder, and turn what Mitsuba says into one sentence."""
+    """Let a scene name files in its own folder, and turn Mitsuba's errors into one sentence."""
     import mitsuba as mi
 
     resolver = mi.file_resolver()
@@ -184,7 +184,7 @@ def quiet_mitsuba() -> Iterator[None]:
 
 
 def _own_picture(state: Any, light: Any, path: Path) -> tuple[Size | None, Floats]:
-    """Size of the projector's own picture, and the colour of a projector without one."""
+    """Return the size of the projector's own picture, and the colour of one without a picture."""
     import mitsuba as mi
 
     node = children(state, light).get("irradiance")

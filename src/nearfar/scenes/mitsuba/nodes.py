@@ -11,7 +11,7 @@ from nearfar.errors import InputError
 
 
 def kind_of(node: Any) -> str:
-    """Name a node's kind: Scene, Sensor, Emitter, ..."""
+    """Return a node's kind: Scene, Sensor, Emitter, ..."""
     return str(node.type).rpartition(".")[2]
 
 
@@ -30,7 +30,7 @@ def one(state: Any, kind: str, plugin: str | None = None) -> Any:
 
 
 def require_one_of_each(state: Any, path: Path) -> None:
-    """Refuse what is no scene with one projector and one sensor.
+    """Refuse a file that is not a scene with one projector and one sensor.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def require_one_of_each(state: Any, path: Path) -> None:
 
 
 def children(state: Any, props: Any) -> dict[str, Any]:
-    """Nodes below a node, by the name of the property that holds each."""
+    """Return the nodes below a node, by the name of the property that holds each."""
     import mitsuba as mi
 
     return {
@@ -60,13 +60,13 @@ def children(state: Any, props: Any) -> dict[str, Any]:
 
 
 def child(state: Any, props: Any, kind: str) -> dict[str, Any]:
-    """Plug-in (as ``type``) and properties of a node's child of a kind; empty without one."""
+    """Return plug-in (as ``type``) and properties of a node's child of a kind; empty if none."""
     found = [node for node in children(state, props).values() if kind_of(node) == kind]
     return {"type": found[0].props.plugin_name(), **dict(found[0].props.items())} if found else {}
 
 
 def replace(props: Any, name: str, value: Any) -> None:
-    """Set a property, whatever it was."""
+    """Set a property, whatever type it had."""
     if name in props:
         del props[name]
     props[name] = value

@@ -10,7 +10,7 @@ of the depths).
 
 Everything here runs both in Mitsuba's scalar variants, a path at a time, and in the vectorised
 ones, where a variable stands for one value per path and ``drjit.syntax`` records the loops. So
-functions are at module level, see no closures and write `_no` where Python would write ``not``.
+functions are at module level, use no closures and write `_no` where Python would write ``not``.
 """
 
 from typing import Any, NamedTuple
@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-# A path goes on with at most this probability once Russian roulette plays.
+# Largest probability that a path survives a round of Russian roulette.
 MAXIMUM_SURVIVAL = 0.95
 UNLIMITED_DEPTH = 2**31
 
 
 class Rules(NamedTuple):
-    """What a scene's integrator asks of paths.
+    """Rules of a scene's integrator that paths follow.
 
     Attributes
     ----------
@@ -80,14 +80,15 @@ def _transmittance(scene, sampler, ray, target, medium, channel, active):  # typ
         inside = active & (medium != None)  # noqa: E711
         if inside:
             mei = medium.sample_interaction(ray, sampler.next_1d(inside), channel, inside)
-            # What stands for the end of the segment, where the medium is left.
+            # The segment ends here: the ray leaves the medium.
             si.t = distance
             even = medium.is_homogeneous()
             crossed = inside & _no(even) & mei.is_valid() & (mei.t < distance)
             place = mi.Point3f(mei.p)
             mei.t = dr.select(crossed, mei.t, dr.inf)
             passed, density = medium.transmittance_eval_pdf(mei, si, inside)
-            # Even media are integrated, others are walked by ratio tracking.
+            # Homogeneous media have a transmittance in closed form, others are sampled by ratio
+            # tracking.
             weight = dr.select(even, passed, _ratio(passed, _of_channel(density, channel)))
             weight = dr.select(crossed, weight * mei.sigma_n, weight)
             carried = dr.select(inside, carried * weight, carried)
@@ -107,7 +108,7 @@ def _transmittance(scene, sampler, ray, target, medium, channel, active):  # typ
 
 
 def _look_through(scene, ray, si, active):  # type: ignore[no-untyped-def]
-    """Pass over the area lights that the camera meets first."""
+    """Look through the area lights that the camera sees first."""
     hidden = active & si.is_valid()
     while hidden:
         hidden = hidden & si.shape.is_emitter()
@@ -118,7 +119,7 @@ def _look_through(scene, ray, si, active):  # type: ignore[no-untyped-def]
 
 
 def _fly(sampler, ray, si, medium, channel, active):  # type: ignore[no-untyped-def]
-    """Fly freely through a medium: the place, whether it scatters there or nothing is met, weight.
+    """Sample a free flight through a medium: where it ends, by scattering or not, and its weight.
 
     Where neither holds the path leaves the medium at the surface `si`.
     """
@@ -141,7 +142,7 @@ def _fly(sampler, ray, si, medium, channel, active):  # type: ignore[no-untyped-
 
 
 def _connect(scene, projector, sampler, ray, si, mei, medium, channel, joins, scatters, volumetric):  # type: ignore[no-untyped-def]
-    """Light that a vertex sends back along the path from the projector, and where it left it."""
+    """Return the projector's light that a vertex scatters along the path, and its pixel's uv."""
     at = dr.zeros(mi.Interaction3f)
     at.p = dr.select(scatters, mi.Point3f(mei.p), mi.Point3f(si.p))
     ds, light = projector.sample_direction(at, mi.Point2f(0), joins)
@@ -168,7 +169,7 @@ def _connect(scene, projector, sampler, ray, si, mei, medium, channel, joins, sc
 
 
 def roulette(sampler: Any, throughput: Any, eta: Any, plays: Any, active: Any) -> tuple[Any, Any]:
-    """End weak paths by chance; it changes the noise, never the mean."""
+    """End weak paths by Russian roulette, which changes the noise and never the mean."""
     chance = dr.minimum(dr.max(throughput) * dr.square(eta), MAXIMUM_SURVIVAL)
     lives = sampler.next_1d(active) < chance
     return dr.select(plays, _ratio(throughput, chance), throughput), lives | _no(plays)
@@ -181,7 +182,7 @@ def _follow(scene, projector, sampler, ray, throughput, medium, rules, tally, ro
     throughput = mi.Color3f(throughput)
     active = dr.max(throughput) > 0
     depth, eta = mi.UInt32(0), mi.Float(1)
-    # One colour per path decides how far it flies through a medium.
+    # Each path samples its free flights by one colour channel.
     channel = mi.UInt32(dr.minimum(3 * sampler.next_1d(active), 2))
     while active:
         si = scene.ray_intersect(ray, active)

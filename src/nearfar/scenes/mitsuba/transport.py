@@ -20,10 +20,10 @@ from nearfar.transport.exact import ExactTransport
 DEFAULT_SAMPLES = 4096
 # Bytes of a block of T while it is summed.
 BLOCK_BYTES = 256 * 2**20
-# What Mitsuba turns linear RGB into a grey film's value with (Rec. 709 luminance).
+# Weights by which Mitsuba turns linear RGB into the value of a grey film (Rec. 709 luminance).
 LUMINANCE_WEIGHTS = np.array([0.212671, 0.715160, 0.072169])
 
-# Integrators whose paths can be followed, and their own longest path and start of roulette.
+# Integrators whose paths can be followed, with their default longest path and start of roulette.
 INTEGRATORS = {
     "path": (-1, 5),
     "direct": (2, 5),
@@ -41,7 +41,7 @@ def render_transport(
 ) -> ExactTransport:
     """Estimate T of a Mitsuba scene by path tracing, all projector pixels at once.
 
-    The estimate is without bias against Mitsuba's own pictures: the mean of ``T @ l`` is what
+    The estimate is unbiased: the mean of ``T @ l`` is what
     `RenderedWorld` renders under ``l`` less what it renders under black. Lights other than the
     projector take no part, since they are ambient light.
 
@@ -49,9 +49,9 @@ def render_transport(
     ----------
     loaded : MitsubaScene
     samples : int
-        Paths per camera pixel; up to a few more where they are cut in passes.
+        Paths per camera pixel; a few more where they are split into passes.
     seed : int
-        The vectorised variants add in any order: equal seeds agree to rounding.
+        The vectorised variants add in any order, so equal seeds agree up to rounding.
     progress : callable, optional
         Called with what is being done and the share done.
 

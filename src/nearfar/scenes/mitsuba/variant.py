@@ -27,7 +27,7 @@ def choose_variant() -> Variant:
     """Load Mitsuba in a variant of linear RGB; a variant set before is kept.
 
     LLVM is the one that ``DRJIT_LIBLLVM_PATH`` names, else the package karellen-llvm-core's, else
-    the system's. Without one the scalar variant runs, which a note says.
+    the system's. Without one the scalar variant runs, and a note says so.
 
     Raises
     ------
@@ -57,8 +57,11 @@ def choose_variant() -> Variant:
         )
     if chosen != SCALAR:
         return Variant(chosen, ())
-    slow = f"Mitsuba runs as {SCALAR}, photos some times and render some hundred times slower"
-    return Variant(chosen, (f"{slow} than as {VECTORISED}: {cure}.",))
+    slow = (
+        f"Mitsuba runs as {SCALAR}, in which photos take several times and render some hundred "
+        f"times as long as in {VECTORISED}: {cure}."
+    )
+    return Variant(chosen, (slow,))
 
 
 def _how_to_install(reason: str) -> str:
@@ -75,7 +78,7 @@ def _how_to_install(reason: str) -> str:
 
 
 def _name_library() -> str:
-    """Name the packaged LLVM, which must be done before Dr.Jit is loaded; say how to get one."""
+    """Name the packaged LLVM, if Dr.Jit is not loaded yet; return how to get LLVM otherwise."""
     if LIBRARY_VARIABLE in os.environ:
         return (
             f"let {LIBRARY_VARIABLE} name LLVM {OLDEST_LLVM} or newer, or remove it from the "
@@ -101,7 +104,7 @@ def _packaged_library() -> str | None:
 
 
 def _has_llvm(drjit: Any) -> bool:
-    # Dr.Jit says on stderr what it did not find; ours is the one sentence about it.
+    # Dr.Jit would print to stderr what it did not find; the note above says so in one sentence.
     level = drjit.log_level()
     drjit.set_log_level(drjit.LogLevel.Disable)
     try:

@@ -19,7 +19,7 @@ from nearfar.scenes.cache import cache_folder
 FORMAT = "nearfar figure data"
 FORMAT_VERSION = 1
 ABOUT = "about"
-# Layers that only show what was measured.
+# Layers that display what was measured, and measure nothing.
 DISPLAY_LAYERS = ("cli", "report")
 
 
@@ -132,7 +132,7 @@ def kept(name: str, make: Callable[[], Data], *, note: Callable[[str], None]) ->
         path.parent.mkdir(parents=True, exist_ok=True)
         write_data(path, name, data)
     except (NearfarError, OSError) as error:
-        # A full or read-only cache must not cost what was just measured.
+        # On a full or read-only disk the data are returned all the same.
         note(f"the data of {name} are not kept for the next run: {error}")
     return data
 

@@ -72,7 +72,8 @@ def components_along_a_line(case: Acquisition, report: Report) -> Data:
     arrays |= {f"picture/{name}": values for name, values in shown.items()}
     arrays["picture/T"] = sum_of(list(shown.values()))
     arrays["columns"] = columns = np.array([int(share * width) for share in LINE.columns])
-    # Summed down the projector, a row responses patterns that vary along the line alone.
+    # Summed down the projector, a row holds the response to patterns that vary along the line
+    # alone.
     arrays |= {
         f"{name}/along": rows[columns].mean(axis=1).reshape(len(columns), *case.projector).sum(1)
         for name, rows in {**parts, "T": sum_of(list(parts.values()))}.items()

@@ -263,7 +263,7 @@ def _require_same(folder: Path, before: Mapping[str, Any], identity: Mapping[str
     other = [name for name in identity if before.get(name) != identity[name]]
     if other:
         raise InputError(
-            f"{folder} was begun with another {', '.join(other)}: give the same, or begin anew "
+            f"{folder} was started with another {', '.join(other)}: give the same, or start anew "
             f"with `force=True`."
         )
 

@@ -4,7 +4,7 @@ from nearfar.arrays import Size
 from nearfar.baselines.brute_force import BruteForce
 from nearfar.workflow.rivals.reference import reference_rival
 
-# One photo of black for so many projector pixels.
+# One photo of black for this many projector pixels.
 PIXELS_PER_BLACK = 16
 
 

@@ -1,4 +1,4 @@
-"""Compressive light transport: random patterns, regularised as the truth likes best."""
+"""Compressive light transport: random patterns, with the regularisation nearest to the truth."""
 
 from collections.abc import Iterator
 

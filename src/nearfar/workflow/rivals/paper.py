@@ -17,7 +17,7 @@ from nearfar.workflow.rivals.rival import Attempt, Budget, Rival
 
 # Sides of the far bands that are tried, as multiples of P/W on each axis.
 BAND_FACTORS = (1.0, 1.2, 2.0)
-# Of the plan whose photos the default budgets are shares of.
+# That of the plan of which default budgets are shares.
 DEFAULT_BAND_FACTOR = 1.2
 
 
@@ -52,7 +52,7 @@ def paper_plans(projector: Size, photos: int) -> list[Plan]:
 
 
 def _far_band(projector: Size, window: int, factor: float) -> Size:
-    """Return odd sides of a far band, so many times P/W on each axis."""
+    """Return the odd sides of a far band, `factor` times P/W on each axis."""
     return Size(
         *(
             max(1, min(2 * round((factor * side / window - 1) / 2) + 1, side - 1 + side % 2))

@@ -30,7 +30,7 @@ class Budget(NamedTuple):
     total_exposure: int | None = None
 
     def exposure(self, photos: int) -> float:
-        """Exposure of each photo, where so many are taken."""
+        """Return the exposure of each photo, if `photos` are taken."""
         return 1.0 if self.total_exposure is None else self.total_exposure / photos
 
 

@@ -248,7 +248,7 @@ def test_rounding_in_a_black_pixel_is_no_light():
     measured = _responses(_world(), FEW)
     responses = measured.responses.copy()
     responses[37] = 1e-9 * np.random.default_rng(0).uniform(-1, 1, size=responses[37].shape)
-    responses[37, :, measured.places([DC])[0]] = 1e-9
+    responses[37, :, measured.response_indices([DC])[0]] = 1e-9
     found = correspond_by_phase(replace(measured, responses=responses))
     assert np.flatnonzero(~found.lit).tolist() == [37]
 
@@ -323,7 +323,7 @@ def test_frequencies_that_settle_nothing_are_refused(frequencies):
 
 def test_responses_without_white_are_refused():
     measured = _responses(_world(Size(2, 2)), FEW)
-    kept = measured.places([k for k in measured.basis.frequencies if k != DC])
+    kept = measured.response_indices([k for k in measured.basis.frequencies if k != DC])
     basis = real_basis([k for k in measured.basis.frequencies if k != DC], PROJECTOR)
     without = replace(measured, basis=basis, responses=measured.responses[..., kept])
     with pytest.raises(InputError, match=r"no response to white.*: .*\.$"):

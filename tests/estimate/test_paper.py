@@ -67,7 +67,7 @@ def test_low_frequency_relighting_is_what_was_measured():
         noise=np.full_like(measurements.noise, 0.01),
     )
     found = estimate(shaken, world.correspondence, window, far, dropped)
-    places = shaken.places(found.far_basis.frequencies)
+    places = shaken.response_indices(found.far_basis.frequencies)
     responses = found.dense() @ found.far_basis.patterns.T
     np.testing.assert_allclose(responses, shaken.responses[..., places], atol=2e-5)
 
@@ -103,7 +103,7 @@ def test_unlit_camera_pixels_keep_f_alone():
     assert np.all(found.direct[2, 3] == 0)
     assert np.all(found.near[2, 3] == 0)
     assert np.all(np.isfinite(found.far))
-    place = measurements.places(found.far_basis.frequencies)
+    place = measurements.response_indices(found.far_basis.frequencies)
     np.testing.assert_allclose(
         found.far[2, 3], measurements.responses.reshape(6, 6, 1, -1)[2, 3][:, place], atol=1e-6
     )

@@ -50,7 +50,7 @@ def test_by_reference_and_by_pairs_agree(small_world, shoot, plan, black):
     pairs = measure(shoot(PAIRS, small_world, QUIET, projector))
     found = measure(shoot(plan, small_world, QUIET, projector))
     assert set(found.basis.frequencies) == set(pairs.basis.frequencies)
-    here, there = (m.places(pairs.basis.frequencies) for m in (found, pairs))
+    here, there = (m.response_indices(pairs.basis.frequencies) for m in (found, pairs))
     # 16 bits: twice a rounding of the photo, and those of white and black, half a level each.
     level = 1 / 65535
     error = np.abs(found.responses[..., here] - pairs.responses[..., there])
@@ -65,7 +65,7 @@ def test_an_inverse_among_them_counts_with_its_sign(small_world, shoot):
     )
     plan = PLAN.model_copy(update={"patterns": flipped})
     found, other = (measure(shoot(p, small_world)) for p in (plan, PLAN))
-    place = found.places([CHECKERBOARD]), other.places([CHECKERBOARD])
+    place = found.response_indices([CHECKERBOARD]), other.response_indices([CHECKERBOARD])
     np.testing.assert_allclose(
         found.responses[..., place[0]], other.responses[..., place[1]], atol=5e-5
     )
@@ -81,7 +81,7 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
     def told(name):
         return np.sqrt(np.mean([getattr(m, name) ** 2 for m in found]))
 
-    light = clean.places([DC])[0]
+    light = clean.response_indices([DC])[0]
     sinusoids = np.setdiff1d(np.arange(clean.basis.count), [light])
     # The references' own error is that of all responses of a pixel; each has its own besides.
     own = told("noise") ** 2 / clean.multiplicity[sinusoids]
@@ -94,7 +94,7 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
     expected = np.sqrt(shared + np.mean(own) / len(sinusoids))
     assert between.std() == pytest.approx(expected, rel=0.1)
     # As many responses as the plan shows, white for DC.
-    assert clean.multiplicity[clean.places([CHECKERBOARD])] == [4]
+    assert clean.multiplicity[clean.response_indices([CHECKERBOARD])] == [4]
     assert clean.multiplicity[light] == sum(
         isinstance(p, Sinusoid) and p.frequency == DC and not p.inverse for p in plan.patterns
     )
@@ -103,7 +103,7 @@ def test_the_noise_is_what_it_is(wide_world, shoot, plan):
 def test_noise_follows_each_pixels_brightness(wide_world, shoot):
     bright = wide_world.with_gains(direct=0.2)
     found = [measure(shoot(PLAN, bright, NOISY, seed=seed)) for seed in range(20)]
-    light = found[0].places([DC])[0]
+    light = found[0].response_indices([DC])[0]
     rest = np.setdiff1d(np.arange(found[0].basis.count), [light])
     scatter = np.std([m.responses[..., rest] for m in found], axis=0)
     each = np.sqrt(np.mean(scatter**2, axis=-1))
@@ -197,7 +197,7 @@ def test_measurements_by_pairs_have_no_reference_noise(wide_world, shoot):
 
 def test_the_noise_of_light_by_pairs_is_what_it_is(wide_world, shoot):
     found = [measure(shoot(PAIRS, wide_world, NOISY, seed=seed)) for seed in range(20)]
-    light = np.stack([m.responses[..., m.places([DC])[0]] for m in found])
+    light = np.stack([m.responses[..., m.response_indices([DC])[0]] for m in found])
     told = np.sqrt(np.mean([m.light_noise**2 for m in found]))
     # Sums are never dark, so the noise of black is an extrapolation of theirs.
     assert np.sqrt(light.var(axis=0, ddof=1).mean()) == pytest.approx(told, rel=0.2)

@@ -105,7 +105,7 @@ def replace_drift(photos):
 
 def _rescaled(found, plain):
     """Responses per unit of white: what lamp counts as 1 is a matter of definition."""
-    light = found.places([DC])[0]
+    light = found.response_indices([DC])[0]
     gain = plain.responses[..., light].sum(axis=0) / found.responses[..., light].sum(axis=0)
     return found.responses * gain[:, None]
 

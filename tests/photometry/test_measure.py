@@ -49,7 +49,7 @@ def test_responses_are_in_photo_units(small_world, shoot):
 def test_what_eight_bits_got_wrong_is_known(small_world, shoot):
     measurements = measure(shoot(PLAN, small_world))
     ideal = small_world.dense() @ (measurements.basis.patterns + measurements.quantisation_error).T
-    place = measurements.places([DC])
+    place = measurements.response_indices([DC])
     keep = np.setdiff1d(np.arange(measurements.basis.count), place)
     np.testing.assert_allclose(measurements.responses[..., keep], ideal[..., keep], atol=2.5e-5)
     assert 0.001 < np.abs(measurements.quantisation_error).max() <= 1 / 255 + 1e-6
@@ -78,7 +78,7 @@ def test_the_projectors_black_falls_out(small_world, shoot):
 def test_the_noise_is_what_it_is(small_world, shoot):
     # Over many seeds, responses scatter by the noise that each capture alone tells.
     found = [measure(shoot(PLAN, small_world, NOISY, seed=seed)) for seed in range(40)]
-    place = found[0].places([DC])
+    place = found[0].response_indices([DC])
     keep = np.setdiff1d(np.arange(found[0].basis.count), place)
     scatter = np.std([m.responses[..., keep] for m in found], axis=0)
     told = np.mean([m.noise for m in found], axis=0)
@@ -113,7 +113,7 @@ def test_white_is_better_than_one_photo_of_it(small_world, shoot):
     errors = []
     for seed in range(6):
         measurements = measure(shoot(PLAN, small_world, NOISY, seed=seed))
-        errors.append(measurements.responses[..., measurements.places([DC])[0]] - truth)
+        errors.append(measurements.responses[..., measurements.response_indices([DC])[0]] - truth)
     one_photo = np.sqrt((truth.mean() + 0.02) / NOISY.full_well)
     assert np.std(errors) < 0.5 * one_photo
 
@@ -127,7 +127,7 @@ def test_a_flickering_lamp_falls_out(small_world, shoot):
         photos, photos=np.rint(photos.photos * lamp[:, None, None, None]).astype(np.uint16)
     )
     found = measure(flickering)
-    keep = np.setdiff1d(np.arange(found.basis.count), found.places([DC]))
+    keep = np.setdiff1d(np.arange(found.basis.count), found.response_indices([DC]))
     error = np.abs(found.responses - steady.responses)[..., keep]
     # A 1 % lamp on responses of up to 0.4: thousandths without the sums, next to none with them.
     assert np.sqrt(np.mean(error**2)) < 4e-4
@@ -158,7 +158,7 @@ def test_a_projector_that_is_not_linear_is_told_by_its_sums(small_world, shoot, 
     assert bent.excess_of_sums < -least
     # White was photographed: it is not spoiled by sums that do not hold.
     truth = (small_world @ np.ones(PLAN.projector)).reshape(-1, 2)
-    white = bent.responses[..., bent.places([DC])[0]]
+    white = bent.responses[..., bent.response_indices([DC])[0]]
     assert np.abs(white - truth).mean() < 0.01 * truth.mean()
 
 

@@ -97,7 +97,7 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     basis = _without_dc(measurements)
     require_settled(basis)
     camera = measurements.camera
-    white = measurements.responses[..., measurements.places([DC])[0]]
+    white = measurements.responses[..., measurements.response_indices([DC])[0]]
     brightest = measurements.brightest or float(white.max(initial=0.0))
     pixels = np.empty((camera.pixels, 2), dtype=np.float32)
     excess = np.empty(camera.pixels, dtype=np.float32)
@@ -144,8 +144,8 @@ def _without_dc(measurements: Measurements) -> RealBasis:
 
 def _relative(measurements: Measurements, least_white: float) -> tuple[Floats, Floats]:
     """Responses over each pixel's own white, (C, channels, R), and their variances; DC left out."""
-    places = measurements.places([k for k in measurements.basis.frequencies if k != DC])
-    white = measurements.responses[..., measurements.places([DC])[0]]
+    places = measurements.response_indices([k for k in measurements.basis.frequencies if k != DC])
+    white = measurements.responses[..., measurements.response_indices([DC])[0]]
     scale = np.maximum(white, least_white)
     inverse = np.divide(1.0, scale, where=scale > 0, out=np.zeros_like(scale))[..., None]
     shape = measurements.responses.shape

@@ -1,4 +1,4 @@
-"""What an estimator is: it makes a transport of measurements and correspondence.
+"""The interface of estimators, which make a transport from measurements and correspondence.
 
 nearfar's own estimators are listed in `ESTIMATORS`; other packages add theirs through the entry
 point group ``nearfar.estimators``, an instance of a subclass of `Estimator`.
@@ -40,12 +40,12 @@ def model_of(plan: Plan) -> Model:
 
 
 class Memory(NamedTuple):
-    """Memory that an estimate takes.
+    """Memory of an estimate.
 
     Attributes
     ----------
     shared : int
-        Bytes of what all camera pixels share.
+        Bytes that all camera pixels share.
     pixel : int
         Bytes of each camera pixel.
     """
@@ -57,9 +57,9 @@ class Memory(NamedTuple):
 class Estimator(ABC):
     """From measurements and correspondence to a transport.
 
-    Camera pixels may be estimated in tiles of camera rows. Where the estimate of a row depends on
-    rows beside it, `halo` says on how many; a tile is then estimated with them, and they are
-    dropped from the result.
+    Camera pixels may be estimated in tiles of camera rows. If the estimate of a row depends on rows
+    beside it, `halo` is their number on each side; a tile is then estimated together with them, and
+    they are dropped from the result.
     """
 
     @property

@@ -1,7 +1,7 @@
-"""The best that the model can do: D, a window and a band fitted to a transport that is known.
+"""The best fit of the model, D with a window and a far band, to a known transport.
 
-What this leaves is the ceiling of any estimate with the same W and far band, and its factors are
-the model's truth: d at q, n in the window, f in the band.
+Its SNR is the upper bound of any estimate with the same W and far band, and its factors are the
+model's true d, n and f.
 
 Index convention: arrays are (n, channels, ...); m runs over far coefficients, w over the window.
 """
@@ -34,7 +34,7 @@ def fit_model(
     Parameters
     ----------
     truth : ExactTransport
-        Where its components are not known apart, d is what stands out at q.
+        If its components are not known separately, d is the sum of the entries around q.
     window : int
         W.
     far_basis : RealBasis

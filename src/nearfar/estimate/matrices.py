@@ -28,7 +28,8 @@ def _centred(
 ) -> CentredBasis:
     basis = real_basis(representatives(frequencies), measurements.projector)
     return replace(
-        centred_basis(basis, window_offsets(window)), places=measurements.places(basis.frequencies)
+        centred_basis(basis, window_offsets(window)),
+        response_indices=measurements.response_indices(basis.frequencies),
     )
 
 

@@ -84,8 +84,7 @@ def estimate(
     rounds : int
         Rounds of near and far.
     device : {"cpu", "cuda", "torch"}
-        Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
-        processor.
+        Device of the estimate: NumPy, PyTorch on an accelerator, or PyTorch on the processor.
     progress : callable, optional
         Called with the number of camera pixels done after each batch.
 
@@ -103,7 +102,7 @@ def estimate(
     there = matrices.put(move)
     errors = _QuantisationErrors(
         *(
-            np.ascontiguousarray(measurements.quantisation_error[centred.places].T)
+            np.ascontiguousarray(measurements.quantisation_error[centred.response_indices].T)
             for centred in (matrices.near, matrices.far)
         )
     )
@@ -167,7 +166,7 @@ class _PixelBatch(NamedTuple):
 
 
 class _Estimate(NamedTuple):
-    """What a round finds; each field's first axis runs over camera pixels."""
+    """The estimate of a round; each field's first axis runs over camera pixels."""
 
     direct: Floats
     near: Floats
@@ -229,7 +228,7 @@ def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
 
 
 class _Leaks(NamedTuple):
-    """What f adds to near responses and the checkerboard's, off the DFT grid."""
+    """What f adds, off the DFT grid, to the responses to the near patterns and the checkerboard."""
 
     checkerboard: Floats
     near: Floats
@@ -250,7 +249,7 @@ def _leaks(far: Floats, batch: _PixelBatch, matrices: Matrices) -> _Leaks:
 def _round(
     batch: _PixelBatch, start: Floats | None, leaks: _Leaks, matrices: Matrices
 ) -> _Estimate:
-    """Do sections 4.1, 4.2 and 4.3 once."""
+    """Estimate d, n and f once, by sections 4.1, 4.2 and 4.3."""
     near_responses = batch.near - leaks.near
     direct = _direct(batch.checkerboard - leaks.checkerboard, near_responses, batch, matrices)
     near_responses -= direct[..., None] * batch.near_of_direct
@@ -306,9 +305,9 @@ def _gather(
         weights=weights,
         noise=measurements.noise[selected],
         light=np.abs(responses).max(axis=(1, 2)),
-        checkerboard=checkerboard.recentre(responses[..., checkerboard.places], centres),
-        near=near_basis.recentre(responses[..., near_basis.places], centres),
-        far=responses[..., far_basis.places],
+        checkerboard=checkerboard.recentre(responses[..., checkerboard.response_indices], centres),
+        near=near_basis.recentre(responses[..., near_basis.response_indices], centres),
+        far=responses[..., far_basis.response_indices],
         near_of_direct=of_direct(near_basis) + near_error,
         far_of_direct=far_basis.uncentre(of_direct(far_basis), centres) + of_error(errors.far),
     )
@@ -317,10 +316,10 @@ def _gather(
 def _direct(
     checkerboard: Floats, near_responses: Floats, batch: _PixelBatch, matrices: Matrices
 ) -> Floats:
-    """Return d, shape (n, channels): section 4.1, and more where q falls between pixels.
+    """Return d, shape (n, channels), by section 4.1, extended to q between pixels.
 
-    There the response to the checkerboard fades, d (1 - 2a)(1 - 2b) for an offset (a, b), so the
-    highest near frequencies are weighed in as far as it does.
+    The response to the checkerboard is d (1 - 2a)(1 - 2b) for an offset (a, b) of q from a pixel.
+    As it fades, the highest near frequencies get more weight.
     """
     xp = namespace(near_responses)
     response = batch.weights @ matrices.checkerboard.on_footprint.T
@@ -352,22 +351,22 @@ def _near(
     else:
         z = start.reshape((rows, matrices.unseen.shape[1]))
     v = n0 + z @ matrices.unseen.T
-    entry_noise = xp.maximum(entry_noise, _strays_beyond_the_border(v, inside, z.shape[1]))
+    entry_noise = xp.maximum(entry_noise, _rms_beyond_border(v, inside, z.shape[1]))
     windows, unseen = solve(n0, matrices.unseen, inside, least_risk(v, inside, entry_noise), z)
     windows = windows.reshape((number, channels, matrices.window**2)) * batch.lit[:, None, None]
     return windows, unseen.reshape((number, channels, z.shape[1]))
 
 
-def _strays_beyond_the_border(v: Floats, inside: Booleans, unknowns: int) -> Floats:
+def _rms_beyond_border(v: Floats, inside: Booleans, unknowns: int) -> Floats:
     """Return the root mean square of window entries beyond the projector's border, (I,).
 
-    They should be zero: what a scene that departs from the model leaves there counts as noise of
-    the entries inside. It is 0 where the model holds, and where there are too few such entries.
+    They are zero if the model holds. If the scene departs from it, they count as noise of the
+    entries inside. 0 where there are too few such entries to tell.
     """
     xp = namespace(v)
     beyond = xp.count_nonzero(~inside, axis=1)
     energy = xp.sum(xp.where(inside, 0.0, v) ** 2, axis=1)
-    strays = xp.sqrt(energy / xp.astype(xp.clip(beyond - unknowns, min=1), v.dtype))
-    strayed = (beyond > unknowns) & (strays > ROUNDING_SHARE * xp.max(xp.abs(v), axis=1))
-    noise: Floats = strays * strayed
+    rms = xp.sqrt(energy / xp.astype(xp.clip(beyond - unknowns, min=1), v.dtype))
+    departs = (beyond > unknowns) & (rms > ROUNDING_SHARE * xp.max(xp.abs(v), axis=1))
+    noise: Floats = rms * departs
     return noise

@@ -76,11 +76,11 @@ def solve(
     if unknowns and rows:
         scale = xp.max(xp.abs(n0), axis=1)
         largest = float(xp.max(xp.abs(unseen)))
-        # Rows stop on their own, so that no row's result depends on its company.
+        # Each row stops by itself, so that its result does not depend on the other rows.
         moving = xp.arange(rows, device=here)
         floor = FIRST_FLOOR * scale
         if start is not None:
-            # From close by the minimum needs no floor to be found, but at the corner.
+            # From a good start no floor is needed, except near the corner.
             floor = xp.where(threshold > CORNER_SHARE * scale, 0.0, floor)
         problem = _Problem(n0, inside, threshold, scale, floor)
         for _ in range(MAXIMUM_STEPS):
@@ -148,7 +148,7 @@ class _Problem(NamedTuple):
         return _Problem._make(values[rows] for values in self)
 
     def settled(self, moved: Floats) -> Booleans:
-        """Return which rows changed no more, under a floor that no longer matters."""
+        """Return which rows have settled, under a floor that no longer matters."""
         least = SIZE_TOLERANCE * self.scale
         still = moved <= LAMBDA_TOLERANCE * self.threshold + least
         done: Booleans = still & (self.floor <= self.threshold + least)

@@ -37,8 +37,8 @@ class CentredBasis:
     Attributes
     ----------
     basis : RealBasis
-    places : ndarray of int, shape (R,)
-        Where its responses stand among the measurements.
+    response_indices : ndarray of int, shape (R,)
+        Indices of its responses among those of the measurements.
     on_window : ndarray, shape (R, W^2), float32
         Patterns over the window.
     on_footprint : ndarray, shape (R, 9), float32
@@ -46,7 +46,7 @@ class CentredBasis:
     """
 
     basis: RealBasis
-    places: NDArray[np.int64]
+    response_indices: NDArray[np.int64]
     on_window: Floats
     on_footprint: Floats
 
@@ -75,7 +75,7 @@ def centred_basis(basis: RealBasis, offsets: NDArray[np.int64]) -> CentredBasis:
     Returns
     -------
     CentredBasis
-        Its places are those of the basis itself.
+        Its response indices are those of the basis itself.
     """
     return CentredBasis(
         basis,

@@ -63,8 +63,8 @@ class RealBasis:
         """Number of real coefficients M."""
         return len(self.index)
 
-    def places(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
-        """Places of the coefficients of `frequencies`, cosine before sine."""
+    def response_indices(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
+        """Return the indices of the responses to `frequencies`, cosine before sine."""
         order = {k: i for i, k in enumerate(self.frequencies)}
         wanted = [order[k] for k in frequencies]
         found = [np.flatnonzero(self.index == i) for i in wanted]

@@ -161,7 +161,7 @@ def measure_pairs(
     )
     left = _remove_visible_noise(differences, deviations, models, variance(pair_mean / 2) * 2)
     responses = _means(differences, places, multiplicity)
-    responses[..., basis.places([DC])[0]] = levels.light
+    responses[..., basis.response_indices([DC])[0]] = levels.light
     return Measurements(
         camera=camera,
         basis=basis,

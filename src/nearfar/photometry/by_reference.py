@@ -104,7 +104,7 @@ def measure_by_reference(
         if progress is not None:
             progress(numbers[-1] + 1)
     responses /= multiplicity
-    responses[..., basis.places([DC])[0]] = levels.light
+    responses[..., basis.response_indices([DC])[0]] = levels.light
 
     def deviation(variance: Floats) -> NDArray[np.float32]:
         return np.sqrt(variance).astype(np.float32)

@@ -93,9 +93,9 @@ class Measurements:
         """Number of camera channels."""
         return int(self.responses.shape[1])
 
-    def places(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
-        """Places of the responses to `frequencies` along the last axis, cosine before sine."""
-        return self.basis.places(frequencies)
+    def response_indices(self, frequencies: Sequence[Frequency]) -> NDArray[np.int64]:
+        """Return the indices of the responses to `frequencies`, cosine before sine."""
+        return self.basis.response_indices(frequencies)
 
     def of_pixels(self, camera: Size, pixels: slice) -> "Measurements":
         """Return the measurements of some camera pixels, as a camera of size `camera`."""

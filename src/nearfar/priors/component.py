@@ -1,8 +1,8 @@
-"""One Gaussian prior of a row of the transport, of few numbers.
+"""A Gaussian prior of a row of the transport, described by five numbers.
 
-A bare wall, wax and a crease differ by orders of magnitude, and no single Gaussian holds them all.
-The prior is therefore a choice among components: which one a camera pixel has, and at which scale,
-is chosen by its own photos (their evidence).
+The near-range light of a bare wall, of wax and of a crease differs by orders of magnitude, and no
+single Gaussian describes them all. The prior is therefore a set of components. Each camera pixel's
+own photos choose its component and prior scale, by their evidence.
 """
 
 from typing import NamedTuple

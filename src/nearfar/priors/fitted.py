@@ -1,4 +1,4 @@
-"""What was fitted to the simulated scenes: prior components, their scales, and typical scenes.
+"""Prior components, their scales and typical scenes, fitted to the simulated scenes.
 
 `benchmarks/refit_priors.py` fits them again and prints how far they move.
 """
@@ -43,10 +43,10 @@ UNLIT_COMPONENTS = tuple(PriorComponent(0.0, 64.0, decay) for decay in (0.7, 1.5
 # camera pixel's white.
 PRIOR_SCALES = tuple(2e-4 * 2.0**step for step in range(11))
 
-# What the planner plans for (docs/decisions/0012): camera pixels of the box, the wedge and the
-# corner together, and of the corner alone. Its creases are few, but what they send from wall to
-# wall decides how well pictures come out there. Each row is a component, its prior scale, and its
-# share of either scene.
+# The typical scenes that the planner plans for (docs/decisions/0012): camera pixels of the box, the
+# wedge and the corner together, and of the corner alone. Few pixels of the corner lie in creases,
+# but the light that these send from wall to wall limits its SNR. Each row is a component, its prior
+# scale, and its share of each scene.
 TYPICAL_SCENES = typical_scenes(
     (1.0, 0.1),
     (PriorComponent(1.3, 256.0, 1.5), 0.0005, (0.22, 0.0)),

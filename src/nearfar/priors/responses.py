@@ -1,4 +1,4 @@
-"""A prior component as the measured frequencies see it, the same for every camera pixel.
+"""The responses to the measured frequencies under a prior component, for every camera pixel.
 
 With n about q of covariance C and f stationary over the pattern grid, of variance S at each real
 response, the responses to the measured cosines and sines, re-centred on q, have the covariance

@@ -1,4 +1,4 @@
-"""Scenes as mixtures of prior components: what a plan is made for."""
+"""Typical scenes, for which plans are made, as mixtures of prior components."""
 
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ class TypicalScenes(NamedTuple):
 def typical_scenes(
     weights: tuple[float, ...], *rows: tuple[PriorComponent, float, tuple[float, ...]]
 ) -> TypicalScenes:
-    """Lay scenes out.
+    """Return scenes from a table with a row for each prior component and scale.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ class Posterior:
     multiplicity : ndarray, shape (R,), float32
         How often each real response was measured.
     prior_component : ndarray of uint8, shape (Cy, Cx)
-        Place in `prior_components`.
+        Index into `prior_components`.
     prior_scale : ndarray, shape (Cy, Cx), float32
         Standard deviation of near-range light at q before any photo, as a share of white.
     white : ndarray, shape (Cy, Cx, channels), float32

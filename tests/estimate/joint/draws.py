@@ -71,7 +71,7 @@ def drawn_rows(count, centres, scale, seed=0):
 def batch_of(measurements, centres, centred):
     count = len(centres)
     pixels = AllPixels(
-        responses=measurements.responses[..., centred.places],
+        responses=measurements.responses[..., centred.response_indices],
         correspondence=centres.astype(float),
         centres=centres,
         lit=np.ones(count, dtype=bool),

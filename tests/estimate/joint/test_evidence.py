@@ -37,7 +37,7 @@ def test_the_evidence_is_that_of_dense_algebra(offset):
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
     batch = batch_of(measurements, centres, centred)
-    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.places])
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.response_indices])
     found = log_evidence(whiten(batch), prior)
     expected = np.stack(
         [dense(measurements, batch, centred, scale)[3] for scale in PRIOR_SCALES], axis=1
@@ -59,11 +59,11 @@ def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():
     batch = batch_of(measurements, centres, centred)
     far_from = PriorComponent(6.0, 256.0, 0.7)
     priors = [
-        response_prior(one, centred, measurements.multiplicity[centred.places])
+        response_prior(one, centred, measurements.multiplicity[centred.response_indices])
         for one in (COMPONENT, far_from)
     ]
     component, scale, _ = most_probable(
-        batch, prior_set(priors, centred, measurements.multiplicity[centred.places])
+        batch, prior_set(priors, centred, measurements.multiplicity[centred.response_indices])
     )
     assert np.mean(component == 0) > 0.95
     # 0.02 in photo units, of a white that is 0.5 and a little.

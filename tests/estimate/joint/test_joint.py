@@ -42,7 +42,7 @@ def test_the_mean_is_that_of_dense_algebra_inside_and_at_the_border(offset):
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
     batch = batch_of(measurements, centres, centred)
-    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.places])
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.response_indices])
     found = solved(batch, prior, np.full(len(centres), 0.05), centred)
     amplitudes, windows, far, _ = dense(measurements, batch, centred, 0.05)
     scale, far_scale = np.abs(windows).max(), np.abs(far).max()
@@ -63,7 +63,7 @@ def test_repeats_count_as_less_noise():
     means = [
         solved(
             batch_of(m, centres, centred),
-            response_prior(COMPONENT, centred, m.multiplicity[centred.places]),
+            response_prior(COMPONENT, centred, m.multiplicity[centred.response_indices]),
             np.full(2, 0.05),
             centred,
         )
@@ -90,11 +90,11 @@ def test_clipped_windows_of_every_component_are_those_of_dense_algebra(component
     multiplicity = measurements.multiplicity.copy()
     if uneven:
         # Cosines that were measured more often than their sines.
-        multiplicity[centred.places[~centred.basis.is_sine]] = 4.0
-    prior = response_prior(component, centred, multiplicity[centred.places])
+        multiplicity[centred.response_indices[~centred.basis.is_sine]] = 4.0
+    prior = response_prior(component, centred, multiplicity[centred.response_indices])
     batch = batch_of(measurements, centres, centred)
     found = solved(batch, prior, np.full(len(centres), 0.05), centred, by=solve_clipped)
-    spread = np.diag(1.0 / multiplicity[centred.places])
+    spread = np.diag(1.0 / multiplicity[centred.response_indices])
     window, power = near_covariance(component, WINDOW), far_variance(centred.basis, component)
     for c in range(len(centres)):
         clipped = centred.on_window * batch.inside[c]
@@ -118,7 +118,7 @@ def test_whole_and_cut_agree_where_nothing_is_cut():
     centred = centred_on_all(frequencies)
     rows, _ = drawn_rows(len(centres), centres, 0.02)
     measurements = measured(rows, frequencies, noise=2e-3, offset=1e-3)
-    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.places])
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.response_indices])
     batch = with_spike(batch_of(measurements, centres, centred), np.array([0, 3, 24]))
     one, other = (
         solved(batch, prior, np.full(3, 0.05), centred, by=solver)

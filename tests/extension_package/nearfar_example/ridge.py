@@ -27,7 +27,7 @@ class RidgeEstimator(Estimator):
         basis, projector = measurements.basis, measurements.projector
         low = representatives(far_frequencies(model.far, projector))
         low = tuple(k for k in low if k in basis.frequencies)
-        places = basis.places(low)
+        places = basis.response_indices(low)
         lit = np.isfinite(q).all(axis=-1).ravel()
         # What direct light of 1 at q answers to every cosine and sine, none where there is none.
         waves = basis.patterns_at(np.nan_to_num(q.reshape(-1, 2))).T * lit[:, None]

@@ -1,4 +1,4 @@
-"""From the rows of the last sweep to a transport.
+"""Assemble a transport from the estimated rows of the last sweep.
 
 Index convention: arrays are (C, channels, ...); w runs over window entries.
 """
@@ -25,7 +25,7 @@ BATCH_PIXELS = 2048
 
 
 def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
-    """Put the factors together: f at the far band's frequencies, its DC what d and n leave."""
+    """Return the transport, with f at the far band's frequencies; its DC is white less d and n."""
     measurements, centred, pixels = problem.measurements, problem.model.centred, problem.pixels
     wanted = set(far_frequencies(far, measurements.projector))
     measured = centred.basis
@@ -78,7 +78,7 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
 def _positive(
     problem: Problem, windows: Floats, far_range: Floats, centred: CentredBasis
 ) -> Floats:
-    """Raise window entries to where n and f together are not negative, white kept."""
+    """Return windows with n + f not negative and the same response to white."""
     away = away_from_q(problem.window**2)
     inside = near.inside(problem.pixels.centres, problem.window, problem.measurements.projector)
     xp = namespace(windows)

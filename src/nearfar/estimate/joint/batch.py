@@ -1,4 +1,4 @@
-"""Camera pixels as the joint estimate sees them: responses re-centred on q, noise, scale.
+"""Batches of camera pixels for the joint estimate: responses re-centred on q, noise, scale.
 
 Index convention: arrays are (n, channels, ...), n camera pixels; r runs over real responses, w
 over window entries.
@@ -19,9 +19,9 @@ from nearfar.transport.direct import direct_weights, footprint, look_up
 
 # A camera pixel darker than this share of the brightest is scaled as if it had as much light.
 WHITE_FLOOR = 1e-3
-# Projector pixels by which q is moved to take derivatives by it.
+# Step of q, in projector pixels, of numerical derivatives by q.
 DIFFERENCE_STEP = 0.02
-# Measurements without noise are taken to have this much, as a share of a camera pixel's white.
+# Least noise of measurements, as a share of a camera pixel's white.
 RELATIVE_NOISE_FLOOR = 1e-6
 
 
@@ -74,7 +74,7 @@ class PixelBatch(NamedTuple):
 
 def dc_index(measurements: Measurements) -> int:
     """Return the index of the response to white."""
-    return int(measurements.places([DC])[0])
+    return int(measurements.response_indices([DC])[0])
 
 
 def white_scale(measurements: Measurements) -> Floats:
@@ -112,16 +112,16 @@ def responses_of_direct(correspondence: Floats, lights: Floats, projector: Size)
     found = np.zeros((len(correspondence), 3, len(lights)), dtype=np.float32)
     found[:, 0] = responses_at(correspondence)
     for axis, step in enumerate(DIFFERENCE_STEP * np.eye(2)):
-        place = correspondence[:, axis]
-        moving = np.flatnonzero(np.isfinite(place) & (place != np.rint(place)))
-        some = correspondence[moving]
+        along = correspondence[:, axis]
+        fractional = np.flatnonzero(np.isfinite(along) & (along != np.rint(along)))
+        some = correspondence[fractional]
         difference = responses_at(some + step) - responses_at(some - step)
-        found[moving, 1 + axis] = difference / (2 * DIFFERENCE_STEP)
+        found[fractional, 1 + axis] = difference / (2 * DIFFERENCE_STEP)
     return found
 
 
 class AllPixels(NamedTuple):
-    """All camera pixels, of which `gather` takes some; each field's first axis runs over them.
+    """All camera pixels, from which `gather` makes batches; each field's first axis runs over them.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ def gather(
         The measured frequencies without DC.
     projector : Size
     known : ndarray, shape (n, channels, R), optional
-        The part of the responses, as measured, that is explained already: it is subtracted.
+        Part of the measured responses to subtract before re-centring.
     """
     some = AllPixels._make(values[selected] for values in pixels)
     responses = some.responses if known is None else some.responses - known

@@ -6,9 +6,9 @@ be solved for by itself: with n = diag(deviation) z, z has the precision
     Lambda = (smooth + diag(independent))^-1 / ratio + diag(deviation) B^T D^-1 B diag(deviation)
 
 over the entries inside, ratio = (s / sigma)^2 and B the patterns over the window. Camera pixels
-whose windows are clipped alike, of one prior component and of ratios that are close, share one
-factor of Lambda; prior scales are tried in steps of 2, so a ratio rounded to the nearest power of
-2 is as good.
+whose windows are clipped to the same rectangle share one factor of Lambda, if they have the same
+prior component and ratio. Prior scales are tried in steps of 2, so ratios are rounded to the
+nearest power of 2 without loss.
 
 Index convention: arrays are (n, channels, ...); r runs over real responses, w over window entries
 inside, g over y and the amplitudes of `nuisance`; m over pairs of a camera pixel and a channel.
@@ -92,23 +92,23 @@ def solve_clipped(
 
 
 class _Clippings(NamedTuple):
-    """What the border leaves of the windows of camera pixels.
+    """The parts of camera pixels' windows that lie on the projector, each a rectangle.
 
     Attributes
     ----------
     rows, columns : list of slice
-        Of the window, for each way in which some are clipped.
-    way : ndarray of int, shape (n,)
-        The way of each camera pixel.
+        Rows and columns of each rectangle that occurs.
+    rectangle : ndarray of int, shape (n,)
+        Index of each camera pixel's rectangle.
     """
 
     rows: list[slice]
     columns: list[slice]
-    way: Integers
+    rectangle: Integers
 
 
 def _clippings(inside: Booleans) -> _Clippings:
-    """Find the rectangles that the entries inside make, (n, W^2)."""
+    """Find the rectangles that the entries inside, (n, W^2), form."""
     side = round(np.sqrt(inside.shape[1]))
     square = inside.reshape(-1, side, side)
     sides: list[Booleans] = [np.any(square, axis=axis) for axis in (2, 1)]
@@ -116,10 +116,10 @@ def _clippings(inside: Booleans) -> _Clippings:
         [end for on in sides for end in (on.argmax(axis=1), side - on[:, ::-1].argmax(axis=1))],
         axis=1,
     )
-    found, way = np.unique(ends, axis=0, return_inverse=True)
+    found, rectangle = np.unique(ends, axis=0, return_inverse=True)
     rows = [slice(int(top), int(bottom)) for top, bottom, _, _ in found]
     columns = [slice(int(first), int(last)) for _, _, first, last in found]
-    return _Clippings(rows, columns, way.ravel())
+    return _Clippings(rows, columns, rectangle.ravel())
 
 
 def _solved(
@@ -137,16 +137,16 @@ def _solved(
     deviation = beside(prior.factors.deviation, right)
     scaled = _information(centred, weight) * deviation * deviation[:, None]
     entries = scaled.reshape((side, side, side, side))
-    places = np.arange(side * side).reshape(side, side)
+    entry_indices = np.arange(side * side).reshape(side, side)
     solved: Floats = xp.zeros_like(right)
-    way = clippings.way[of]
-    for one in np.unique(way):
+    rectangle = clippings.rectangle[of]
+    for one in np.unique(rectangle):
         rows, columns = clippings.rows[one], clippings.columns[one]
-        inner = places[rows, columns].ravel()
-        alike = beside(np.flatnonzero(way == one)[:, None, None], right)
+        inner = entry_indices[rows, columns].ravel()
+        alike = beside(np.flatnonzero(rectangle == one)[:, None, None], right)
         numbers = beside(np.arange(right.shape[1])[:, None], right)
         at = (alike, numbers, beside(inner, right))
-        precision = _smooth_precision(prior, places[rows, columns]) / ratio
+        precision = _smooth_precision(prior, entry_indices[rows, columns]) / ratio
         matrix = entries[rows, columns, rows, columns].reshape((len(inner), len(inner)))
         matrix = matrix + beside(precision, right)
         found = xp.linalg.solve(matrix, right[at].reshape((-1, len(inner))).T).T
@@ -180,12 +180,12 @@ def _information(centred: CentredBasis, weight: Floats) -> Floats:
     return information
 
 
-def _smooth_precision(prior: ResponsePrior, places: Integers) -> Floats:
-    """Return (smooth + diag(independent))^-1 over the entries at `places`, a rectangle."""
-    independent = prior.factors.independent[places.ravel()]
+def _smooth_precision(prior: ResponsePrior, entry_indices: Integers) -> Floats:
+    """Return (smooth + diag(independent))^-1 over a rectangle of window entries."""
+    independent = prior.factors.independent[entry_indices.ravel()]
     everywhere = float(prior.factors.independent.min())
-    found = _inverse_of_smooth(CORRELATION_LENGTH, *places.shape, everywhere).copy()
-    # Entries around q may have more of their own: a correction of a few ranks.
+    found = _inverse_of_smooth(CORRELATION_LENGTH, *entry_indices.shape, everywhere).copy()
+    # Entries around q may have a larger independent variance: a correction of low rank.
     more = np.flatnonzero(independent > everywhere)
     if len(more):
         columns = found[:, more]

@@ -1,8 +1,8 @@
 """The joint estimate: direct, near and far in one model, each camera pixel with a prior of its own.
 
-In the first sweep every camera pixel chooses a prior component and scale by its own photos and
-takes the posterior mean. Later sweeps start from what is expected from its neighbours and estimate
-the difference.
+The first sweep chooses a prior component and scale for every camera pixel by its own photos, and
+returns the posterior mean. Later sweeps start from the expectation from its neighbours and
+estimate the difference.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,8 @@ from nearfar.transport.model import Transport
 Choices = tuple[ComponentChoice, ...]
 # Sweeps: one by each camera pixel's own photos alone, the rest with its neighbours.
 SWEEPS = 3
-# q moves by no more projector pixels than this in one sweep, and stays where it was rounded to.
+# Largest shift of q in one sweep, in projector pixels, and largest distance of q from its rounded
+# value.
 LARGEST_SHIFT = 0.25
 LARGEST_FROM_CENTRE = 0.499
 
@@ -46,19 +47,18 @@ def estimate_jointly(
     measurements : Measurements
         With white, and at least one other frequency.
     correspondence : ndarray, shape (Cy, Cx, 2)
-        q as (y, x), NaN where there is no direct light. The transport's own is rounded where it
-        is nearly whole, and else moved by the little that the photos ask for.
+        q as (y, x), NaN where there is no direct light. In the transport it is rounded where it is
+        nearly whole, and elsewhere shifted a little to fit the photos.
     window : int
         W, an upper bound of how far near-range light reaches.
     far : Size
         Far band: f is kept at its measured frequencies.
     sweeps : int
-        The first by each camera pixel's own photos alone, the rest with its neighbours.
+        Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
     chosen : Choices
         Prior components and scales that `choose_components` chose by some of the photos.
     device : {"cpu", "cuda", "torch"}
-        Where the work is done: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
-        processor.
+        Device of the estimate: NumPy, PyTorch on an accelerator, or PyTorch on the processor.
     progress : callable, optional
         Called with the share done.
 
@@ -69,7 +69,7 @@ def estimate_jointly(
     Raises
     ------
     InputError
-        If white or everything else is missing, or the device is.
+        If white or everything but white was not measured, or the device is not there.
     """
     report = progress or (lambda _share: None)
     problem = lay_out(measurements, correspondence, window, device)
@@ -84,7 +84,7 @@ def choose_components(
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Choices:
-    """Choose each camera pixel's prior component by some photos, to estimate from more of them.
+    """Choose each camera pixel's prior components from the first photos of a capture.
 
     Parameters and errors are those of `estimate_jointly`.
 
@@ -102,7 +102,7 @@ def choose_components(
 def _sweep(
     problem: Problem, sweeps: int, chosen: Choices, progress: Callable[[float], None]
 ) -> tuple[Problem, EstimatedRows]:
-    """Sweep so many times, q moved after each."""
+    """Make the sweeps, and shift q after each."""
     rows = None
     for number, choice in zip_longest(range(sweeps), chosen[:sweeps]):
 
@@ -117,7 +117,7 @@ def _sweep(
 
 
 def _moved(problem: Problem, rows: EstimatedRows) -> Floats:
-    """Move q by what it was found to be off, but no further than its rounding allows."""
+    """Shift q by its estimated error, at most to where it would round to another pixel."""
     xp = namespace(rows.amplitudes)
     amplitudes = xp.astype(rows.amplitudes, xp.float64)
     direct = amplitudes[..., 1]

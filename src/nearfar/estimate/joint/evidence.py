@@ -5,11 +5,11 @@ constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with o an
 v_i depends on s and sigma through their ratio alone, so every camera pixel shares one table over
 variance ratios, and the sums over i are matrix products.
 
-A few responses make a shortlist, and all responses choose from it: to choose by a few alone cost
-1.7 dB on the wedge, and by all throughout takes three times as long.
+A few screening responses make a shortlist, and all responses choose from it. The screening
+responses alone cost 1.7 dB on the wedge; all responses throughout take three times as long.
 
-Channels are not averaged first: by their mean, the shelf's coloured books lose 1.2 dB under a
-random light.
+The evidence is summed over channels. That of the mean of the channels costs the coloured books of
+the shelf 1.2 dB under a random light.
 
 Index convention: arrays are (n, channels, ...); i runs over eigenvectors.
 """
@@ -44,7 +44,7 @@ class PriorSet(NamedTuple):
         The same for the screening responses alone; the priors themselves where all responses
         screen.
     screening : ndarray of int
-        Places of the screening responses.
+        Indices of the screening responses.
     """
 
     priors: tuple[ResponsePrior, ...]
@@ -85,7 +85,7 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
     Returns
     -------
     prior_component : ndarray of int, shape (n,)
-        Place among the candidates.
+        Index of a candidate.
     prior_scale : ndarray, shape (n,)
         s as a share of white.
     evidence : ndarray, shape (n,)
@@ -104,12 +104,12 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
         least = xp.sort(values, axis=0)[-min(SHORTLIST_LENGTH, len(candidates.priors))]
         shortlisted = values >= least
         values[...] = -xp.inf
-        for place, prior in enumerate(candidates.priors):
-            (mine,) = xp.nonzero(shortlisted[place, :])
+        for index, prior in enumerate(candidates.priors):
+            (mine,) = xp.nonzero(shortlisted[index, :])
             if len(mine):
                 by_all = log_evidence(whitened.only(mine), prior)
-                steps[place, mine] = xp.argmax(by_all, axis=1)
-                values[place, mine] = xp.max(by_all, axis=1)
+                steps[index, mine] = xp.argmax(by_all, axis=1)
+                values[index, mine] = xp.max(by_all, axis=1)
     best = xp.argmax(values, axis=0)
     step = xp.take_along_axis(steps, best[None, :], axis=0)[0, :]
     return best, beside(np.array(PRIOR_SCALES), values)[step], xp.max(values, axis=0)
@@ -118,7 +118,7 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
 class WhitenedResponses(NamedTuple):
     """Responses in units of their noise, a row for each channel of each camera pixel.
 
-    Rows with the same table of variance ratios stand side by side.
+    Rows with the same table of variance ratios are next to each other.
 
     Attributes
     ----------
@@ -126,13 +126,13 @@ class WhitenedResponses(NamedTuple):
     white_ratio, offset_ratio : ndarray, shape (m, 1)
         White, and the standard deviation of the references' error, over the noise.
     table_step : ndarray of int, shape (m,)
-        First step of the row's table, rising.
+        First step of the row's table, in ascending order.
     pixel : ndarray of int, shape (m,)
-        Number of the camera pixel in the batch.
+        Index of the camera pixel in the batch.
     direct_weights : ndarray, shape (n, 9)
-        Unit direct light around q.
+        Weights of unit direct light on `FOOTPRINT_OFFSETS`.
     of_offset : ndarray, shape (n or 0, R)
-        Responses to a unit error of the references; none where they have no noise.
+        Responses to a unit error of the references; no rows if the references have no noise.
     """
 
     responses: Floats
@@ -146,9 +146,9 @@ class WhitenedResponses(NamedTuple):
     def only(self, selected: Integers) -> "WhitenedResponses":
         """Return the rows of some camera pixels."""
         xp, here = namespace(selected), device(selected)
-        place = xp.full(len(self.direct_weights), -1, dtype=xp.int64, device=here)
-        place[selected] = xp.arange(len(selected), dtype=xp.int64, device=here)
-        pixel = place[self.pixel]
+        new_index = xp.full(len(self.direct_weights), -1, dtype=xp.int64, device=here)
+        new_index[selected] = xp.arange(len(selected), dtype=xp.int64, device=here)
+        pixel = new_index[self.pixel]
         (rows,) = xp.nonzero(pixel >= 0)
         return WhitenedResponses(
             self.responses[rows],
@@ -226,7 +226,7 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
         factor = 1.0 + direct_variance * uu
         squares = yy - direct_variance * uy**2 / factor
         found[start:stop] = -0.5 * (squares + log_determinant + xp.log(factor))
-    # Rows of one camera pixel, one for each channel, side by side again.
+    # Back to the order of camera pixels, with a row for each channel.
     together = found[xp.argsort(whitened.pixel, stable=True)]
     total: Floats = xp.sum(together.reshape((len(u), -1, len(PRIOR_SCALES))), axis=1)
     return total

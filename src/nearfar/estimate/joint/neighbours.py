@@ -1,9 +1,9 @@
-"""What is expected of a camera pixel from its neighbours.
+"""The expectation of a camera pixel's n and f from its 3 x 3 neighbourhood.
 
-Near- and far-range light changes slowly over a surface. The mean over the 3 x 3 neighbours, as a
-share of white, is what is expected of a camera pixel, as far as the neighbours differ by no more
-than their noise (the local linear minimum mean square error filter; Lee, IEEE PAMI 2, 1980), so
-that edges stay.
+Near- and far-range light, as shares of white, change slowly over a surface. Where neighbours differ
+by no more than their noise, their mean is expected. Where they differ by more, the expectation is
+closer to the camera pixel's own value, so that edges are kept (the local linear minimum mean square
+error filter; Lee, IEEE PAMI 2, 1980).
 
 Index convention: arrays are (Cy, Cx, channels, j), j over coefficients.
 """
@@ -22,14 +22,14 @@ BYTES_AT_ONCE = 2**22
 
 
 def expect_each(values: Floats, variance: Floats, multiplicity: Floats) -> Floats:
-    """Filter each coefficient by itself.
+    """Filter each coefficient with a gain of its own.
 
     Parameters
     ----------
     values : ndarray, shape (Cy, Cx, channels, J)
         As shares of white.
     variance : ndarray, shape (Cy, Cx, channels)
-        Of their noise where they were measured once, above 0.
+        Of their noise if measured once; above 0.
     multiplicity : ndarray, shape (J,)
         How often each was measured.
 
@@ -54,7 +54,7 @@ def expect_each(values: Floats, variance: Floats, multiplicity: Floats) -> Float
 
 
 def expect_together(values: Floats, variance: Floats, lit: Booleans) -> Floats:
-    """Filter coefficients that belong together: one gain for all of them.
+    """Filter coefficients with one gain for all of them.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _row_blocks(values: Floats) -> list[slice]:
 
 
 def _with_neighbours(values: Floats, rows: slice) -> Floats:
-    """Return rows and one pixel more on every side; at the camera's border the last is repeated."""
+    """Return rows with one more pixel on every side, repeated at the camera's border."""
     some = values[max(rows.start - 1, 0) : rows.stop + 1]
     above = [some[:1]] if rows.start == 0 else []
     below = [some[-1:]] if rows.stop == len(values) else []

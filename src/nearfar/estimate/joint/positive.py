@@ -1,9 +1,9 @@
-"""Transport is never negative: window entries are changed no further than that asks.
+"""Non-negative transport, by the smallest change of window entries.
 
-Where n and f together would be below 0 at a window entry, n is raised to what f lacks, and all
-other entries give as much as the window gained (the Euclidean projection on a simplex; Michelot,
-JOTA 50, 1986), so that white stays what it was. Entries next to q share their light with d and are
-left alone.
+Where n + f is negative at a window entry, n is raised until n + f is 0. The other entries are
+lowered by as much in total, so that the response to white does not change: the Euclidean projection
+onto a simplex (Michelot, JOTA 50, 1986). Entries next to q share their light with d and do not
+change.
 
 Index convention: arrays are (n, channels, W^2).
 """
@@ -15,18 +15,18 @@ MAXIMUM_ITERATIONS = 60
 
 
 def raise_to(values: Floats, least: Floats, free: Booleans) -> Floats:
-    """Return the nearest values that are nowhere below `least` and have the same sum.
+    """Return the nearest values that are at least `least` and have the same sum.
 
     Parameters
     ----------
     values, least : ndarray, shape (..., E)
     free : ndarray of bool, shape (..., E)
-        Entries that may change, and that the sum is of.
+        Entries that may change; the sum is over them.
 
     Returns
     -------
     ndarray, shape (..., E), float32
-        Unchanged where the sum is too small for that.
+        The values themselves where their sum is too small.
     """
     xp = namespace(values)
     above = xp.astype(xp.where(free, values - least, 0.0), xp.float64)

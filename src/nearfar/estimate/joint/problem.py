@@ -1,4 +1,4 @@
-"""What all sweeps of the joint estimate share: the responses in order, q, and the priors.
+"""The problem that all sweeps of the joint estimate share: ordered responses, q, and priors.
 
 Index convention: arrays are (C, channels, ...); r runs over real responses, w over window entries.
 """
@@ -29,9 +29,9 @@ from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.priors.responses import response_prior
 from nearfar.transport import near
 
-# q this close to a whole projector pixel is rounded to it: noise moves q by as much, and a
-# footprint of 10 % too much beside q cost 1.5 dB under a random light. Direct light that really
-# lies beside it is found by prior components with spread.
+# q this close to a whole projector pixel is rounded to it. Noise moves q by as much, and a
+# footprint with 10 % of its weight on the wrong pixel costs 1.5 dB under a random light. Prior
+# components with spread represent direct light that really lies beside q.
 WHOLE_PIXEL_DISTANCE = 0.1
 
 
@@ -74,7 +74,7 @@ class Model(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What all sweeps share."""
+    """Measurements, priors and camera pixels that all sweeps share."""
 
     measurements: Measurements
     model: Model
@@ -85,7 +85,7 @@ class Problem(NamedTuple):
 def build_model(
     measured: RealBasis, multiplicity: Floats, window: int, device: Device, *, unlit: bool
 ) -> Model:
-    """Build the priors for what is measured; the last few are kept, so that tiles share them.
+    """Build the priors for the measured frequencies; the last few are cached for other tiles.
 
     Parameters
     ----------
@@ -112,8 +112,10 @@ def build_model(
         )
     # Pairs of a cosine and a sine side by side, those without a sine at the end.
     frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
-    indices = measured.places(frequencies)
-    centred = replace(_centred(tuple(frequencies), measured.projector, window), places=indices)
+    indices = measured.response_indices(frequencies)
+    centred = replace(
+        _centred(tuple(frequencies), measured.projector, window), response_indices=indices
+    )
     key = (tuple(frequencies), measured.projector, window, tuple(multiplicity[indices].tolist()))
     return Model(
         centred.put(move),
@@ -126,7 +128,7 @@ def build_model(
 def lay_out(
     measurements: Measurements, correspondence: Floats, window: int, device: Device
 ) -> Problem:
-    """Lay out measurements for the joint estimate.
+    """Prepare measurements for the joint estimate.
 
     Parameters
     ----------
@@ -134,7 +136,7 @@ def lay_out(
     correspondence : ndarray, shape (Cy, Cx, 2)
     window : int
     device : {"cpu", "cuda", "torch"}
-        Where all but the measurements' own arrays are put.
+        Device of all arrays but those of `measurements`.
 
     Raises
     ------
@@ -150,7 +152,7 @@ def lay_out(
     )
     white = white_scale(measurements)
     pixels = AllPixels(
-        responses=measurements.responses[..., model.centred.places],
+        responses=measurements.responses[..., model.centred.response_indices],
         correspondence=correspondence.reshape(-1, 2),
         centres=near.centre(correspondence, measurements.projector),
         lit=lit,

@@ -22,8 +22,8 @@ class PosteriorMean(NamedTuple):
     Attributes
     ----------
     amplitudes : ndarray, shape (n, channels, 4 + E)
-        o, what the references' error adds to the responses; d; by how much q is off down and
-        across, times d; and d2 ... of other surfaces.
+        o, the error that the references add to responses; d; d times the error of q down and
+        across; and d2 ... of other surfaces.
     near : ndarray, shape (n, channels, W^2)
     far : ndarray, shape (n, channels, R)
         Responses of f, re-centred.
@@ -52,7 +52,7 @@ def near_noise(batch: PixelBatch, prior: ResponsePrior, ratio: Floats) -> Floats
     xp = namespace(ratio)
     lowest, highest = float(prior.variance_ratios[0]), float(prior.variance_ratios[-1])
     table, ratios = beside(prior.noise_gain, ratio), beside(prior.variance_ratios, ratio)
-    # The ratios tabulated are half a power of 2 apart.
+    # Successive ratios of the table differ by a factor sqrt(2).
     within = xp.clip(ratio, lowest, highest)
     step = xp.astype(xp.floor(2 * xp.log2(within / lowest)), xp.int64)
     step = xp.clip(step, 0, len(prior.variance_ratios) - 2)

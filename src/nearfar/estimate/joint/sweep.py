@@ -40,7 +40,7 @@ CLIPPED_BATCH_PIXELS = 512
 
 
 class _Start(NamedTuple):
-    """What a sweep but the first starts from."""
+    """What a later sweep starts from."""
 
     before: EstimatedRows
     expected: EstimatedRows  # from the neighbours
@@ -59,11 +59,11 @@ def sweep_once(
     ----------
     problem : Problem
     before : EstimatedRows, optional
-        Of the sweep before; none in the first.
+        Of the sweep before; None in the first.
     report : callable
         Called with the share done.
     chosen : ComponentChoice, optional
-        Prior components that need not be chosen any more.
+        Prior components and scales, if they are chosen already.
     """
     pixels, model = problem.pixels, problem.model
     centred, projector = model.centred, problem.measurements.projector
@@ -128,7 +128,7 @@ def sweep_once(
 def _explained(
     problem: Problem, start: _Start | None, selected: slice | NDArray[np.int64]
 ) -> Floats | None:
-    """Return the responses that are expected, and direct light's to the quantisation error."""
+    """Return the expected responses, plus those of direct light to the quantisation error."""
     if start is None:
         return None
     centred = problem.model.centred
@@ -141,7 +141,7 @@ def _explained(
 
 
 def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows:
-    """Make room for what a sweep finds, behind the choices of the sweeps before."""
+    """Return rows of zeros for a sweep to fill, with the choices of the sweeps before it."""
     responses = problem.pixels.responses
     xp, (number, channels, count) = namespace(responses), responses.shape
 
@@ -168,7 +168,7 @@ def _choose(
         component, scale, _ = most_probable(batch, candidates)
         return component, namespace(scale).astype(scale, namespace(scale).float32)
     xp = namespace(given.prior_component)
-    # Given for lit camera pixels where there is no direct light now, or the reverse.
+    # Chosen when the camera pixel was lit and is not now, or the reverse.
     absent = (given.prior_component < 0) | (given.prior_component >= len(candidates.priors))
     (left,) = xp.nonzero(absent)
     if len(left):
@@ -180,7 +180,7 @@ def _choose(
 def _clipped_alike(
     pixels: AllPixels, component: Integers, clipped: Booleans
 ) -> Iterator[NDArray[np.int64]]:
-    """Yield batches of one prior component; windows that are clipped alike stand together."""
+    """Yield batches of one prior component, windows clipped alike next to each other."""
     (selected,) = np.nonzero(fetch(clipped))
     centres, component = fetch(pixels.centres)[selected], fetch(component)
     order = selected[np.lexsort((centres[:, 1], centres[:, 0], component[selected]))]
@@ -191,8 +191,8 @@ def _clipped_alike(
 
 def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
-    # A row for each projector pixel, so that what a camera pixel reads lies side by side.
-    errors = problem.measurements.quantisation_error[problem.model.centred.places]
+    # A row for each projector pixel, so that a camera pixel reads contiguous memory.
+    errors = problem.measurements.quantisation_error[problem.model.centred.response_indices]
     where = footprint(fetch(problem.pixels.correspondence), problem.measurements.projector)
     error, pixels, weights = (
         beside(np.ascontiguousarray(values), problem.pixels.responses)
@@ -209,7 +209,7 @@ def _with_spikes(
     solve: Callable[[PixelBatch, ResponsePrior, Floats, CentredBasis], PosteriorMean],
     centred: CentredBasis,
 ) -> PosteriorMean:
-    """Estimate camera pixels of one prior component; spikes are part of their windows."""
+    """Estimate camera pixels of one prior component, and add spikes to their windows."""
     mean = solve(batch, prior, ratio, centred)
     xp, here = namespace(mean.near), device(mean.near)
     number = xp.arange(len(ratio), device=here)
@@ -234,7 +234,7 @@ def _with_spikes(
 
 
 def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
-    """Return what is expected of each camera pixel from its neighbours."""
+    """Return the expectation of each camera pixel's rows from its neighbours."""
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     xp, shape = namespace(rows.near), (*camera, channels)

@@ -255,5 +255,5 @@ def _largest_white(measurements: Measurements) -> float:
     """Return the largest response to white, 0 where it was not measured."""
     if DC not in measurements.basis.frequencies:
         return 0.0
-    (index,) = measurements.places([DC])
+    (index,) = measurements.response_indices([DC])
     return float(np.abs(measurements.responses[..., index]).max(initial=0.0))

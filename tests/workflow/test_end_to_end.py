@@ -311,7 +311,7 @@ def test_a_plan_by_reference_that_lacks_photos_is_refused(tmp_path, world):
     for number, (lacking, message) in enumerate(
         [
             (lambda p: p.purpose == "direct", "not the paper's"),
-            (lambda p: p.purpose == "reference", "neither noise nor drift"),
+            (lambda p: p.purpose == "reference", "too few to estimate noise and drift"),
         ]
     ):
         patterns = tuple(p for p in BY_REFERENCE.patterns if not lacking(p))

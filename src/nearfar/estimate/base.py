@@ -78,7 +78,7 @@ class Estimator(ABC):
 
     @abstractmethod
     def memory(self, plan: Plan, channels: int) -> Memory:
-        """Return the memory that an estimate from a plan's photos of so many channels takes."""
+        """Return the memory that an estimate from a plan's photos of `channels` channels takes."""
 
     @abstractmethod
     def estimate(

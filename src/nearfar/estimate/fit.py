@@ -19,7 +19,7 @@ from nearfar.transport.model import Transport
 # Inside the window n takes whatever f leaves, so f is fitted to what lies outside; with this small
 # weight inside, a part that both could hold goes to f.
 WEIGHT_INSIDE = 0.001
-# Conjugate gradients end at this share of the first residual, or after so many iterations.
+# Conjugate gradients end at this share of the first residual, or after this many iterations.
 MAXIMUM_ITERATIONS = 60
 TOLERANCE = 1e-5
 # Camera pixels of a batch.

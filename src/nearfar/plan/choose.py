@@ -100,7 +100,7 @@ def choose_plan(
     noise: float = NOISE,
     progress: Report | OldReport | None = None,
 ) -> tuple[Plan, Expected]:
-    """Choose a plan of at most so many photos, correspondence by phase among them.
+    """Choose a plan of at most `photos` photos, whose own phase gives correspondence.
 
     Parameters
     ----------

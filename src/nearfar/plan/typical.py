@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from nearfar.transport.model import Transport
     from nearfar.transport.posterior import Posterior
 
-# Prior scales of one component within so many octaves are put together.
+# Prior scales of one component within this many octaves are put together.
 OCTAVES_TOGETHER = 2
 # A group with less than this share of a scene's squared light is left out.
 SHARE_FLOOR = 5e-4

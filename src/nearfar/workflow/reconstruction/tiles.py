@@ -87,7 +87,7 @@ def tile_rows(
 def memory_of_tile(
     plan: Plan, camera: Size, channels: int, estimator: Estimator, rows: int
 ) -> float:
-    """Return the memory in bytes in which a tile of so many rows is reconstructed."""
+    """Return the memory in bytes in which a tile of `rows` rows is reconstructed."""
     shared, row = _shared_and_row(plan, camera, channels, estimator)
     return shared + row * (rows + _halo_rows(estimator))
 

@@ -48,7 +48,7 @@ export function onePart({ shape, data, scale }, part, gain) {
   return { height: shape[1], width: shape[2], colours: shape[3], values };
 }
 
-// One row and column in every so many, so that at most so many pixels are left.
+// Keep one row and column in every few, so that at most `maximumPixels` pixels are left.
 export function shrink(picture, maximumPixels) {
   const step = Math.ceil(Math.sqrt(picture.height * picture.width / maximumPixels));
   if (step === 1) return picture;

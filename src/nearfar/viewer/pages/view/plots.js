@@ -25,7 +25,7 @@ export function drawMap(canvas, values, [height, width], low, high, scale) {
 // Smaller values count as zero.
 const FLOOR = 1e-12;
 
-// Magnitudes on a log scale, down to so many decades below the largest; grey where they are zero.
+// Magnitudes on a log scale, down to a number of decades below the largest; grey at zero.
 // Returns the logarithm of the largest.
 export function drawLog(canvas, values, shape, scale, decades = 5) {
   const logarithms = Float32Array.from(values, v => Math.abs(v) > FLOOR ? Math.log10(Math.abs(v)) : NaN);

@@ -44,8 +44,8 @@ from nearfar.priors.typical import TypicalScenes
 # Standard deviation of the response to a sinusoid, as a share of white: 30 000 electrons at full
 # scale and a scene of middling brightness.
 NOISE = 0.011
-# Prior standard deviation of direct light, as a share of white.
-DIRECT_DEVIATION = 0.5
+# Standard deviation of direct light in the typical scenes, as a share of white.
+TYPICAL_DIRECT_DEVIATION = 0.5
 # All frequencies up to as many cycles per pattern grid are candidates; beyond, one in each of
 # these shares of 1/W: a window's spectrum changes no faster.
 LOWEST_CYCLES = 8
@@ -225,7 +225,7 @@ class _ExpectedErrors:
         for prior_component, scale in typical.prior_components:
             covariance = near_covariance(prior_component, window)
             far = np.diag(far_variance(basis, prior_component)[~basis.is_sine])
-            direct = np.full_like(far, DIRECT_DEVIATION**2)
+            direct = np.full_like(far, TYPICAL_DIRECT_DEVIATION**2)
             squared = scale**2
             parts.append(direct + squared * (cosines @ covariance @ cosines.T + far))
             parts.append(squared * (sines @ covariance @ sines.T + far) * np.outer(paired, paired))

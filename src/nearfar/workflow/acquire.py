@@ -37,9 +37,9 @@ def acquire(
 ) -> Capture:
     """Shoot a plan.
 
-    Every photo is on the disk before the next pattern is displayed. Until the last one is there,
-    they lie in a folder of the capture's name with ``.unfinished`` behind it, from which a capture
-    that was stopped can be resumed.
+    Every photo is written to disk before the next pattern is displayed. Until the last photo is
+    written, the photos lie in a folder with the capture's name and ``.unfinished`` appended, from
+    which a stopped capture can be resumed.
 
     Parameters
     ----------
@@ -48,17 +48,17 @@ def acquire(
         Capture to make.
     rig : Rig
     resume : bool
-        Go on with the photos that are there, of the same plan and rig.
+        Keep the photos of a stopped capture, and take the others; plan and rig must be the same.
     force : bool
-        Replace a capture that is there, and without `resume` what was not finished.
+        Replace a capture that is there and, without `resume`, the photos of a stopped one.
     progress : callable, optional
-        Called with "photos" and the share of them that is there, 0 to 1, after each.
+        Called after each photo with "photos" and the share of them that is taken, 0 to 1.
     observers : sequence of CaptureObserver
-        Each hears of every photo, of those that were there too; where one says that it is enough,
-        no more are taken.
+        Each is called with every photo, including those of a stopped capture. The capture ends
+        when one returns ``Verdict.ENOUGH``.
     on_alarm : callable, optional
-        Called with each alarm that the photos give, a sentence; a rig passes on its own. The
-        capture remembers both.
+        Called with each alarm about a photo, a sentence; a rig reports its own. The capture
+        stores both.
     enough, told : callable, optional
         .. deprecated:: 0.1
             Use `observers` and `on_alarm`.
@@ -75,11 +75,12 @@ def acquire(
         If the rig's projector is not the plan's; if plan or rig are not those of the photos there;
         if a photo has another shape or type than the others.
     UselessPhotosError
-        If the photos show that the projector is off: they are removed, unless they were there.
+        If the photos show that the projector is off; they are removed, except those of a stopped
+        capture.
     NearfarError
-        As `nearfar.files.resumable_output`. What was taken is kept, and the message says where.
+        As `nearfar.files.resumable_output`. The message says where the photos are kept.
     KeptInterrupt
-        If the user stopped it; likewise.
+        If the user interrupted it; the message says the same.
 
     Examples
     --------
@@ -106,7 +107,7 @@ def acquire(
             alarms: list[str] = []
             for number in range(taken):
                 enough_now = is_enough(observers, number, writer.read(number))
-                # Only the last may end it: photos are not taken back.
+                # Only the last photo may end the capture: no photo is removed.
                 ended = ended or (enough_now and number + 1 == taken)
             photos = iter(()) if ended else _photos(plan, rig, taken)
             while not ended:
@@ -114,7 +115,7 @@ def acquire(
                 alarms += rig.alarms[alarms_of_rig:]
                 alarms_of_rig = len(rig.alarms)
                 photo = writer.add(photo, rig.conditions(), alarms)
-                # The photo is good and kept by now: its faults are noted with the next.
+                # The photo is written by now: its alarms are stored with the next.
                 alarms = [str(fault) for fault in finder.examine(writer.taken - 1, photo)]
                 if on_alarm is not None:
                     for alarm in alarms:
@@ -130,7 +131,7 @@ def acquire(
         if not kept.photos:
             raise
         raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
-    # Until the capture had its name, its photos could be resumed by the log alone.
+    # The log was needed to resume until the capture had its final name.
     (path.resolve() / LOG_NAME).unlink(missing_ok=True)
     return open_capture(path)
 
@@ -143,7 +144,7 @@ def shoot_again(
     *,
     progress: Report = ignore_progress,
 ) -> Capture:
-    """Take named photos of a finished capture again; it changes as a whole or not at all.
+    """Take chosen photos of a finished capture again; all of them are replaced, or none.
 
     Parameters
     ----------
@@ -154,9 +155,9 @@ def shoot_again(
     rig : Rig
         Set up as it was.
     numbers : sequence of int
-        Which photos.
+        Numbers of the photos in the plan.
     progress : callable, optional
-        Called with "photos" and the share of them that is there, 0 to 1, after each.
+        Called after each photo with "photos" and the share of them that is taken, 0 to 1.
 
     Returns
     -------
@@ -165,7 +166,8 @@ def shoot_again(
     Raises
     ------
     InputError
-        If plan or rig are not the capture's, there is no such photo, or one is not like the others.
+        If plan or rig are not the capture's, a number is not in the plan, or a new photo has
+        another shape or type than the others.
     NearfarError
         As `nearfar.capture.replacing.replace_photos`.
     """
@@ -177,7 +179,7 @@ def shoot_again(
         Path(path), capture.rig, rig.describe(), "take them all anew with `force=True`"
     )
     known = [number for number in numbers if 0 <= number < len(plan.patterns)]
-    # A run of consecutive ones at a time, so that the rig numbers them as the plan does.
+    # One run of consecutive numbers at a time, so that the rig numbers photos as the plan does.
     runs = _runs(known)
     photos = (
         photo for run in runs for photo in rig.shoot((plan.draw(number) for number in run), run[0])
@@ -193,7 +195,7 @@ def shoot_again(
 
 
 def _runs(numbers: Sequence[int]) -> list[list[int]]:
-    """Split numbers into runs of consecutive ones."""
+    """Split numbers into runs of consecutive numbers."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -204,7 +206,7 @@ def _runs(numbers: Sequence[int]) -> list[list[int]]:
 
 
 class _Kept:
-    """What is kept of a capture that was stopped, in words."""
+    """The photos that are kept of a stopped capture, and a sentence about them."""
 
     def __init__(self, path: Path, count: int, *, resume: bool) -> None:
         self.folder: Path | None = None
@@ -212,7 +214,7 @@ class _Kept:
 
     @property
     def photos(self) -> int:
-        """Photos that are kept."""
+        """Number of photos that are kept."""
         return count_photos(self.folder) if self.folder is not None else 0
 
     def is_worth_keeping(self, folder: Path, error: BaseException) -> bool:

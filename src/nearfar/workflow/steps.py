@@ -1,7 +1,7 @@
-"""The steps from a capture to a transport, each by itself: measure, correspond, estimate.
+"""The steps from a capture to a transport as single functions: measure, correspond, estimate.
 
-`nearfar.reconstruct` takes all of them tile by tile of the camera, in bounded memory. Here each
-step takes the whole camera at once and returns what the next one needs.
+`nearfar.reconstruct` performs all steps tile by tile of the camera, in bounded memory. Here each
+step processes the whole camera at once, and returns the input of the next.
 """
 
 from dataclasses import replace
@@ -35,7 +35,7 @@ def measure(capture: Capture, *, progress: Report | None = None) -> Measurements
     ----------
     capture : Capture
     progress : callable, optional
-        Called with what is being done and the share of it that is done, 0 to 1.
+        Called with the step and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -76,13 +76,13 @@ def correspond(
     ----------
     capture : Capture
     method : str, optional
-        "stripes", "gray" or "phase": by photos of stripes or of Gray code, or by the phase of the
-        photos of transport; or a method that another package adds. By default the one that the
-        plan was made for.
+        "stripes", "gray" or "phase": from photos of stripes, from photos of Gray code, or from the
+        phase of the photos of transport; or a method that another package adds. By default the
+        plan's own.
     measurements : Measurements, optional
-        The capture's, which the phase is read from; measured here if left out.
+        Of the capture, for the phase; by default the capture is measured here.
     progress : callable, optional
-        Called with what is being done and the share of it that is done, 0 to 1.
+        Called with the step and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -135,16 +135,15 @@ def estimate_transport(
     far : Size or (height, width)
         Far band, in DFT frequencies of the pattern grid.
     method : str
-        Estimator: ``"joint"`` for all three components in one model, ``"paper"`` for one after the
-        other as in the paper, or one that another package adds.
+        Estimator: ``"joint"`` estimates all three components in one model, ``"paper"`` one after
+        another as in the paper; or an estimator that another package adds.
     dropped : Size or (height, width), optional
-        Block of near frequencies that were not shot, which the paper's estimator needs; by
-        default those of `nearfar.paper_plan`.
+        Block of near frequencies that were not measured, for the paper's estimator; by default
+        that of `nearfar.paper_plan`.
     device : {"cpu", "cuda", "torch"}
-        Where the estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
-        processor.
+        Device of the estimate: NumPy, PyTorch on an accelerator, or PyTorch on the processor.
     progress : callable, optional
-        Called with what is being done and the share of it that is done, 0 to 1.
+        Called with the step and the share of it that is done, 0 to 1.
 
     Returns
     -------
@@ -153,8 +152,8 @@ def estimate_transport(
     Raises
     ------
     InputError
-        If the measurements lack what the estimator needs, the correspondence has no camera pixel
-        with direct light, or the device is not there.
+        If the estimator needs frequencies that were not measured, no camera pixel has direct
+        light, or the device is not there.
 
     Examples
     --------

@@ -28,8 +28,7 @@ class ReconstructionOptions:
         tiles of as many rows as fit. A square T is the exception: it needs the measurements of the
         whole camera at once.
     device : {"cpu", "cuda", "torch"}
-        Where the estimate is made: by NumPy, by PyTorch on an accelerator, or by PyTorch on the
-        processor.
+        Device of the estimate: NumPy, PyTorch on an accelerator, or PyTorch on the processor.
     half : bool
         Whether n and f are stored as float16, in half the bytes. The provenance's ``rounding`` is
         the rounding error as a share of their noise.

@@ -7,7 +7,7 @@ from multiprocessing.process import BaseProcess
 
 _FORKS = get_context("forkserver")
 _FORKS.set_forkserver_preload(
-    ["nearfar.cli.main", "nearfar.rigs.config", "nearfar.workflow.acquire", "tests.processes"]
+    ["nearfar.cli.main", "nearfar.rigs.tables", "nearfar.workflow.acquire", "tests.processes"]
 )
 
 

@@ -6,7 +6,9 @@ BIN := $(VENV)/bin
 # Rebuilt when the lock or the project's own description changes.
 READY := $(VENV)/.ready
 
-.PHONY: demo test docs check lint types layers lock benchmark clean
+.PHONY: setup demo test docs check lint types layers lock benchmark clean
+
+setup: $(READY)
 
 demo: $(READY)
 	$(BIN)/nearfar demo nearfar-demo --force

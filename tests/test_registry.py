@@ -63,6 +63,7 @@ def test_an_unknown_name_is_refused_with_all_that_there_are(install) -> None:
     ("module", "sentence"),
     [
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
+        ("import nosdk.api", "No module named 'nosdk'.*: install nosdk, which that package needs"),
         ("A = (", "SyntaxError"),
         ("B = 1.0", "has no attribute 'A'"),
         ("A = 'one'", "is a str and not a float"),

@@ -119,7 +119,7 @@ class Registry(Generic[Registered]):
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             raise ExtensionError(
                 f"the {self._what} {name!r} of {_origin(entry)} cannot be loaded ({reason}): "
-                f"update or uninstall that package."
+                f"{_cure(entry, error)}."
             ) from error
         if not isinstance(found, self._expected):
             raise ExtensionError(
@@ -127,6 +127,14 @@ class Registry(Generic[Registered]):
                 f"not a {self._expected.__name__}: update or uninstall that package."
             )
         return found
+
+
+def _cure(entry: EntryPoint, error: Exception) -> str:
+    """Return what to do where an entry point cannot be loaded."""
+    missing = error.name if isinstance(error, ModuleNotFoundError) else None
+    if missing and missing.partition(".")[0] != entry.module.partition(".")[0]:
+        return f"install {missing}, which that package needs, or uninstall that package"
+    return "update or uninstall that package"
 
 
 def _origin(entry: EntryPoint) -> str:

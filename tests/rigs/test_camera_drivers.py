@@ -8,9 +8,11 @@ import tomllib
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nearfar.errors import DeviceError, ExtensionError, UnreadableFileError
+from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.cameras.driver import CameraDriver, CameraTable, FoundCamera
 from nearfar.rigs.cameras.registry import CAMERAS, find_cameras
 from nearfar.rigs.initial import draft_rig
@@ -35,6 +37,11 @@ def _fail_to_find() -> list[FoundCamera]:
     raise OSError("no light\nat all")
 
 
+def _find_under_another_name() -> list[FoundCamera]:
+    return [FoundCamera("camera", "box", "A shoe box")]
+
+
+MISNAMED = CameraDriver(PinholeTable, _find_under_another_name)
 PINHOLE = CameraDriver(PinholeTable, _find_pinholes, "# Millimetres.\n# hole = 0.2\n")
 BLIND = CameraDriver(PinholeTable, _fail_to_find)
 
@@ -126,3 +133,33 @@ def test_every_setting_it_comments_on_is_one(driver):
     # What cannot be left out is not among the comments.
     settings += 'producer = "maker.cti"\n' if driver == "harvesters" else ""
     RealTable.model_validate(tomllib.loads(settings))
+
+
+def test_a_driver_that_lists_cameras_under_another_name_is_named(add):
+    add(misnamed=f"{__name__}:MISNAMED", pinhole=f"{__name__}:PINHOLE")
+    found, unable = find_cameras()
+    assert {camera.driver for camera in found} >= {"pinhole"}
+    assert "camera" not in {camera.driver for camera in found}
+    assert any("'misnamed' lists cameras of a driver 'camera'" in said for said in unable)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        np.zeros((4, 5, 1)),
+        np.zeros((4, 5, 1), np.int32),
+        np.zeros(20, np.uint16),
+        np.zeros((0, 5, 1), np.uint8),
+        None,
+    ],
+)
+def test_a_driver_that_gives_no_photo_is_named(frame):
+    class Odd(Camera):
+        full_scale = 255.0
+
+        def take(self):
+            return frame
+
+    for frames in (1, 2):
+        with pytest.raises(DeviceError, match=r"the odd camera gives frames of .* its driver must"):
+            Odd("the odd camera", frames=frames, bracket=(1.0,)).photograph()

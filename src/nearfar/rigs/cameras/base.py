@@ -28,6 +28,7 @@ MAXIMUM_EXPOSURE_STEPS = 10
 EXPOSURE_TOLERANCE = 0.05
 
 Frame = NDArray[np.uint8] | NDArray[np.uint16]
+FRAME_TYPES = ("uint8", "uint16", "float32")
 
 
 class Camera(ABC):
@@ -219,8 +220,23 @@ class Camera(ABC):
 
     def _averaged(self) -> Photo:
         if self._frames == 1:
-            return self.take()
+            return self._checked(self.take())
         # Some cameras know their full scale only after a photo.
-        first = self.take()
-        others = (self.take() for _ in range(self._frames - 1))
+        first = self._checked(self.take())
+        others = (self._checked(self.take()) for _ in range(self._frames - 1))
         return average(chain([first], others), self.full_scale)
+
+    def _checked(self, frame: Frame) -> Frame:
+        """Refuse a frame that is no photo, in the name of the camera whose driver made it.
+
+        Raises
+        ------
+        DeviceError
+        """
+        values = np.asarray(frame)
+        if values.dtype.name not in FRAME_TYPES or values.ndim not in {2, 3} or not values.size:
+            raise DeviceError(
+                f"{self.name} gives frames of {values.dtype} and shape {values.shape}: its driver "
+                f"must return {', '.join(FRAME_TYPES)} of shape (height, width, channels)."
+            )
+        return frame

@@ -60,7 +60,7 @@ def _found_by(name: str) -> list[FoundCamera]:
     if name in CAMERAS.own:
         return list(find())
     try:
-        return [FoundCamera(*camera) for camera in find()]
+        found = [FoundCamera(*camera) for camera in find()]
     except MissingPackageError:
         raise
     except Exception as error:
@@ -71,3 +71,10 @@ def _found_by(name: str) -> list[FoundCamera]:
             f"the camera driver {name!r} cannot search for cameras ({reason}): update or uninstall "
             f"its package."
         ) from error
+    for camera in found:
+        if camera.driver != name:
+            raise ExtensionError(
+                f"the camera driver {name!r} lists cameras of a driver {camera.driver!r}: update "
+                f"or uninstall its package, which must list them under its own name."
+            )
+    return found

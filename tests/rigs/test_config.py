@@ -5,12 +5,13 @@ import shutil
 import numpy as np
 import pytest
 
+import nearfar
 from nearfar.arrays import Size
 from nearfar.errors import DeviceError, UnreadableFileError
 from nearfar.rigs.cameras.driver import FoundCamera
 from nearfar.rigs.cameras.folder import FolderCamera
 from nearfar.rigs.initial import draft_rig
-from nearfar.rigs.opening import open_rig, opened_rig
+from nearfar.rigs.opening import open_rig
 from nearfar.rigs.screens import Monitor
 from nearfar.rigs.tables import RealTable, read_rig_table
 from tests.cli.conftest import run_nearfar
@@ -77,7 +78,7 @@ def test_a_simulated_rig_is_a_context_and_works_without(tmp_path):
     np.testing.assert_array_equal(list(rig.shoot(white)), photos)
     with (
         pytest.warns(DeprecationWarning, match="use nearfar.open_rig"),
-        opened_rig(str(tmp_path / "T.npy"), Size(4, 4), told=print) as old,
+        nearfar.opened_rig(str(tmp_path / "T.npy"), Size(4, 4), told=print) as old,
     ):
         np.testing.assert_array_equal(list(old.shoot(white)), photos)
 

@@ -1,4 +1,4 @@
-"""What can go wrong, in one place.
+"""All exceptions of nearfar.
 
 Every fault a user can cause or meet is a `NearfarError` joined with the standard type that a
 Python programmer would expect, so that ``except FileNotFoundError`` keeps working. A message

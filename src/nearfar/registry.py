@@ -130,7 +130,7 @@ class Registry(Generic[Registered]):
 
 
 def _cure(entry: EntryPoint, error: Exception) -> str:
-    """Return what to do where an entry point cannot be loaded."""
+    """Return the cure for an entry point that cannot be loaded, for a message."""
     missing = error.name if isinstance(error, ModuleNotFoundError) else None
     if missing and missing.partition(".")[0] != entry.module.partition(".")[0]:
         return f"install {missing}, which that package needs, or uninstall that package"

@@ -31,7 +31,7 @@ class Pairing:
 
 @dataclass(frozen=True)
 class ImportSummary:
-    """What was imported: the capture, and the first and the last pairing to look over."""
+    """An imported capture, and its first and last pairing of pattern and photo to look over."""
 
     capture: Capture
     first: Pairing

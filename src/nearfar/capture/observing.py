@@ -1,4 +1,4 @@
-"""What follows a capture photo by photo, and may end it."""
+"""The interface of observers, which follow a capture photo by photo and may end it."""
 
 from collections.abc import Callable, Sequence
 from enum import Enum

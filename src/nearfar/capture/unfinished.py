@@ -15,7 +15,7 @@ LOG_NAME = "photos.jsonl"
 
 
 class Taken(NamedTuple):
-    """What the log keeps of a photo; the fields are named as in the log."""
+    """Log entry of one photo; the fields are named as in the log."""
 
     time: float
     saturated: float
@@ -37,7 +37,7 @@ def count_photos(folder: Path) -> int:
 
 
 class UnfinishedCapture(NamedTuple):
-    """What is known of a capture that was started and not finished.
+    """Log of a capture that was started and not finished.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class UnfinishedCapture(NamedTuple):
 
 
 def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
-    """Return what is known of a capture that was not finished; no photos if there is none.
+    """Read the log of an unfinished capture; the result has no photos if there is no log.
 
     Raises
     ------

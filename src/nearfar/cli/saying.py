@@ -1,4 +1,4 @@
-"""What a command prints: results on stdout, warnings on stderr."""
+"""Output of commands: results on stdout, warnings on stderr."""
 
 import sys
 from pathlib import Path

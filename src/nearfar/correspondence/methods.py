@@ -1,4 +1,4 @@
-"""What a correspondence method is, and which one finds q in the photos of a plan."""
+"""The interface of correspondence methods, and the choice of one for a plan."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -89,7 +89,7 @@ def method_named(name: str) -> CorrespondenceMethod:
 
 
 def method_of(plan: Plan) -> CorrespondenceMethod:
-    """Return what finds q in the photos of a plan.
+    """Return the correspondence method that finds q in the photos of a plan.
 
     It is the method that the plan names. Where the plan does not hold all that this method needs,
     since its capture ended early, say, it is the first of nearfar's methods that the plan serves.

@@ -36,7 +36,7 @@ LARGEST_STRENGTH_RATIO = 3.0
 
 
 class _Axis(NamedTuple):
-    """What one axis measures at every camera pixel, each of shape (C,)."""
+    """Measurements of one axis at every camera pixel, each of shape (C,)."""
 
     place: Floats
     strength: Floats

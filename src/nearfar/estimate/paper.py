@@ -228,7 +228,7 @@ def _moved(previous: "_Leaks", leaks: "_Leaks") -> NDArray[np.float64]:
 
 
 class _Leaks(NamedTuple):
-    """What f adds, off the DFT grid, to the responses to the near patterns and the checkerboard."""
+    """Contribution of f, off the DFT grid, to the responses to near patterns and checkerboard."""
 
     checkerboard: Floats
     near: Floats

@@ -8,7 +8,7 @@ from nearfar.illumination.frequencies import Frequency
 
 
 class Fault(Protocol):
-    """What is wrong; its text is a sentence."""
+    """A fault; its text is a sentence."""
 
     def __str__(self) -> str: ...
 

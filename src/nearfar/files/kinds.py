@@ -1,4 +1,4 @@
-"""What a Zarr folder holds, from its metadata."""
+"""The kind of data that a Zarr folder holds, from its metadata."""
 
 import json
 from pathlib import Path

@@ -13,7 +13,7 @@ from nearfar.packages import needed
 
 
 class RawPhoto(NamedTuple):
-    """What a raw file holds.
+    """The content of a raw file.
 
     Attributes
     ----------

@@ -246,7 +246,7 @@ def _picture(values: Floats, photos: Photos) -> NDArray[np.float32]:
 
 
 class _Channel(NamedTuple):
-    """What all fits of a channel share.
+    """The data that all fits of a channel share.
 
     Attributes
     ----------

@@ -112,7 +112,7 @@ class Measurements:
 
 
 def join(parts: Sequence[Measurements]) -> Measurements:
-    """Put measurements of blocks of camera rows together, in order."""
+    """Concatenate measurements of successive blocks of camera rows."""
     first = parts[0]
     if len(parts) == 1:
         return first

@@ -1,4 +1,4 @@
-"""What to project, and why."""
+"""Plans: the patterns to project, and how they are chosen."""
 
 from nearfar.plan.choose import choose_plan
 from nearfar.plan.correspondence import CORRESPONDENCE_METHODS

@@ -16,7 +16,7 @@ def no_patterns(_projector: Size) -> tuple[Pattern, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class CorrespondencePatterns:
-    """What a correspondence method adds to a plan.
+    """The patterns that a correspondence method adds to a plan.
 
     A method that finds q in the photos is a `nearfar.correspondence.CorrespondenceMethod`, which
     is one of these; one that is only this leaves q to be given, or found by another method.

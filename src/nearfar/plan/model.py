@@ -1,9 +1,8 @@
-"""The plan: frozen data that says what to project, in what order, and what for."""
+"""The plan: the patterns to project, their order, and the purpose of each."""
 
 import json
 from collections import Counter
 from collections.abc import Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -50,7 +49,7 @@ NOT_INSTALLED = "not_installed"
 
 
 class Plan(Frozen):
-    """What to project: one pattern for each photo, in the order to shoot.
+    """Patterns to project: one for each photo, in the order to shoot.
 
     A pattern may stand in it several times: its photos are averaged.
 
@@ -126,16 +125,18 @@ class Plan(Frozen):
             pattern.require_place_on(self.projector)
         return self
 
-    @cached_property
+    @property
     def counts(self) -> dict[Purpose, int]:
         """Number of photos for each purpose; checks are left out where there are none."""
+        # Not cached: a copy with other patterns would take the cached counts along.
         counted: Counter[Purpose] = Counter(pattern.purpose for pattern in self.patterns)
         return {**dict.fromkeys(PURPOSES, 0), **counted}
 
     @property
     def transport_photos(self) -> int:
         """Photos of transport: direct, near and far."""
-        return sum(self.counts[purpose] for purpose in ("direct", "near", "far"))
+        counts = self.counts
+        return sum(counts[purpose] for purpose in ("direct", "near", "far"))
 
     @property
     def savings(self) -> float:
@@ -143,7 +144,7 @@ class Plan(Frozen):
         return self.projector.pixels / self.transport_photos
 
     def summary(self) -> dict[str, Any]:
-        """Return what ``nearfar plan --json`` prints."""
+        """Return the numbers that ``nearfar plan --json`` prints."""
         return {
             "photos": self.counts,
             "transport_photos": self.transport_photos,

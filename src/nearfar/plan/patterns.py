@@ -1,4 +1,4 @@
-"""Patterns as data: what a photo of a plan shows, and what for."""
+"""Patterns as data: the content of each projected pattern, and its purpose."""
 
 from abc import ABC, abstractmethod
 from functools import cache
@@ -39,7 +39,7 @@ class Frozen(BaseModel):
 
 
 class Pattern(Frozen, ABC):
-    """What one photo shows.
+    """The pattern that is projected for one photo.
 
     A kind of pattern is a subclass: it narrows `kind` to a literal of its own, by which it is found
     again in a file, adds what `draw` needs, and gives `purpose` a default.
@@ -207,7 +207,7 @@ def kinds_of(pattern: type[Pattern]) -> frozenset[str]:
 
 @cache
 def pattern_reader(added: tuple[type[Pattern], ...]) -> TypeAdapter[tuple[Pattern, ...]]:
-    """Return what validates patterns: nearfar's own, and those of some more kinds."""
+    """Return the pydantic adapter that validates nearfar's own patterns and further types."""
     # Made at run time, so that no type checker follows it.
     union: Any = Union
     annotated: Any = Annotated

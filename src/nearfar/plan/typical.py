@@ -1,4 +1,4 @@
-"""What scene to plan for, where a quick first estimate of it is there."""
+"""Typical scenes that a plan is chosen for, or a quick first estimate of the real one."""
 
 from typing import TYPE_CHECKING
 

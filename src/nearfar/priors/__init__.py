@@ -1,1 +1,1 @@
-"""What rows of a transport are expected to be before any photo."""
+"""Prior distributions of the rows of a transport."""

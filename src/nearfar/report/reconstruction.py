@@ -135,7 +135,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def _explain(snr: Map) -> str:
-    """Return what the histogram shows, in words."""
+    """Describe the histogram in words."""
     if snr.title.startswith("floodlit picture over its error"):
         return (
             "Signal over one standard deviation, under white, of every camera pixel: 20 dB is an "

@@ -1,4 +1,4 @@
-"""What a rig is: a projector that displays patterns, and a camera that photographs them."""
+"""The interface of a rig: a projector that displays patterns, a camera that photographs them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
@@ -28,16 +28,16 @@ class Rig(Protocol):
         ...
 
     def describe(self) -> dict[str, Any]:
-        """Return what the capture should remember of the rig, as JSON."""
+        """Return the settings of the rig that are recorded in a capture, as JSON types."""
         ...
 
     @property
     def alarms(self) -> Sequence[str]:
-        """What went wrong so far, a sentence each: mended by the rig, or for the user to know."""
+        """Faults so far, a sentence each: mended by the rig, or for the user to know."""
         ...
 
     def conditions(self) -> Mapping[str, float]:
-        """Return what may change from photo to photo, such as temperatures, for the last one."""
+        """Return readings recorded with the last photo, such as temperatures."""
         ...
 
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:

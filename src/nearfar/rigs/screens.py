@@ -77,7 +77,7 @@ class Screen(Protocol):
 
     @property
     def monitor(self) -> Monitor:
-        """What it shows them on."""
+        """The screen that patterns are displayed on."""
         ...
 
     @property

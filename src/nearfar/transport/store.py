@@ -152,7 +152,7 @@ def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
 
 
 def _attributes(transport: Transport) -> dict[str, Any]:
-    """Return what all camera pixels share, as JSON types."""
+    """Return the metadata that all camera pixels share, as JSON types."""
     attributes = {
         "projector": list(transport.projector),
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
@@ -165,7 +165,7 @@ def _attributes(transport: Transport) -> dict[str, Any]:
 
 
 def _described(posterior: Posterior) -> dict[str, Any]:
-    """Return what all camera pixels share of a posterior, as JSON types."""
+    """Return the metadata of a posterior that all camera pixels share, as JSON types."""
     return {
         "kinds": [list(component) for component in posterior.prior_components],
         "frequencies": [frequency_to_text(k) for k in posterior.frequencies],

@@ -1,4 +1,4 @@
-"""What the viewer's responses contain, independently of HTTP."""
+"""The content of the viewer's responses, independent of HTTP."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any

@@ -28,7 +28,7 @@ LEVELS = {"white": 255, "black": 0, "grey": 128}
 
 
 class Settings(BaseModel):
-    """What the browser asks to change; settings that are left out stay.
+    """Settings that the browser asks to change; those left out stay as they are.
 
     Attributes
     ----------

@@ -85,6 +85,8 @@ def serve(
         log_level="error",
         access_log=False,
         lifespan="off",
+        # Of the loops that may be installed, this one reads what has arrived before it runs timers.
+        loop="asyncio",
         http=Connection,
         ws="websockets-sansio",
         ws_max_size=maximum_message_bytes,
@@ -116,7 +118,7 @@ def _listen(listening: ListeningAddress) -> socket.socket:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(tuple(listening))
         # From here on clients wait until the server runs, and are not refused.
-        listener.listen()
+        listener.listen(MAXIMUM_CONNECTIONS)
     except OSError as error:
         listener.close()
         if isinstance(error, socket.gaierror):

@@ -87,7 +87,7 @@ def export_to_separate(
 def describe_separation(
     found: Separation, taken: PhotosToSeparate, method: Method
 ) -> dict[str, Any]:
-    """Return what was separated and how, ready for JSON."""
+    """Return the method, the photos and the results of the separation, as JSON types."""
     direct, global_ = (float(picture.sum(dtype=np.float64)) for picture in found)
     total = direct + global_
     return {

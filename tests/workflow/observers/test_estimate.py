@@ -25,7 +25,7 @@ from nearfar.workflow.evaluate import relighting_snr
 from nearfar.workflow.observers import estimate as observing
 from nearfar.workflow.observers.estimate import EstimateObserver
 from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
-from nearfar.workflow.reconstruction.job import Part
+from nearfar.workflow.reconstruction.job import ReconstructedTile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from nearfar.workflow.reconstruction.sinks import MemorySink
@@ -96,7 +96,7 @@ def _made(estimate, capture):
     """Transport and correspondence of a capture that was followed."""
     sink = MemorySink()
     execute(estimate.finish(capture), SerialExecutor(), sink, ignore_progress)
-    return Part(*sink.collected())
+    return ReconstructedTile(*sink.collected())
 
 
 @pytest.mark.parametrize("plan", ["reference", "pairs", "pairs and stripes"])

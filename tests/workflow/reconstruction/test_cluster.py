@@ -183,7 +183,7 @@ def test_a_scheduler_that_is_lost_costs_what_was_not_written(cluster, world, tmp
             os.kill(host, signal.SIGKILL)
 
         threading.Thread(target=kill, daemon=True).start()
-        with pytest.raises(ClusterError, match=r"was lost in the middle.* blocks of rows are kept"):
+        with pytest.raises(ClusterError, match=r"was lost in the middle.* tiles are kept"):
             _reconstruct(capture, tmp_path / "t.zarr", scheduler=address, memory=memory)
     before = _files(tmp_path)
     # Workers that go on without a scheduler for a while write nothing more.
@@ -223,7 +223,7 @@ def test_what_was_interrupted_is_gone_on_with_here_or_there(cluster, world, tmp_
 
     for scheduler, resumed_by in ((cluster, None), (None, cluster)):
         path = tmp_path / f"{'cluster' if scheduler else 'local'}-first.zarr"
-        with pytest.raises(KeptInterrupt, match=r"^interrupted; \d+ blocks .* are kept"):
+        with pytest.raises(KeptInterrupt, match=r"^interrupted; \d+ tiles are kept"):
             _reconstruct(
                 capture,
                 path,

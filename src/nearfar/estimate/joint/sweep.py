@@ -40,7 +40,7 @@ CLIPPED_BATCH_PIXELS = 512
 
 
 class _Start(NamedTuple):
-    """What a later sweep starts from."""
+    """The state that a later sweep starts from."""
 
     before: EstimatedRows
     expected: EstimatedRows  # from the neighbours

@@ -154,7 +154,7 @@ class AravisCamera(Camera):
         return max(low.value, 1.0) / MICROSECONDS_PER_SECOND, high.value / MICROSECONDS_PER_SECOND
 
     def describe(self) -> dict[str, Any]:
-        """Return what a capture remembers of the camera."""
+        """Return the settings that are recorded once in a capture, as JSON types."""
         return {
             **super().describe(),
             "driver": NAME,

@@ -1,4 +1,4 @@
-"""What every camera has in common: exposure, brackets, averages, auto-exposure.
+"""The base class of all cameras: exposure, brackets, averages, auto-exposure.
 
 A driver opens a device and takes single frames; all else is here.
 """
@@ -93,11 +93,11 @@ class Camera(ABC):
         return None
 
     def describe(self) -> dict[str, Any]:
-        """Return what a capture remembers of the camera: what stays as it is, as JSON."""
+        """Return the settings that are recorded once in a capture, as JSON types."""
         return {"name": self.name, "frames": self._frames, "bracket": list(self._bracket)}
 
     def conditions(self) -> dict[str, float]:
-        """Return what may change from photo to photo, such as temperatures in degrees Celsius."""
+        """Return readings recorded with each photo, such as temperatures in degrees Celsius."""
         return {}
 
     def close(self) -> None:  # noqa: B027

@@ -1,4 +1,4 @@
-"""What a camera driver is: the settings that it takes, and how it finds its cameras."""
+"""The interface of camera drivers: their settings, and how they find their cameras."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -84,7 +84,7 @@ class FolderCamera(Camera):
         return self._full_scale
 
     def describe(self) -> dict[str, Any]:
-        """Return what a capture remembers of the camera."""
+        """Return the settings that are recorded once in a capture, as JSON types."""
         return {**super().describe(), "driver": NAME, "command": self._command}
 
     def take(self) -> Frame:

@@ -92,7 +92,7 @@ class HarvestersCamera(Camera):
             return max(node.min, 1.0) / MICROSECONDS_PER_SECOND, node.max / MICROSECONDS_PER_SECOND
 
     def describe(self) -> dict[str, Any]:
-        """Return what a capture remembers of the camera."""
+        """Return the settings that are recorded once in a capture, as JSON types."""
         return {
             **super().describe(),
             "driver": NAME,

@@ -104,7 +104,7 @@ class GphotoCamera(Camera):
         return (min(speeds), max(speeds)) if speeds else None
 
     def describe(self) -> dict[str, Any]:
-        """Return what a capture remembers of the camera."""
+        """Return the settings that are recorded once in a capture, as JSON types."""
         return {**super().describe(), "driver": NAME, "settings": self._settings}
 
     def close(self) -> None:

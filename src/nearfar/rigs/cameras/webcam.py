@@ -119,7 +119,7 @@ class OpencvCamera(Camera):
         return EXPOSURE_LIMITS_SECONDS if can else None
 
     def describe(self) -> dict[str, Any]:
-        """Return what a capture remembers of the camera."""
+        """Return the settings that are recorded once in a capture, as JSON types."""
         return {
             **super().describe(),
             "driver": NAME,

@@ -1,4 +1,4 @@
-"""What black and white look like to a camera, and the noise in between.
+"""Photos of black and white, and the noise in between.
 
 Index convention: photos are (Cy, Cx, channels), raw levels.
 """
@@ -50,7 +50,7 @@ class BlackAndWhite(NamedTuple):
 
     @property
     def contrast(self) -> float:
-        """What white adds to black, mean level."""
+        """Mean level of white over black."""
         return float(self.white.mean() - self.black.mean())
 
     def variance(self, levels: Floats) -> Floats:

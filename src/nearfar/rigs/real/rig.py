@@ -114,7 +114,7 @@ class RealRig:
 
     @property
     def monitor(self) -> Monitor:
-        """What the projector is connected to."""
+        """The output that the projector is connected to."""
         return self._screen.monitor
 
     @property
@@ -129,16 +129,16 @@ class RealRig:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know of the rig before photos are taken: nothing."""
+        """Notes on the rig before photos are taken: none."""
         return ()
 
     @property
     def alarms(self) -> list[str]:
-        """What went wrong so far, a sentence each."""
+        """Faults so far, a sentence each."""
         return self._alarms.sentences
 
     def describe(self) -> dict[str, Any]:
-        """Return what the capture remembers: what stays as it is from photo to photo."""
+        """Return the settings of the rig that are recorded in a capture, as JSON types."""
         monitor, calibration = self._screen.monitor, self._calibration
         return {
             "kind": "real",
@@ -157,7 +157,7 @@ class RealRig:
         }
 
     def conditions(self) -> dict[str, float]:
-        """Return what may change from photo to photo, such as temperatures in degrees Celsius."""
+        """Return readings recorded with the last photo, such as temperatures in degrees Celsius."""
         return self._conditions
 
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:

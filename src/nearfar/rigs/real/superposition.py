@@ -19,7 +19,7 @@ MAXIMUM_EXCESS_SHARE = 0.02
 
 
 class Superposition(NamedTuple):
-    """What checking superposition found.
+    """The result of a superposition check.
 
     Attributes
     ----------

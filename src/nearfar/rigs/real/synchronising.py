@@ -19,7 +19,7 @@ MAXIMUM_SETTLE_REFRESHES = 32
 
 
 class Synchronised(NamedTuple):
-    """What synchronising found.
+    """The result of synchronising.
 
     Attributes
     ----------

@@ -78,7 +78,7 @@ class SimulatedRig:
         return float(self.sensor.full_scale)
 
     def describe(self) -> dict[str, Any]:
-        """Return what the capture remembers: scene, settings, exposure."""
+        """Return the scene, the settings and the exposure, as JSON types."""
         return {
             "kind": "simulated",
             "scene": self.name,

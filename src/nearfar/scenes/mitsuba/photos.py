@@ -60,7 +60,7 @@ class RenderedWorld:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know, a sentence each."""
+        """Warnings for the user, a sentence each."""
         return self._loaded.notes
 
     def describe(self) -> dict[str, Any]:

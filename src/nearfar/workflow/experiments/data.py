@@ -25,7 +25,7 @@ DISPLAY_LAYERS = ("cli", "report")
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """What an experiment found.
+    """The results of an experiment.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ TileReport = Callable[[int, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What an executor needs to reconstruct a transport.
+    """The work of an executor: all that it needs to reconstruct a transport.
 
     Attributes
     ----------

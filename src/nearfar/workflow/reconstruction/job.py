@@ -27,7 +27,7 @@ from nearfar.workflow.reconstruction.summary import provenance_of
 from nearfar.workflow.reconstruction.tiles import Tiling, rows_to_measure, tile_rows
 
 
-class Part(NamedTuple):
+class ReconstructedTile(NamedTuple):
     """The transport and the correspondence of a tile."""
 
     transport: Transport
@@ -36,7 +36,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What all tiles of a reconstruction share.
+    """The data that all tiles of a reconstruction share.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def reconstruct_tile(
     tile: slice,
     known: Correspondence | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Part:
+) -> ReconstructedTile:
     """Reconstruct the camera pixels of a tile.
 
     Parameters
@@ -152,7 +152,7 @@ def reconstruct_tile(
 
     Returns
     -------
-    Part
+    ReconstructedTile
         With ``excess_of_sums`` and ``rounding`` of this tile in its provenance.
     """
     around = job.tiling.with_halo(tile)
@@ -178,4 +178,4 @@ def reconstruct_tile(
         provenance=provenance,
         quality=None if saturated is None else Quality(correspondence.confidence, saturated),
     )
-    return Part(transport, correspondence)
+    return ReconstructedTile(transport, correspondence)

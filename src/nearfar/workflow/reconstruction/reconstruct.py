@@ -141,11 +141,7 @@ def reconstruct_to_file(
     >>> done.lit, nearfar.load_transport("made.zarr").camera
     (64, Size(height=8, width=8))
     """
-    options, report, output = (
-        options or ReconstructionOptions(),
-        progress or ignore_progress,
-        Path(output),
-    )
+    options, output = options or ReconstructionOptions(), Path(output)
     if correspondence is not None and not correspondence.lit.any():
         raise without_light(capture)
     executor = executor_of(options)
@@ -159,7 +155,7 @@ def reconstruct_to_file(
     preparing = partial(prepare, capture, options, correspondence)
     work = Work(capture, options, correspondence, tiling, preparing)
     with resumable_file(output, tiling, identity, resume=resume, force=force) as sink:
-        return execute(work, executor, sink, report)
+        return execute(work, executor, sink, progress or ignore_progress)
 
 
 def executor_of(options: ReconstructionOptions) -> Executor:

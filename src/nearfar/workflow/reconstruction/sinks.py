@@ -18,7 +18,7 @@ from nearfar.release import version
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import stacked
 from nearfar.transport.store import write_provenance, write_rows
-from nearfar.workflow.reconstruction.job import Part
+from nearfar.workflow.reconstruction.job import ReconstructedTile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.summary import Summary
 from nearfar.workflow.reconstruction.tiles import Tiling
@@ -31,7 +31,7 @@ LOG_NAME = "blocks.jsonl"
 class Store(Protocol):
     """Stores tiles, from several threads at a time."""
 
-    def put(self, tile: slice, part: Part) -> Summary:
+    def put(self, tile: slice, part: ReconstructedTile) -> Summary:
         """Store a tile and return its summary."""
         ...
 
@@ -61,7 +61,7 @@ class MemorySink:
     """Keeps a transport in memory."""
 
     def __init__(self) -> None:
-        self._parts: dict[int, Part] = {}
+        self._parts: dict[int, ReconstructedTile] = {}
         self._provenance: Mapping[str, Any] = {}
 
     @property
@@ -69,7 +69,7 @@ class MemorySink:
         """The sink itself."""
         return self
 
-    def put(self, tile: slice, part: Part) -> Summary:
+    def put(self, tile: slice, part: ReconstructedTile) -> Summary:
         """Keep a tile."""
         self._parts[tile.start] = part
         return summary_of(part)
@@ -106,7 +106,7 @@ class TileWriter:
     folder: Path
     tiling: Tiling
 
-    def put(self, tile: slice, part: Part) -> Summary:
+    def put(self, tile: slice, part: ReconstructedTile) -> Summary:
         """Write a tile; the first one also creates the arrays of the transport."""
         rows, height = self.tiling.rows, self.tiling.height
         write_rows(self.folder, part.transport, tile.start, rows=rows, height=height)
@@ -128,7 +128,7 @@ class FileSink:
 
     @property
     def store(self) -> TileWriter:
-        """What writes tiles into the folder."""
+        """Writer of the tiles into the folder."""
         return TileWriter(self._folder, self._tiling)
 
     def stored(self) -> Mapping[int, Summary]:
@@ -217,7 +217,7 @@ def identity_of(
     options: ReconstructionOptions,
     tiling: Tiling,
 ) -> dict[str, Any]:
-    """Return what all tiles of a transport must have in common, as JSON types."""
+    """Return the metadata that all tiles of a transport must share, as JSON types."""
     metadata = (capture.path / "zarr.json").read_bytes()
     return {
         # Photos that were taken again have other times.
@@ -232,7 +232,7 @@ def identity_of(
     }
 
 
-def summary_of(part: Part) -> Summary:
+def summary_of(part: ReconstructedTile) -> Summary:
     """Return the summary of a tile."""
     lit = part.correspondence.lit
     return Summary(int(lit.sum()), int(lit.size), dict(part.transport.provenance))
@@ -274,7 +274,7 @@ def _kept(output: Path) -> str:
     count = len(stored_tiles(folder))
     again = "`resume=True, force=True`" if output.exists() else "`resume=True`"
     return (
-        f"{count} blocks of rows are kept in {folder}, and {again} goes on with them"
+        f"{count} tiles are kept in {folder}, and {again} goes on with them"
         if count
         else ""
     )

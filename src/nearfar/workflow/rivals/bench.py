@@ -10,7 +10,7 @@ from nearfar.transport.exact import ExactTransport
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What all methods share.
+    """The scene, the camera and the noise that all methods share.
 
     Attributes
     ----------

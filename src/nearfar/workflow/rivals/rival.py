@@ -1,4 +1,4 @@
-"""What a rival method is: how it takes photos, what it makes of them, and how a plot draws it.
+"""The interface of rival methods: their photos, their result, and their curve in a plot.
 
 A rival of another package is a `Rival` too, added by an entry point of the group
 ``nearfar.rivals``.
@@ -43,7 +43,7 @@ class Relights(Protocol):
 
 
 class Attempt(NamedTuple):
-    """What a method measured.
+    """The result of a method.
 
     Attributes
     ----------

@@ -273,8 +273,4 @@ def _kept(output: Path) -> str:
     folder = output.resolve().with_name(f"{output.resolve().name}{UNFINISHED}")
     count = len(stored_tiles(folder))
     again = "`resume=True, force=True`" if output.exists() else "`resume=True`"
-    return (
-        f"{count} tiles are kept in {folder}, and {again} goes on with them"
-        if count
-        else ""
-    )
+    return f"{count} tiles are kept in {folder}, and {again} goes on with them" if count else ""

@@ -51,10 +51,19 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(lambda: shutil.rmtree(cache, ignore_errors=True))
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Run a process more than there are processors: many tests wait for cameras and browsers."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files of slow tests: were one the last, the others would wait for it."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    """Begin with the slowest files: were one the last, the others would wait for it."""
+    minutes: dict[Path, float] = {}
+    for item in items:
+        if slow := item.get_closest_marker("slow"):
+            before = minutes.get(item.path, 0.0)
+            minutes[item.path] = max(before, slow.kwargs.get("minutes", 0.5))
+    items.sort(key=lambda item: -minutes.get(item.path, 0.0))
 
 
 @pytest.fixture

@@ -16,6 +16,8 @@ CASES = [
     ("wedge", "68x100", 19, "7x11", 45.5, 48.0),
 ]
 
+pytestmark = pytest.mark.slow(minutes=4)
+
 
 def _run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
     monkeypatch.setattr("sys.argv", ["nearfar", *map(str, arguments)])
@@ -25,7 +27,6 @@ def _run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
         assert not end.code, arguments
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("scene", "projector", "window", "far", "pictures", "white"), CASES)
 def test_a_scene_is_relit_as_well_as_asked(
     tmp_path: Path, monkeypatch, capsys, scene, projector, window, far, pictures, white
@@ -47,7 +48,6 @@ def test_a_scene_is_relit_as_well_as_asked(
     assert judged["snr_b_frequency"]["p5"] > 30
 
 
-@pytest.mark.slow
 def test_without_noise_every_frequency_and_camera_pixel_is_as_good_as_in_the_paper():
     found = acquire_in_theory(WEDGE, lambda _what, _share: None).numbers
     assert found["plan"]["transport_photos"] == 423
@@ -59,7 +59,6 @@ def test_without_noise_every_frequency_and_camera_pixel_is_as_good_as_in_the_pap
     assert max(abs(ky) / 3.5, abs(kx) / 5) < 2
 
 
-@pytest.mark.slow
 def test_the_demo_ends_in_a_page(tmp_path: Path, monkeypatch, capsys):
     _run(monkeypatch, "demo", tmp_path / "out")
     said = capsys.readouterr().out

@@ -145,6 +145,34 @@ def test_what_cannot_be_used_is_refused_by_a_sentence(case):
     assert len(said.split()) > 6
 
 
+PLAN = nearfar.paper_plan(SIZE, 3, (3, 3))
+LIT = nearfar.given_correspondence(np.ones((*SIZE, 2)), SIZE, SIZE)
+# What each takes, and what a newcomer gives in its place.
+OBJECTS = {
+    "acquire, plan": lambda given, path: nearfar.acquire(given, path, None),
+    "acquire, rig": lambda given, path: nearfar.acquire(PLAN, path, given),
+    "write_capture": lambda given, path: nearfar.write_capture(given, path, []),
+    "measure": lambda given, _path: nearfar.measure(given),
+    "correspond": lambda given, _path: nearfar.correspond(given),
+    "estimate_transport, measurements": lambda given, _path: nearfar.estimate_transport(
+        given, LIT, 3, (3, 3)
+    ),
+    "reconstruct": lambda given, _path: nearfar.reconstruct(given),
+    "reconstruct_to_file": nearfar.reconstruct_to_file,
+    "prepare_transport": lambda given, _path: nearfar.prepare_transport(given),
+    "save_transport": nearfar.save_transport,
+}
+
+
+@pytest.mark.filterwarnings("ignore:.* with the path as its first argument")
+@pytest.mark.parametrize("entry", OBJECTS)
+@pytest.mark.parametrize("given", [None, 3, "capture.zarr", GOOD, EXACT])
+def test_an_object_of_another_type_is_named_and_nothing_is_written(entry, given, tmp_path):
+    with pytest.raises(InputError, match=r"^a \w+ was given for the \w+, .*: give what nearfar"):
+        OBJECTS[entry](given, tmp_path / "made.zarr")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("entry", ARRAYS)
 def test_a_list_is_an_array(entry):
     good, call = ARRAYS[entry]

@@ -92,7 +92,7 @@ def rig(tmp_path_factory):
         bench.close()
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=2)
 @pytest.mark.parametrize("name", ["tutorial.md", "howto/real-rig.md"])
 def test_what_is_shown_on_a_rig_runs_on_one(rig, name, tmp_path):
     rig.folder = tmp_path

@@ -200,6 +200,29 @@ def _by(shape: tuple[int, ...]) -> str:
     return "x".join(map(str, shape)) if shape else "one number"
 
 
+def require_instance(value: Any, expected: type, name: str, source: str) -> None:
+    """Refuse an object of another type, such as a path where the object read from it is meant.
+
+    Parameters
+    ----------
+    value : object
+    expected : type
+    name : str
+        Name of the argument.
+    source : str
+        Public function that returns such objects.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(value, expected):
+        raise InputError(
+            f"a {type(value).__name__} was given for the {name}, and not a {expected.__name__}: "
+            f"give what {source} returns."
+        )
+
+
 class NoArray:
     """Base of operators, which NumPy would turn into an array of one object."""
 

@@ -64,7 +64,7 @@ print(camera.take().shape, flush=True)
 time.sleep(60)
 """
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow(minutes=3)
 
 
 class Bench:

@@ -29,6 +29,7 @@ from nearfar.capture.store import (
     white_and_black,
 )
 from nearfar.capture.unfinished import LOG_NAME, Taken, other_plan, require_same_rig
+from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
 from nearfar.files import (
@@ -344,6 +345,7 @@ def write_capture(
     >>> nearfar.write_capture(plan, "own.zarr", photos, full_scale=1.0)
     <nearfar capture: 52 photos of 8x8, own.zarr>
     """
+    require_instance(plan, Plan, "plan", "nearfar.read_plan")
     observers = with_predicate(observers, enough, "nearfar.write_capture")
     path = Path(path)
     count = len(plan.patterns)

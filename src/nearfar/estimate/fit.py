@@ -9,7 +9,7 @@ Index convention: arrays are (n, channels, ...); m runs over far coefficients, w
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.arrays import Booleans, Floats, blocks, product
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import direct, near
@@ -68,13 +68,13 @@ def fit_model(
         within = rows[number[:, :, None], np.arange(channels)[:, None], entries[:, None]]
         within = within * inside[:, None]
         f[batch] = _far(rows, within, inside, centred, centres[batch])
-        seen: Floats = (
-            centred.recentre(f[batch] * far_basis.weights, centres[batch]) @ centred.on_window
+        seen: Floats = product(
+            centred.recentre(f[batch] * far_basis.weights, centres[batch]), centred.on_window
         )
         n[batch] = (within - seen) * inside[:, None]
         # The paper's own far step: what D and N leave at the far frequencies is f's.
-        responses = centred.uncentre(n[batch] @ centred.on_window.T, centres[batch])
-        f[batch] = rows @ far_basis.patterns.T - responses
+        responses = centred.uncentre(product(n[batch], centred.on_window.T), centres[batch])
+        f[batch] = product(rows, far_basis.patterns.T) - responses
     shape = (*truth.camera, channels)
     return Transport(
         projector=truth.projector,
@@ -114,13 +114,13 @@ def _far(
     less: Floats = np.float32(1.0 - WEIGHT_INSIDE) * inside[:, None]
 
     def normal(f: Floats) -> Floats:
-        seen = (centred.recentre(f * weights, centres) @ centred.on_window) * less
+        seen = product(centred.recentre(f * weights, centres), centred.on_window) * less
         return np.asarray(
-            f * weights - weights * centred.uncentre(seen @ centred.on_window.T, centres)
+            f * weights - weights * centred.uncentre(product(seen, centred.on_window.T), centres)
         )
 
-    right = weights * (rows @ centred.basis.patterns.T)
-    right -= weights * centred.uncentre((within * less) @ centred.on_window.T, centres)
+    right = weights * product(rows, centred.basis.patterns.T)
+    right -= weights * centred.uncentre(product(within * less, centred.on_window.T), centres)
     f = np.zeros_like(right)
     residual = right.copy()
     # Preconditioned by the diagonal without a window.

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats, Size, beside, namespace
+from nearfar.arrays import Complexes, Floats, Size, beside, namespace, product
 from nearfar.illumination.frequencies import Frequency, as_array
 
 
@@ -160,7 +160,7 @@ class RealBasis:
         """Adjoint of `analyse`, and the rows of F: (..., M) to (..., P)."""
         dtype = np.result_type(coefficients.dtype, np.float32)
         weighted = coefficients * self.weights.astype(dtype)
-        return np.asarray(weighted @ self.patterns.astype(dtype, copy=False))
+        return product(weighted, self.patterns.astype(dtype, copy=False))
 
 
 def real_basis(frequencies: Sequence[Frequency], projector: Size) -> RealBasis:

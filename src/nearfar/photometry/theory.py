@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size, blocks
+from nearfar.arrays import Floats, Size, blocks, product
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.frequencies import representatives
 from nearfar.illumination.real_basis import real_basis
@@ -82,7 +82,7 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
     pixels, channels = transport.camera.pixels, transport.channels
     responses = np.empty((pixels, channels, basis.count), dtype=np.float32)
     for block in blocks(pixels, PIXELS_AT_ONCE):
-        responses[block] = transport.rows(block).astype(np.float64) @ patterns
+        responses[block] = product(transport.rows(block).astype(np.float64), patterns)
     nothing = np.zeros((pixels, channels), dtype=np.float32)
     return Measurements(
         camera=transport.camera,

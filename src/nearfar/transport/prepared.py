@@ -17,7 +17,7 @@ from array_api_compat import device as device_of
 from array_api_compat import is_array_api_obj, is_numpy_array
 
 from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace
-from nearfar.checks import NoArray, as_light, as_lights
+from nearfar.checks import NoArray, as_light, as_lights, require_instance
 from nearfar.devices import Device, mover
 from nearfar.transport import near as windows
 from nearfar.transport.direct import footprint
@@ -168,6 +168,7 @@ def prepare_transport(
     >>> prepared.pictures(lights).shape
     (2, 8, 8, 1)
     """
+    require_instance(transport, Transport, "transport", "nearfar.load_transport")
     move = mover(device)
     if half is None:
         half = device == "cuda" and rounding_over_noise(transport) < NEGLIGIBLE_ROUNDING

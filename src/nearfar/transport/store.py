@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import AnyPath, Floats, Size, blocks
+from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import UnreadableFileError
 from nearfar.files import (
@@ -71,6 +72,7 @@ def save_transport(transport: Transport, path: AnyPath, *, force: bool = False) 
     --------
     >>> nearfar.save_transport(transport, "transport.zarr")
     """
+    require_instance(transport, Transport, "transport", "nearfar.reconstruct")
     write_transport(path, [transport], transport.camera.height, force=force)
 
 

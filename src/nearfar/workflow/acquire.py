@@ -12,6 +12,7 @@ from nearfar.capture import Capture, CaptureWriter, open_capture
 from nearfar.capture.observing import CaptureObserver, is_enough, with_predicate
 from nearfar.capture.replacing import replace_photos
 from nearfar.capture.unfinished import LOG_NAME, count_photos, require_same_rig
+from nearfar.checks import require_instance
 from nearfar.deprecation import warn_of
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.faults.while_capturing import FaultsWhileCapturing
@@ -121,7 +122,7 @@ def acquire(
                     for alarm in alarms:
                         on_alarm(alarm)
                 report("photos", writer.taken / count)
-                ended = is_enough(observers, writer.taken - 1, photo) or writer.ended
+                ended = is_enough(observers, writer.taken - 1, photo) or writer.taken == count
             writer.finish(alarms)
     except KeyboardInterrupt as error:
         if not kept.photos:
@@ -249,6 +250,12 @@ def acquire_in_memory(plan: Plan, rig: Rig) -> PhotosInMemory:
 
 
 def _require(plan: Plan, rig: Rig) -> None:
+    require_instance(plan, Plan, "plan", "nearfar.choose_plan")
+    if not hasattr(rig, "shoot"):
+        raise InputError(
+            f"a {type(rig).__name__} was given for the rig, and takes no photos: give what "
+            f"nearfar.open_rig returns."
+        )
     plan.require_real("shoot")
     if rig.projector != plan.projector:
         raise InputError(

@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from nearfar.arrays import AnySize, as_size
 from nearfar.capture import Capture
+from nearfar.checks import require_instance
 from nearfar.correspondence import (
     Correspondence,
     method_named,
@@ -55,6 +56,7 @@ def measure(capture: Capture, *, progress: Report | None = None) -> Measurements
     >>> measurements.responses.shape  # camera pixels, channels, cosines and sines
     (64, 1, 18)
     """
+    require_instance(capture, Capture, "capture", "nearfar.open_capture")
     report = progress or ignore_progress
     photos = photos_without_drift(capture, report)
     count = len(capture.plan.patterns)
@@ -100,6 +102,7 @@ def correspond(
     >>> int(correspondence.lit.sum())
     64
     """
+    require_instance(capture, Capture, "capture", "nearfar.open_capture")
     report, plan = progress or ignore_progress, capture.plan
     chosen = method_of(plan) if method is None else method_named(method)
     photos = photos_without_drift(capture, report)
@@ -161,6 +164,8 @@ def estimate_transport(
     >>> estimate
     <nearfar transport: projector 8x8, camera 8x8, channels 1, W = 3>
     """
+    require_instance(measurements, Measurements, "measurements", "nearfar.measure")
+    require_instance(correspondence, Correspondence, "correspondence", "nearfar.correspond")
     report, far = progress or ignore_progress, as_size(far, "far")
     if not correspondence.lit.any():
         raise InputError(

@@ -40,7 +40,7 @@ PLANS = {
     "paper": lambda: paper_plan(PROJECTOR, 7, Size(3, 3)),
 }
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow(minutes=3)
 
 
 @contextmanager

@@ -27,10 +27,11 @@ from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.reconstruction.sinks import LOG_NAME
 from tests.absent import NEEDS_PYTORCH
 from tests.cli.conftest import run_nearfar
+from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
-CAMERA = Size(100, 12)
-# Rows of a block, about.
+CAMERA = Size(100, 6)
+# Rows of a tile.
 ROWS = 3
 SLOW = """
 import sys
@@ -69,15 +70,8 @@ def capture(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def memory(capture):
-    """Bytes in which so few rows are worked at that there are many blocks."""
-    for size in range(400_000_000, 10**9, 100_000):
-        try:
-            tiling = tiling_of(capture, ReconstructionOptions(memory=size), given=False)
-        except InputError:
-            continue
-        if tiling.rows >= ROWS:
-            return size
-    raise AssertionError
+    """Bytes in which so few rows are worked at that there are many tiles."""
+    return memory_for(ROWS, capture.plan, CAMERA, "joint", channels=1)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +109,7 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
     path = tmp_path / "t.zarr"
     given = {"memory": memory}
     with pytest.raises(
-        KeptInterrupt, match=r"^interrupted; \d+ blocks .* and `resume=True` goes on"
+        KeptInterrupt, match=r"^interrupted; \d+ tiles .* and `resume=True` goes on"
     ):
         into(path, capture, progress=_stop_after(50), **given)
     assert not path.exists()
@@ -184,7 +178,7 @@ def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
         _check_same(whole, path)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1.5)
 def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path):
     generator = random.Random(0)
     path = tmp_path / "t.zarr"

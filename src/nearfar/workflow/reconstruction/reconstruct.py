@@ -5,6 +5,7 @@ from pathlib import Path
 
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture
+from nearfar.checks import require_instance
 from nearfar.correspondence import Correspondence
 from nearfar.devices import Device
 from nearfar.progress import Report, ignore_progress
@@ -68,6 +69,7 @@ def reconstruct(
     >>> (transport @ light).shape
     (8, 8)
     """
+    _require(capture, correspondence)
     options = ReconstructionOptions(method, square, memory, device, half)
     report, sink = progress or ignore_progress, MemorySink()
     job = prepare(capture, options, correspondence, report)
@@ -141,6 +143,7 @@ def reconstruct_to_file(
     >>> done.lit, nearfar.load_transport("made.zarr").camera
     (64, Size(height=8, width=8))
     """
+    _require(capture, correspondence)
     options, output = options or ReconstructionOptions(), Path(output)
     if correspondence is not None and not correspondence.lit.any():
         raise without_light(capture)
@@ -156,6 +159,12 @@ def reconstruct_to_file(
     work = Work(capture, options, correspondence, tiling, preparing)
     with resumable_file(output, tiling, identity, resume=resume, force=force) as sink:
         return execute(work, executor, sink, progress or ignore_progress)
+
+
+def _require(capture: Capture, correspondence: Correspondence | None) -> None:
+    require_instance(capture, Capture, "capture", "nearfar.open_capture")
+    if correspondence is not None:
+        require_instance(correspondence, Correspondence, "correspondence", "nearfar.correspond")
 
 
 def executor_of(options: ReconstructionOptions) -> Executor:

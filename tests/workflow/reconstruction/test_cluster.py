@@ -77,14 +77,14 @@ def scheduler():
 
 @pytest.fixture(scope="module")
 def world():
-    return model_transport(PROJECTOR, CAMERA, window=7, far=Size(3, 3), channels=3)
+    return model_transport(PROJECTOR, CAMERA, window=7, far=Size(3, 3), channels=1)
 
 
 def _capture(method, world, folder):
     optics = SimulatedProjector()
     rig = SimulatedRig(world, "test", optics, SimulatedCamera(), 1.0, 0)
     plan = PLANS[method]()
-    return acquire(plan, folder / "c.zarr", rig), memory_for(5, plan, CAMERA, method)
+    return acquire(plan, folder / "c.zarr", rig), memory_for(5, plan, CAMERA, method, channels=1)
 
 
 def _files(folder):

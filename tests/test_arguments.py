@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import nearfar
 from nearfar.errors import InputError
+from nearfar.photometry.theory import measure_in_theory
 from tests.worlds import model_transport
 
 SIZE = nearfar.Size(6, 7)
@@ -13,6 +15,11 @@ EXACT = nearfar.ExactTransport(SIZE, SIZE, (), (), WORLD.dense().transpose(1, 0,
 PREPARED = nearfar.prepare_transport(WORLD)
 OPERATOR = WORLD.as_linear_operator()
 GOOD = np.full(SIZE, 0.5)
+PLAN = nearfar.paper_plan(SIZE, 3, (3, 3))
+LIT = nearfar.given_correspondence(np.ones((*SIZE, 2)), SIZE, SIZE)
+MEASURED = measure_in_theory(
+    nearfar.paper_plan(SIZE, 3, (3, 3), offset="none", correspondence="none"), WORLD
+)
 
 
 def _bad_arrays(good):
@@ -96,6 +103,9 @@ NUMBERS = {
 }
 COUNTS = {
     "column, y": lambda y: WORLD.column(y, 1),
+    "estimate_transport, window": lambda window: nearfar.estimate_transport(
+        MEASURED, LIT, window, (3, 3)
+    ),
     "column, x": lambda x: WORLD.column(1, x),
     "natural_picture, seed": lambda seed: nearfar.natural_picture(SIZE, seed),
     "random_pattern, seed": lambda seed: nearfar.random_pattern(SIZE, seed),
@@ -145,8 +155,6 @@ def test_what_cannot_be_used_is_refused_by_a_sentence(case):
     assert len(said.split()) > 6
 
 
-PLAN = nearfar.paper_plan(SIZE, 3, (3, 3))
-LIT = nearfar.given_correspondence(np.ones((*SIZE, 2)), SIZE, SIZE)
 # What each takes, and what a newcomer gives in its place.
 OBJECTS = {
     "acquire, plan": lambda given, path: nearfar.acquire(given, path, None),
@@ -214,3 +222,35 @@ def test_a_factor_scales_pictures(operator):
         expected = factor * (operator @ GOOD)
         np.testing.assert_allclose((factor * operator) @ GOOD, expected, rtol=1e-5, atol=1e-6)
         np.testing.assert_allclose((operator * factor) @ GOOD, expected, rtol=1e-5, atol=1e-6)
+
+
+def test_one_light_in_the_place_of_several_is_told_apart():
+    for operator in (WORLD, EXACT, PREPARED):
+        with pytest.raises(
+            InputError, match=r"several are expected: give n x 6x7, `light\[None\]`"
+        ):
+            operator.pictures(GOOD)
+
+
+def test_an_exact_transport_of_direct_or_near_light_alone_is_refused():
+    part = (sparse.csr_array(np.eye(42, dtype=np.float32)),)
+    for direct, near in ((part, ()), ((), part)):
+        with pytest.raises(InputError, match="direct and near must both be given"):
+            nearfar.ExactTransport(SIZE, SIZE, direct, near, EXACT.far)
+
+
+@pytest.mark.parametrize("window", [0, 8, 100])
+def test_a_window_beyond_the_projector_is_refused(window):
+    with pytest.raises(InputError, match="window|W = "):
+        nearfar.estimate_transport(MEASURED, LIT, window, (3, 3))
+
+
+@pytest.mark.parametrize("exposure", [0, -1.0, np.nan, "1"])
+def test_an_exposure_that_cannot_be_is_refused(exposure):
+    with pytest.raises(InputError, match="exposure"):
+        nearfar.open_rig("cornell", SIZE, exposure=exposure)
+
+
+def test_progress_that_is_no_function_is_refused(tmp_path):
+    with pytest.raises(InputError, match="progress is a int"):
+        nearfar.write_capture(PLAN, tmp_path / "c.zarr", [], progress=5)

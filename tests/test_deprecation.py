@@ -1,5 +1,7 @@
 """Old ways to call public functions keep working, and warn."""
 
+from inspect import signature
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,10 @@ from nearfar.arrays import Size
 from tests.worlds import model_transport
 
 SIZE = Size(6, 6)
+
+
+def photos_of(more):
+    return {"photos": more[0]} if more else {}
 
 
 def test_a_path_that_comes_first_is_still_taken(tmp_path):
@@ -25,6 +31,9 @@ def test_a_path_that_comes_first_is_still_taken(tmp_path):
         with pytest.warns(DeprecationWarning, match=f"{name} with the path as its first") as seen:
             function(path, what, *more)
         assert seen[0].filename == __file__
+        content = next(iter(signature(function).parameters))
+        with pytest.warns(DeprecationWarning, match=f"{name} with the path as its first"):
+            function(path, *more[1:], **{content: what}, **photos_of(more), force=True)
         function(what, str(path), *more, force=True)
     assert nearfar.load_transport(tmp_path / "save_transport.zarr").camera == SIZE
 

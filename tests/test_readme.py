@@ -66,4 +66,4 @@ def test_layers_are_those_that_are_checked():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contracts = settings["tool"]["importlinter"]["contracts"]
     (layers,) = [contract["layers"] for contract in contracts if contract["type"] == "layers"]
-    assert rows == [layer.split(" : ") for layer in layers if layer != "__main__"]
+    assert rows == [layer.split(" | ") for layer in layers if layer != "__main__"]

@@ -66,7 +66,7 @@ def test_an_unknown_name_is_refused_with_all_that_there_are(install) -> None:
         ("import nosdk.api", "No module named 'nosdk'.*: install nosdk, which that package needs"),
         ("A = (", "SyntaxError"),
         ("B = 1.0", "has no attribute 'A'"),
-        ("A = 'one'", "is a str and not a float"),
+        ("A = 'one'", "is of type str, not float"),
     ],
 )
 def test_an_object_that_cannot_be_used_names_its_package(install, module, sentence) -> None:
@@ -88,5 +88,5 @@ def test_a_name_that_is_taken_is_left_out_with_a_warning(install) -> None:
     assert names == ["pi", "absent", "a"]
     assert registry["pi"] == pytest.approx(3.14159, abs=1e-5)
     said = "\n".join(str(one.message) for one in caught)
-    assert "a number 'pi', a name that nearfar has taken" in said
+    assert "a number 'pi', a name that nearfar already has" in said
     assert "a number 'a', a name that the package" in said

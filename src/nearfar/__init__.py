@@ -21,6 +21,7 @@ Open a rig
 
 Capture the photos
     acquire                show a plan on a rig and keep the photos
+    shoot_again            take some of the photos again
     write_capture          keep photos that were taken elsewhere
     open_capture           open the photos that are kept
     Capture                the photos of a plan, on the disk
@@ -119,7 +120,7 @@ if TYPE_CHECKING:
     from nearfar.transport.model import Transport
     from nearfar.transport.prepared import prepare_transport
     from nearfar.transport.store import load_transport, save_transport
-    from nearfar.workflow.acquire import acquire
+    from nearfar.workflow.acquire import acquire, shoot_again
     from nearfar.workflow.check import check_model
     from nearfar.workflow.conditioning import condition_near
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
@@ -141,6 +142,7 @@ _HOMES = {
     "parse_plan": "nearfar.plan",
     "open_rig": "nearfar.rigs.opening",
     "acquire": "nearfar.workflow.acquire",
+    "shoot_again": "nearfar.workflow.acquire",
     "write_capture": "nearfar.capture",
     "open_capture": "nearfar.capture",
     "Capture": "nearfar.capture",
@@ -186,6 +188,7 @@ __all__ = [  # noqa: RUF022
     "parse_plan",
     "open_rig",
     "acquire",
+    "shoot_again",
     "write_capture",
     "open_capture",
     "Capture",

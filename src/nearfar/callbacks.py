@@ -5,6 +5,7 @@ from inspect import signature
 from typing import Any, cast
 
 from nearfar.deprecation import warn_of
+from nearfar.errors import InputError
 
 # The type of `progress` of every function that takes long. It is called with the step and the share
 # of the step that is done, 0 to 1.
@@ -62,6 +63,11 @@ def as_report(
     """
     if progress is None:
         return ignore_progress
+    if not callable(progress):
+        raise InputError(
+            f"progress is a {type(progress).__name__}, not a function: give one that takes a "
+            f"step and the share done, such as nearfar.progress_bar yields."
+        )
     try:
         signature(progress).bind("", 0.0)
     except TypeError:

@@ -8,7 +8,7 @@ over lights.
 """
 
 from operator import index
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from array_api_compat import is_array_api_obj, is_numpy_array
@@ -91,7 +91,7 @@ def as_pixels(pixels: Any, count: int) -> slice:
 def real_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
     """Return an array of real numbers, NaN and infinities among them; lists are accepted.
 
-    An array that is one already is returned as the same object, a memory map among them.
+    An array of real numbers is returned unchanged, memory maps included.
 
     Raises
     ------
@@ -151,6 +151,11 @@ def as_lights(lights: Any, projector: Size, channels: int) -> Any:
     array = _finite_elsewhere(lights) if foreign else finite_numbers(lights, "the lights")
     if array.ndim == 0:
         raise InputError(f"the lights are one number: give n x {projector}.")
+    if tuple(array.shape) in {projector, (*projector, channels)}:
+        raise InputError(
+            f"one light of {projector} was given where several are expected: give n x {projector}, "
+            f"`light[None]` for one."
+        )
     _require_light(tuple(array.shape[1:]), projector, channels)
     return array
 
@@ -226,6 +231,7 @@ def require_instance(value: Any, expected: type, name: str, source: str) -> None
 class NoArray:
     """Base of operators, which NumPy would turn into an array of one object."""
 
+    _instead: ClassVar[str] = "multiply it with a light, or take its rows by rows(slice(None))"
     # NumPy's own numbers and arrays leave products with an operator to the operator.
     __array_ufunc__ = None
 
@@ -237,6 +243,5 @@ class NoArray:
         InputError
         """
         raise InputError(
-            f"a {type(self).__name__} is an operator and not an array: multiply it with a light, "
-            f"or take its rows by rows(slice(None))."
+            f"this {type(self).__name__} is an operator and not an array: {self._instead}."
         )

@@ -103,7 +103,8 @@ class Registry(Generic[Registered]):
             elif known.value != entry.value:
                 warnings.warn(
                     f"{_origin(entry)} adds a {self._what} {entry.name!r}, a name that "
-                    f"{_origin(known)} has taken: it is left out; uninstall one of them.",
+                    f"{_origin(known)} already has: it is left out; rename it, or uninstall "
+                    f"{_origin(entry)}.",
                     stacklevel=2,
                 )
         return added
@@ -123,8 +124,9 @@ class Registry(Generic[Registered]):
             ) from error
         if not isinstance(found, self._expected):
             raise ExtensionError(
-                f"the {self._what} {name!r} of {_origin(entry)} is a {type(found).__name__} and "
-                f"not a {self._expected.__name__}: update or uninstall that package."
+                f"the {self._what} {name!r} of {_origin(entry)} is of type "
+                f"{type(found).__name__}, not {self._expected.__name__}: update or uninstall that "
+                f"package."
             )
         return found
 

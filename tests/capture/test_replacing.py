@@ -82,9 +82,15 @@ def test_by_the_command_line(tmp_path):
     ran = run_nearfar("acquire", *options, "--reshoot", "4, 7-9")
     assert ran.status == 0, ran.err
     assert "4 photos of" in ran.out
-    for wrong in ("x", "4-", "-4", "", "3,,4"):
+    for wrong in ("x", "4-", "-4", "", "3,,4", "9-4"):
         assert run_nearfar("acquire", *options, "--reshoot", wrong).status == 2, wrong
-    assert run_nearfar("acquire", *options, "--reshoot", "1", "--resume").status == 2
+    for other in (("--resume",), ("--memory", "1GB"), ("--device", "cpu")):
+        assert run_nearfar("acquire", *options, "--reshoot", "1", *other).status == 2, other
+    another = tmp_path / "another.json"
+    run_nearfar("plan", "--projector", "16x16", "--near", 5, "--far", "3x3", "-o", another)
+    ran = run_nearfar("acquire", another, *options[1:], "--reshoot", "1")
+    assert ran.status == 1
+    assert "is of another plan" in ran.err
     ran = run_nearfar("acquire", *options, "--reshoot", "9999")
     assert ran.status == 1
     assert "has no photo 9999" in ran.err

@@ -66,7 +66,7 @@ def test_photos_that_settle_no_place_need_a_correspondence(
         ("-1GB", "2GB or 500MB"),
         ("nanGB", "2GB or 500MB"),
         ("infGB", "2GB or 500MB"),
-        ("1MB", "too few for one row"),
+        ("1MB", "too little for one row"),
     ],
 )
 def test_a_memory_that_cannot_be(
@@ -82,7 +82,7 @@ def test_a_memory_that_cannot_be(
         (("--transport", "{capture}"), "both capture and transport"),
         (("--transport", "{there}"), "--force"),
         (("--transport", "{out}", "--memory", "some"), "2GB or 500MB"),
-        (("--transport", "{out}", "--memory", "1MB"), "too few for one row"),
+        (("--transport", "{out}", "--memory", "1MB"), "too little for one row"),
         (("--transport", "{missing}"), "folder"),
     ],
 )

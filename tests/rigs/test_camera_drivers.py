@@ -92,7 +92,7 @@ def test_a_broken_driver_hides_no_other(add, tmp_path):
     assert "pinhole" in {camera.driver for camera in found}
     for words in (
         "the camera driver 'absent' of nearfar cannot be loaded (ModuleNotFoundError",
-        "the camera driver 'wrong' of nearfar is a function and not a CameraDriver",
+        "the camera driver 'wrong' of nearfar is of type function, not CameraDriver",
         "the camera driver 'blind' cannot search for cameras (OSError: no light at all)",
     ):
         (told,) = [sentence for sentence in unable if words in sentence]
@@ -149,6 +149,8 @@ def test_a_driver_that_lists_cameras_under_another_name_is_named(add):
         np.zeros((4, 5, 1)),
         np.zeros((4, 5, 1), np.int32),
         np.zeros(20, np.uint16),
+        np.zeros((4, 5), np.uint16),
+        np.zeros((4, 5, 2), np.uint16),
         np.zeros((0, 5, 1), np.uint8),
         None,
     ],
@@ -163,3 +165,5 @@ def test_a_driver_that_gives_no_photo_is_named(frame):
     for frames in (1, 2):
         with pytest.raises(DeviceError, match=r"the odd camera gives frames of .* its driver must"):
             Odd("the odd camera", frames=frames, bracket=(1.0,)).photograph()
+    with pytest.raises(DeviceError, match=r"the odd camera gives frames of "):
+        Odd("the odd camera").take_surely()

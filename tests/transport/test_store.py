@@ -297,7 +297,7 @@ def test_the_camera_of_a_dense_transport_is_told_by_its_rows(tmp_path):
     ("array", "message"),
     [
         (np.ones((12, 13)), "13 columns"),
-        (np.ones((13, 12)), "13 rows, which tell no camera size"),
+        (np.ones((13, 12)), "13 rows, from which no camera size"),
         (np.ones((12, 12, 5)), "a dense transport is"),
         (np.full((12, 12), np.nan), "NaN"),
         (np.ones(12), "a dense transport is"),

@@ -99,7 +99,7 @@ def test_a_camera_that_is_not_linear_is_told():
             return np.rint(16383 * share**0.7).astype(np.uint16)
 
     found = calibrate(_rig(camera=Bent))
-    assert any("miss a line" in note for note in found.notes)
+    assert any("deviate from a straight line" in note for note in found.notes)
 
 
 def test_a_bright_room_is_told():

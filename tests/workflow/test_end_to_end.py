@@ -251,7 +251,7 @@ def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
 @pytest.mark.parametrize("method", ["joint", "paper"])
 def test_too_little_memory_is_said_before_any_work(tmp_path, world, method):
     capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world))
-    with pytest.raises(InputError, match=r"too few for one row.*`memory=\d00000000` or more"):
+    with pytest.raises(InputError, match=r"too little for one row.*`memory=\d00000000` or more"):
         reconstruction.reconstruct(capture, method=method, memory=10**6)
 
 

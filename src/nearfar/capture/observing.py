@@ -58,6 +58,8 @@ def with_predicate(
     observers: Sequence[CaptureObserver],
     enough: Callable[[int, NDArray[Any]], bool] | None,
     function: str,
+    *,
+    stacklevel: int = 4,
 ) -> Sequence[CaptureObserver]:
     """Add a predicate, given as the deprecated `enough`, to the observers; warn of it.
 
@@ -68,12 +70,14 @@ def with_predicate(
         Returns whether the capture ends with a photo, by its number and the photo.
     function : str
         The public function that it was given to.
+    stacklevel : int
+        As `warnings.warn` takes it; 4 is the caller of the function that calls this one.
     """
     if enough is None:
         return observers
     warn_of(
         f"enough of {function}",
         "give observers, whose method after_photo returns a nearfar.capture.Verdict",
-        stacklevel=4,
+        stacklevel=stacklevel,
     )
     return [*observers, _Predicate(enough)]

@@ -97,7 +97,7 @@ class Capture:
         return f"<nearfar capture: {len(self.plan.patterns)} photos of {self.camera}, {self.path}>"
 
     def _repr_html_(self) -> str:
-        """Show the capture in a notebook: its first photo and its brightest."""
+        """Show the capture in a notebook: its first photo, and white and black."""
         step = -(-max(self.camera) // THUMBNAIL_PIXELS)
         names = {"first photo": 0}
         if (found := white_and_black(self.plan)) is not None:
@@ -175,7 +175,7 @@ def open_capture(path: AnyPath) -> Capture:
     times, saturated = read_array(group, "time"), read_array(group, "saturated")
     full_scale, rig = attributes.get("full_scale"), attributes.get("rig")
     exposure = attributes.get("exposure")
-    # Captures that were imported have none, and older ones.
+    # Imported captures and older ones have none.
     conditions: Any = attributes.get("conditions")
     alarms = attributes.get("alarms")
     if (

@@ -98,6 +98,7 @@ class CaptureWriter:
         count = len(plan.patterns)
         self._called = [f"photo {i}" for i in range(count)]
         if names:
+            check_count(len(names), count, more=len(names) > count)
             self._called = [
                 f"{photo} ({name})" for photo, name in zip(self._called, names, strict=True)
             ]
@@ -346,10 +347,10 @@ def write_capture(
     <nearfar capture: 52 photos of 8x8, own.zarr>
     """
     require_instance(plan, Plan, "plan", "nearfar.read_plan")
-    observers = with_predicate(observers, enough, "nearfar.write_capture")
+    # One stack frame more than elsewhere: the decorator that accepts either order of arguments.
+    observers = with_predicate(observers, enough, "nearfar.write_capture", stacklevel=5)
     path = Path(path)
     count = len(plan.patterns)
-    # One stack frame more than elsewhere: the decorator that accepts either order of arguments.
     report = as_report(progress, count, stacklevel=5)
     with new_output(path, force=force) as partial:
         writer = CaptureWriter(

@@ -109,7 +109,14 @@ def acquire(
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
     if reshoot is not None:
-        given = {"--until": until, "--transport": transport, "--resume": resume, "--force": force}
+        given = {
+            "--until": until,
+            "--transport": transport,
+            "--memory": memory,
+            "--device": device,
+            "--resume": resume,
+            "--force": force,
+        }
         _refuse(given, "does not go with --reshoot.")
         take_again(plan_file, output, rig, photo_numbers(reshoot), quiet=quiet)
         return

@@ -37,7 +37,8 @@ def faults_in_sentences() -> Iterator[None]:
         _discard_stdout()
         sys.exit(1)
     except MemoryError as error:
-        _fail(f"there is not enough memory ({error}): choose smaller sizes.")
+        reason = f" ({error})" if str(error) else ""
+        _fail(f"there is not enough memory{reason}: choose smaller sizes.")
     except (typer.Exit, typer.BadParameter):
         raise
     except OSError as error:

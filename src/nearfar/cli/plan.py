@@ -86,7 +86,7 @@ def plan(
 
     expected = None
     if look is not None and photos is None:
-        raise typer.BadParameter("--look is of plans chosen for --photos N")
+        raise typer.BadParameter("--look goes with --photos N only")
     if photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
         typical, noise = (TYPICAL_SCENES, NOISE) if look is None else _looked_at(look, projector)
@@ -160,4 +160,6 @@ def _refuse_with_photos(
     if offset not in (None, "reference"):
         raise typer.BadParameter("--photos chooses plans by reference: leave --offset out")
     if correspondence not in (None, "phase"):
-        raise typer.BadParameter("--photos needs no photos for correspondence: leave it out")
+        raise typer.BadParameter(
+            "--photos needs no photos for correspondence: leave --correspondence out"
+        )

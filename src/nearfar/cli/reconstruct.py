@@ -7,6 +7,7 @@ import typer
 
 from nearfar.arrays import parse_bytes
 from nearfar.cli.choices import choice
+from nearfar.cli.flags import with_flags
 from nearfar.cli.options import (
     CapturePath,
     Force,
@@ -50,7 +51,7 @@ def reconstruct(
     memory: Annotated[
         str,
         typer.Option(
-            help="Memory to work in: blocks of camera rows that fit.",
+            help="Memory to work in: tiles of camera rows that fit.",
             metavar="2GB",
         ),
     ] = "2GB",
@@ -71,9 +72,7 @@ def reconstruct(
     ] = None,
     resume: Annotated[
         bool,
-        typer.Option(
-            "--resume", help="Go on with the blocks of a reconstruction that was stopped."
-        ),
+        typer.Option("--resume", help="Go on with the tiles of a reconstruction that was stopped."),
     ] = False,
     report: ReportPath = None,
     force: Force = False,
@@ -124,4 +123,5 @@ def _write_report(report: Path, output: Path, capture: "Capture", *, force: bool
     from nearfar.report.reconstruction import reconstruction_page
     from nearfar.transport.store import open_transport
 
-    write_page(report, reconstruction_page(open_transport(output), capture), force=force)
+    text = reconstruction_page(open_transport(output), capture, with_flags)
+    write_page(report, text, force=force)

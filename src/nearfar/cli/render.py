@@ -62,7 +62,10 @@ def render(
     check_output(output, force=force)
     from_file = is_mitsuba(Path(scene))
     if not from_file and (samples, seed) != (None, None):
-        raise typer.BadParameter("a built-in scene is computed without chance.", param_hint=scene)
+        raise typer.BadParameter(
+            "a built-in scene is computed without chance: leave it out.",
+            param_hint="--samples" if samples is not None else "--seed",
+        )
     with progress_bar("rendering", quiet=quiet) as report:
         if from_file:
             transport = _render_file(scene, projector, camera, samples, seed or 0, report)

@@ -12,17 +12,23 @@ def take_again(plan_file: Path, output: Path, rig: str, numbers: list[int], *, q
     """Take photos of a finished capture again."""
     from nearfar.capture import open_capture
     from nearfar.plan import read_plan
+    from nearfar.plan.checks import with_checks
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import shoot_again
 
     made, before = read_plan(plan_file), open_capture(output)
+    if "check" in before.plan.counts and "check" not in made.counts:
+        # It was taken with --until, which added them to the plan.
+        made = with_checks(made)
     with (
         progress_bar("opening the rig", quiet=quiet) as report,
         open_rig(
             rig, made.projector, exposure=before.exposure, progress=report, on_alarm=warn
         ) as opened,
     ):
-        shoot_again(before.plan, output, opened, numbers, progress=report)
+        for note in opened.notes:
+            warn(note)
+        shoot_again(made, output, opened, numbers, progress=report)
     say(f"{len(numbers)} photos of {output} taken again", quiet=quiet)
 
 
@@ -31,7 +37,8 @@ def photo_numbers(text: str) -> list[int]:
     found: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()):
+        is_range = first.isdecimal() and last.isdecimal() and int(first) <= int(last)
+        if not (is_range if dash else first.isdecimal()):
             raise typer.BadParameter(
                 f"{part.strip()!r} is no photo's number: write them as 12,40-60.",
                 param_hint="--reshoot",

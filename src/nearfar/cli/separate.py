@@ -172,7 +172,7 @@ def separate(
         else:
             assert rig is not None
             taken, rig_says = steps.shoot_photos(rig, projector, method, report)
-            described, exposure = {"rig": rig_says}, rig_says["transport_exposure"]
+            described, exposure = {"rig": rig_says}, rig_says.get("transport_exposure", 1.0)
         found = take_apart(
             taken, method.separate, progress=lambda share: report("separating", share)
         )

@@ -92,7 +92,7 @@ def correspond_by_stripes(
     rows = slice(0, photos.camera.height) if rows is None else rows
     camera = size_of_rows(photos, rows)
     down = _axis(photos, "black row", rows, progress)
-    across = _axis(photos, "black column", rows, progress)
+    across = _axis(photos, "black column", rows, progress, plan.projector.height)
 
     false_alarm: Floats = np.zeros(camera.pixels)
     for axis, length in ((down, plan.projector.height), (across, plan.projector.width)):
@@ -115,11 +115,17 @@ def correspond_by_stripes(
     )
 
 
-def _axis(photos: Photos, kind: str, rows: slice, progress: Callable[[int], None] | None) -> _Axis:
+def _axis(
+    photos: Photos,
+    kind: str,
+    rows: slice,
+    progress: Callable[[int], None] | None,
+    before: int = 0,
+) -> _Axis:
     numbers = _numbers(photos.plan, kind)
     removed, white = _marginal(photos, [numbers[s] for s in sorted(numbers)], rows)
     if progress is not None:
-        progress(len(numbers))
+        progress(before + len(numbers))
     return _peak(removed, white)
 
 

@@ -119,9 +119,9 @@ class InverseDoesNotAdd:
 
     def __str__(self) -> str:
         return (
-            f"photo {self.photo} and that of the inverse pattern sum to {self.share:+.1%} of white "
-            f"off white and black, which have not changed: the response is not linear, or "
-            f"something is saturated; run nearfar calibrate."
+            f"photo {self.photo} and that of its inverse pattern sum to white and black "
+            f"{self.share:+.1%} of white, though white and black have not changed: the response is "
+            f"not linear, or something is saturated; run nearfar calibrate."
         )
 
 
@@ -134,8 +134,7 @@ class LightChange:
     light : {"lamp", "ambient", "any"}
         Exposure or lamp; ambient light; or either, for a while.
     share : float
-        Size of the change, as a share of the light before it; of ambient light, as a share of
-        white.
+        Size of the change: of the lamp as a share of its light before, else as a share of white.
     """
 
     light: Literal["lamp", "ambient", "any"]
@@ -221,9 +220,9 @@ class LightChangedWhileStopped:
 
     def __str__(self) -> str:
         return (
-            f"photo {self.photo}, of {self.pattern}, is {self.share:+.1%} of white off that of "
-            f"before the capture was resumed: lamp, exposure or ambient light have changed; set "
-            f"them as they were, or start anew with `force=True`."
+            f"photo {self.photo}, of {self.pattern}, differs by {self.share:+.1%} of white from "
+            f"the one before the capture was stopped: lamp, exposure or ambient light has changed; "
+            f"set them as they were, or start anew with `force=True`."
         )
 
 

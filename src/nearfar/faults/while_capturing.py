@@ -44,7 +44,7 @@ MAXIMUM_ROWS = 256
 
 
 class FaultsWhileCapturing:
-    """Finds faults photo by photo; each sort of fault is found once.
+    """Finds faults photo by photo; each sort of fault is reported once.
 
     Parameters
     ----------

@@ -85,8 +85,8 @@ def responses_of_pairs(plan: Plan) -> tuple[RealBasis, Integers, Floats]:
     pairs = find_pairs(plan)
     if all(pair.frequency != DC for pair in pairs):
         raise InputError(
-            "the plan shows no white with its inverse, black, of which all light is a share: plan "
-            "with a far band, which white belongs to."
+            "the plan has no pair of white and black, against which all light is measured: plan "
+            "with a far band, which contains white."
         )
     basis, place = basis_of([(pair.frequency, pair.sine) for pair in pairs], plan.projector)
     places = np.array([place[pair.frequency, pair.sine] for pair in pairs])

@@ -133,7 +133,7 @@ def comparison_page(comparison: Comparison) -> str:
         "Every method sees the same scene, camera and noise, and finds correspondence itself where "
         "it needs it; photos count stripes, inverses, references and black. The paper's method "
         "takes the best of several far bands, compressive light transport the regularisation that "
-        "the true transport likes best."
+        "fits the true transport best."
     )
     body = [
         f"<h1>Methods compared on {escape(comparison.scene)}</h1>",
@@ -148,8 +148,8 @@ def comparison_page(comparison: Comparison) -> str:
         ("Equal photos", "Each photo is exposed alike.", comparison.equal_photos),
         (
             "Equal total exposure",
-            "Exposure in photos' worth: a method of many photos exposes each for less, one of few "
-            "for longer, its well as much deeper.",
+            "Exposure is counted in photos: a method with many photos exposes each for less time, "
+            "one with few for longer, with a full well that is deeper in proportion.",
             comparison.equal_exposure,
         ),
     ):

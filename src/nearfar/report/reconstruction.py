@@ -1,7 +1,7 @@
 """The report of a reconstruction: pictures, maps, error bars, and its provenance."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from html import escape
 from typing import Any
 
@@ -32,7 +32,9 @@ PURPOSES = {
 }
 
 
-def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
+def reconstruction_page(
+    stored: StoredTransport, capture: Capture, reword: Callable[[str], str] = str
+) -> str:
     """Return the report of a transport as one self-contained HTML page.
 
     Parameters
@@ -40,6 +42,8 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
     stored : StoredTransport
     capture : Capture
         The capture that it was reconstructed from.
+    reword : callable, optional
+        Rewords a fault, such as for readers who use the command line.
 
     Raises
     ------
@@ -69,7 +73,10 @@ def reconstruction_page(stored: StoredTransport, capture: Capture) -> str:
         ]
     )
     faults = [*map(str, find_faults(capture, stored.provenance)), *capture.alarms]
-    thinned = "" if step == 1 else f" One row and column of the camera in {step} is shown."
+    faults = [reword(fault) for fault in faults]
+    thinned = (
+        "" if step == 1 else f" Only one in {step} of the rows and columns of the camera is shown."
+    )
     body = f"""
 <h1>{escape(stored.path.name)}</h1>
 <p>The light transport of a scene, reconstructed from the photos in

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from nearfar.rigs.cameras.driver import FoundCamera
 from nearfar.rigs.cameras.registry import CAMERAS
-from nearfar.rigs.screens import Monitor
+from nearfar.rigs.screens import Monitor, choose_monitor
 
 ADVICE = """\
 # Exposure in seconds, rounded to whole refreshes of the projector; "auto" fits it to white.
@@ -21,7 +21,9 @@ BRACKET = """\
 
 
 def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> str:
-    """Write a RIG.toml for the last monitor and the first camera; the others stand as comments.
+    """Write a RIG.toml for the second monitor, or the only one, and the first camera.
+
+    The others stand in it as comments.
 
     Parameters
     ----------
@@ -42,8 +44,7 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
         "# Name or index, as nearfar devices lists them.",
     ]
     if monitors:
-        # The first monitor is usually the one that people work at.
-        chosen = monitors[min(1, len(monitors) - 1)]
+        chosen = choose_monitor(monitors, None)
         named = [m.name for m in monitors].count(chosen.name) == 1
         lines.append(f"monitor = {_quoted(chosen.name) if named else chosen.index}  # {chosen}")
         lines += [f"# monitor = {m.index}  # {m}" for m in monitors if m != chosen]

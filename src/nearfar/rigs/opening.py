@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from nearfar.arrays import AnyPath, AnySize, Size, as_size
+from nearfar.checks import as_number
 from nearfar.errors import InputError, MissingFileError
 from nearfar.progress import Report
 from nearfar.rigs.calibration import calibration_folder, read_calibration
@@ -72,6 +73,13 @@ def open_rig(
     ...     again = nearfar.acquire(plan, "again.zarr", rig)
     """
     projector = as_size(projector, "projector")
+    if exposure is not None and as_number(exposure, "the exposure") <= 0:
+        raise InputError(f"the exposure is {exposure} seconds: give one above 0.")
+    if not isinstance(rig, str | os.PathLike):
+        raise InputError(
+            f"a {type(rig).__name__} was given for the rig: give the name of a scene, or the path "
+            f"of a transport or of a RIG.toml."
+        )
     name, path = os.fspath(rig), Path(rig)
     table: SimulatedTable | RealTable
     if name in SCENES:
@@ -169,7 +177,7 @@ def open_real_rig(
             scale=table.projector.scale,
             brightness=table.projector.brightness,
             settle=table.projector.settle,
-            exposure=exposure or _exposure_of(table),
+            exposure=_exposure_of(table) if exposure is None else exposure,
             on_alarm=on_alarm,
             on_start=on_start,
         )

@@ -1,7 +1,7 @@
 """The adjoint of a transport as an operator: ``transport.H @ image``."""
 
 from dataclasses import dataclass
-from typing import Generic, Protocol, Self, TypeVar
+from typing import ClassVar, Generic, Protocol, Self, TypeVar
 
 from nearfar.arrays import Floats, Size
 from nearfar.checks import NoArray
@@ -52,6 +52,7 @@ class AdjointTransport(NoArray, Generic[Of]):
     """
 
     of: Of
+    _instead: ClassVar[str] = "multiply it with an image of the camera"
 
     @property
     def H(self) -> Of:  # noqa: N802

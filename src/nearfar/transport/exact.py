@@ -73,6 +73,11 @@ class ExactTransport(NoArray):
                 f"{self.name}: a matrix of {rows} x {columns} does not fit a camera of "
                 f"{self.camera} and a projector of {self.projector}."
             )
+        if len(self.direct) != len(self.near):
+            raise InputError(
+                f"{self.name}: direct and near must both be given, a matrix for each channel, or "
+                f"neither."
+            )
         for part in (self.direct, self.near):
             if len(part) not in (0, channels):
                 raise InputError(f"{self.name}: its components differ in their channels.")

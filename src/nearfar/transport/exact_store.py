@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
+from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import (
@@ -51,6 +52,7 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
     >>> nearfar.load_exact("truth.zarr").projector
     Size(height=8, width=8)
     """
+    require_instance(transport, ExactTransport, "transport", "nearfar.load_exact")
     path = Path(path)
     attributes = {
         "name": transport.name,
@@ -204,13 +206,14 @@ def _as_matrices(
         raise InputError(
             f"{source} has {columns} columns"
             + (f", the projector of {projector} has {projector.pixels}" if projector else "")
-            + ": name the projector that it is for."
+            + ": give `projector`, the size that it is for."
         )
     camera = camera or _finer(projector, rows)
     if camera is None or camera.pixels != rows:
         raise InputError(
-            f"{source} has {rows} rows, which tell no camera size for a projector of {projector}: "
-            f"give it as camera in an .npz, or under [scene] in RIG.toml."
+            f"{source} has {rows} rows, from which no camera size follows for a projector of "
+            f"{projector}: give `camera`, store it in the .npz as camera, or set it under [scene] "
+            f"in RIG.toml."
         )
     return np.ascontiguousarray(np.moveaxis(dense, 2, 0), dtype=np.float32), projector, camera
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from nearfar.arrays import Floats
+from nearfar.checks import as_place
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
 from nearfar.illumination.real_basis import RealBasis
@@ -140,7 +141,7 @@ class Plots:
                 drawn.fill_between(
                     np.arange(width), low, level + off, alpha=0.25, color=drawn_line.get_color()
                 )
-        drawn.set(xlabel=f"projector column, row {line}", ylabel="answer, photo units")
+        drawn.set(xlabel=f"projector column, row {line}", ylabel="transport, photo units")
         most = max(float(np.abs(part).max()) for part in rows)
         drawn.set_ylim(bottom=most * 10.0**-LINE_DECADES if most > 0 else None)
         drawn.set_title(f"camera pixel ({y}, {x})")
@@ -180,10 +181,9 @@ class Plots:
         return _bare(_logarithm(_axes(ax), picture), f"lit by projector pixel ({y}, {x})")
 
     def _pixel(self, y: int, x: int) -> slice:
-        height, width = self._transport.camera
-        if not (0 <= y < height and 0 <= x < width):
-            raise InputError(f"({y}, {x}) is no pixel of the camera of {height}x{width}.")
-        return slice(y * width + x, y * width + x + 1)
+        camera = self._transport.camera
+        y, x = as_place(y, x, camera, "camera")
+        return slice(y * camera.width + x, y * camera.width + x + 1)
 
 
 def _axes(ax: "Axes | None") -> "Axes":
@@ -203,7 +203,7 @@ def _logarithm(ax: "Axes", values: Floats) -> "Axes":
     shown = np.log10(np.maximum(np.abs(values), 1e-30))
     high = float(shown.max())
     image = ax.imshow(shown, cmap="magma", vmin=high - COLOUR_SCALE_DECADES, vmax=high)
-    ax.figure.colorbar(image, ax=ax, label="log10 of the answer")
+    ax.figure.colorbar(image, ax=ax, label="log10 of the transport")
     return ax
 
 

@@ -10,7 +10,7 @@ lights are (P + 1, L, 1 or channels), whose last projector pixel is dark.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from array_api_compat import device as device_of
@@ -51,6 +51,8 @@ class PreparedTransport(NoArray):
     held : int
         How many values are gathered at once.
     """
+
+    _instead: ClassVar[str] = "multiply it with a light"
 
     projector: Size
     camera: Size

@@ -328,7 +328,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
         layouts = [(array.shape, array.dtype.kind) for array in quality.values()]
         if layouts != [(each[:2], "f"), (each[:2], "b")]:
             raise UnreadableFileError(
-                f"{path} is damaged: what tells how far to trust it does not fit the transport; "
+                f"{path} is damaged: its quality maps do not fit the transport; "
                 f"reconstruct it again."
             )
     return StoredTransport(
@@ -369,8 +369,7 @@ def _posterior_fits(
 
 def _misfit(path: Path) -> UnreadableFileError:
     return UnreadableFileError(
-        f"{path} is damaged: what its error bars follow from does not fit the transport; "
-        f"reconstruct it again."
+        f"{path} is damaged: its posterior does not fit the transport; reconstruct it again."
     )
 
 

@@ -2,7 +2,7 @@
 
 A server waits for a connection that has sent no request yet, or part of one, for a client that
 does not read its response, and for the next request of a connection that was answered. The last
-are closed first, and of the others the oldest.
+are closed first, then the others; of each, those that have waited longest.
 """
 
 import asyncio

@@ -3,6 +3,7 @@
 Only this machine is served by default; on other addresses a token is required.
 """
 
+import errno
 import logging
 import secrets
 import socket
@@ -121,7 +122,7 @@ def _listen(listening: ListeningAddress) -> socket.socket:
         listener.listen(MAXIMUM_CONNECTIONS)
     except OSError as error:
         listener.close()
-        if isinstance(error, socket.gaierror):
+        if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
             raise InputError(
                 f"{listening.host} is no address of this machine ({error.strerror}): give "
                 f"{LOOPBACK}, or 0.0.0.0 for all that it has."

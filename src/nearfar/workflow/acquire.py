@@ -143,7 +143,7 @@ def shoot_again(
     rig: Rig,
     numbers: Sequence[int],
     *,
-    progress: Report = ignore_progress,
+    progress: Report | None = None,
 ) -> Capture:
     """Take chosen photos of a finished capture again; all of them are replaced, or none.
 
@@ -171,7 +171,14 @@ def shoot_again(
         another shape or type than the others.
     NearfarError
         As `nearfar.capture.replacing.replace_photos`.
+
+    Examples
+    --------
+    >>> with nearfar.open_rig("scene.npy", size) as rig:
+    ...     nearfar.shoot_again(plan, "capture.zarr", rig, [3, 4])
+    <nearfar capture: 52 photos of 8x8, capture.zarr>
     """
+    report = progress or ignore_progress
     _require(plan, rig)
     capture = open_capture(path)
     if capture.plan.patterns != plan.patterns[: len(capture.plan.patterns)]:
@@ -191,7 +198,7 @@ def shoot_again(
         photos,
         conditions=rig.conditions,
         alarms=lambda: rig.alarms,
-        progress=progress,
+        progress=report,
     )
 
 

@@ -143,19 +143,20 @@ def calibrate(rig: RealRig, progress: Report = ignore_progress) -> Findings:
     sensor, noise = _noise([*photos.values(), *([dark] if dark else [])], black, full)
     if line is None:
         notes.append(
-            "the camera's own line and its black level are not known, since its exposure cannot be "
-            "set from here, or only to what is too bright: let it be linear, such as by raw files."
+            "the camera's linearity and black level could not be measured, because its exposure "
+            "cannot be set from here, or every setting is too bright: make sure that its levels "
+            "are linear, for instance by raw files."
         )
     elif line.worst > MAXIMUM_LINE_ERROR:
         notes.append(
-            f"the camera's levels miss a line by up to {line.worst:.1%} of full scale: use raw or "
-            f"uncompressed files, and turn its gamma off."
+            f"the camera's levels deviate from a straight line by up to {line.worst:.1%} of full "
+            f"scale: use raw or uncompressed files, and turn its gamma off."
         )
     checked = _checked(rig, response, lit, black_light, report)
     residual = float(np.abs(checked[:, 1] - checked[:, 0]).max())
     if residual > MAXIMUM_RAMP_ERROR:
         notes.append(
-            f"the linearised ramp still misses a line by up to {residual:.1%} of white: the "
+            f"the linearised ramp still deviates from a line by up to {residual:.1%} of white: the "
             f"projector's response depends on the picture, so turn its picture enhancement off."
         )
     ambient = float(max(0.0, (black_light.mean() - black) / full))

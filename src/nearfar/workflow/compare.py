@@ -2,8 +2,8 @@
 
 Every method sees the same scene, camera and noise. All photos count: stripes, inverses, references
 and black too. One unit of exposure is a photo in which the brightest camera pixel comes to the full
-well under white. At equal total exposure a method of fewer photos exposes each for longer, its well
-as much deeper, and a method of many for less.
+well under white. At equal total exposure a method with fewer photos exposes each for longer, with a
+full well deeper in proportion, and a method with many for less.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -157,7 +157,7 @@ def compare(
     jobs = _jobs(scene.projector, methods, budgets)
     done: list[tuple[Budget, Trial]] = []
     for number, (method, budget) in enumerate(jobs):
-        report(method, number / len(jobs))
+        report("comparing", number / len(jobs))
         trials = [
             _judge(method, budget, attempt, lights, truth)
             for attempt in RIVALS[method].attempts(bench, budget)

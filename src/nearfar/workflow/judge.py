@@ -199,7 +199,7 @@ def _pairs(folder: Path) -> dict[str, tuple[Path, Path]]:
             both = halves.setdefault(name, {})
             if half in both:
                 raise InputError(
-                    f"{folder} has both {both[half].name} and {path.name}: leave one of them."
+                    f"{folder} has both {both[half].name} and {path.name}: remove one of them."
                 )
             both[half] = path
     if not halves:

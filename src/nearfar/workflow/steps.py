@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from nearfar.arrays import AnySize, as_size
 from nearfar.capture import Capture
-from nearfar.checks import require_instance
+from nearfar.checks import as_count, require_instance
 from nearfar.correspondence import (
     Correspondence,
     method_named,
@@ -167,6 +167,12 @@ def estimate_transport(
     require_instance(measurements, Measurements, "measurements", "nearfar.measure")
     require_instance(correspondence, Correspondence, "correspondence", "nearfar.correspond")
     report, far = progress or ignore_progress, as_size(far, "far")
+    window, projector = as_count(window, "window", 1), measurements.projector
+    if window > min(projector) or far.height > projector.height or far.width > projector.width:
+        raise InputError(
+            f"W = {window} and a far band of {far} do not fit a projector of {projector}: choose "
+            f"smaller ones."
+        )
     if not correspondence.lit.any():
         raise InputError(
             "the correspondence has no camera pixel with direct light, so there is nothing to "

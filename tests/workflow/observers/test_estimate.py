@@ -265,6 +265,12 @@ def test_photos_that_cannot_be_measured_are_kept(rig, tmp_path):
     )
 
 
+@pytest.mark.parametrize("options", [{"method": "paper"}, {"square": True}])
+def test_options_that_it_would_not_follow_are_refused(options):
+    with pytest.raises(InputError, match="while capturing, only"):
+        EstimateObserver(PLANS["reference"], 1.0, ReconstructionOptions(**options))
+
+
 def test_complex_patterns_are_refused():
     with pytest.raises(PlanError):
         EstimateObserver(paper_plan(SIZE, 8, Size(5, 5), offset="none"), 1.0)

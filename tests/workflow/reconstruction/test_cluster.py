@@ -263,8 +263,10 @@ def test_what_cannot_be_is_said_before_any_work(cluster, world, tmp_path, monkey
         tried("nonsense://x")
     with pytest.raises(ClusterError, match=r"has 2\.0 GB: give a smaller `memory`"):
         tried(memory=10**10)
-    with pytest.raises(InputError, match="too few for one row"):
+    with pytest.raises(InputError, match="too little for one row"):
         tried(memory=10**6)
+    with pytest.raises(InputError, match="workers of a scheduler take one each"):
+        tried(tiles_at_once=2)
     with pytest.raises(ExistingOutputError):
         tried(output="c.zarr")
     unlit = np.full((*CAMERA, 2), np.nan, np.float32)

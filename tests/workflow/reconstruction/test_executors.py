@@ -1,6 +1,8 @@
 """Tiles worked at one after another, or side by side; options that cannot be."""
 
+import re
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +115,14 @@ def test_tiles_share_the_memory(capture):
         memory=2 * memory_for(4, capture.plan, CAMERA, "joint", channels=1), tiles_at_once=2
     )
     assert tiling_of(capture, options, given=False).rows == 4
+    # What is advised for several at once is enough for them.
+    with pytest.raises(
+        InputError, match=r"in each of 4 tiles at once: give `memory=(\d+)`"
+    ) as said:
+        tiling_of(capture, replace(options, memory=10**9, tiles_at_once=4), given=False)
+    advised = int(re.search(r"`memory=(\d+)`", str(said.value))[1])
+    enough = replace(options, memory=advised, tiles_at_once=4)
+    assert tiling_of(capture, enough, given=False).rows >= 1
     one, _ = nearfar.reconstruct(capture)
     assert one.camera == CAMERA
 

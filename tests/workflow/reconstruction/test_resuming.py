@@ -3,6 +3,7 @@
 import random
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,13 @@ from nearfar.arrays import Size
 from nearfar.capture import open_capture
 from nearfar.capture.replacing import replace_photos
 from nearfar.correspondence import Correspondence
-from nearfar.errors import ExistingOutputError, InputError, KeptInterrupt, MissingFileError
+from nearfar.errors import (
+    ExistingOutputError,
+    InputError,
+    KeptInterrupt,
+    MissingFileError,
+    UselessPhotosError,
+)
 from nearfar.plan.choose import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -151,6 +158,28 @@ def test_photos_that_were_taken_again_are_another_capture(capture, memory, tmp_p
     again = replace_photos(source, [3], [capture.photos[3]])
     with pytest.raises(InputError, match="another capture"):
         into(path, again, memory=memory, resume=True)
+
+
+def test_what_is_refused_says_nothing_of_tiles_of_an_earlier_job(capture, memory, tmp_path):
+    path = tmp_path / "t.zarr"
+    with pytest.raises(KeptInterrupt):
+        into(path, capture, memory=memory, progress=_stop_after(20))
+    with pytest.raises(ExistingOutputError) as there:
+        into(path, capture, memory=memory)
+    with pytest.raises(InputError, match="was started with another") as other:
+        into(path, capture, memory=memory, half=True, resume=True)
+    for refused in (there, other):
+        assert "kept in" not in str(refused.value)
+
+
+def test_a_capture_without_direct_light_leaves_nothing(tmp_path):
+    dark = model_transport(Size(16, 20), Size(12, 6), window=5, far=Size(3, 3), channels=1)
+    dark = replace(dark, direct=0 * dark.direct, near=0 * dark.near)
+    rig = SimulatedRig(dark, "dark", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
+    shot = acquire(choose_plan(Size(16, 20), 50)[0], tmp_path / "c.zarr", rig)
+    with pytest.raises(UselessPhotosError, match=r"no direct light .* to reconstruct\.$"):
+        into(tmp_path / "t.zarr", shot)
+    assert [path.name for path in tmp_path.iterdir()] == ["c.zarr"]
 
 
 def test_what_was_stopped_before_its_first_block_leaves_nothing(capture, memory, tmp_path):

@@ -38,7 +38,7 @@ def test_as_many_rows_are_taken_as_fit(method, rows):
             tiling = tile_rows(plan, CAMERA, 3, estimator, 2, memory + bytes_more)
             assert (tiling.rows, tiling.halo, tiling.height) == (expected, 2, 60)
         else:
-            with pytest.raises(InputError, match="too few for one row"):
+            with pytest.raises(InputError, match="too little for one row"):
                 tile_rows(plan, CAMERA, 3, estimator, 2, memory + bytes_more)
 
 

@@ -19,7 +19,7 @@ FLOAT32_BYTES = 4
 
 @dataclass(frozen=True, eq=False)
 class JointEstimator(Estimator):
-    """Direct, near- and far-range light in one model, by a prior and by neighbours.
+    """Estimates direct, near- and far-range light together, from a prior and from neighbours.
 
     It takes any plan with a white photo and another frequency.
 

@@ -48,7 +48,7 @@ FEATURE_TYPES: dict[type, list[str]] = {
 SETTINGS = """\
 # Rows x columns to read, from the middle of the sensor.
 # region = "1080x1440"
-# Of those that are not packed, the one of most bits is chosen.
+# Left out: the format with the most bits that is not packed, Bayer before Mono.
 # pixel_format = "Mono12"
 # "software", "free" (the camera runs by itself), or the line of a hardware trigger such as "Line1".
 # trigger = "software"
@@ -87,7 +87,8 @@ class AravisCamera(Camera):
     region : Size, optional
         Rows and columns to read, from the middle of the sensor; all if left out.
     pixel_format : str, optional
-        Such as Mono16; of those that are not packed the one of most bits if left out.
+        Such as Mono16. If left out: the one with the most bits that is not packed, Bayer before
+        Mono.
     trigger : str
         "software", one trigger a photo; "free", the camera runs by itself, and the first frame that
         began after the pattern was shown counts; or the line of a hardware trigger, such as Line1.

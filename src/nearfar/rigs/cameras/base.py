@@ -162,8 +162,8 @@ class Camera(ABC):
         """
         for _ in range(MAXIMUM_TRIES - 1):
             with suppress(LostPhotoError):
-                return self.take()
-        return self.take()
+                return self._checked(self.take())
+        return self._checked(self.take())
 
     def expose_for_light(self, rounded: Callable[[float], float] = float) -> float:
         """Choose the exposure at which the present light just fits the sensor.
@@ -234,9 +234,11 @@ class Camera(ABC):
         DeviceError
         """
         values = np.asarray(frame)
-        if values.dtype.name not in FRAME_TYPES or values.ndim not in {2, 3} or not values.size:
+        fits = values.ndim == 3 and values.shape[2] in {1, 3} and values.size
+        if values.dtype.name not in FRAME_TYPES or not fits:
             raise DeviceError(
                 f"{self.name} gives frames of {values.dtype} and shape {values.shape}: its driver "
-                f"must return {', '.join(FRAME_TYPES)} of shape (height, width, channels)."
+                f"must return {', '.join(FRAME_TYPES)} of shape (height, width, 1) or "
+                f"(height, width, 3)."
             )
         return frame

@@ -101,9 +101,9 @@ def measure_black_and_white(blacks: list[Levels], whites: list[Levels]) -> Black
     visible = VISIBLE_DEVIATIONS * np.sqrt(max(noise[0], rounding))
     if found.contrast <= 0 or brightest <= visible:
         raise DeviceError(
-            f"white looks like black to the camera (mean level {white.mean():.6g} after "
-            f"{black.mean():.6g}): turn the projector on, open its shutter, and point the camera "
-            f"at what it lights."
+            f"white looks like black to the camera (mean level {white.mean():.6g} under white, "
+            f"{black.mean():.6g} under black): turn the projector on, open its shutter, and point "
+            f"the camera at what it lights."
         )
     return found
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Size
+from nearfar.errors import InputError
 from nearfar.faults.records import ExposureBeats, NotLinearLight
 from nearfar.illumination.frames import FrameLayout, fit_frame
 from nearfar.rigs.base import Photo
@@ -25,6 +26,17 @@ from nearfar.rigs.real.shutter import Shutter
 from nearfar.rigs.real.superposition import check_superposition
 from nearfar.rigs.real.synchronising import MAXIMUM_SETTLE_REFRESHES, synchronise
 from nearfar.rigs.screens import Monitor, Screen
+
+
+def _layout(projector: Size, scale: int | None, monitor: Monitor) -> FrameLayout:
+    try:
+        return fit_frame(projector, scale, monitor.size)
+    except InputError:
+        raise InputError(
+            f"a pattern grid of {projector} with {scale or 1}x{scale or 1} projector pixels for "
+            f"each of its own does not fit on the monitor {monitor.name} of {monitor.size}: lower "
+            f"scale under [projector] of the rig, or make a plan for a smaller grid."
+        ) from None
 
 
 class RealRig:
@@ -84,7 +96,7 @@ class RealRig:
     ) -> None:
         self._screen, self.camera, self._projector = screen, camera, projector
         self._alarms, self._on_start = AlarmLog(on_alarm), on_start
-        self.layout: FrameLayout = fit_frame(projector, scale, screen.monitor.size)
+        self.layout: FrameLayout = _layout(projector, scale, screen.monitor)
         self._calibration, self._brightness = calibration, brightness
         response = calibration.response_table() if calibration else identity()
         self._linear = LinearProjector(response, self.layout, brightness)

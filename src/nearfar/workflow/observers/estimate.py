@@ -98,6 +98,11 @@ class EstimateObserver:
         self, plan: Plan, full_scale: float, options: ReconstructionOptions | None = None
     ) -> None:
         self._options = options or ReconstructionOptions()
+        if self._options.method != "joint" or self._options.square:
+            raise InputError(
+                "while capturing, only `method='joint'` makes a transport, and no `square` one: "
+                "give these options to nearfar.reconstruct after the capture."
+            )
         require_device(self._options.device)
         JOINT.require(plan)
         self.photos: PhotosInMemory | None = None

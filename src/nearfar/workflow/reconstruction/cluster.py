@@ -98,7 +98,7 @@ class DaskExecutor:
                     yield tasks[task], task.result()
             except KilledWorker as error:
                 raise ClusterError(
-                    f"a block of rows was lost with its worker again and again, "
+                    f"a tile was lost with its worker again and again, "
                     f"{error.last_worker} last: look at the workers' logs, and if memory ran out "
                     f"give less `memory`."
                 ) from error

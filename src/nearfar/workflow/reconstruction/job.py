@@ -83,8 +83,9 @@ def tiling_of(capture: Capture, options: ReconstructionOptions, *, given: bool) 
     found_in_tiles = not (given or options.square)
     halo = estimator.halo + (method_of(plan).rows_beside if found_in_tiles else 0)
     rows = plan.projector if options.square else capture.camera
-    memory = options.memory // options.tiles_at_once
-    return tile_rows(plan, rows, capture.channels, estimator, halo, memory)
+    return tile_rows(
+        plan, rows, capture.channels, estimator, halo, options.memory, options.tiles_at_once
+    )
 
 
 def prepare(

@@ -8,6 +8,7 @@ from nearfar.capture import Capture
 from nearfar.checks import require_instance
 from nearfar.correspondence import Correspondence
 from nearfar.devices import Device
+from nearfar.errors import InputError
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.workflow.reconstruction.executors import (
@@ -149,6 +150,11 @@ def reconstruct_to_file(
         raise without_light(capture)
     executor = executor_of(options)
     if scheduler is not None:
+        if options.tiles_at_once != 1:
+            raise InputError(
+                f"{options.tiles_at_once} tiles at once are for this process, and the workers of a "
+                f"scheduler take one each: leave out `tiles_at_once`, and start more workers."
+            )
         # Dask takes a second to load, and may not be installed.
         from nearfar.workflow.reconstruction.cluster import DaskExecutor
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence, joined
-from nearfar.errors import InputError, KeptInterrupt, NearfarError
+from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
 from nearfar.files import UNFINISHED, new_output, resumable_output
 from nearfar.files.logs import note, read_notes
 from nearfar.release import version
@@ -178,9 +178,10 @@ def resumable_file(
         If the body was interrupted; the message says the same.
     """
 
-    def is_worth_keeping(folder: Path, _fault: BaseException) -> bool:
-        return bool(stored_tiles(folder))
+    def is_worth_keeping(folder: Path, fault: BaseException) -> bool:
+        return bool(stored_tiles(folder)) and not isinstance(fault, UselessPhotosError)
 
+    kept = _Kept(output)
     try:
         with resumable_output(output, is_worth_keeping, resume=resume, force=force) as folder:
             if lines := _lines(folder):
@@ -190,13 +191,14 @@ def resumable_file(
             # Chunks that were being written when the job was killed.
             for left in folder.rglob(".*.partial"):
                 left.unlink()
+            kept.is_at_work = True
             yield FileSink(folder, tiling)
     except KeyboardInterrupt as error:
-        if kept := _kept(output):
+        if kept.tiles:
             raise KeptInterrupt(f"interrupted; {kept}.") from error
         raise
     except NearfarError as error:
-        if kept := _kept(output):
+        if kept.tiles:
             raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
         raise
     (output.resolve() / LOG_NAME).unlink(missing_ok=True)
@@ -268,9 +270,22 @@ def _require_same(folder: Path, before: Mapping[str, Any], identity: Mapping[str
         )
 
 
-def _kept(output: Path) -> str:
-    """Describe in words which tiles of a stopped job are kept, and where; empty if none are."""
-    folder = output.resolve().with_name(f"{output.resolve().name}{UNFINISHED}")
-    count = len(stored_tiles(folder))
-    again = "`resume=True, force=True`" if output.exists() else "`resume=True`"
-    return f"{count} tiles are kept in {folder}, and {again} goes on with them" if count else ""
+class _Kept:
+    """The tiles of a stopped job that are kept, and the words for them in a message."""
+
+    def __init__(self, output: Path) -> None:
+        self._output = output
+        self._folder = output.resolve().with_name(f"{output.resolve().name}{UNFINISHED}")
+        # Before, the folder may be another job's.
+        self.is_at_work = False
+
+    @property
+    def tiles(self) -> int:
+        """Number of tiles that this job keeps."""
+        return len(stored_tiles(self._folder)) if self.is_at_work else 0
+
+    def __str__(self) -> str:
+        count = self.tiles
+        again = "`resume=True, force=True`" if self._output.exists() else "`resume=True`"
+        are = "tile is" if count == 1 else "tiles are"
+        return f"{count} {are} kept in {self._folder}, and {again} goes on with them"

@@ -18,7 +18,7 @@ from nearfar.capture import Capture, white_and_black
 from nearfar.correspondence import Correspondence, joined, onto_projector
 from nearfar.correspondence.methods import find_correspondence, method_of
 from nearfar.correspondence.square import quality_on_projector
-from nearfar.errors import InputError
+from nearfar.errors import InputError, UselessPhotosError
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import remove_drift
@@ -240,14 +240,16 @@ def _with_capture_named(capture: Capture) -> Iterator[None]:
         yield
     except InputError as error:
         reason = str(error).rstrip(".")
-        raise type(error)(f"{capture.path}: {reason}, or give `correspondence`.") from None
+        raise type(error)(
+            f"{capture.path}: {reason}, or give `correspondence` to reconstruct."
+        ) from None
 
 
-def without_light(capture: Capture) -> InputError:
+def without_light(capture: Capture) -> UselessPhotosError:
     """Return the error for a capture that shows no direct light."""
-    return InputError(
+    return UselessPhotosError(
         f"{capture.path} shows no direct light at any camera pixel: check that the camera "
-        f"sees the projector's light, or give `correspondence`."
+        f"sees the projector's light, or give `correspondence` to reconstruct."
     )
 
 

@@ -49,9 +49,15 @@ class Tiling(NamedTuple):
 
 
 def tile_rows(
-    plan: Plan, camera: Size, channels: int, estimator: Estimator, halo: int, memory: int
+    plan: Plan,
+    camera: Size,
+    channels: int,
+    estimator: Estimator,
+    halo: int,
+    memory: int,
+    tiles_at_once: int = 1,
 ) -> Tiling:
-    """Divide the rows of a camera into tiles, each of which is reconstructed within `memory`.
+    """Divide the rows of a camera into tiles that are reconstructed within `memory`.
 
     Parameters
     ----------
@@ -63,6 +69,8 @@ def tile_rows(
         Rows on each side of a tile that its result also depends on.
     memory : int
         In bytes.
+    tiles_at_once : int
+        Tiles that share the memory.
 
     Raises
     ------
@@ -71,14 +79,16 @@ def tile_rows(
     """
     shared, row = _shared_and_row(plan, camera, channels, estimator)
     halo_rows = _halo_rows(estimator)
-    rows = int((memory - shared) / row) - halo_rows
+    rows = int((memory // tiles_at_once - shared) / row) - halo_rows
     if rows + halo_rows >= camera.height:
         return Tiling(camera.height, camera.height, halo)
     if rows < 1:
         least = memory_of_tile(plan, camera, channels, estimator, min(1, camera.height - halo_rows))
+        enough = int(np.ceil(tiles_at_once * least / 1e8)) * 10**8
+        each = f" in each of {tiles_at_once} tiles at once" if tiles_at_once > 1 else ""
         raise InputError(
-            f"{memory / 1e6:.0f} MB of memory are too few for one row of these photos: give "
-            f"`memory={int(np.ceil(least / 1e8)) * 10**8}` or more."
+            f"{memory / 1e6:.0f} MB of memory is too little for one row of these photos{each}: "
+            f"give `memory={enough}` or more."
         )
     rows = rows if rows < 2 * ROWS_MULTIPLE else rows - rows % ROWS_MULTIPLE
     return Tiling(camera.height, rows, halo)

@@ -29,6 +29,6 @@ class Bench:
     gain: float
 
     def rig(self, exposure: float) -> SimulatedRig:
-        """Return a rig that exposes photos for `exposure` units, in a full well as much deeper."""
+        """Return a rig that exposes for `exposure` units, its full well deeper in proportion."""
         camera = self.camera.model_copy(update={"full_well": self.camera.full_well * exposure})
         return SimulatedRig(self.scene, self.scene.name, SimulatedProjector(), camera, self.gain, 0)

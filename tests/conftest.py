@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from nearfar import parallel
 from nearfar.arrays import Size
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import Plan
@@ -43,7 +44,13 @@ def pytest_runtest_makereport(
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep the scenes that tests compute in one place, away from the user's own cache."""
+    """Keep the scenes that tests compute in one place; a thread in each of several processes.
+
+    `tests.test_parallel` runs with several threads.
+    """
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        # More threads than processors mostly wait for one another.
+        parallel.MAXIMUM_THREADS = 1
     # Processes that run tests side by side find it set by the one that started them.
     if "NEARFAR_CACHE" not in os.environ:
         cache = tempfile.mkdtemp(prefix="nearfar-cache-")

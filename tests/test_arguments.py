@@ -241,7 +241,7 @@ def test_an_exact_transport_of_direct_or_near_light_alone_is_refused():
 
 @pytest.mark.parametrize("window", [0, 8, 100])
 def test_a_window_beyond_the_projector_is_refused(window):
-    with pytest.raises(InputError, match="window|W = "):
+    with pytest.raises(InputError, match=r"window|W = "):
         nearfar.estimate_transport(MEASURED, LIT, window, (3, 3))
 
 

@@ -15,14 +15,18 @@ Fetched = TypeVar("Fetched")
 MAXIMUM_THREADS = 8
 
 
+def threads() -> int:
+    """Return the number of threads that work is shared among."""
+    return min(MAXIMUM_THREADS, processors())
+
+
 def side_by_side(work: Callable[[Item], None], items: Iterable[Item]) -> None:
     """Call `work` with every item, in threads on all processors; no two may write the same data.
 
     A matrix product within `work` runs on one processor, so the result does not depend on the
     number of processors.
     """
-    workers = min(MAXIMUM_THREADS, processors())
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(max_workers=workers) as pool:
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(max_workers=threads()) as pool:
         # Reading the results raises the errors of the threads.
         for _ in pool.map(work, items):
             pass

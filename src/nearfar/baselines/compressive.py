@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from nearfar.arrays import Floats, blocks, processors
+from nearfar.arrays import Floats, blocks
 from nearfar.baselines.lasso import highest_penalty, refit, solve, start
 from nearfar.baselines.random_patterns import (
     CompressiveMeasurements,
@@ -32,6 +32,7 @@ from nearfar.baselines.random_patterns import (
 )
 from nearfar.baselines.sensing import Sensing, sense
 from nearfar.errors import InputError
+from nearfar.parallel import threads
 from nearfar.transport.exact import ExactTransport
 
 # The whole method, with the steps that lie in other modules.
@@ -124,7 +125,7 @@ def _reconstruct(
 
     done = 0
     # One BLAS thread in each of these threads: more would only wait for each other.
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(processors()) as pool:
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(threads()) as pool:
         for count in pool.map(one, blocks(len(rows), ROWS_AT_ONCE)):
             done += count
             if progress is not None:

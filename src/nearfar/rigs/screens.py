@@ -5,7 +5,7 @@ monitor's native size.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import TracebackType
@@ -118,7 +118,7 @@ def find_monitors() -> tuple[Monitor, ...]:
         return _monitors(glfw)
 
 
-def choose_monitor(monitors: tuple[Monitor, ...], wanted: str | int | None) -> Monitor:
+def choose_monitor(monitors: Sequence[Monitor], wanted: str | int | None) -> Monitor:
     """Choose a monitor by name or index; the only one, or the second, where nothing is wanted.
 
     Raises

@@ -13,6 +13,7 @@ from nearfar.plan import paper_plan
 from nearfar.rigs.tables import RealTable, SimulatedTable
 from nearfar.scenes.cache import cached_scene
 from tests.rigs.displays import one_monitor
+from tests.rigs.loopback import alone_on_the_loopback
 from tests.rigs.test_loop import CAMERA, PROJECTOR, Bench
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -86,13 +87,13 @@ def rig(tmp_path_factory):
     lights = np.eye(PROJECTOR.pixels, dtype=np.float32).reshape(-1, *PROJECTOR)
     transport = world.pictures(lights).mean(axis=-1).reshape(PROJECTOR.pixels, -1).T
     np.save(folder / "transport.npy", 0.7 / transport.sum(axis=1).max() * transport)
-    with one_monitor() as display:
+    with alone_on_the_loopback(), one_monitor() as display:
         bench = Bench(folder, display, "DESK")
         yield bench
         bench.close()
 
 
-@pytest.mark.slow(minutes=2)
+@pytest.mark.slow(minutes=0.6)
 @pytest.mark.parametrize("name", ["tutorial.md", "howto/real-rig.md"])
 def test_what_is_shown_on_a_rig_runs_on_one(rig, name, tmp_path):
     rig.folder = tmp_path

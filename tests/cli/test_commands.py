@@ -105,8 +105,8 @@ def test_a_command_of_a_name_that_is_taken_is_left_out_with_a_warning(tmp_path: 
     ran = _run(tmp_path, "--help")
     assert ran.returncode == 0
     assert ran.stderr == (
-        "warning: the package added_commands adds a command 'plan', a name that nearfar has "
-        "taken: it is left out; uninstall one of them.\n"
+        "warning: the package added_commands adds a command 'plan', a name that nearfar already "
+        "has: it is left out; rename it, or uninstall the package added_commands.\n"
     )
     plan = _run(tmp_path, "plan", "--projector", "16x20", "--near", "5", "--far", "3x3", "-q")
     assert (plan.returncode, plan.stdout, plan.stderr) == (0, "", "")

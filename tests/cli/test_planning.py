@@ -129,7 +129,7 @@ def test_a_number_of_photos_is_the_whole_command(tmp_path: Path):
         (("--near", 5), 2, "give --photos N"),
         (("--photos", 40, "--far", "3x3"), 2, "paper's plan"),
         (("--photos", 40, "--offset", "inverse"), 2, "leave --offset out"),
-        (("--photos", 40, "--correspondence", "stripes"), 2, "leave it out"),
+        (("--photos", 40, "--correspondence", "stripes"), 2, "leave --correspondence out"),
         (("--photos", 0), 2, "photos"),
         (("--photos", 9), 1, "too few"),
         (("--photos", 40, "--near", 99), 1, "does not fit"),

@@ -70,7 +70,7 @@ def test_light_that_changed_meanwhile_is_told(small_world, tmp_path):
         rig, told = _Darker(_rig(small_world), exposure / 0.5), []
         acquire(CHOSEN, path, rig, resume=True, on_alarm=told.append)
         assert len(told) == warned
-        assert all("before the capture was resumed" in alarm for alarm in told)
+        assert all("before the capture was stopped" in alarm for alarm in told)
 
 
 class _Darker:

@@ -144,7 +144,7 @@ def test_a_large_camera_is_thinned_out(made, monkeypatch):
         "nearfar.report.reconstruction.MAXIMUM_DISPLAYED_PIXELS", CAMERA.pixels // 3
     )
     page = reconstruction_page(open_transport(made / "t.zarr"), open_capture(made / "capture.zarr"))
-    assert "One row and column of the camera in 2 is shown" in page
+    assert "One in 2 of the camera's rows and columns is shown" in page
     assert CAMERA.pixels < MAXIMUM_DISPLAYED_PIXELS
 
 

@@ -23,6 +23,7 @@ from nearfar.plan import Plan, read_plan
 from nearfar.scenes.cache import cached_scene
 from tests.cli.conftest import check_done, run_nearfar
 from tests.rigs.displays import one_monitor
+from tests.rigs.loopback import alone_on_the_loopback
 from tests.waiting import LONGEST_WAIT
 
 PROJECTOR, CAMERA, PHOTOS = Size(20, 24), Size(30, 36), 40
@@ -144,7 +145,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def display():
-    with one_monitor() as name:
+    with alone_on_the_loopback(), one_monitor() as name:
         yield name
 
 

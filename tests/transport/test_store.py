@@ -115,7 +115,7 @@ def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):
     save_transport(_believed(_transport(generator)), path)
     about = path / "quality_saturated" / "zarr.json"
     about.write_text(about.read_text().replace('"bool"', '"uint8"'))
-    with pytest.raises(UnreadableFileError, match="how far to trust it does not fit"):
+    with pytest.raises(UnreadableFileError, match="its quality maps do not fit"):
         load_transport(path)
     about.unlink()
     with pytest.raises(UnreadableFileError, match="quality_saturated"):

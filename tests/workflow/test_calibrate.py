@@ -128,7 +128,7 @@ def test_a_camera_whose_exposure_cannot_be_set_is_calibrated_but_for_its_line():
     camera = Fixed(screen, transport, CAMERA, PROJECTOR, gamma=2.2, sensor=SENSOR, unit=1 / 60)
     found = calibrate(RealRig(screen, camera, PROJECTOR, scale=1))
     assert found.calibration.linearity is None
-    assert any("black level are not known" in note for note in found.notes)
+    assert any("black level could not be measured" in note for note in found.notes)
     assert np.abs(found.calibration.response_table() - EVERY[:, None] ** 2.2).max() < 0.006
 
 

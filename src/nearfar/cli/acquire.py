@@ -109,21 +109,14 @@ def acquire(
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
     if reshoot is not None:
-        given = {
-            "--until": until,
-            "--transport": transport,
-            "--memory": memory,
-            "--device": device,
-            "--resume": resume,
-            "--force": force,
-        }
+        given = {"--until": until, "--transport": transport, "--memory": memory}
+        given |= {"--device": device, "--resume": resume, "--force": force}
         _refuse(given, "does not go with --reshoot.")
         take_again(plan_file, output, rig, photo_numbers(reshoot), quiet=quiet)
         return
     if transport is None:
         _refuse({"--memory": memory, "--device": device}, "is for --transport.")
-    available = parse_bytes(memory or "2GB")
-    options = ReconstructionOptions(memory=available, device=device or "cpu")
+    options = ReconstructionOptions(memory=parse_bytes(memory or "2GB"), device=device or "cpu")
     made = _plan_to_shoot(plan_file, with_check_photos=until is not None)
     keep_input(output, plan_file, Path(rig))
     check_resumable(output, resume=resume, force=force)

@@ -74,9 +74,7 @@ def reconstruction_page(
     )
     faults = [*map(str, find_faults(capture, stored.provenance)), *capture.alarms]
     faults = [reword(fault) for fault in faults]
-    thinned = (
-        "" if step == 1 else f" Only one in {step} of the rows and columns of the camera is shown."
-    )
+    thinned = "" if step == 1 else f" One in {step} of the camera's rows and columns is shown."
     body = f"""
 <h1>{escape(stored.path.name)}</h1>
 <p>The light transport of a scene, reconstructed from the photos in

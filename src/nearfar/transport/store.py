@@ -369,7 +369,8 @@ def _posterior_fits(
 
 def _misfit(path: Path) -> UnreadableFileError:
     return UnreadableFileError(
-        f"{path} is damaged: its posterior does not fit the transport; reconstruct it again."
+        f"{path} is damaged: the posterior of its error bars does not fit the transport; "
+        f"reconstruct it again."
     )
 
 

@@ -256,6 +256,17 @@ def test_a_camera_that_stops_and_a_kill_cost_no_photo(bench, calibrated):
     _check(bench, "stopped")
 
 
+def test_a_camera_that_was_silent_for_long_is_opened_again(bench, calibrated):
+    # Longer than the heartbeat's timeout, 3 seconds, after which it takes orders from nobody.
+    running = bench.start("acquire", "plan.json", "silent.zarr", "--rig", bench.rig)
+    bench.wait_for("silent.zarr", 10)
+    bench.control.write_text(json.dumps({"fault": "silence", "seconds": 4.0}))
+    _, err = running.communicate(timeout=LONGEST_WAIT)
+    assert running.returncode == 0, err
+    assert "was taken again" in err
+    _check(bench, "silent")
+
+
 def test_a_camera_that_a_killed_program_left_sending_sends_to_the_next(bench):
     for wait in (0.0, 0.5):
         holding = subprocess.Popen(

@@ -124,20 +124,9 @@ class AravisCamera(Camera):
         self._camera = self._stream = None
         self._full_scale = full_scale
         self._trigger, self._features = trigger, dict(features or {})
-        try:
-            # On a machine with several networks, a camera that is opened without this may send
-            # nothing.
-            self._library.plain("arv_update_device_list")
-            self._camera = self._call("arv_camera_new", device.encode() if device else None)
-            words = [
-                self._call(f"arv_camera_get_{what}", self._camera) or b""
-                for what in ("vendor_name", "model_name", "device_serial_number")
-            ]
-            self.name = " ".join(text.decode(errors="replace") for text in words)
-            self._set_up(region, pixel_format)
-        except BaseException:
-            self.close()
-            raise
+        self._wanted_region, self._wanted_format = region, pixel_format
+        self._device = device.encode() if device else None
+        self._open()
 
     @property
     def full_scale(self) -> float:
@@ -191,10 +180,60 @@ class AravisCamera(Camera):
         Raises
         ------
         LostPhotoError
-            If no frame arrives in time, or with holes.
+            If no frame arrives in time, or with holes. A camera that had stopped answering has
+            been opened again by then.
         DeviceError
-            If the camera does not answer.
+            If the camera does not answer, and cannot be opened again.
         """
+        try:
+            return self._triggered()
+        except LostPhotoError:
+            if not self._is_controlled():
+                self._open_again()
+            raise
+        except DeviceError:
+            self._open_again()
+            raise LostPhotoError(
+                f"{self.name} stopped answering and was opened again: check its cable."
+            ) from None
+
+    def _open(self) -> None:
+        try:
+            # On a machine with several networks, a camera that is opened without this may send
+            # nothing.
+            self._library.plain("arv_update_device_list")
+            if self._device is None and self._library.plain("arv_get_n_devices"):
+                # Opened again, it is to be the same camera, not the first that is found by then.
+                self._device = self._library.plain("arv_get_device_id", 0)
+            self._camera = self._call("arv_camera_new", self._device)
+            words = [
+                self._call(f"arv_camera_get_{what}", self._camera) or b""
+                for what in ("vendor_name", "model_name", "device_serial_number")
+            ]
+            self.name = " ".join(text.decode(errors="replace") for text in words)
+            self._set_up(self._wanted_region, self._wanted_format)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open_again(self) -> None:
+        self.close()
+        self._open()
+        if self.exposure is not None:
+            self.exposure = self._set_exposure(self.exposure)
+
+    def _is_controlled(self) -> bool:
+        """Tell whether a GigE Vision camera still takes orders from this program.
+
+        It stops doing so when it hears nothing for its heartbeat's timeout, such as while its cable
+        is out, and would stay silent from then on.
+        """
+        if not self._library.plain("arv_camera_is_gv_device", self._camera):
+            return True
+        device = self._library.plain("arv_camera_get_device", self._camera)
+        return bool(self._library.plain("arv_gv_device_is_controller", device))
+
+    def _triggered(self) -> Frame:
         # A frame that came without a trigger belongs to no pattern.
         while old := self._library.plain("arv_stream_try_pop_buffer", self._stream):
             self._library.plain("arv_stream_push_buffer", self._stream, old)

@@ -50,6 +50,9 @@ PLAIN: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "arv_buffer_get_image_width": (c_int, (c_void_p,)),
     "arv_buffer_get_image_height": (c_int, (c_void_p,)),
     "arv_buffer_get_frame_id": (c_uint64, (c_void_p,)),
+    "arv_camera_get_device": (c_void_p, (c_void_p,)),
+    "arv_camera_is_gv_device": (c_bool, (c_void_p,)),
+    "arv_gv_device_is_controller": (c_bool, (c_void_p,)),
 }
 FALLIBLE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "arv_camera_new": (c_void_p, (c_char_p,)),

@@ -1,10 +1,13 @@
 """Threads for NumPy's work: it releases the interpreter lock while it computes."""
 
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import AbstractContextManager
+from functools import lru_cache
+from typing import Any, TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from nearfar.arrays import processors
 
@@ -26,10 +29,35 @@ def side_by_side(work: Callable[[Item], None], items: Iterable[Item]) -> None:
     A matrix product within `work` runs on one processor, so the result does not depend on the
     number of processors.
     """
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(max_workers=threads()) as pool:
-        # Reading the results raises the errors of the threads.
-        for _ in pool.map(work, items):
-            pass
+    everything = list(items)
+    count = min(threads(), len(everything))
+    with single_threaded_products():
+        if count <= 1:
+            for item in everything:
+                work(item)
+            return
+        with ThreadPoolExecutor(max_workers=count) as pool:
+            # Reading the results raises the errors of the threads.
+            for _ in pool.map(work, everything):
+                pass
+
+
+def single_threaded_products() -> AbstractContextManager[Any]:
+    """Return a context in which each matrix product runs on one processor.
+
+    Several products run at the same time instead, so the result does not depend on the number of
+    processors.
+    """
+    limited: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(
+        limits=1, user_api="blas"
+    )
+    return limited
+
+
+@lru_cache(maxsize=1)
+def _libraries(_modules: int) -> ThreadpoolController:
+    """Return the BLAS libraries, which are looked for again where more modules are loaded."""
+    return ThreadpoolController()
 
 
 def ahead(

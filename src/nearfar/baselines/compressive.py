@@ -20,7 +20,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from nearfar.arrays import Floats, blocks
 from nearfar.baselines.lasso import highest_penalty, refit, solve, start
@@ -32,7 +31,7 @@ from nearfar.baselines.random_patterns import (
 )
 from nearfar.baselines.sensing import Sensing, sense
 from nearfar.errors import InputError
-from nearfar.parallel import threads
+from nearfar.parallel import single_threaded_products, threads
 from nearfar.transport.exact import ExactTransport
 
 # The whole method, with the steps that lie in other modules.
@@ -125,7 +124,7 @@ def _reconstruct(
 
     done = 0
     # One BLAS thread in each of these threads: more would only wait for each other.
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(threads()) as pool:
+    with single_threaded_products(), ThreadPoolExecutor(threads()) as pool:
         for count in pool.map(one, blocks(len(rows), ROWS_AT_ONCE)):
             done += count
             if progress is not None:

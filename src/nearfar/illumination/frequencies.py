@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Size
 
+HALF = Fraction(1, 2)
+
 
 class Frequency(NamedTuple):
     """Cycles per projector pixel down and across."""
@@ -28,13 +30,19 @@ class Frequency(NamedTuple):
     @property
     def is_own_negative(self) -> bool:
         """Whether k and -k are the same: DC, the checkerboard, (0, 1/2) and (1/2, 0)."""
-        return self == -self
+        return all(part.denominator <= 2 for part in self)
 
 
 def wrap(fy: Fraction, fx: Fraction) -> Frequency:
     """Bring a frequency into [-1/2, 1/2) on both axes."""
-    half = Fraction(1, 2)
-    return Frequency((fy + half) % 1 - half, (fx + half) % 1 - half)
+    return Frequency(_wrap(fy), _wrap(fx))
+
+
+def _wrap(part: Fraction) -> Fraction:
+    # Most frequencies are in there already, and arithmetic with fractions is slow.
+    if -part.denominator <= 2 * part.numerator < part.denominator:
+        return part
+    return (part + HALF) % 1 - HALF
 
 
 DC = Frequency(Fraction(0), Fraction(0))

@@ -246,11 +246,11 @@ class _ExpectedErrors:
 
     def condition_on(self, candidate: int, noise: float) -> None:
         """Condition the covariances on one measurement of a candidate."""
-        column = self.covariance[:, :, candidate]
+        column = self.covariance[:, :, candidate].copy()
         measured = column[:, candidate] + noise**2
-        self.covariance = self.covariance - (
-            column[:, :, None] * (column / measured[:, None])[:, None, :]
-        )
+        # One at a time, which stays in the processor's cache.
+        for covariance, mine, of_one in zip(self.covariance, column, measured, strict=True):
+            np.subtract(covariance, mine[:, None] * (mine / of_one), out=covariance)
 
 
 def _weights(frequencies: list[Frequency], projector: Size) -> Floats:

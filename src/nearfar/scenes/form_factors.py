@@ -4,7 +4,7 @@ Index convention: i, j are patches, a, b their samples. F_ij is the share of the
 i and arrives at j; the irradiance at i under radiosities B is sum_j F_ij B_j.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -27,7 +27,9 @@ MAXIMUM_ROW_SUM = 0.999
 # Rays between two patches that something may hide from each other.
 RAYS_PER_PAIR = 4
 ROWS_AT_ONCE = 256
-PAIRS_AT_ONCE = 4096
+# Products of samples at once: their arrays stay in the processor's cache.
+PRODUCTS_AT_ONCE = 2**15
+TOUCHING_AT_ONCE = 2**13
 
 
 def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Floats:
@@ -147,28 +149,42 @@ def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
     Samples too near for points are taken as parallelograms.
     """
     result = np.empty(len(i))
-    order = np.argsort(patches.counts[i] * patches.counts[j], kind="stable")
-    for chunk in blocks(len(i), PAIRS_AT_ONCE):
-        pairs = order[chunk]
+    nothing = np.empty(0, dtype=np.int64)
+    near: list[tuple[Integers, Integers, Integers]] = [(nothing, nothing, nothing)]
+    for pairs, a_count, b_count in _alike(patches.counts[i], patches.counts[j]):
         a, b = i[pairs], j[pairs]
-        left, right = slice(patches.counts[a].max()), slice(patches.counts[b].max())
-        area, other_area = patches.areas[a, left], patches.areas[b, right]
+        left, right = slice(a_count), slice(b_count)
         value, square = point_exchange(
             patches.positions[a, left],
             patches.normals[a, left],
-            area,
+            patches.areas[a, left],
             other_position=patches.positions[b, right],
             other_normal=patches.normals[b, right],
-            other_area=other_area,
+            other_area=patches.areas[b, right],
         )
-        size = np.linalg.norm(patches.edges[a, left], axis=-1).max(axis=-1)
-        other_size = np.linalg.norm(patches.edges[b, right], axis=-1).max(axis=-1)
-        reach = NEAR_SIDES * (size[:, :, None] + other_size[:, None, :])
-        true = (area > 0)[:, :, None] & (other_area > 0)[:, None, :]
-        pair, s, t = np.nonzero(true & (square < reach**2))
-        value[pair, s, t] = touching_exchange((a[pair], s), (b[pair], t), patches)
+        reach = patches.sides[a, left, None] + patches.sides[b, None, right]
+        reach *= NEAR_SIDES
+        pair, s, t = np.nonzero(square < reach**2)
+        value[pair, s, t] = 0
         result[pairs] = value.sum(axis=(-1, -2))
+        near.append((pairs[pair], s, t))
+    pair, s, t = (np.concatenate(indices) for indices in zip(*near, strict=True))
+    for some in blocks(len(pair), TOUCHING_AT_ONCE):
+        at = pair[some]
+        value = touching_exchange((i[at], s[some]), (j[at], t[some]), patches)
+        np.add.at(result, at, value)
     return result
+
+
+def _alike(first: Integers, second: Integers) -> Iterator[tuple[Integers, int, int]]:
+    """Yield pairs whose patches have as many samples as one another's, and these two counts."""
+    order = np.lexsort((second, first))
+    changes = (np.diff(first[order]) != 0) | (np.diff(second[order]) != 0)
+    for group in np.split(order, np.flatnonzero(changes) + 1):
+        if len(group):
+            a_count, b_count = int(first[group[0]]), int(second[group[0]])
+            for part in blocks(len(group), PRODUCTS_AT_ONCE // (a_count * b_count)):
+                yield group[part], a_count, b_count
 
 
 def touching_exchange(
@@ -201,34 +217,41 @@ def point_to_parallelogram(
     between the point's normal and the normal of the plane through edge and point, after the
     shape is cut off at the point's horizon.
     """
-    position, normal = patches.positions[point], patches.normals[point]
-    along, up = np.moveaxis(patches.edges[shape], 1, 0) / 2
-    way = patches.positions[shape] - position
-    corners = np.stack([way - along - up, way + along - up, way + along + up, way - along + up])
-    heights = np.einsum("knx,nx->kn", corners, normal)
-    total = np.zeros(len(way))
+    # Coordinates come first from here on: each is one contiguous array.
+    position, normal = patches.positions[point].T, np.ascontiguousarray(patches.normals[point].T)
+    along, up = np.ascontiguousarray(np.moveaxis(patches.edges[shape], 0, -1)) / 2
+    way = patches.positions[shape].T - position
+    corners = [way - along - up, way + along - up, way + along + up, way - along + up]
+    heights = [_dot(corner, normal) for corner in corners]
+    total = np.zeros(way.shape[1])
     leaves, enters = np.zeros_like(way), np.zeros_like(way)
     for this, following in zip(range(4), (1, 2, 3, 0), strict=True):
         start, end = corners[this], corners[following]
         low, high = heights[this], heights[following]
         slope = np.where(low == high, 1.0, low - high)
-        crossing = start + (low / slope)[:, None] * (end - start)
+        crossing = start + low / slope * (end - start)
         down, rising = (low >= 0) & (high < 0), (low < 0) & (high >= 0)
-        leaves[down], enters[rising] = crossing[down], crossing[rising]
-        start = np.where(rising[:, None], crossing, start)
-        end = np.where(down[:, None], crossing, end)
+        leaves, enters = np.where(down, crossing, leaves), np.where(rising, crossing, enters)
+        start, end = np.where(rising, crossing, start), np.where(down, crossing, end)
         total += np.where((low >= 0) | (high >= 0), _edge(start, end, normal), 0)
     total += _edge(leaves, enters, normal)
-    facing = np.einsum("nx,nx->n", way, patches.normals[shape]) < 0
+    facing = _dot(way, patches.normals[shape].T) < 0
     return np.where(facing, np.maximum(total, 0), 0) / (2 * np.pi)
 
 
 def _edge(start: Floats, end: Floats, normal: Floats) -> Floats:
     """Angle between two points seen from the origin, times the cosine to the edge's plane."""
-    crossed = np.cross(end, start)
-    sine = np.linalg.norm(crossed, axis=-1)
-    angle = np.arctan2(sine, np.einsum("nx,nx->n", start, end))
-    return np.asarray(angle * np.einsum("nx,nx->n", crossed, normal) / np.maximum(sine, 1e-30))
+    (sx, sy, sz), (ex, ey, ez) = start, end
+    crossed = np.stack([ey * sz - ez * sy, ez * sx - ex * sz, ex * sy - ey * sx])
+    sine = np.sqrt(_dot(crossed, crossed))
+    angle = np.arctan2(sine, _dot(start, end))
+    return np.asarray(angle * _dot(crossed, normal) / np.maximum(sine, 1e-30))
+
+
+def _dot(first: Floats, second: Floats) -> Floats:
+    """Scalar products of vectors, (3, n) each."""
+    product = first * second
+    return np.asarray(product[0] + product[1] + product[2])
 
 
 def visible_share(i: Integers, j: Integers, patches: Patches, occluders: Surface) -> Floats:

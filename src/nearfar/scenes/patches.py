@@ -66,6 +66,8 @@ class Patches:
         The samples of each patch, filled up with its centre.
     edges : ndarray, shape (n, k, 2, 3), float64
         Sides of the samples' parallelograms.
+    sides : ndarray, shape (n, k), float64
+        Length of the longer side of each sample's parallelogram.
     areas : ndarray, shape (n, k), float64
         Zero where filled up.
     counts : ndarray, shape (n,), int64
@@ -82,6 +84,7 @@ class Patches:
     positions: Floats
     normals: Floats
     edges: Floats
+    sides: Floats
     areas: Floats
     counts: Integers
 
@@ -212,18 +215,20 @@ def build_patches(
     edges = np.zeros((*shape, 2, 3))
     edges[patch, slot] = both("edges")
     positions[patch, slot], normals[patch, slot], areas[patch, slot] = position, normal, area
+    sides = np.linalg.norm(edges, axis=-1).max(axis=-1)
     offset = np.linalg.norm(positions - centre[:, None], axis=-1)
     return Patches(
         centre=centre,
         normal=direction,
         area=total,
         flux=np.bincount(patch, both("flux")).astype(float),
-        radius=(offset + np.linalg.norm(edges, axis=-1).max(axis=-1) / 2).max(axis=1),
+        radius=(offset + sides / 2).max(axis=1),
         part=both("part")[first].astype(np.int64),
         pixel=both("pixel")[first].astype(np.int64),
         positions=positions,
         normals=normals,
         edges=edges,
+        sides=sides,
         areas=areas,
         counts=counts,
     )

@@ -6,8 +6,6 @@ step processes the whole camera at once, and returns the input of the next.
 
 from dataclasses import replace
 
-from threadpoolctl import threadpool_limits
-
 from nearfar.arrays import AnySize, as_size
 from nearfar.capture import Capture
 from nearfar.checks import as_count, require_instance
@@ -20,6 +18,7 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.base import ESTIMATORS, Model
 from nearfar.illumination.frequencies import default_dropped
+from nearfar.parallel import single_threaded_products
 from nearfar.photometry.measure import measure as measure_photos
 from nearfar.photometry.measurements import Measurements
 from nearfar.progress import Report, counting, ignore_progress
@@ -60,7 +59,7 @@ def measure(capture: Capture, *, progress: Report | None = None) -> Measurements
     report = progress or ignore_progress
     photos = photos_without_drift(capture, report)
     count = len(capture.plan.patterns)
-    with threadpool_limits(1, "blas"):
+    with single_threaded_products():
         found = measure_photos(photos, progress=counting(report, "measuring", count))
     return replace(found, brightest=brightest_white(photos))
 
@@ -107,7 +106,7 @@ def correspond(
     chosen = method_of(plan) if method is None else method_named(method)
     photos = photos_without_drift(capture, report)
     count = max(1, plan.counts["correspondence"])
-    with threadpool_limits(1, "blas"):
+    with single_threaded_products():
         return chosen.find(
             photos,
             slice(0, photos.camera.height),
@@ -188,7 +187,7 @@ def estimate_transport(
         else as_size(dropped, "dropped")
     )
     estimator, model = ESTIMATORS[method], Model(window, far, left_out)
-    with threadpool_limits(1, "blas"):
+    with single_threaded_products():
         return estimator.estimate(
             measurements, correspondence.q, model, device=device, progress=done
         )

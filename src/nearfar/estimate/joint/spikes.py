@@ -8,6 +8,7 @@ spike near that q is expected, and a smaller gain in evidence is enough.
 Index convention: arrays are (n, channels, ...); w runs over window entries.
 """
 
+from functools import lru_cache
 from math import log
 
 import numpy as np
@@ -60,8 +61,9 @@ def likeliest_spike(
     return xp.argmax(gain, axis=1), xp.max(gain, axis=1)
 
 
+@lru_cache(maxsize=8)
 def away_from_q(entries: int) -> Booleans:
-    """Return which of W^2 window entries are not next to q, shape (W^2,)."""
+    """Return which of W^2 window entries are not next to q, shape (W^2,), cached: read only."""
     return np.asarray(np.abs(window_offsets(round(np.sqrt(entries)))).max(axis=1) > 1)
 
 

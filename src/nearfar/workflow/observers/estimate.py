@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from nearfar.capture import Capture
 from nearfar.correspondence.methods import find_correspondence
@@ -24,6 +23,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import Choices, choose_components
 from nearfar.estimate.joint.estimator import JOINT, JointEstimator
 from nearfar.estimate.joint.problem import build_model
+from nearfar.parallel import single_threaded_products
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure, measured_basis
 from nearfar.plan import Plan, Sinusoid
@@ -238,7 +238,7 @@ class EstimateObserver:
 
     def _choose(self, taken: int) -> _EarlyChoice | None:
         """Choose components from the first photos; None if they do not determine q."""
-        with threadpool_limits(1, "blas"):
+        with single_threaded_products():
             return self._timed_choice(taken)
 
     def _timed_choice(self, taken: int) -> _EarlyChoice | None:

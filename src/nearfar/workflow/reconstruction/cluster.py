@@ -21,9 +21,10 @@ from nearfar.capture import open_capture
 from nearfar.correspondence import Correspondence
 from nearfar.errors import ClusterError, MissingPackageError
 from nearfar.files.writes import abandon, admit
+from nearfar.parallel import single_threaded_products
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
-from nearfar.workflow.reconstruction.executors import TileReport, Work, single_threaded_products
+from nearfar.workflow.reconstruction.executors import TileReport, Work
 from nearfar.workflow.reconstruction.job import Job, prepare, reconstruct_tile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.sinks import Store, TileWriter

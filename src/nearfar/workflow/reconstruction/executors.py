@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Protocol
 
-from threadpoolctl import threadpool_limits
-
 from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence
+from nearfar.parallel import single_threaded_products
 from nearfar.progress import Report
 from nearfar.workflow.reconstruction.job import Job, reconstruct_tile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
@@ -150,15 +149,6 @@ def _reconstructed(
         job, tile, work.known_of(tile), lambda share: tile_report(tile.start, share)
     )
     return store.put(tile, part)
-
-
-def single_threaded_products() -> threadpool_limits:
-    """Return a context in which each matrix product runs on one processor.
-
-    Several products run at the same time instead, so the result does not depend on the number of
-    processors.
-    """
-    return threadpool_limits(1, "blas")
 
 
 def execute(work: Work, executor: Executor, sink: Sink, report: Report) -> Summary:

@@ -16,6 +16,7 @@ import pytest
 
 from nearfar.errors import ExistingOutputError, InputError, MissingFileError, StorageError
 from nearfar.files import add_array, create_durable_store, create_store, new_output, write_picture
+from tests.waiting import LONGEST_WAIT
 
 
 def listing(folder: Path) -> dict[str, bytes]:
@@ -259,7 +260,7 @@ def test_a_killed_command_leaves_the_old(tmp_path: Path, how: signal.Signals) ->
         time.sleep(0.1)
         command.send_signal(how)
         with contextlib.suppress(subprocess.TimeoutExpired):
-            command.wait(timeout=20)
+            command.wait(timeout=LONGEST_WAIT)
         command.kill()
     after = listing(tmp_path)
     if how is signal.SIGKILL:

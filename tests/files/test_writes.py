@@ -11,6 +11,7 @@ from nearfar.errors import StorageError
 from nearfar.files import add_array, add_to_store, new_output, open_store, read_array, stores
 from nearfar.files.stores import create_durable_store, create_store
 from nearfar.files.writes import abandon
+from tests.waiting import LONGEST_WAIT
 
 
 @pytest.mark.parametrize(
@@ -35,7 +36,7 @@ def test_writes_under_way_end_before_their_folder_goes(tmp_path, monkeypatch, cr
         array = add_array(group, "values", (40, 8), np.float32, (1, 8))
         monkeypatch.setattr(stores, name, slow)
         threading.Thread(target=array.__setitem__, args=(..., 1.0), daemon=True).start()
-        assert begun.wait(10)
+        assert begun.wait(LONGEST_WAIT)
         raise KeyboardInterrupt
     assert faults == []
     assert "c.0.0" in ended

@@ -93,7 +93,7 @@ WAITING = """
 from nearfar.rigs.screens import Window
 with Window() as window:
     print("shown", flush=True)
-    window.wait(60.0)
+    window.wait(600.0)
 """
 
 

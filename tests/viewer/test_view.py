@@ -214,14 +214,14 @@ def test_pixels_are_answered_while_a_map_is_computed(serve_it, monkeypatch):
 
     def slow(maps, name):
         begun.set()
-        assert over.wait(30)
+        assert over.wait(LONGEST_WAIT)
         return pack_map(maps, name)
 
     monkeypatch.setattr(application, "pack_map", slow)
     address = serve_it()
     with ThreadPoolExecutor() as asking:
         drawn = asking.submit(ask, address, "/map/error")
-        assert begun.wait(30)
+        assert begun.wait(LONGEST_WAIT)
         try:
             assert ask(address, "/row?y=1&x=2")
             assert ask(address, "/column?y=1&x=2")

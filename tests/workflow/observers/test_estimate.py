@@ -30,6 +30,7 @@ from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from nearfar.workflow.reconstruction.sinks import MemorySink
 from tests.observers import EndsWhere
+from tests.waiting import LONGEST_WAIT
 from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
@@ -238,7 +239,7 @@ def test_a_pending_choice_ends_with_the_capture(rig, tmp_path, monkeypatch):
     monkeypatch.setattr(observing, "choose_components", endless)
 
     def stop(number, _photo):
-        if number > 80 and begun.wait(10):
+        if number > 80 and begun.wait(LONGEST_WAIT):
             raise KeyboardInterrupt
 
     with (

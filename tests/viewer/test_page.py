@@ -96,8 +96,20 @@ def test_pictures_that_the_address_does_not_hold_are_named(open_page, address):
     assert (seen(page, "light") == 60).all()
 
 
+# Frames reach the page late, as from a busy server.
+SLOWLY = """
+    const Prompt = WebSocket;
+    window.WebSocket = class extends Prompt {
+      set onmessage(receive) { super.onmessage = event => setTimeout(() => receive(event), 400); }
+    };
+"""
+
+
 def test_the_picture_that_is_saved_is_of_the_light_that_is_shown(open_page, address, tmp_path):
     page = open_page(address, {"kind": "white"})
+    page.add_init_script(SLOWLY)
+    page.reload()
+    settled(page)
     white = decode_png(saved(page, "#save-png", tmp_path).read_bytes())
     with page.expect_download() as download:
         page.evaluate("""() => { document.querySelector('[data-kind=pixel]').click();

@@ -11,7 +11,7 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 from zarr.abc.store import ByteRequest, Store
-from zarr.codecs import BloscCodec, Crc32cCodec
+from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.errors import ContainsArrayError, ContainsGroupError, NodeNotFoundError
 from zarr.storage import LocalStore
@@ -196,8 +196,7 @@ def _new_array(
         shape=shape,
         dtype=np.dtype(dtype),
         chunks=chunks,
-        # Light is noise in its lowest bits, so only planes of its high bits shrink.
-        compressors=[BloscCodec(cname="lz4", shuffle="bitshuffle"), Crc32cCodec()],
+        compressors=[ZstdCodec(level=1), Crc32cCodec()],
         # One flat folder per array: a new chunk is durable with one folder to wait for.
         chunk_key_encoding={"name": "default", "separator": "."},
         fill_value=0,

@@ -27,6 +27,7 @@ async function open() {
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
       showFault('');
+      scenePictures.lightChanged();
       lightCanvas.requestDraw();
     } else {
       show();
@@ -48,7 +49,8 @@ async function open() {
   show();
   const connection = new Connection({
     light: () => light,
-    onFrame: (header, parts, isNewest) => scenePictures.receive(header, parts, isNewest, store.state),
+    onFrame: (header, parts, isNewest) =>
+      scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state),
     onFault: showFault,
   });
   if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);

@@ -23,6 +23,13 @@ export class ScenePictures {
   // Whether it is, and of the newest light.
   get isFinal() { return this.isExact && this.#frame.isNewest; }
 
+  // The light has changed: the picture is of an older one.
+  lightChanged() {
+    if (!this.#frame) return;
+    this.#frame.isNewest = false;
+    this.#describeFrame();
+  }
+
   receive(header, parts, isNewest, state) {
     this.#frame = { exact: header.exact, isNewest, parts: { ...parts, scale: header.scale } };
     this.#frameTimes = this.#frameTimes.filter(time => time > performance.now() - 1000);
@@ -33,8 +40,13 @@ export class ScenePictures {
     set(get('frame-status'), 'textContent',
       rate + coarse + (header.stride > 1 ? `one row and column in ${header.stride}` : 'every camera pixel'));
     this.#frameCount += 1;
-    // For those who drive the page by a program.
-    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact: header.exact, newest: isNewest });
+    this.#describeFrame();
+  }
+
+  // For those who drive the page by a program.
+  #describeFrame() {
+    const { exact, isNewest } = this.#frame;
+    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, newest: isNewest });
   }
 
   draw(state) {

@@ -29,7 +29,7 @@ class Scene:
         self.transport = np.load(settings["transport"]).astype(np.float64)
         self.projector = Size(*settings["projector"])
         self.camera = Size(*settings["camera"])
-        self.gamma = settings.get("gamma", GAMMA)
+        self.light_of_level = (np.arange(256) / 255.0) ** settings.get("gamma", GAMMA)
         self.sensor = SimulatedCamera(**settings.get("sensor", {}))
         # Exposure in seconds at which the transport is in photo units.
         self.unit = settings.get("unit", 0.02)
@@ -41,11 +41,11 @@ class Scene:
 
     def light(self) -> np.ndarray[Any, Any]:
         """Read the screen back, as light on the pattern grid."""
-        shot = np.asarray(self.screen.grab(self.screen.monitors[0]))[..., :3] / 255.0
+        shot = np.asarray(self.screen.grab(self.screen.monitors[0]))[..., :3]
         block = min(side // n for side, n in zip(shot.shape[:2], self.projector, strict=True))
         height, width = (block * n for n in self.projector)
         top, left = (shot.shape[0] - height) // 2, (shot.shape[1] - width) // 2
-        linear = (shot[top : top + height, left : left + width] ** self.gamma).mean(axis=-1)
+        linear = self.light_of_level[shot[top : top + height, left : left + width]].mean(axis=-1)
         cells = linear.reshape(self.projector.height, block, self.projector.width, block)
         return cells.mean(axis=(1, 3)).reshape(-1)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.capture import open_capture, white_and_black, write_capture
+from nearfar.capture import CaptureWriter, open_capture, white_and_black, write_capture
 from nearfar.capture.unfinished import LOG_NAME
 from nearfar.errors import (
     ExistingOutputError,
@@ -285,6 +285,17 @@ def test_another_plan_or_rig_is_refused_and_nothing_is_lost(rig, undisturbed, tm
     for changed in (replace(rig, seed=4), replace(rig, exposure=0.9)):
         with pytest.raises(InputError, match=r"another rig \((seed|transport_exposure)\)"):
             acquire(PLAN, tmp_path / "c.zarr", changed, resume=True)
+    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+
+
+def test_another_full_scale_is_refused(rig, undisturbed, tmp_path):
+    _stopped(rig, tmp_path / "c.zarr", 12)
+    folder = tmp_path / "c.zarr.unfinished"
+    about = json.loads((folder / "zarr.json").read_text())["attributes"]["rig"]
+    said = f"with a full scale of {rig.full_scale:g}, and is to be resumed with 4095"
+    with pytest.raises(InputError, match=said):
+        CaptureWriter.resume(folder, PLAN, full_scale=4095, rig=about)
+    assert CaptureWriter.resume(folder, PLAN, rig=about).taken == 12
     _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 

@@ -265,6 +265,11 @@ class CaptureWriter:
         many = self.taken > min(photos.shape[0], len(self._plan.patterns))
         if many or not is_positive(scale):
             raise UnreadableFileError(f"{folder} is damaged: start anew with `force=True`.")
+        if self._scale is not None and float(self._scale) != float(scale):
+            raise InputError(
+                f"{folder} was begun with a full scale of {scale:g}, and is to be resumed with "
+                f"{self._scale:g}: set the camera as it was, or start anew with `force=True`."
+            )
         self._scale = float(scale)
         self._means[: self.taken] = [taken.mean for taken in self._taken]
         if self._taken:

@@ -70,16 +70,17 @@ def compare(
     from nearfar.scenes.cache import cached_scene
     from nearfar.transport.exact_store import load_exact
     from nearfar.workflow.compare import compare as run
+    from nearfar.workflow.compare import known_methods
 
     if output is not None:
         check_output(output, force=force, replaceable=is_comparison)
-    budgets = _budgets(photos)
+    budgets, methods = _budgets(photos), known_methods(method)
     with progress_bar("comparing", quiet=quiet or as_json) as report:
         if scene in SCENES:
             truth = cached_scene(scene, projector, camera, progress=report)
         else:
             truth = load_exact(Path(scene), projector=projector, camera=camera)
-        found = run(truth, budgets, methods=method, window=near, progress=report)
+        found = run(truth, budgets, methods=methods, window=near, progress=report)
         if output is not None:
             write_comparison(output, found, force=force)
     if as_json:

@@ -131,13 +131,7 @@ def compare(
     InputError
         If there is no such method, or no budget that is enough for any.
     """
-    methods = tuple(RIVALS) if methods is None else methods
-    unknown = [name for name in methods if name not in RIVALS]
-    if unknown or not methods:
-        raise InputError(
-            f"there is no method {', '.join(unknown) or 'to compare'}: choose from "
-            f"{', '.join(RIVALS)}."
-        )
+    methods = known_methods(methods)
     budgets = sorted(set(default_budgets(scene.projector) if budgets is None else budgets))
     if not budgets or budgets[0] < FEWEST_PHOTOS:
         raise InputError(
@@ -172,6 +166,18 @@ def compare(
         tuple(trial for budget, trial in done if budget.total_exposure is None),
         tuple(trial for budget, trial in done if budget.total_exposure is not None),
     )
+
+
+def known_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
+    """Return methods to compare, all if none are named; raises as `compare`."""
+    chosen = tuple(RIVALS if methods is None else methods)
+    unknown = [name for name in chosen if name not in RIVALS]
+    if unknown or not chosen:
+        raise InputError(
+            f"there is no method {', '.join(unknown) or 'to compare'}: choose from "
+            f"{', '.join(RIVALS)}."
+        )
+    return chosen
 
 
 def _jobs(

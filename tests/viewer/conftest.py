@@ -138,6 +138,7 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
     def open_it(address: str, state: Any = None, **options: Any) -> Page:
         context = browser.new_context(viewport={"width": 1300, "height": 900}, **options)
         contexts.append(context)
+        context.set_default_timeout(1000 * LONGEST_WAIT)
         page = context.new_page()
         # The browser itself logs the response to a file that was refused.
         page.on("console", lambda line: "status of 400" in line.text or console.append(line.text))

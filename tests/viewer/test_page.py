@@ -207,6 +207,7 @@ def test_the_page_reports_a_lost_server_and_reconnects(open_page, stored, browse
     from tests.viewer.conftest import served_view
 
     context = browser.new_context()
+    context.set_default_timeout(1000 * LONGEST_WAIT)
     with served_view(InteractiveTransport(stored)) as address:
         page = context.new_page()
         page.goto(address)

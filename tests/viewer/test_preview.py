@@ -168,8 +168,12 @@ def test_a_real_browser_shows_it(served, tmp_path):
 def test_faults_are_displayed_and_the_preview_goes_on(served):
     camera, ask, until = served
     ask("/settings", {"exposure": 100.0})
-    until(lambda state: "cannot expose 100 s" in state["fault"])
-    until(lambda state: state["fault"] == "")
+    refused = until(lambda state: "cannot expose 100 s" in state["fault"])
+    # It stays readable while photos go on, until something is changed.
+    later = until(lambda state: state["number"] > refused["number"] + 3)
+    assert "cannot expose 100 s" in later["fault"]
+    ask("/settings", {"exposure": 0.2})
+    until(lambda state: state["fault"] == "" and state["exposure"] == 0.2)
     camera.from_now_on = "lost"
     until(lambda state: "the photo was lost" in state["fault"])
     camera.from_now_on = None

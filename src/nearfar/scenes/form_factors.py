@@ -150,7 +150,7 @@ def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
     """
     result = np.empty(len(i))
     nothing = np.empty(0, dtype=np.int64)
-    near: list[tuple[Integers, Integers, Integers]] = [(nothing, nothing, nothing)]
+    touching: list[tuple[Integers, Integers, Integers]] = [(nothing, nothing, nothing)]
     for pairs, a_count, b_count in _alike(patches.counts[i], patches.counts[j]):
         a, b = i[pairs], j[pairs]
         left, right = slice(a_count), slice(b_count)
@@ -167,8 +167,8 @@ def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
         pair, s, t = np.nonzero(square < reach**2)
         value[pair, s, t] = 0
         result[pairs] = value.sum(axis=(-1, -2))
-        near.append((pairs[pair], s, t))
-    pair, s, t = (np.concatenate(indices) for indices in zip(*near, strict=True))
+        touching.append((pairs[pair], s, t))
+    pair, s, t = (np.concatenate(indices) for indices in zip(*touching, strict=True))
     for some in blocks(len(pair), TOUCHING_AT_ONCE):
         at = pair[some]
         value = touching_exchange((i[at], s[some]), (j[at], t[some]), patches)
@@ -177,7 +177,7 @@ def refined(i: Integers, j: Integers, patches: Patches) -> Floats:
 
 
 def _alike(first: Integers, second: Integers) -> Iterator[tuple[Integers, int, int]]:
-    """Yield pairs whose patches have as many samples as one another's, and these two counts."""
+    """Yield groups of pairs with the same two numbers of samples, and these numbers."""
     order = np.lexsort((second, first))
     changes = (np.diff(first[order]) != 0) | (np.diff(second[order]) != 0)
     for group in np.split(order, np.flatnonzero(changes) + 1):

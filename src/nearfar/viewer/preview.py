@@ -117,11 +117,14 @@ def run_preview(rig: RealRig, port: int, on_start: Callable[[str], object] | Non
         if on_start is not None:
             on_start(url)
         pattern: Pattern = "white"
+        refusal = ""
         while not (settings := exchange.take_settings()).stop:
             pattern = settings.pattern or pattern
             pixels = _draw(pattern, rig.projector)
             try:
-                fault = _set_exposure(rig, pixels, settings)
+                if settings.model_fields_set:
+                    # Displayed until the next change, or nobody could read it.
+                    refusal = _set_exposure(rig, pixels, settings)
                 photo = rig.photograph(pixels)
             except DeviceError as error:
                 exchange.publish(None, fault=str(error))
@@ -130,7 +133,7 @@ def run_preview(rig: RealRig, port: int, on_start: Callable[[str], object] | Non
             exchange.publish(
                 encode_for_display(photo, rig.full_scale),
                 **photo_statistics(photo, rig.full_scale)._asdict(),
-                fault=fault,
+                fault=refusal,
                 pattern=pattern,
                 exposure=rig.camera.exposure,
                 limits=rig.camera.exposure_limits,

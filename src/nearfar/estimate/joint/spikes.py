@@ -63,7 +63,7 @@ def likeliest_spike(
 
 @lru_cache(maxsize=8)
 def away_from_q(entries: int) -> Booleans:
-    """Return which of W^2 window entries are not next to q, shape (W^2,), cached: read only."""
+    """Return which of W^2 window entries are not next to q, (W^2,); all callers share the array."""
     return np.asarray(np.abs(window_offsets(round(np.sqrt(entries)))).max(axis=1) > 1)
 
 

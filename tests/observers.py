@@ -1,6 +1,6 @@
 """Observers of captures for tests."""
 
-from nearfar.capture import Verdict
+from nearfar.capture import Decision
 
 
 class EndsWhere:
@@ -10,4 +10,4 @@ class EndsWhere:
         self._is_enough = is_enough
 
     def after_photo(self, number, photo):
-        return Verdict.ENOUGH if self._is_enough(number, photo) else Verdict.CONTINUE
+        return Decision.ENOUGH if self._is_enough(number, photo) else Decision.CONTINUE

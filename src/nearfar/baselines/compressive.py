@@ -54,7 +54,6 @@ PATTERNS_PER_COEFFICIENT = 2
 # Rows that are solved together.
 ROWS_AT_ONCE = 512
 
-Progress = Callable[[float], None]
 
 Solver = Callable[[Sensing, Floats], Floats]
 
@@ -64,7 +63,7 @@ def reconstruct_compressive(
     share: float = DEFAULT_PENALTY_SHARE,
     *,
     refitted: bool = True,
-    progress: Progress | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> ExactTransport:
     """Reconstruct every row with one lambda relative to the row's own scale.
 
@@ -107,7 +106,7 @@ def refit_few(sensing: Sensing, responses: Floats, coefficients: Floats) -> Floa
 
 
 def _reconstruct(
-    measurements: CompressiveMeasurements, solver: Solver, progress: Progress | None
+    measurements: CompressiveMeasurements, solver: Solver, progress: Callable[[float], None] | None
 ) -> ExactTransport:
     """Solve rows in blocks, on all cores."""
     sensing = sense(measurements.patterns)

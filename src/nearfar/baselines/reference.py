@@ -10,7 +10,7 @@ pixels and channels, p over projector pixels.
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size, blocks
+from nearfar.callbacks import Report
 from nearfar.errors import InputError, StorageError
 from nearfar.rigs.base import Photo, Rig
 from nearfar.transport.exact import ExactTransport
@@ -26,8 +27,6 @@ from nearfar.transport.exact import ExactTransport
 DEFAULT_MEMORY_BYTES = 2**29
 # Largest memory that a decoder takes for each photo and each column of a row.
 BYTES_PER_NUMBER = 64
-
-Progress = Callable[[str, float], None]
 
 
 class Acquisition(Protocol):
@@ -75,7 +74,7 @@ def acquire_reference(
     memory: int = DEFAULT_MEMORY_BYTES,
     out: NDArray[np.float32] | None = None,
     folder: Path | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> ExactTransport:
     """Shoot all patterns and decode T in pieces.
 
@@ -132,7 +131,7 @@ def acquire_reference(
 
 
 def _shoot(
-    acquisition: Acquisition, rig: Rig, memory: int, folder: Path | None, report: Progress
+    acquisition: Acquisition, rig: Rig, memory: int, folder: Path | None, report: Report
 ) -> tuple[NDArray[Any], Size]:
     """Return the photos as they came, shape (photos, C, channels), and the camera's size."""
     kept: NDArray[Any] | None = None

@@ -1,7 +1,7 @@
 """Captures: raw photos on the disk, and photos taken elsewhere."""
 
 from nearfar.capture.importing import ImportSummary, Pairing, import_photos, pair, pairing
-from nearfar.capture.observing import CaptureObserver, Verdict
+from nearfar.capture.observing import CaptureObserver, Decision
 from nearfar.capture.store import KIND, Capture, open_capture, white_and_black
 from nearfar.capture.writing import CaptureWriter, write_capture
 
@@ -10,9 +10,9 @@ __all__ = [
     "Capture",
     "CaptureObserver",
     "CaptureWriter",
+    "Decision",
     "ImportSummary",
     "Pairing",
-    "Verdict",
     "import_photos",
     "open_capture",
     "pair",

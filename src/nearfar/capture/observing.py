@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from nearfar.deprecation import warn_of
 
 
-class Verdict(Enum):
+class Decision(Enum):
     """Whether a capture is to go on."""
 
     CONTINUE = "continue"
@@ -19,7 +19,7 @@ class Verdict(Enum):
 class CaptureObserver(Protocol):
     """Is called with every photo of a capture, in order."""
 
-    def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict | None:
+    def after_photo(self, number: int, photo: NDArray[Any]) -> Decision | None:
         """Take in a photo.
 
         Parameters
@@ -31,8 +31,8 @@ class CaptureObserver(Protocol):
 
         Returns
         -------
-        Verdict or None
-            ``Verdict.ENOUGH`` ends the capture with this photo; an observer that never ends one
+        Decision or None
+            ``Decision.ENOUGH`` ends the capture with this photo; an observer that never ends one
             returns None.
         """
         ...
@@ -40,8 +40,8 @@ class CaptureObserver(Protocol):
 
 def is_enough(observers: Sequence[CaptureObserver], number: int, photo: NDArray[Any]) -> bool:
     """Pass a photo to every observer; return whether any of them ends the capture."""
-    verdicts = [observer.after_photo(number, photo) for observer in observers]
-    return Verdict.ENOUGH in verdicts
+    decisions = [observer.after_photo(number, photo) for observer in observers]
+    return Decision.ENOUGH in decisions
 
 
 class _Predicate:
@@ -50,8 +50,8 @@ class _Predicate:
     def __init__(self, predicate: Callable[[int, NDArray[Any]], bool]) -> None:
         self._predicate = predicate
 
-    def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict:
-        return Verdict.ENOUGH if self._predicate(number, photo) else Verdict.CONTINUE
+    def after_photo(self, number: int, photo: NDArray[Any]) -> Decision:
+        return Decision.ENOUGH if self._predicate(number, photo) else Decision.CONTINUE
 
 
 def with_predicate(
@@ -77,7 +77,7 @@ def with_predicate(
         return observers
     warn_of(
         f"enough of {function}",
-        "give observers, whose method after_photo returns a nearfar.capture.Verdict",
+        "give observers, whose method after_photo returns a nearfar.capture.Decision",
         stacklevel=stacklevel,
     )
     return [*observers, _Predicate(enough)]

@@ -323,7 +323,7 @@ def write_capture(
     progress : callable, optional
         Called with "photos" and the share of them that is written, 0 to 1, after each.
     observers : sequence of CaptureObserver
-        Each is called with every photo; where one returns ``Verdict.ENOUGH``, the capture and its
+        Each is called with every photo; where one returns ``Decision.ENOUGH``, the capture and its
         plan end with that photo.
     enough : callable, optional
         .. deprecated:: 0.1

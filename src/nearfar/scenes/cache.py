@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 from nearfar.arrays import Size
+from nearfar.callbacks import Report
 from nearfar.errors import NearfarError
 from nearfar.scenes import SCENES, build, sizes
-from nearfar.scenes.description import Progress
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact, save_exact
 
@@ -27,7 +27,7 @@ def cached_scene(
     projector: Size | None = None,
     camera: Size | None = None,
     *,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> ExactTransport:
     """Compute a scene's transport, or read what an earlier call kept.
 

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nearfar.arrays import Size
+from nearfar.callbacks import Report
 
 if TYPE_CHECKING:
     from nearfar.scenes.geometry import Scene
     from nearfar.transport.exact import ExactTransport
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +40,7 @@ class SceneDescription:
     summary: str
     projector: Size
     camera_scale: int = 1
-    compute: "Callable[[Size, Size, Progress], ExactTransport]"
+    compute: "Callable[[Size, Size, Report], ExactTransport]"
     held_out: bool = False
 
 
@@ -57,7 +56,7 @@ class ByRadiosity:
 
     surfaces: "Callable[[], Scene]"
 
-    def __call__(self, projector: Size, camera: Size, progress: Progress) -> "ExactTransport":
+    def __call__(self, projector: Size, camera: Size, progress: Report) -> "ExactTransport":
         """Compute the transport for the sizes of pattern grid and photo."""
         # Ray casting is heavy to import, and a scene is described without it.
         from nearfar.scenes.render import render

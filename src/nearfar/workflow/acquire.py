@@ -56,7 +56,7 @@ def acquire(
         Called after each photo with "photos" and the share of them that is taken, 0 to 1.
     observers : sequence of CaptureObserver
         Each is called with every photo, including those of a stopped capture. The capture ends
-        when one returns ``Verdict.ENOUGH``.
+        when one returns ``Decision.ENOUGH``.
     on_alarm : callable, optional
         Called with each alarm about a photo, a sentence; a rig reports its own. The capture
         stores both.

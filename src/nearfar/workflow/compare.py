@@ -6,13 +6,14 @@ well under white. At equal total exposure a method with fewer photos exposes eac
 full well deeper in proportion, and a method with many for less.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nearfar.arrays import Floats, Size
+from nearfar.callbacks import Report
 from nearfar.errors import InputError
 from nearfar.illumination.pictures import standard_lights
 from nearfar.plan.choose import FEWEST_PHOTOS, default_window
@@ -27,8 +28,6 @@ from nearfar.workflow.rivals.rival import Attempt, Budget
 
 # A default budget is the paper's photos divided by one of these.
 BUDGET_DIVISORS = (16, 8, 4, 2, 1)
-
-Report = Callable[[str, float], None]
 
 
 class Trial(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.capture import Verdict, open_capture
+from nearfar.capture import Decision, open_capture
 from nearfar.errors import InputError, PlanError
 from nearfar.plan import choose_plan, paper_plan, parse_plan
 from nearfar.plan.checks import (
@@ -108,8 +108,8 @@ def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_no
     shown = (plan.draw(i) for i in range(len(plan.patterns)))
     for number, photo in enumerate(rig.shoot(shown)):
         failed = qualities and number < len(plan.patterns)
-        verdict = check.after_photo(number, np.zeros_like(photo) if failed else photo)
-        assert verdict is Verdict.CONTINUE
+        decision = check.after_photo(number, np.zeros_like(photo) if failed else photo)
+        assert decision is Decision.CONTINUE
     assert qualities[0].fault is None
     assert qualities[-1].fault.endswith(".")
     assert qualities[-1].photos == len(plan.patterns)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
+from nearfar.callbacks import Report
 from nearfar.errors import InputError
 from nearfar.files import new_output
 from nearfar.markup import numbers
@@ -13,7 +14,6 @@ from nearfar.report.figures.style import save, styled
 from nearfar.report.figures.table import relighting_rows, table
 from nearfar.report.model_check import HEAD, check_rows
 from nearfar.report.page import page
-from nearfar.workflow.experiments.acquired import Report
 from nearfar.workflow.experiments.data import Data, kept, together, write_data
 from nearfar.workflow.experiments.paper import EXPERIMENTS
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size
+from nearfar.callbacks import Report
 from nearfar.correspondence import Correspondence
 from nearfar.illumination.pictures import landscape, penguin, white
 from nearfar.plan import Plan, paper_plan
@@ -27,8 +28,6 @@ from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import percentiles, relighting_snr, row_snr
 from nearfar.workflow.experiments.data import Data
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
-
-Report = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)

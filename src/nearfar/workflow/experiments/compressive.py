@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from nearfar.baselines.choosing import best_share
 from nearfar.baselines.compressive import reconstruct_compressive
 from nearfar.baselines.random_patterns import bernoulli_patterns, measure_without_noise
+from nearfar.callbacks import Report
 from nearfar.illumination.frequencies import representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan.patterns import Exponential
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.evaluate import percentiles, snr, snr_of_rows
-from nearfar.workflow.experiments.acquired import Report, thin
+from nearfar.workflow.experiments.acquired import thin
 from nearfar.workflow.experiments.data import Data
 from nearfar.workflow.experiments.in_theory import Theory, lights
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size
+from nearfar.callbacks import Report
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.pictures import lettering, natural_picture, random_pattern, white
 from nearfar.photometry.theory import measure_in_theory
@@ -19,7 +20,7 @@ from nearfar.scenes.cache import cached_scene
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import percentiles, relighting_snr, row_snr
-from nearfar.workflow.experiments.acquired import Report, relit, savings_in_theory, thin
+from nearfar.workflow.experiments.acquired import relit, savings_in_theory, thin
 from nearfar.workflow.experiments.data import Data
 
 # Which natural picture.

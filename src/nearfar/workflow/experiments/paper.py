@@ -3,7 +3,8 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from nearfar.workflow.experiments.acquired import BOX, CORNER, Report, acquire_scene
+from nearfar.callbacks import Report
+from nearfar.workflow.experiments.acquired import BOX, CORNER, acquire_scene
 from nearfar.workflow.experiments.compressive import acquire_compressively
 from nearfar.workflow.experiments.data import Data
 from nearfar.workflow.experiments.in_theory import WEDGE, acquire_in_theory

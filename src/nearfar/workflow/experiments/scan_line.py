@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
+from nearfar.callbacks import Report
 from nearfar.illumination.frequencies import as_array, far_frequencies, near_frequencies
 from nearfar.illumination.pictures import white
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.check import check_model, numbers_of
 from nearfar.workflow.conditioning import condition_near
-from nearfar.workflow.experiments.acquired import Acquisition, Report, thin
+from nearfar.workflow.experiments.acquired import Acquisition, thin
 from nearfar.workflow.experiments.data import Data
 
 # Singular values above this share of the largest of T count towards a rank.

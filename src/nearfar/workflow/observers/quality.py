@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers, blocks
-from nearfar.capture import Verdict
+from nearfar.capture import Decision
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
 from nearfar.estimate.joint import ErrorBars, estimate_jointly
@@ -111,7 +111,7 @@ class QualityObserver:
         self._ends = set(ends(plan))
         self._next_estimate = MINIMUM_PHOTOS + sum(map(len, check_photos(plan).values()))
 
-    def after_photo(self, number: int, photo: NDArray[Any]) -> Verdict:
+    def after_photo(self, number: int, photo: NDArray[Any]) -> Decision:
         """Keep the chosen rows of a photo, (Cy, Cx, channels), and estimate if it is time.
 
         Raises
@@ -126,7 +126,7 @@ class QualityObserver:
         taken = number + 1
         last = taken == len(self._plan.patterns)
         if taken not in self._ends or (taken < self._next_estimate and not last):
-            return Verdict.CONTINUE
+            return Decision.CONTINUE
         try:
             self.quality = self._estimate(taken)
         except InputError as error:
@@ -139,7 +139,7 @@ class QualityObserver:
         self._next_estimate = int(
             taken * 2 ** (np.clip(missing, 0.0, MAXIMUM_MISSING_DECIBELS) / MAXIMUM_GAIN_DECIBELS)
         )
-        return Verdict.ENOUGH if missing <= 0 else Verdict.CONTINUE
+        return Decision.ENOUGH if missing <= 0 else Decision.CONTINUE
 
     def _estimate(self, taken: int) -> CaptureQuality:
         plan = self._plan.first(taken)

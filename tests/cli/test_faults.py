@@ -9,6 +9,7 @@ import imagecodecs
 import numpy as np
 import pytest
 
+from nearfar.cli.faults import faults_in_sentences
 from tests.cli.conftest import (
     PLAN,
     PROJECTOR,
@@ -39,6 +40,20 @@ def test_lights_that_cannot_be_shown(
     np.save(path, light)
     arguments = ("relight", finished.transport, path, tmp_path / "out.npy", *options)
     check_refused(untouched, arguments, path, word)
+
+
+def test_a_fault_of_a_disk_is_not_said_to_be_of_stdout(capsys):
+    # Its memory's first page is no process's to read.
+    with (
+        pytest.raises(SystemExit),
+        faults_in_sentences(),
+        Path("/proc/self/mem").open("rb") as file,
+    ):
+        file.read(1)
+    said = capsys.readouterr().err
+    assert said == (
+        "nearfar: a file could not be read or written (Input/output error): check the disks.\n"
+    )
 
 
 # Correspondence

@@ -1,5 +1,6 @@
 """How errors and interrupts of a command reach people: a sentence, and an exit status."""
 
+import errno
 import os
 import signal
 import sys
@@ -42,13 +43,15 @@ def faults_in_sentences() -> Iterator[None]:
     except (typer.Exit, typer.BadParameter):
         raise
     except OSError as error:
+        fault = error.strerror or str(error)
         if error.filename is None:
-            # Errors of files name the file; an error without a name is of stdout.
+            # Errors of files name the file, but for those of a disk that cannot be read.
+            if error.errno == errno.EIO:
+                _fail(f"a file could not be read or written ({fault}): check the disks.")
             _discard_stdout()
-            _fail(f"stdout could not be written ({error.strerror or error}): send it elsewhere.")
+            _fail(f"stdout could not be written ({fault}): send it elsewhere.")
         _fail(
-            f"{error.filename} could not be used ({error.strerror}): check that it is there and "
-            f"may be read."
+            f"{error.filename} could not be used ({fault}): check that it is there and may be read."
         )
     except Exception as error:  # A fault of our own still owes the user a sentence.
         if _stops:

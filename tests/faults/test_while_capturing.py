@@ -56,6 +56,22 @@ def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, 
     assert any("which no linear response does" in alarm for alarm in told)
 
 
+def test_the_alarm_of_the_last_photo_before_a_stop_is_stored(small_world, tmp_path):
+    whole, path, told = tmp_path / "whole.zarr", tmp_path / "stopped.zarr", []
+    rig = _rig(small_world, exposure=3.0)
+    acquire(CHOSEN, whole, rig, on_alarm=told.append)
+
+    def stop(_number, _photo):
+        if told[1:]:
+            raise KeyboardInterrupt
+        return False
+
+    with pytest.raises(KeptInterrupt):
+        acquire(CHOSEN, path, rig, on_alarm=told.append, observers=[EndsWhere(stop)])
+    acquire(CHOSEN, path, rig, resume=True)
+    assert open_capture(path).alarms == open_capture(whole).alarms == (told[0],)
+
+
 def test_light_that_changed_meanwhile_is_told(small_world, tmp_path):
     def stop(number, _photo):
         if number == 25:

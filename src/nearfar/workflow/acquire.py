@@ -106,6 +106,10 @@ def acquire(
             finder = FaultsWhileCapturing(plan, rig.full_scale)
             finder.recall(writer.read, taken)
             alarms: list[str] = []
+            if taken:
+                # The capture was stopped before the alarms of its last photo could be stored.
+                last = writer.read(taken - 1)
+                alarms = [str(fault) for fault in finder.examine(taken - 1, last)]
             for number in range(taken):
                 enough_now = is_enough(observers, number, writer.read(number))
                 # Only the last photo may end the capture: no photo is removed.

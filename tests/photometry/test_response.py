@@ -7,8 +7,8 @@ from nearfar.errors import InputError
 from nearfar.photometry.exposures import Sensor, average, merge_exposures
 from nearfar.photometry.response import (
     fit_linearity,
-    fit_noise,
     fit_response,
+    fit_sensor_noise,
     pair_noise,
     unmix_response,
 )
@@ -90,7 +90,7 @@ def test_the_noise_of_pairs_tells_gain_and_read_noise(sensor):
         mean, variance = pair_noise(one, other, 65535.0)
         means.append(mean)
         variances.append(variance)
-    found = fit_noise(np.concatenate(means), np.concatenate(variances), sensor.black)
+    found = fit_sensor_noise(np.concatenate(means), np.concatenate(variances), sensor.black)
     assert found.gain == pytest.approx(sensor.gain, rel=0.05)
     assert found.read == pytest.approx(sensor.read, rel=0.2)
 

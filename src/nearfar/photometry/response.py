@@ -129,7 +129,7 @@ def fit_linearity(seconds: Floats, levels: Floats, full_scale: float) -> Lineari
     return Linearity(float(black), float(rate), float(worst))
 
 
-def fit_noise(means: Floats, variances: Floats, black: float) -> Sensor:
+def fit_sensor_noise(means: Floats, variances: Floats, black: float) -> Sensor:
     """Fit read noise and gain to the noise of pairs of photos: variance = read^2 + gain * light.
 
     Parameters

@@ -15,8 +15,8 @@ from nearfar.photometry.exposures import Sensor
 from nearfar.photometry.response import (
     Linearity,
     fit_linearity,
-    fit_noise,
     fit_response,
+    fit_sensor_noise,
     pair_noise,
     unmix_response,
 )
@@ -243,7 +243,7 @@ def _noise(pairs: list[list[Photo]], black: float, full: float) -> tuple[Sensor,
     groups = [pair_noise(one, other, full) for one, other in pairs]
     means = np.concatenate([mean for mean, _ in groups])
     variances = np.concatenate([variance for _, variance in groups])
-    return fit_noise(means, variances, black), np.stack([means, variances], axis=-1)
+    return fit_sensor_noise(means, variances, black), np.stack([means, variances], axis=-1)
 
 
 def _checked(

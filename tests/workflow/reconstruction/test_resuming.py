@@ -36,7 +36,9 @@ from tests.processes import run_command, start
 from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
-CAMERA = Size(78, 6)
+CAMERA = Size(24, 6)
+# So many tiles that a reconstruction is still at work when it is killed for the twentieth time.
+TALL_CAMERA = Size(78, 6)
 # Rows of a tile.
 ROWS = 3
 SLOW = """
@@ -66,24 +68,43 @@ def into(
     )
 
 
+def _captured(camera, folder):
+    world = model_transport(Size(16, 20), camera, window=5, far=Size(3, 3), channels=1)
+    rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
+    return acquire(choose_plan(Size(16, 20), 50)[0], folder / "c.zarr", rig)
+
+
+def _memory(capture):
+    """Bytes in which so few rows are worked at that there are many tiles."""
+    return memory_for(ROWS, capture.plan, capture.camera, "joint", channels=1)
+
+
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory):
-    world = model_transport(Size(16, 20), CAMERA, window=5, far=Size(3, 3), channels=1)
-    rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
-    path = tmp_path_factory.mktemp("capture") / "c.zarr"
-    return acquire(choose_plan(Size(16, 20), 50)[0], path, rig)
+    return _captured(CAMERA, tmp_path_factory.mktemp("capture"))
 
 
 @pytest.fixture(scope="module")
 def memory(capture):
-    """Bytes in which so few rows are worked at that there are many tiles."""
-    return memory_for(ROWS, capture.plan, CAMERA, "joint", channels=1)
+    return _memory(capture)
 
 
 @pytest.fixture(scope="module")
 def whole(capture, memory, tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "t.zarr"
     into(path, capture, memory=memory)
+    return path
+
+
+@pytest.fixture(scope="module")
+def tall_capture(tmp_path_factory):
+    return _captured(TALL_CAMERA, tmp_path_factory.mktemp("tall"))
+
+
+@pytest.fixture(scope="module")
+def tall_whole(tall_capture, tmp_path_factory):
+    path = tmp_path_factory.mktemp("tall whole") / "t.zarr"
+    into(path, tall_capture, memory=_memory(tall_capture))
     return path
 
 
@@ -96,7 +117,7 @@ def _check_same(one, other):
 
 
 def _stop_after(count):
-    """Stop when so many blocks are done."""
+    """Stop when so many rows are done."""
 
     def progress(what, share):
         if what == "reconstructing" and share * CAMERA.height >= count:
@@ -105,10 +126,12 @@ def _stop_after(count):
     return progress
 
 
-def test_it_is_cut_into_many_blocks(capture, whole, memory):
-    tiling = tiling_of(capture, ReconstructionOptions(memory=memory), given=False)
-    assert len(list(tiling.tiles())) >= 25
-    assert not (whole / LOG_NAME).exists()
+def test_it_is_cut_into_many_blocks(capture, whole, tall_capture, tall_whole):
+    for each, path, least in ((capture, whole, 8), (tall_capture, tall_whole, 25)):
+        options = ReconstructionOptions(memory=_memory(each))
+        tiling = tiling_of(each, options, given=False)
+        assert len(list(tiling.tiles())) >= least
+        assert not (path / LOG_NAME).exists()
 
 
 def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
@@ -117,7 +140,7 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
     with pytest.raises(
         KeptInterrupt, match=r"^interrupted; \d+ tiles? .* and `resume=True` goes on"
     ):
-        into(path, capture, progress=_stop_after(30), **given)
+        into(path, capture, progress=_stop_after(10), **given)
     assert not path.exists()
     with pytest.raises(ExistingOutputError):
         into(path, capture, **given)
@@ -145,7 +168,7 @@ def test_what_was_interrupted_is_gone_on_with(capture, whole, memory, tmp_path):
 def test_another_device_does_not_go_on_with_it(capture, memory, tmp_path):
     path = tmp_path / "t.zarr"
     with pytest.raises(KeptInterrupt):
-        into(path, capture, memory=memory, progress=_stop_after(20))
+        into(path, capture, memory=memory, progress=_stop_after(7))
     with pytest.raises(InputError, match="was started with another"):
         into(path, capture, memory=memory, device="torch", resume=True)
 
@@ -154,7 +177,7 @@ def test_photos_that_were_taken_again_are_another_capture(capture, memory, tmp_p
     path, source = tmp_path / "t.zarr", tmp_path / "c.zarr"
     shutil.copytree(capture.path, source)
     with pytest.raises(KeptInterrupt):
-        into(path, open_capture(source), memory=memory, progress=_stop_after(20))
+        into(path, open_capture(source), memory=memory, progress=_stop_after(7))
     again = replace_photos(source, [3], [capture.photos[3]])
     with pytest.raises(InputError, match="another capture"):
         into(path, again, memory=memory, resume=True)
@@ -163,7 +186,7 @@ def test_photos_that_were_taken_again_are_another_capture(capture, memory, tmp_p
 def test_what_is_refused_says_nothing_of_tiles_of_an_earlier_job(capture, memory, tmp_path):
     path = tmp_path / "t.zarr"
     with pytest.raises(KeptInterrupt):
-        into(path, capture, memory=memory, progress=_stop_after(20))
+        into(path, capture, memory=memory, progress=_stop_after(7))
     with pytest.raises(ExistingOutputError) as there:
         into(path, capture, memory=memory)
     with pytest.raises(InputError, match="was started with another") as other:
@@ -197,7 +220,7 @@ def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
         path = tmp_path / f"{next(iter(again))}.zarr"
         folder = Path(f"{path}.unfinished")
         with pytest.raises(KeptInterrupt):
-            into(path, capture, memory=memory, progress=_stop_after(5))
+            into(path, capture, memory=memory, progress=_stop_after(4))
         first, *_ = (folder / LOG_NAME).read_bytes().splitlines(keepends=True)
         shutil.rmtree(folder)
         folder.mkdir()
@@ -207,11 +230,12 @@ def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
 
 
 @pytest.mark.slow(minutes=1.5)
-def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path):
+def test_kill_9_at_twenty_moments_costs_nothing(tall_capture, tall_whole, tmp_path):
     generator = random.Random(0)
     path = tmp_path / "t.zarr"
     log = Path(f"{path}.unfinished") / LOG_NAME
-    command = ("reconstruct", capture.path, path, "--memory", f"{memory / 1e6}MB", "-q")
+    memory = f"{_memory(tall_capture) / 1e6}MB"
+    command = ("reconstruct", tall_capture.path, path, "--memory", memory, "-q")
     kills = 0
     while kills < 20:
         resume = ["--resume"] if log.parent.exists() else []
@@ -236,7 +260,7 @@ def test_kill_9_at_twenty_moments_costs_nothing(capture, whole, memory, tmp_path
         resume = ["--resume"] if log.parent.exists() else []
         check_done(run_nearfar(*command, *resume))
     assert kills == 20, "it ended before it was killed twenty times: give it more tiles"
-    _check_same(whole, path)
+    _check_same(tall_whole, path)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -247,7 +271,7 @@ def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):
     assert ran.status == 1
     assert "nothing to go on with" in ran.err
     with pytest.raises(KeptInterrupt):
-        into(path, open_capture(capture.path), memory=memory, progress=_stop_after(30))
+        into(path, open_capture(capture.path), memory=memory, progress=_stop_after(10))
     log = tmp_path / "t.zarr.unfinished" / LOG_NAME
     log.write_bytes(log.read_bytes()[:-9])
     ran = run_nearfar("reconstruct", *options, "--resume")

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 from array_api_compat import array_namespace, device, is_numpy_array, to_device
+from array_api_compat import numpy as numpy_namespace
 from numpy.typing import NDArray
 
 from nearfar.errors import InputError
@@ -171,6 +172,9 @@ def processors() -> int:
 
 def namespace(*values: Any) -> Any:
     """Return the array-API functions for arrays: NumPy's, PyTorch's or CuPy's."""
+    # Asked for often, and finding it out takes as long as work on a few camera pixels.
+    if all(type(value) is np.ndarray for value in values):
+        return numpy_namespace
     return array_namespace(*values)
 
 

@@ -10,12 +10,13 @@ W/2 - 1.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Complexes, Floats
 from nearfar.illumination.real_basis import RealBasis
 
 
@@ -49,6 +50,16 @@ class CentredBasis:
     response_indices: NDArray[np.int64]
     on_window: Floats
     on_footprint: Floats
+
+    @cached_property
+    def side_waves(self) -> tuple[Complexes, Complexes]:
+        """exp(j 2 pi k y) and exp(j 2 pi k x) over differences of entries, each (K, 2 W - 1)."""
+        window = round(np.sqrt(self.on_window.shape[1]))
+        side = np.arange(1 - window, window)
+        down, across = (
+            np.exp(2j * np.pi * self.basis.cycles[:, axis, None] * side) for axis in (0, 1)
+        )
+        return down, across
 
     def put(self, move: Callable[[Any], Any]) -> "CentredBasis":
         """Put the patterns onto a device."""

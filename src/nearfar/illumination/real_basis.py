@@ -11,12 +11,28 @@ Index convention: m runs over the real coefficients, cosine before sine for each
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Complexes, Floats, Size, beside, namespace, product
 from nearfar.illumination.frequencies import Frequency, as_array
+
+
+class _Layout(NamedTuple):
+    """Coefficients of frequencies that are their own negatives, and of the others.
+
+    Attributes
+    ----------
+    own : tuple of ndarray of int
+        Coefficients of those that are their own negatives, and their frequencies.
+    pairs : list
+        Each run of frequencies with a cosine and a sine, and where its coefficients start and stop.
+    """
+
+    own: tuple[NDArray[np.int64], NDArray[np.int64]]
+    pairs: list[tuple[slice, tuple[int, int]]]
 
 
 @dataclass(frozen=True)
@@ -117,24 +133,37 @@ class RealBasis:
         down, across = (beside(phases, responses) for phases in self._single_phases)
         phase = down[centres[:, 0]] * across[centres[:, 1]]
         real, imaginary = xp.real(phase)[:, None], xp.imag(phase)[:, None]
-        cosine = np.flatnonzero(~self.is_sine)
-        # A frequency that is its own negative has no sine: its phase is 1 or -1.
-        own = np.diff(np.append(cosine, self.count)) == 1
         shifted: Floats = xp.empty_like(responses)
-        single, alone = beside(cosine[own], responses), beside(np.flatnonzero(own), responses)
+        own, pairs = self._layout
+        # A frequency that is its own negative has no sine: its phase is 1 or -1.
+        single, alone = (beside(indices, responses) for indices in own)
         shifted[..., single] = responses[..., single] * real[..., alone]
-        first = np.flatnonzero(~own)
-        if not len(first):
-            return shifted
-        # Runs of pairs side by side, so that slices are views and nothing is copied.
-        for run in np.split(first, np.flatnonzero(np.diff(first) != 1) + 1):
-            start, stop = cosine[run[0]], cosine[run[-1]] + 2
-            c = real[..., run[0] : run[-1] + 1]
-            s = sign * imaginary[..., run[0] : run[-1] + 1]
+        for run, (start, stop) in pairs:
+            c = real[..., run]
+            s = sign * imaginary[..., run]
             even, odd = responses[..., start:stop:2], responses[..., start + 1 : stop : 2]
             shifted[..., start:stop:2] = even * c + odd * s
             shifted[..., start + 1 : stop : 2] = odd * c - even * s
         return shifted
+
+    @cached_property
+    def _layout(self) -> _Layout:
+        """Where the coefficients of each kind of frequency lie."""
+        cosine = np.flatnonzero(~self.is_sine)
+        own = np.diff(np.append(cosine, self.count)) == 1
+        single, first = np.flatnonzero(own), np.flatnonzero(~own)
+        # Runs of pairs side by side, so that slices are views and nothing is copied.
+        runs = np.split(first, np.flatnonzero(np.diff(first) != 1) + 1) if len(first) else []
+        return _Layout(
+            (cosine[single], single),
+            [
+                (
+                    slice(int(run[0]), int(run[-1]) + 1),
+                    (int(cosine[run[0]]), int(cosine[run[-1]]) + 2),
+                )
+                for run in runs
+            ],
+        )
 
     @cached_property
     def _phases(self) -> tuple[Complexes, Complexes]:

@@ -170,9 +170,8 @@ def _information(centred: CentredBasis, weight: Floats) -> Floats:
         information = (patterns.T * weight) @ patterns
         return information
     window = round(np.sqrt(centred.on_window.shape[1]))
-    side = np.arange(1 - window, window)
-    waves = [np.exp(2j * np.pi * centred.basis.cycles[:, axis, None] * side) for axis in (0, 1)]
-    of_difference = np.real((waves[0].T * weights[cosine]) @ waves[1])
+    down, across = centred.side_waves
+    of_difference = np.real((down.T * weights[cosine]) @ across)
     # [y, x, y', x'] is of_difference[y - y', x - x'], counted from the middle.
     apart = np.subtract.outer(np.arange(window), np.arange(window)) + window - 1
     table = of_difference[apart[:, None, :, None], apart[None, :, None, :]]

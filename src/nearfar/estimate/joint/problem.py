@@ -165,6 +165,8 @@ def lay_out(
     return Problem(measurements, model, pixels, window)
 
 
+# With its phases, which each sweep of each tile reads.
+@lru_cache(maxsize=4)
 def _centred(frequencies: tuple[Frequency, ...], projector: Size, window: int) -> CentredBasis:
     return centred_basis(real_basis(frequencies, projector), window_offsets(window))
 

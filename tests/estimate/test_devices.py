@@ -20,7 +20,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 
 # An accelerator's own where there is one.
 DEVICES = ["torch", "cuda"] if torch.cuda.is_available() else ["torch"]
-PROJECTOR, CAMERA, WINDOW = Size(24, 30), Size(24, 30), 7
+PROJECTOR, CAMERA, WINDOW = Size(16, 20), Size(16, 20), 5
 
 
 def _by_paper(measurements, q, plan, device):
@@ -46,8 +46,8 @@ def test_the_estimate_is_numpys(shoot, by, offset, between, device):
     q = world.correspondence.copy()
     if between:
         # Between pixels, so that q is put right; and some without direct light.
-        q = np.clip(q + np.random.default_rng(0).uniform(-0.4, 0.4, q.shape), 0, 23)
-        q[3:5, 8:20] = np.nan
+        q = np.clip(q + np.random.default_rng(0).uniform(-0.4, 0.4, q.shape), 0, 15)
+        q[3:5, 8:16] = np.nan
         q = q.astype(np.float32)
     # What rounding the responses in single precision changes is all that another library may.
     generator = np.random.default_rng(1)

@@ -3,6 +3,7 @@
 import re
 import threading
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA = Size(16, 20), Size(30, 12)
+EXECUTORS = {"serial": SerialExecutor(), "threads": ThreadExecutor(3)}
 
 
 @pytest.fixture(scope="module")
@@ -61,9 +63,22 @@ def _executed(work, executor, report=lambda _what, _share: None):
     return *sink.collected(), summary
 
 
-def test_tiles_side_by_side_are_those_one_after_another(work):
-    serial, q, said = _executed(work, SerialExecutor())
-    threaded, found, also_said = _executed(work, ThreadExecutor(3))
+@pytest.fixture(scope="module")
+def executed(work):
+    """Return what an executor, by its name, makes of the work, and the progress it reports."""
+
+    @cache
+    def execute_once(name):
+        reports = []
+        found = _executed(work, EXECUTORS[name], lambda *report: reports.append(report))
+        return *found, reports
+
+    return execute_once
+
+
+def test_tiles_side_by_side_are_those_one_after_another(executed):
+    serial, q, said, _ = executed("serial")
+    threaded, found, also_said, _ = executed("threads")
     for name in FACTORS:
         np.testing.assert_array_equal(getattr(threaded, name), getattr(serial, name))
     np.testing.assert_array_equal(found.q, q.q)
@@ -91,11 +106,10 @@ def test_no_more_tiles_are_worked_at_than_asked_for(work, monkeypatch):
     assert most == [2]
 
 
-@pytest.mark.parametrize("executor", [SerialExecutor(), ThreadExecutor(2)])
-def test_progress_rises_to_the_whole(work, executor):
-    shares = []
-    _executed(work, executor, lambda what, share: shares.append((what, share)))
-    done = [share for what, share in shares if what == "reconstructing"]
+@pytest.mark.parametrize("name", EXECUTORS)
+def test_progress_rises_to_the_whole(executed, name):
+    *_, reports = executed(name)
+    done = [share for what, share in reports if what == "reconstructing"]
     assert done == sorted(done)
     assert done[-1] == pytest.approx(1.0)
 

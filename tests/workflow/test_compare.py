@@ -25,17 +25,19 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.compare import Comparison, Trial, compare, default_budgets
 from nearfar.workflow.rivals import RIVALS
+from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.paper import paper_plans
+from nearfar.workflow.rivals.rival import Budget
 
 BUDGETS = (40, 130)
 
-pytestmark = pytest.mark.slow(minutes=1)
+pytestmark = pytest.mark.slow(minutes=0.5)
 
 
 @pytest.fixture(scope="module")
 def scene():
-    box = cached_scene("cornell", Size(16, 16))
-    # One channel: methods do not mix them, and each costs as much again.
+    # One channel and few camera pixels: methods do not mix them, and each costs as much again.
+    box = cached_scene("cornell", Size(16, 16), Size(4, 4))
     return replace(box, direct=box.direct[:1], near=box.near[:1], far=box.far[:1])
 
 
@@ -62,6 +64,25 @@ def test_every_method_has_its_trials(found):
         np.testing.assert_allclose([t.exposure for t in mine], (40, 130, 272))
     for trial in found.equal_photos:
         assert trial.photos <= trial.budget
+
+
+def test_as_much_exposure_as_photos_is_the_same_trial(found):
+    for method, photos in (("joint", 130), ("CLT", 130), ("brute force", 272)):
+        one, same = (
+            next(t for t in trials if t.method == method and t.budget == photos)
+            for trials in (found.equal_photos, found.equal_exposure)
+        )
+        assert one == same
+
+
+@pytest.mark.parametrize(("method", "photos"), [("joint", 40), ("brute force", 272)])
+def test_photos_of_one_unit_each_are_the_same_photos(scene, method, photos):
+    # What lets a comparison take that trial from the one before.
+    bench = Bench(scene, SimulatedCamera(), 5, 1.0)
+    light = np.ones(scene.projector, dtype=np.float32)
+    budgets = Budget(photos), Budget(photos, photos)
+    (one,), (same,) = (RIVALS[method].attempts(bench, budget) for budget in budgets)
+    np.testing.assert_array_equal(one.transport @ light, same.transport @ light)
 
 
 def test_light_is_worth_decibels(found):

@@ -149,14 +149,23 @@ def compare(
     report = progress or (lambda _what, _share: None)
     jobs = _jobs(scene.projector, methods, budgets)
     done: list[tuple[Budget, Trial]] = []
+    # Where a method took every photo of its budget, as much total exposure gives the same photos.
+    same: dict[tuple[str, Budget], Trial] = {}
     for number, (method, budget) in enumerate(jobs):
         report("comparing", number / len(jobs))
+        if (method, budget) in same:
+            done.append((budget, same[method, budget]))
+            continue
         trials = [
             _judge(method, budget, attempt, lights, truth)
             for attempt in RIVALS[method].attempts(bench, budget)
         ]
         if trials:
-            done.append((budget, max(trials, key=lambda trial: trial.pictures)))
+            best = max(trials, key=lambda trial: trial.pictures)
+            done.append((budget, best))
+            took_all = all(trial.photos == budget.photos for trial in trials)
+            if took_all and budget.total_exposure is None:
+                same[method, Budget(budget.photos, budget.photos)] = best
     report("compared", 1.0)
     return Comparison(
         scene.name,

@@ -1,6 +1,7 @@
 """The paper's figures: drawn from measured data, kept, told apart by version, nothing clipped."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +11,18 @@ from matplotlib.text import Text
 
 from nearfar.errors import ExistingOutputError, InputError, UnreadableFileError
 from nearfar.files import read_picture
-from nearfar.report.figures import NAMES
+from nearfar.report.figures import NAMES, run
 from nearfar.report.figures.run import make_figures
 from nearfar.report.figures.sheets import SHEETS
-from nearfar.report.figures.style import styled
+from nearfar.report.figures.style import DPI, styled
 from nearfar.workflow.experiments import acquired, in_theory
 from nearfar.workflow.experiments import data as kept_data
 from nearfar.workflow.experiments.data import Data, kept, read_data, together, write_data
 from nearfar.workflow.experiments.paper import EXPERIMENTS
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
+from tests.report.figures.conftest import WEDGE
+
+ENDINGS = ("pdf", "png", "npz")
 
 
 def test_the_cases_are_those_of_the_paper():
@@ -38,11 +42,10 @@ def test_the_cases_are_those_of_the_paper():
 
 
 @pytest.mark.slow
-def test_all_figures_stand_in_a_folder(small, tmp_path: Path):
-    out = tmp_path / "out"
-    make_figures(out)
+def test_all_figures_stand_in_a_folder(drawn_once):
+    out = drawn_once.folder
     assert sorted(path.name for path in out.iterdir()) == sorted(
-        ["index.html", *(f"figure-{n}.{end}" for n in SHEETS for end in ("pdf", "png", "npz"))]
+        ["index.html", *(f"figure-{n}.{end}" for n in SHEETS for end in ENDINGS)]
     )
     page = (out / "index.html").read_text(encoding="utf-8")
     for name in SHEETS:
@@ -58,27 +61,36 @@ def test_all_figures_stand_in_a_folder(small, tmp_path: Path):
     assert "15.4" in page
     for word in ("nan", "None", "inf "):
         assert f">{word}<" not in page
-    assert sorted(small) == ["CLT", "box", "corner", "scan-line", "wedge"]
+    assert sorted(drawn_once.asked) == ["CLT", "box", "corner", "scan-line", "wedge"]
 
 
 @pytest.mark.slow
-def test_a_second_run_measures_nothing_and_draws_the_same(small, tmp_path: Path):
-    make_figures(tmp_path / "one", ["5", "2"])
-    asked = list(small)
-    assert sorted(asked) == ["box", "wedge"]
+def test_a_second_run_measures_nothing_and_draws_the_same(
+    drawn_once, small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    shutil.copytree(drawn_once.cache, tmp_path / "cache")
     make_figures(tmp_path / "two", ["2", "5"])
-    assert small == asked
-    names = sorted(path.name for path in (tmp_path / "one").iterdir())
-    assert "figure-1.png" not in names
+    assert small == []
+    names = {path.name for path in (tmp_path / "two").iterdir()}
+    assert names == {"index.html", *(f"figure-{n}.{e}" for n in "25" for e in ENDINGS)}
     for name in names:
-        if not name.endswith(".npz"):
-            one, two = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
-            assert one == two, name
+        if name.endswith((".png", ".pdf")):
+            one, two = (folder / name for folder in (drawn_once.folder, tmp_path / "two"))
+            assert one.read_bytes() == two.read_bytes(), name
+    # In whatever order the figures are asked for, and measured anew.
+    monkeypatch.setenv("NEARFAR_CACHE", str(tmp_path / "empty"))
+    monkeypatch.setattr(run, "save", lambda *_: None)
+    make_figures(tmp_path / "three", ["5", "2"])
+    assert sorted(small) == ["box", "wedge"]
+    two, three = (tmp_path / folder / "index.html" for folder in ("two", "three"))
+    assert two.read_bytes() == three.read_bytes()
 
 
 def test_what_another_version_kept_is_measured_again_and_said(
     small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
+    # What is kept is what was measured, whatever is drawn of it.
+    monkeypatch.setattr(run, "save", lambda *_: None)
     notes: list[str] = []
     with monkeypatch.context() as older:
         older.setattr(kept_data, "version", lambda: "0.0.1")
@@ -142,15 +154,14 @@ def test_data_are_what_was_written(tmp_path: Path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(SHEETS))
-def test_no_label_is_clipped(measured_once, name: str):
+def test_no_label_is_clipped(drawn_once, measured_once, name: str):
     sheet = SHEETS[name]
     data = together([measured_once[one] for one in sheet.experiments])
+    figure = drawn_once.figures[f"figure-{name}"]
     with styled():
-        figure = sheet.draw(data)
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        # Inches; what lies beyond the page would be cut off.
-        drawn = figure.get_tightbbox(canvas.get_renderer())
+        # Laid out as it was saved. Inches; what lies beyond the page would be cut off.
+        figure.set_dpi(DPI)
+        drawn = figure.get_tightbbox(FigureCanvasAgg(figure).get_renderer())
     texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
     assert len(texts) >= 10
     assert drawn.x0 >= -0.01
@@ -158,6 +169,20 @@ def test_no_label_is_clipped(measured_once, name: str):
     assert drawn.x1 <= figure.get_figwidth() + 0.01
     assert drawn.y1 <= figure.get_figheight() + 0.01
     assert sheet.caption(data).endswith(".")
+
+
+@pytest.mark.slow
+def test_the_rival_has_as_many_patterns_and_its_own_lambda(measured_once):
+    found = measured_once["CLT"].numbers["CLT"]
+    assert found["patterns"] == WEDGE.plan.transport_photos
+    best = max(max(plain, refitted) for _, plain, refitted in found["grid"])
+    share, plain, refitted = next(line for line in found["grid"] if line[0] == found["share"])
+    assert best == (refitted if found["refitted"] else plain)
+    assert 0 < share <= 1
+    ours = measured_once["wedge"].numbers["snr_b"]
+    assert ours.keys() == found["snr_b"].keys() == {"white", "picture", "letters", "random"}
+    for light, theirs in found["snr_b"].items():
+        assert ours[light] > theirs + 10
 
 
 def test_figures_that_are_not_there(tmp_path: Path, folder_listing):

@@ -8,7 +8,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.evaluate import snr, snr_of_rows
-from tests.report.figures.conftest import BOX, WEDGE
+from tests.report.figures.conftest import BOX
 
 pytestmark = pytest.mark.slow
 
@@ -56,19 +56,6 @@ def test_slices_and_their_singular_values_are_those_of_the_scene(measured_once):
     c = int(data.arrays["columns"][0])
     whole = np.fft.fft2(rows[c].reshape(BOX.projector))[0]
     np.testing.assert_allclose(np.fft.fft(data.arrays["T/along"][0]), whole, atol=1e-5)
-
-
-def test_the_rival_has_as_many_patterns_and_its_own_lambda(measured_once):
-    found = measured_once["CLT"].numbers["CLT"]
-    assert found["patterns"] == WEDGE.plan.transport_photos
-    best = max(max(plain, refitted) for _, plain, refitted in found["grid"])
-    share, plain, refitted = next(line for line in found["grid"] if line[0] == found["share"])
-    assert best == (refitted if found["refitted"] else plain)
-    assert 0 < share <= 1
-    ours = measured_once["wedge"].numbers["snr_b"]
-    assert ours.keys() == found["snr_b"].keys() == {"white", "picture", "letters", "random"}
-    for light, theirs in found["snr_b"].items():
-        assert ours[light] > theirs + 10
 
 
 def test_snr_of_rows_is_that_of_each_row():

@@ -1,13 +1,11 @@
 """A transport with error bars, and its page, served."""
 
-import json
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -27,7 +25,7 @@ from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from tests.rigs.displays import need
 from tests.viewer.asking import CAMERA, PROJECTOR
-from tests.viewer.browsing import settled
+from tests.viewer.browsing import Pages
 from tests.waiting import LONGEST_WAIT
 from tests.worlds import model_transport
 
@@ -129,25 +127,13 @@ def browser() -> Iterator[Browser]:
         running.close()
 
 
+@pytest.fixture(scope="module")
+def pages(browser: Browser) -> Pages:
+    return Pages(browser)
+
+
 @pytest.fixture
-def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
+def open_page(pages: Pages) -> Iterator[Callable[..., Page]]:
     """Open the viewer's page; any output on its console is a failure."""
-    console: list[str] = []
-    contexts = []
-
-    def open_it(address: str, state: Any = None, **options: Any) -> Page:
-        context = browser.new_context(viewport={"width": 1300, "height": 900}, **options)
-        contexts.append(context)
-        context.set_default_timeout(1000 * LONGEST_WAIT)
-        page = context.new_page()
-        # The browser itself logs the response to a file that was refused.
-        page.on("console", lambda line: "status of 400" in line.text or console.append(line.text))
-        page.on("pageerror", lambda error: console.append(str(error)))
-        page.goto(address + "/" + ("#" + quote(json.dumps(state)) if state else ""))
-        settled(page)
-        return page
-
-    yield open_it
-    for context in contexts:
-        context.close()
-    assert console == []
+    yield pages.open
+    assert pages.put_back() == []

@@ -106,10 +106,7 @@ SLOWLY = """
 
 
 def test_the_picture_that_is_saved_is_of_the_light_that_is_shown(open_page, address, tmp_path):
-    page = open_page(address, {"kind": "white"})
-    page.add_init_script(SLOWLY)
-    page.reload()
-    settled(page)
+    page = open_page(address, {"kind": "white"}, script=SLOWLY)
     white = decode_png(saved(page, "#save-png", tmp_path).read_bytes())
     with page.expect_download() as download:
         page.evaluate("""() => { document.querySelector('[data-kind=pixel]').click();

@@ -10,7 +10,7 @@ from nearfar.files.codecs import decode_png, encode_png
 from nearfar.illumination.pictures import natural_picture
 from tests.cli.conftest import run_nearfar
 from tests.viewer.asking import CAMERA, PROJECTOR
-from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, slide, tone
+from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, show, slide, tone
 from tests.waiting import LONGEST_WAIT
 
 pytestmark = pytest.mark.slow
@@ -55,11 +55,11 @@ def test_the_picture_is_that_of_relight_for_the_same_light(
 
 
 def test_lights_have_the_shapes_that_they_are_named_for(open_page, address, tmp_path):
+    page = open_page(address)
+
     def light(**state):
-        page = open_page(address, state)
-        found = read_light(saved(page, "#save-light", tmp_path), PROJECTOR)
-        page.close()
-        return found
+        show(page, address, state)
+        return read_light(saved(page, "#save-light", tmp_path), PROJECTOR)
 
     y, x = np.indices(PROJECTOR)
     assert (light(kind="white") == 1).all()

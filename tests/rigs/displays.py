@@ -45,10 +45,10 @@ def need(*programs: str) -> None:
 
 
 @contextmanager
-def one_monitor() -> Iterator[str]:
-    """Run a display of one monitor, 720x1280; gives its name."""
+def one_monitor(mode: str = MODE) -> Iterator[str]:
+    """Run a display of one monitor, WIDTHxHEIGHT; gives its name."""
     need("Xvfb")
-    with _server("Xvfb", "-screen", "0", "1280x720x24", "-nolisten", "tcp") as display:
+    with _server("Xvfb", "-screen", "0", f"{mode}x24", "-nolisten", "tcp") as display:
         yield display
 
 

@@ -27,6 +27,9 @@ from tests.rigs.loopback import alone_on_the_loopback
 from tests.waiting import LONGEST_WAIT
 
 PROJECTOR, CAMERA, PHOTOS = Size(20, 24), Size(30, 36), 40
+# Blocks of 9 pixels, and a frame around them. Every frame is drawn in software, read back and
+# averaged, so that most of a larger screen's time would go into its pixels.
+SCREEN = "240x200"
 UNIT = 1 / 60
 SENSOR = {"bits": 16}
 RIG = """
@@ -145,7 +148,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def display():
-    with alone_on_the_loopback(), one_monitor() as name:
+    with alone_on_the_loopback(), one_monitor(SCREEN) as name:
         yield name
 
 

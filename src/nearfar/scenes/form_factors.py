@@ -12,7 +12,7 @@ from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.parallel import side_by_side
 from nearfar.scenes.geometry import Part
 from nearfar.scenes.patches import Patches
-from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked
+from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked_along
 
 # Pairs nearer than this many of their radii are summed over their samples.
 NEAR_RADII = 3.0
@@ -30,6 +30,7 @@ ROWS_AT_ONCE = 256
 # Products of samples at once: their arrays stay in the processor's cache.
 PRODUCTS_AT_ONCE = 2**15
 TOUCHING_AT_ONCE = 2**13
+RAYS_AT_ONCE = 2**13
 
 
 def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Floats:
@@ -50,7 +51,7 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
     count = len(patches)
     result = np.zeros((count, count), dtype=np.float32)
     flat = np.array([not part.occludes for part in parts])[patches.part]
-    boxes = occluder_boxes(parts)
+    boxes, ends = occluder_boxes(parts), ray_ends(patches)
 
     def fill(rows: slice) -> None:
         # Only pairs j >= the block's first row; the rest by symmetry.
@@ -73,7 +74,7 @@ def exchange(patches: Patches, parts: Sequence[Part], occluders: Surface) -> Flo
             shadowed = block > 0
             shadowed &= crosses_any(patches.centre[rows], patches.centre[columns], boxes)
             i, j = np.nonzero(shadowed)
-            block[i, j] *= visible_share(i + rows.start, j + columns.start, patches, occluders)
+            block[i, j] *= visible_share(i + rows.start, j + columns.start, ends, occluders)
         # Inside the block both halves were computed: keep one.
         inner = block[:, : len(block)]
         block[:, : len(block)] = np.triu(inner) + np.triu(inner, 1).T
@@ -254,23 +255,40 @@ def _dot(first: Floats, second: Floats) -> Floats:
     return np.asarray(product[0] + product[1] + product[2])
 
 
-def visible_share(i: Integers, j: Integers, patches: Patches, occluders: Surface) -> Floats:
+def ray_ends(patches: Patches) -> tuple[Floats, Floats]:
+    """Where rays from and to each patch end, and the normals there, (RAYS_PER_PAIR, n, 3) each."""
+    every = np.arange(len(patches))
+    samples = [
+        (2 * turn + 1) * patches.counts // (2 * RAYS_PER_PAIR) for turn in range(RAYS_PER_PAIR)
+    ]
+    normals = np.stack([patches.normals[every, sample] for sample in samples])
+    positions = np.stack([patches.positions[every, sample] for sample in samples])
+    return positions + SURFACE_OFFSET * normals, normals
+
+
+def visible_share(
+    i: Integers, j: Integers, ends: tuple[Floats, Floats], occluders: Surface
+) -> Floats:
     """Share of a few rays between pairs of patches that nothing blocks; shape (pairs,)."""
-    facing, visible = np.zeros(len(i)), np.zeros(len(i))
-    for turn in range(RAYS_PER_PAIR):
-        # Samples in opposite order, so that the rays differ from parallel ones.
-        a = (2 * turn + 1) * patches.counts[i] // (2 * RAYS_PER_PAIR)
-        b = (2 * ((turn * 3 + 1) % RAYS_PER_PAIR) + 1) * patches.counts[j] // (2 * RAYS_PER_PAIR)
-        start = patches.positions[i, a] + SURFACE_OFFSET * patches.normals[i, a]
-        end = patches.positions[j, b] + SURFACE_OFFSET * patches.normals[j, b]
-        way = end - start
-        # What lies below a horizon is left out of the exchange already.
-        above = (np.einsum("nx,nx->n", way, patches.normals[i, a]) > 0) & (
-            np.einsum("nx,nx->n", way, patches.normals[j, b]) < 0
-        )
-        facing += above
-        visible[above] += ~blocked(occluders, start[above], end[above])
-    return visible / np.maximum(facing, 1)
+    share = np.empty(len(i))
+    points, normals = ends
+    for pairs in blocks(len(i), RAYS_AT_ONCE):
+        first, second = i[pairs], j[pairs]
+        facing, visible = np.zeros(len(first)), np.zeros(len(first))
+        for turn in range(RAYS_PER_PAIR):
+            # Samples in opposite order, so that the rays differ from parallel ones.
+            other = (turn * 3 + 1) % RAYS_PER_PAIR
+            start = points[turn].take(first, axis=0)
+            way = points[other].take(second, axis=0)
+            way -= start
+            # What lies below a horizon is left out of the exchange already.
+            above = np.einsum("nx,nx->n", way, normals[turn].take(first, axis=0)) > 0
+            above &= np.einsum("nx,nx->n", way, normals[other].take(second, axis=0)) < 0
+            facing += above
+            # Hardly a ray lies below: following it costs less than picking out the others.
+            visible += above & ~blocked_along(occluders, start, way)
+        share[pairs] = visible / np.maximum(facing, 1)
+    return share
 
 
 def occluder_boxes(parts: Sequence[Part]) -> list[tuple[Floats, Floats]]:

@@ -103,9 +103,14 @@ def hit(where: Surface, origin: Floats, direction: Floats) -> Hits:
 
 def blocked(where: Surface, origin: Floats, target: Floats) -> Booleans:
     """Whether a triangle stands between points `origin` and `target`, both (n, 3)."""
+    return blocked_along(where, origin, target - origin)
+
+
+def blocked_along(where: Surface, origin: Floats, way: Floats) -> Booleans:
+    """Whether a triangle stands between points `origin` and ``origin + way``, both (n, 3)."""
     if not len(where.triangles) or not len(origin):
         return np.zeros(len(origin), dtype=bool)
-    return np.asarray(where.occluded(origin, target - origin) >= 0)
+    return np.asarray(where.occluded(origin, way) >= 0)
 
 
 def _crossed(triangles: Floats) -> Floats:

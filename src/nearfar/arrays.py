@@ -132,10 +132,10 @@ def parse_size(text: str, *, name: str = "size") -> Size:
         height, width = (int(part) for part in parts)
     except ValueError:
         raise InputError(
-            f"{name} {text!r} is not a size: write height x width, for instance 68x100."
+            f"the {name} {text!r} is not HxW: write height x width, for instance 68x100."
         ) from None
     if height < 1 or width < 1:
-        raise InputError(f"{name} {text!r} has a side under 1: both must be at least 1.")
+        raise InputError(f"the {name} {text!r} has a side under 1: both must be at least 1.")
     return Size(height, width)
 
 

@@ -70,9 +70,11 @@ def pair(plan: Plan, folder: Path, list_file: Path | None = None) -> list[Path]:
     if len(photos) != count:
         source = folder if list_file is None else list_file
         ends = f" (first {photos[0].name}, last {photos[-1].name})" if photos else ""
+        plural = "s" * (len(photos) != 1)
         raise InputError(
-            f"{source} has {len(photos)} photos{ends}, but the plan has {count} patterns: give "
-            f"one photo for each pattern{_hint(folder, photos) if list_file is None else ''}."
+            f"{source} has {len(photos)} photo{plural}{ends}, but the plan has {count} patterns: "
+            f"give one photo for each pattern"
+            f"{_hint(folder, photos) if list_file is None else ''}."
         )
     return photos
 

@@ -228,7 +228,8 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
             raise MissingFileError(f"{path} is not there: check the name.")
         if not (path / _METADATA).is_file():
             raise UnreadableFileError(
-                f"{path} is not {article} {kind}: it is no Zarr folder with a zarr.json."
+                f"{path} is not {article} {kind}: it is no Zarr folder with a zarr.json; check the "
+                f"name."
             )
         with _sentences(path, "its zarr.json"):
             store = _WholeStore(path, read_only=True)

@@ -1,6 +1,6 @@
 """A transport that is known exactly: its components as dense or sparse matrices per channel."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -246,14 +246,20 @@ class ExactTransport(NoArray):
         return direct, near, far
 
 
-def sum_rows(parts: Iterable[tuple[sparse.csr_array, ...] | Floats], pixels: slice) -> Floats:
+def sum_rows(parts: Sequence[tuple[sparse.csr_array, ...] | Floats], pixels: slice) -> Floats:
     """Add rows of matrices given per channel, dense or sparse: (n, channels, P), float32."""
-    return np.asarray(
-        sum(np.stack([_dense_rows(matrix, pixels) for matrix in part], axis=1) for part in parts)
-    )
+    channels = len(parts[0])
+    count, columns = parts[0][0][pixels].shape
+    total = np.zeros((count, channels, columns), dtype=np.float32)
+    for part in parts:
+        for channel, matrix in enumerate(part):
+            rows = matrix[pixels]
+            # Most scenes have no near light by itself: nothing to add.
+            if isinstance(rows, np.ndarray) or rows.nnz:
+                total[:, channel] += _dense(rows)
+    return total
 
 
-def _dense_rows(matrix: sparse.csr_array | Floats, pixels: slice) -> Floats:
-    rows = matrix[pixels]
+def _dense(rows: sparse.csr_array | Floats) -> Floats:
     dense = rows if isinstance(rows, np.ndarray) else rows.toarray()
     return np.asarray(dense, dtype=np.float32)

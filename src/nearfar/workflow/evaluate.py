@@ -185,7 +185,8 @@ def row_snr(
     for block in blocks(pixels, BLOCK):
         known = truth.component_rows(block) if truth.is_apart else (truth.rows(block),)
         found = transport.component_rows(block)
-        rows = exposure * _sum(known)
+        rows = _sum(known)
+        rows *= exposure
         off = rows - _sum(found)
         signal[block], error[block] = _energy_of_rows(rows), _energy_of_rows(off)
         signal_k += _energy_of_frequencies(rows.reshape(-1, *projector))
@@ -226,9 +227,10 @@ def energies(truth: Floats, estimate: Floats) -> tuple[float, float]:
 
 
 def _sum(parts: Sequence[Floats]) -> Floats:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
+    """Add arrays into a new one."""
+    total = parts[0] + parts[1] if len(parts) > 1 else parts[0].copy()
+    for part in parts[2:]:
+        total += part
     return total
 
 

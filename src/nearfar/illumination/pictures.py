@@ -89,7 +89,7 @@ def natural_picture(size: AnySize, seed: int, *, colour: bool = False) -> Floats
     low, high = LARGEST_RADIUS**-2, SMALLEST_RADIUS**-2
     for _ in range(NUMBER_OF_LEAVES):
         radius = longest * generator.uniform(low, high) ** -0.5
-        middle = generator.uniform(0, [height, width])
+        middle = generator.random(2) * [height, width]
         # Reflectances of natural scenes are skewed to the dark.
         shade = generator.uniform(0.05, 1.0) ** 1.8
         tint = shade * generator.uniform(0.6, 1.0, size=3)[: drawn.shape[2]]
@@ -98,10 +98,14 @@ def natural_picture(size: AnySize, seed: int, *, colour: bool = False) -> Floats
             slice(max(0, int(m - radius)), min(side, int(m + radius) + 2))
             for m, side in zip(middle, (height, width), strict=True)
         )
+        # Front to back: a leaf only fills what is still empty, and most are behind others.
+        if not empty[box].any():
+            continue
         down = (np.arange(height)[box[0], None] - middle[0]) / radius
         across = (np.arange(width)[None, box[1]] - middle[1]) / radius
-        # Front to back: a leaf only fills what is still empty.
         leaf = empty[box] & (down**2 + across**2 <= 1.0)
+        if not leaf.any():
+            continue
         shading = 1.0 + slope[0] * down + slope[1] * across
         drawn[box][leaf] = np.clip(tint * shading[leaf][:, None], 0.0, 1.0)
         empty[box] &= ~leaf

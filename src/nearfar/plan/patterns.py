@@ -1,7 +1,7 @@
 """Patterns as data: the content of each projected pattern, and its purpose."""
 
 from abc import ABC, abstractmethod
-from functools import cache
+from functools import cache, lru_cache
 from typing import Annotated, Any, Literal, Union
 
 import numpy as np
@@ -194,7 +194,13 @@ class Picture(Pattern):
 
     def draw(self, size: Size) -> NDArray[np.uint8]:
         """Draw the 8-bit pattern, shape (Py, Px)."""
-        return patterns.quantise(natural_picture(size, self.seed).astype(np.float64))
+        return _picture(size, self.seed).copy()
+
+
+# Each picture is shown twice, and again compared with in each estimate of a capture.
+@lru_cache(maxsize=4)
+def _picture(size: Size, seed: int) -> NDArray[np.uint8]:
+    return patterns.quantise(natural_picture(size, seed).astype(np.float64))
 
 
 OWN_PATTERNS: tuple[type[Pattern], ...] = (Sinusoid, Exponential, Stripe, GrayCode, Picture)

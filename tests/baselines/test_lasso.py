@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn.linear_model import Lasso
 
 from nearfar.arrays import Size
 from nearfar.baselines.haar import haar
@@ -36,6 +35,9 @@ def _objective(sensing, responses, coefficients, penalty):
 
 @pytest.mark.parametrize("share", [0.3, 0.03, 0.003])
 def test_it_finds_a_librarys_minimum(share):
+    # Imported here: it takes seconds, in each process that collects tests.
+    from sklearn.linear_model import Lasso
+
     _, patterns, sensing, responses, _ = _problem()
     penalty = share * highest_penalty(start(sensing.columns, responses))
     found = solve(sensing.columns, responses, penalty, tolerance=1e-5)

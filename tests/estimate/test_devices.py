@@ -16,11 +16,19 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from tests.absent import said_without
 from tests.worlds import model_transport
 
-torch = pytest.importorskip("torch", reason="PyTorch is not installed")
-
-# An accelerator's own where there is one.
-DEVICES = ["torch", "cuda"] if torch.cuda.is_available() else ["torch"]
 PROJECTOR, CAMERA, WINDOW = Size(16, 20), Size(16, 20), 5
+
+
+@pytest.fixture(scope="module")
+def torch():
+    """PyTorch, which takes seconds to import: not in each process that collects tests."""
+    return pytest.importorskip("torch", reason="PyTorch is not installed")
+
+
+@pytest.fixture(scope="module")
+def devices(torch):
+    """Devices of PyTorch: the processor, and an accelerator's own where there is one."""
+    return ["torch", "cuda"] if torch.cuda.is_available() else ["torch"]
 
 
 def _by_paper(measurements, q, plan, device):
@@ -31,12 +39,11 @@ def _jointly(measurements, q, plan, device):
     return estimate_jointly(measurements, q, plan.window, plan.far, device=device)
 
 
-@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(
     ("by", "offset"), [(_jointly, "reference"), (_jointly, "inverse"), (_by_paper, "inverse")]
 )
 @pytest.mark.parametrize("between", [False, True])
-def test_the_estimate_is_numpys(shoot, by, offset, between, device):
+def test_the_estimate_is_numpys(shoot, devices, by, offset, between):
     world = model_transport(PROJECTOR, CAMERA, window=WINDOW, far=Size(3, 3), channels=2)
     if offset == "reference":
         plan = choose_plan(PROJECTOR, 80, window=WINDOW)[0]
@@ -55,10 +62,13 @@ def test_the_estimate_is_numpys(shoot, by, offset, between, device):
         1 + 2e-7 * generator.normal(size=measurements.responses.shape)
     )
     again = replace(measurements, responses=rounded.astype(np.float32))
-    ours, shaken, theirs = (
-        by(given, q, plan, where)
-        for given, where in ((measurements, "cpu"), (again, "cpu"), (measurements, device))
-    )
+    ours, shaken = (by(given, q, plan, "cpu") for given in (measurements, again))
+    for device in devices:
+        _check_as_good(by(measurements, q, plan, device), ours, shaken)
+
+
+def _check_as_good(theirs, ours, shaken):
+    """Check an estimate to differ from ours no more than rounded responses make ours differ."""
     if ours.posterior is not None:
         assert np.mean(ours.posterior.prior_component == theirs.posterior.prior_component) > 0.99
     for name in ("direct", "near", "far", "correspondence"):
@@ -70,7 +80,7 @@ def test_the_estimate_is_numpys(shoot, by, offset, between, device):
     np.testing.assert_array_equal(np.isnan(ours.correspondence), np.isnan(theirs.correspondence))
 
 
-def test_arrays_come_and_go():
+def test_arrays_come_and_go(torch):
     values = np.arange(6.0, dtype=np.float32).reshape(2, 3)
     there = mover("torch")(values)
     assert isinstance(there, torch.Tensor)
@@ -80,15 +90,16 @@ def test_arrays_come_and_go():
     assert beside(values, values) is values
 
 
-def test_a_device_that_is_not_there_is_said():
+def test_a_device_that_is_not_there_is_said(devices):
     values = np.arange(3.0)
-    if "cuda" in DEVICES:
+    if "cuda" in devices:
         np.testing.assert_array_equal(fetch(mover("cuda")(values)), values)
     else:
         with pytest.raises(InputError, match="no CUDA device"):
             mover("cuda")
 
 
+@pytest.mark.usefixtures("torch")
 def test_without_pytorch_it_is_said():
     program = "from nearfar.devices import mover\nmover('cuda')"
     assert "pip install 'nearfar[torch]'" in said_without("torch", program)

@@ -7,16 +7,19 @@ from nearfar.arrays import Size
 from nearfar.capture import open_capture
 from nearfar.errors import KeptInterrupt
 from nearfar.plan import paper_plan
-from nearfar.plan.choose import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
 from tests.observers import EndsWhere
+from tests.plans import chosen_plan
 from tests.worlds import model_transport
 
 PAPER = paper_plan(Size(16, 20), 5, Size(3, 3))
-CHOSEN = choose_plan(Size(16, 20), 50)[0]
+
+
+def _plan(kind):
+    return PAPER if kind == "paper" else chosen_plan(Size(16, 20), 50)
 
 
 def _rig(world, gamma=1.0, exposure=0.5):
@@ -25,7 +28,7 @@ def _rig(world, gamma=1.0, exposure=0.5):
     )
 
 
-@pytest.mark.parametrize("plan", [PAPER, CHOSEN])
+@pytest.mark.parametrize("kind", ["paper", "chosen"])
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -34,16 +37,18 @@ def _rig(world, gamma=1.0, exposure=0.5):
         ({"exposure": 3.0}, "is saturated: expose less"),
     ],
 )
-def test_a_fault_is_told_once_and_remembered(small_world, tmp_path, plan, fault, words):
+def test_a_fault_is_told_once_and_remembered(small_world, tmp_path, kind, fault, words):
     told = []
-    acquire(plan, tmp_path / "c.zarr", _rig(small_world, **fault), on_alarm=told.append)
+    acquire(_plan(kind), tmp_path / "c.zarr", _rig(small_world, **fault), on_alarm=told.append)
     assert open_capture(tmp_path / "c.zarr").alarms == tuple(told)
     assert len(told) == (words is not None)
     assert words is None or words in told[0]
 
 
-@pytest.mark.parametrize("plan", [PAPER, CHOSEN])
-def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, plan):
+@pytest.mark.parametrize("kind", ["paper", "chosen"])
+def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, kind):
+    plan = _plan(kind)
+
     def stop(number, _photo):
         if number == 6:
             raise KeyboardInterrupt
@@ -59,7 +64,7 @@ def test_a_capture_that_is_gone_on_with_is_looked_at_too(small_world, tmp_path, 
 def test_the_alarm_of_the_last_photo_before_a_stop_is_stored(small_world, tmp_path):
     whole, path, told = tmp_path / "whole.zarr", tmp_path / "stopped.zarr", []
     rig = _rig(small_world, exposure=3.0)
-    acquire(CHOSEN, whole, rig, on_alarm=told.append)
+    acquire(_plan("chosen"), whole, rig, on_alarm=told.append)
 
     def stop(_number, _photo):
         if told[1:]:
@@ -67,8 +72,8 @@ def test_the_alarm_of_the_last_photo_before_a_stop_is_stored(small_world, tmp_pa
         return False
 
     with pytest.raises(KeptInterrupt):
-        acquire(CHOSEN, path, rig, on_alarm=told.append, observers=[EndsWhere(stop)])
-    acquire(CHOSEN, path, rig, resume=True)
+        acquire(_plan("chosen"), path, rig, on_alarm=told.append, observers=[EndsWhere(stop)])
+    acquire(_plan("chosen"), path, rig, resume=True)
     assert open_capture(path).alarms == open_capture(whole).alarms == (told[0],)
 
 
@@ -81,10 +86,10 @@ def test_light_that_changed_meanwhile_is_told(small_world, tmp_path):
     for exposure, warned in ((0.5, 0), (0.45, 1)):
         path = tmp_path / f"{exposure}.zarr"
         with pytest.raises(KeptInterrupt):
-            acquire(CHOSEN, path, _rig(small_world), observers=[EndsWhere(stop)])
+            acquire(_plan("chosen"), path, _rig(small_world), observers=[EndsWhere(stop)])
         # A lamp that is darker now, of which the rig knows nothing.
         rig, told = _Darker(_rig(small_world), exposure / 0.5), []
-        acquire(CHOSEN, path, rig, resume=True, on_alarm=told.append)
+        acquire(_plan("chosen"), path, rig, resume=True, on_alarm=told.append)
         assert len(told) == warned
         assert all("before the capture was stopped" in alarm for alarm in told)
 
@@ -106,5 +111,5 @@ def test_noise_alone_is_no_alarm(tmp_path):
     dim = SimulatedCamera(full_well=500.0)
     rig = SimulatedRig(world, "test", SimulatedProjector(), dim, 0.5, 0)
     told = []
-    acquire(CHOSEN, tmp_path / "c.zarr", rig, on_alarm=told.append)
+    acquire(_plan("chosen"), tmp_path / "c.zarr", rig, on_alarm=told.append)
     assert told == [], np.array(told)

@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from nearfar.capture import open_capture
 from nearfar.correspondence import correspond_by_gray_code, given_correspondence
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import natural_picture
-from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan import paper_plan
 from nearfar.rigs.opening import open_rig
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.drift import SimulatedDrift
@@ -30,6 +30,7 @@ from nearfar.workflow.reconstruction.job import tiling_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from tests.conftest import QUIET
 from tests.estimate.test_fit import _exact_of
+from tests.plans import chosen_plan
 from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
@@ -44,15 +45,45 @@ def _rig(world, camera=QUIET):
     return SimulatedRig(world, "test", SimulatedProjector(), camera, 1.0, 0)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def world():
+    """A transport that obeys the model; nothing writes to it."""
     return model_transport(
         PROJECTOR, Size(24, 30), window=7, far=Size(3, 3), channels=3
     ).with_gains(near=0.2)
 
 
-def test_a_clean_capture_of_a_model_world_relights_it(tmp_path, world):
-    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world))
+@pytest.fixture(scope="module")
+def captured(world, tmp_path_factory):
+    """Return a capture of the world by a plan, taken once: one seed gives the same photos.
+
+    Nothing writes to its folder.
+    """
+
+    @cache
+    def taken(plan, camera=QUIET):
+        return acquire(plan, tmp_path_factory.mktemp("capture") / "c.zarr", _rig(world, camera))
+
+    return taken
+
+
+@pytest.fixture(scope="module")
+def by_chosen_plan(captured):
+    """Return a plan of few photos, its capture, and what is reconstructed with some memory."""
+    plan = chosen_plan(PROJECTOR, 60, window=7)
+    capture = captured(plan, SimulatedCamera())
+    return plan, capture, cache(partial(reconstruction.reconstruct, capture))
+
+
+@pytest.fixture(scope="module")
+def captured_finer(tmp_path_factory):
+    """The transport of a camera twice as fine as the projector, and a capture of it."""
+    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3)).with_gains(near=0.1)
+    return fine, acquire(PLAN, tmp_path_factory.mktemp("finer") / "c.zarr", _rig(fine))
+
+
+def test_a_clean_capture_of_a_model_world_relights_it(captured, world):
+    capture = captured(PLAN)
     transport, correspondence = reconstruct(capture)
     assert correspondence.lit.all()
     light = nearfar.natural_picture(PROJECTOR, 1, colour=True)
@@ -61,20 +92,19 @@ def test_a_clean_capture_of_a_model_world_relights_it(tmp_path, world):
     np.testing.assert_allclose(transport.black, 0.03, atol=1e-4)
 
 
-def test_more_noise_makes_it_worse_and_none_makes_it_exact(tmp_path, world):
+def test_more_noise_makes_it_worse_and_none_makes_it_exact(captured, world):
     light = nearfar.natural_picture(PROJECTOR, 2)
     found = []
-    for number, camera in enumerate([SimulatedCamera(full_well=1000), SimulatedCamera(), QUIET]):
-        capture = acquire(PLAN, tmp_path / f"{number}.zarr", _rig(world, camera))
+    for camera in (SimulatedCamera(full_well=1000), SimulatedCamera(), QUIET):
         given = given_correspondence(world.correspondence, world.camera, PROJECTOR)
-        transport, _ = reconstruct(capture, given)
+        transport, _ = reconstruct(captured(PLAN, camera), given)
         found.append(snr(world @ light, transport @ light))
     assert found[0] + 8 < found[1] < found[2]
     assert found[2] > 65
 
 
-def test_blocks_of_rows_change_next_to_nothing(tmp_path, world):
-    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+def test_blocks_of_rows_change_next_to_nothing(captured):
+    capture = captured(PLAN, SimulatedCamera())
     whole, _ = reconstruct(capture)
     parts, _ = reconstruct(capture, memory=memory_for(12, PLAN, PROJECTOR))
     # The noise model is fitted in each block on its own: what differs is far below the noise.
@@ -112,9 +142,9 @@ def test_a_dark_margin_is_no_fault(tmp_path, world):
     assert whole.posterior.white[:12].min() > 0
 
 
-def test_correspondence_can_be_given(tmp_path, world):
+def test_correspondence_can_be_given(captured, world):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
-    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    capture = captured(plan)
     given = given_correspondence(world.correspondence, world.camera, PROJECTOR)
     transport, _ = reconstruct(capture, given)
     light = nearfar.random_pattern(PROJECTOR, 1)
@@ -132,9 +162,8 @@ def test_a_camera_twice_as_fine_keeps_its_own_resolution(tmp_path):
     assert snr(fine @ light, transport @ light) > 40
 
 
-def test_the_square_transport_has_the_projectors_size(tmp_path):
-    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3)).with_gains(near=0.1)
-    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(fine))
+def test_the_square_transport_has_the_projectors_size(captured_finer):
+    fine, capture = captured_finer
     transport, correspondence = reconstruct(capture, square=True)
     assert transport.camera == PROJECTOR
     assert correspondence.q.shape == (48, 60, 2)
@@ -154,8 +183,8 @@ def test_a_plan_that_is_not_the_papers_is_refused(tmp_path, world):
         reconstruct(capture)
 
 
-def test_a_capture_by_reference_relights_as_well(tmp_path, world):
-    capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(world))
+def test_a_capture_by_reference_relights_as_well(captured, world):
+    capture = captured(BY_REFERENCE)
     transport, correspondence = reconstruct(capture)
     assert correspondence.lit.all()
     light = nearfar.natural_picture(PROJECTOR, 1, colour=True)
@@ -165,18 +194,17 @@ def test_a_capture_by_reference_relights_as_well(tmp_path, world):
     assert transport.provenance["drift"]["ambient"] < 1e-4
 
 
-def test_drift_is_taken_out_told_and_kept_from_stripes(tmp_path, world):
+def test_drift_is_taken_out_told_and_kept_from_stripes(tmp_path, captured, world):
     drift = SimulatedDrift(per_100_photos=-0.15)
     camera = SimulatedCamera(ambient_drift=SimulatedDrift(per_100_photos=2.0))
-    rigs = {
-        "still": _rig(world, SimulatedCamera()),
-        "moved": replace(_rig(world, camera), optics=SimulatedProjector(lamp_drift=drift)),
+    moved = replace(_rig(world, camera), optics=SimulatedProjector(lamp_drift=drift))
+    captures = {
+        "still": captured(BY_REFERENCE, SimulatedCamera()),
+        "moved": acquire(BY_REFERENCE, tmp_path / "c.zarr", moved),
     }
     light, found = nearfar.natural_picture(PROJECTOR, 1), {}
-    for name, rig in rigs.items():
-        transport, correspondence = reconstruct(
-            acquire(BY_REFERENCE, tmp_path / f"{name}.zarr", rig)
-        )
+    for name, capture in captures.items():
+        transport, correspondence = reconstruct(capture)
         assert correspondence.lit.all()
         gain = np.vdot(world @ light, transport @ light) / np.vdot(world @ light, world @ light)
         found[name] = snr(gain * (world @ light), transport @ light)
@@ -187,8 +215,8 @@ def test_drift_is_taken_out_told_and_kept_from_stripes(tmp_path, world):
     assert transport.provenance["drift"]["lamp"] == pytest.approx(expected, rel=0.1)
 
 
-def test_blocks_of_rows_change_nothing_by_reference(tmp_path, world):
-    capture = acquire(BY_REFERENCE, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+def test_blocks_of_rows_change_nothing_by_reference(captured):
+    capture = captured(BY_REFERENCE, SimulatedCamera())
     whole, _ = reconstruct(capture)
     memory = memory_for(5, BY_REFERENCE, PROJECTOR)
     parts, _ = reconstruct(capture, memory=memory)
@@ -198,17 +226,18 @@ def test_blocks_of_rows_change_nothing_by_reference(tmp_path, world):
 
 
 @pytest.mark.parametrize("given", [False, True])
-def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
-    plan, _ = choose_plan(PROJECTOR, 60, window=7)
-    capture = acquire(plan, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
-    known = given_correspondence(world.correspondence, world.camera, PROJECTOR) if given else None
-    whole, q = reconstruction.reconstruct(capture, known)
+def test_blocks_of_rows_change_nothing_for_neighbours(by_chosen_plan, world, given):
+    plan, capture, reconstructed = by_chosen_plan
+    if given:
+        known = given_correspondence(world.correspondence, world.camera, PROJECTOR)
+        reconstructed = partial(reconstruction.reconstruct, capture, known)
+    whole, q = reconstructed()
     for rows in (11, 5):
         memory = memory_for(rows, plan, PROJECTOR, "joint")
         options = ReconstructionOptions(memory=memory)
         tiles = list(tiling_of(capture, options, given=given).tiles())
         assert len(tiles) == -(-24 // rows)
-        parts, found = reconstruction.reconstruct(capture, known, memory=memory)
+        parts, found = reconstructed(memory=memory)
         np.testing.assert_array_equal(found.lit, q.lit)
         # Matrix products round by blocks, and a camera pixel between two kinds may take the other.
         same = parts.posterior.prior_component == whole.posterior.prior_component
@@ -218,14 +247,13 @@ def test_blocks_of_rows_change_nothing_for_neighbours(tmp_path, world, given):
             assert np.mean(np.abs(one - other) > 1e-4) < 0.01, name
 
 
-def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
-    plan, _ = choose_plan(PROJECTOR, 60, window=7)
-    capture = acquire(plan, tmp_path / "c.zarr", _rig(world, SimulatedCamera()))
+def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, by_chosen_plan):
+    plan, capture, reconstructed = by_chosen_plan
     memory = memory_for(5, plan, PROJECTOR, "joint")
     options = ReconstructionOptions(memory=memory)
     reconstruction.reconstruct_to_file(capture, tmp_path / "t.zarr", options=options)
     stored = load_transport(tmp_path / "t.zarr")
-    whole, _ = reconstruction.reconstruct(capture, memory=memory)
+    whole, _ = reconstructed(memory=memory)
     for name in (*FACTORS, "provenance"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(whole, name))
     for name in POSTERIOR_FIELDS:
@@ -234,10 +262,9 @@ def test_blocks_go_to_the_disk_as_the_whole_does(tmp_path, world):
         )
 
 
-def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
-    plan, _ = choose_plan(PROJECTOR, 60, window=7)
-    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
-    transport, _ = reconstruction.reconstruct(capture)
+def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, by_chosen_plan):
+    _, _, reconstructed = by_chosen_plan
+    transport, _ = reconstructed()
 
     def faulty():
         yield of_rows(transport, slice(0, 5))
@@ -245,19 +272,18 @@ def test_a_fault_in_a_later_block_leaves_nothing(tmp_path, world):
 
     with pytest.raises(InputError, match="a photo is damaged"):
         write_transport(tmp_path / "t.zarr", faulty(), 24)
-    assert [path.name for path in tmp_path.iterdir()] == ["c.zarr"]
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("method", ["joint", "paper"])
-def test_too_little_memory_is_said_before_any_work(tmp_path, world, method):
-    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(world))
+def test_too_little_memory_is_said_before_any_work(captured, method):
     with pytest.raises(InputError, match=r"too little for one row.*`memory=\d00000000` or more"):
-        reconstruction.reconstruct(capture, method=method, memory=10**6)
+        reconstruction.reconstruct(captured(PLAN), method=method, memory=10**6)
 
 
 def test_a_square_transport_in_tiles_is_that_of_the_whole(tmp_path):
     fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3), channels=3)
-    plan, _ = choose_plan(PROJECTOR, 60, window=7)
+    plan = chosen_plan(PROJECTOR, 60, window=7)
     capture = acquire(plan, tmp_path / "c.zarr", _rig(fine.with_gains(near=0.1), SimulatedCamera()))
     known = given_correspondence(fine.correspondence, fine.camera, PROJECTOR)
     whole, _ = reconstruction.reconstruct(capture, known, square=True)
@@ -272,9 +298,8 @@ def test_a_square_transport_in_tiles_is_that_of_the_whole(tmp_path):
         assert np.mean(np.abs(one - other) > 1e-3 * np.abs(other).max()) < 0.01, name
 
 
-def test_the_square_transport_keeps_how_far_its_rows_are_to_be_trusted(tmp_path):
-    fine = model_transport(PROJECTOR, Size(48, 60), window=7, far=Size(3, 3)).with_gains(near=0.1)
-    capture = acquire(PLAN, tmp_path / "c.zarr", _rig(fine))
+def test_the_square_transport_keeps_how_far_its_rows_are_to_be_trusted(captured_finer):
+    fine, capture = captured_finer
     q = np.array(fine.correspondence, dtype=np.float32)
     q[:, :30] = np.nan
     known = given_correspondence(q, fine.camera, PROJECTOR)
@@ -355,9 +380,8 @@ def test_a_truth_of_another_size_is_refused(world):
         judge_by_truth(world, other)
 
 
-def test_a_capture_remembers_its_rig(tmp_path, world):
-    acquire(PLAN, tmp_path / "c.zarr", _rig(world))
-    capture = open_capture(tmp_path / "c.zarr")
+def test_a_capture_remembers_its_rig(captured):
+    capture = open_capture(captured(PLAN).path)
     assert capture.rig["scene"] == "test"
     assert capture.rig["camera"]["bits"] == 16
     assert capture.plan == PLAN
@@ -367,9 +391,9 @@ def test_a_capture_remembers_its_rig(tmp_path, world):
 
 
 @pytest.mark.parametrize("method", ["paper", "joint"])
-def test_a_plan_of_gray_code_corresponds_by_it(tmp_path, world, method):
+def test_a_plan_of_gray_code_corresponds_by_it(captured, method):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="gray")
-    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    capture = captured(plan)
     transport, correspondence = reconstruct(capture, method=method)
     expected = correspond_by_gray_code(capture)
     np.testing.assert_array_equal(correspondence.q, expected.q)
@@ -380,9 +404,9 @@ def test_a_plan_of_gray_code_corresponds_by_it(tmp_path, world, method):
     assert np.mean(parts.q == expected.q) > 0.95
 
 
-def test_a_plan_without_stripes_corresponds_by_phase(tmp_path, world):
+def test_a_plan_without_stripes_corresponds_by_phase(captured, world):
     plan = paper_plan(PROJECTOR, 7, Size(3, 3), correspondence="none")
-    capture = acquire(plan, tmp_path / "c.zarr", _rig(world))
+    capture = captured(plan)
     transport, correspondence = reconstruct(capture)
     assert np.abs(correspondence.q - world.correspondence).max() < 0.5
     light = nearfar.random_pattern(PROJECTOR, 1)
@@ -404,7 +428,7 @@ def test_few_photos_that_were_chosen_relight_as_well_as_many(tmp_path):
         return relighting_snr(transport, scene, lights)
 
     many = scores(paper_plan(scene.projector, 7, Size(5, 5)), "paper")
-    few, _ = choose_plan(scene.projector, 52, window=7)
+    few = chosen_plan(scene.projector, 52, window=7)
     found = scores(few, "joint")
     # 144 photos of transport and 64 of stripes against 52.
     assert found["picture"] > many["picture"] - 0.3

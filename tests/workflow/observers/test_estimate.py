@@ -3,7 +3,7 @@
 import threading
 import time
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from nearfar.correspondence import correspond_by_stripes
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure, measured_basis
-from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan import paper_plan
 from nearfar.plan.checks import ends
 from nearfar.progress import ignore_progress
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -30,19 +30,27 @@ from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
 from nearfar.workflow.reconstruction.sinks import MemorySink
 from tests.observers import EndsWhere
+from tests.plans import chosen_plan
 from tests.waiting import LONGEST_WAIT
 from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
 
 SIZE = Size(32, 32)
-PLANS = {
-    "reference": choose_plan(SIZE, 120)[0],
-    "pairs": paper_plan(SIZE, 8, Size(5, 5), correspondence="none"),
-    "pairs and stripes": paper_plan(SIZE, 8, Size(5, 5)),
-    "reference and stripes": paper_plan(SIZE, 8, Size(5, 5), offset="reference"),
+PAIRS = partial(paper_plan, SIZE, 8, Size(5, 5))
+# Made when they are asked for: choosing one takes as long as some tests.
+MAKERS = {
+    "reference": lambda: chosen_plan(SIZE, 120),
+    "pairs": partial(PAIRS, correspondence="none"),
+    "pairs and stripes": PAIRS,
+    "reference and stripes": partial(PAIRS, offset="reference"),
 }
 
 pytestmark = pytest.mark.slow
+
+
+@cache
+def _plan(name):
+    return MAKERS[name]()
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +77,7 @@ def afterwards(scene, tmp_path_factory):
     @cache
     def reconstructed(plan):
         path = tmp_path_factory.mktemp("afterwards") / "c.zarr"
-        return reconstruct(acquire(PLANS[plan], path, _rig(scene)))
+        return reconstruct(acquire(_plan(plan), path, _rig(scene)))
 
     return reconstructed
 
@@ -102,9 +110,9 @@ def _made(estimate, capture):
 
 @pytest.mark.parametrize("plan", ["reference", "pairs", "pairs and stripes"])
 def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, afterwards, tmp_path, plan):
-    part, estimate, _ = _follow(PLANS[plan], rig, tmp_path / "c.zarr")
+    part, estimate, _ = _follow(_plan(plan), rig, tmp_path / "c.zarr")
     expected, correspondence = afterwards(plan)
-    assert 0 < estimate.chosen_by < len(PLANS[plan].patterns)
+    assert 0 < estimate.chosen_by < len(_plan(plan).patterns)
     np.testing.assert_array_equal(part.correspondence.q, correspondence.q)
     assert part.transport.provenance == expected.provenance
     lights = standard_lights(SIZE)
@@ -114,7 +122,7 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, afterwards, 
 
 
 def test_components_are_those_of_the_early_choice(rig, tmp_path):
-    part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
+    part, estimate, _ = _follow(_plan("reference"), rig, tmp_path / "c.zarr")
     chosen = estimate._choice.components[0]
     np.testing.assert_array_equal(
         part.transport.posterior.prior_component.ravel(), chosen.prior_component
@@ -123,7 +131,7 @@ def test_components_are_those_of_the_early_choice(rig, tmp_path):
 
 
 def test_components_of_pixels_that_turn_out_unlit_are_chosen_again(rig, tmp_path, monkeypatch):
-    plan = PLANS["pairs and stripes"]
+    plan = _plan("pairs and stripes")
     dark = (3, 4)
 
     def unlit(photos, _measurements, rows):
@@ -145,7 +153,7 @@ def test_photos_that_come_too_fast_are_estimated_from_all_the_same(
     rig, afterwards, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(EstimateObserver, "_is_time", lambda *_: False)
-    part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
+    part, estimate, _ = _follow(_plan("reference"), rig, tmp_path / "c.zarr")
     assert estimate.chosen_by == 0
     expected, _ = afterwards("reference")
     for name in ("direct", "near", "far"):
@@ -153,7 +161,7 @@ def test_photos_that_come_too_fast_are_estimated_from_all_the_same(
 
 
 def test_photos_that_do_not_fit_are_read_again_in_blocks(rig, tmp_path):
-    plan = PLANS["reference"]
+    plan = _plan("reference")
     memory = memory_for(9, plan, SIZE, "joint")
     with Patient(plan, rig.full_scale, ReconstructionOptions(memory=memory)) as estimate:
         capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
@@ -169,15 +177,15 @@ def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
     with (
         pytest.raises(InputError, match="`memory="),
         EstimateObserver(
-            PLANS["reference"], rig.full_scale, ReconstructionOptions(memory=10**6)
+            _plan("reference"), rig.full_scale, ReconstructionOptions(memory=10**6)
         ) as estimate,
     ):
-        acquire(PLANS["reference"], tmp_path / "c.zarr", rig, observers=[estimate])
+        acquire(_plan("reference"), tmp_path / "c.zarr", rig, observers=[estimate])
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path):
-    plan = PLANS["reference"]
+    plan = _plan("reference")
     end = next(end for end in ends(plan) if end > 0.6 * len(plan.patterns))
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(
@@ -197,7 +205,7 @@ def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path
 def test_components_from_too_few_photos_are_chosen_again(rig, afterwards, tmp_path, monkeypatch):
     # Photos come too fast for more than the first choice, by half of them.
     monkeypatch.setattr(Patient, "_ends_in_time", lambda *_: False)
-    part, estimate, _ = _follow(PLANS["reference"], rig, tmp_path / "c.zarr")
+    part, estimate, _ = _follow(_plan("reference"), rig, tmp_path / "c.zarr")
     assert estimate._choice is not None
     assert estimate.chosen_by == 0
     expected, _ = afterwards("reference")
@@ -208,7 +216,7 @@ def test_a_small_camera_has_no_early_choice(tmp_path):
     world = model_transport(SIZE, Size(1, 1), window=5, far=Size(3, 3), channels=1)
     rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
     for plan in ("reference", "pairs"):
-        part, estimate, capture = _follow(PLANS[plan], rig, tmp_path / f"{plan}.zarr")
+        part, estimate, capture = _follow(_plan(plan), rig, tmp_path / f"{plan}.zarr")
         assert estimate._choice is None
         expected, _ = reconstruct(capture)
         np.testing.assert_array_equal(part.transport.near, expected.near)
@@ -219,7 +227,7 @@ def test_a_fault_of_the_work_beside_costs_no_photo(rig, tmp_path, monkeypatch):
         raise RuntimeError("out of memory")
 
     monkeypatch.setattr(observing, "choose_components", faulty)
-    plan = PLANS["reference"]
+    plan = _plan("reference")
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(plan, tmp_path / "c.zarr", rig, observers=[estimate])
         assert len(capture.plan.patterns) == len(plan.patterns)
@@ -244,10 +252,10 @@ def test_a_pending_choice_ends_with_the_capture(rig, tmp_path, monkeypatch):
 
     with (
         pytest.raises(KeyboardInterrupt),
-        EstimateObserver(PLANS["reference"], rig.full_scale) as estimate,
+        EstimateObserver(_plan("reference"), rig.full_scale) as estimate,
     ):
         observers = [estimate, EndsWhere(stop)]
-        acquire(PLANS["reference"], tmp_path / "c.zarr", rig, observers=observers)
+        acquire(_plan("reference"), tmp_path / "c.zarr", rig, observers=observers)
     assert begun.is_set()
     assert [path.name for path in tmp_path.iterdir()] == ["c.zarr.unfinished"]
     assert threading.active_count() <= before + 1
@@ -256,20 +264,20 @@ def test_a_pending_choice_ends_with_the_capture(rig, tmp_path, monkeypatch):
 def test_photos_that_cannot_be_measured_are_kept(rig, tmp_path):
     # White stands at full scale everywhere, which the references tell.
     bright = replace(rig, exposure=1e3)
-    with Patient(PLANS["reference"], rig.full_scale) as estimate:
-        capture = acquire(PLANS["reference"], tmp_path / "c.zarr", bright, observers=[estimate])
+    with Patient(_plan("reference"), rig.full_scale) as estimate:
+        capture = acquire(_plan("reference"), tmp_path / "c.zarr", bright, observers=[estimate])
         with pytest.raises(InputError, match="full scale"):
             _made(estimate, capture)
     assert estimate.chosen_by == 0
     np.testing.assert_array_equal(
-        capture.read([0]), acquire_in_memory(PLANS["reference"], bright).read([0], slice(None))
+        capture.read([0]), acquire_in_memory(_plan("reference"), bright).read([0], slice(None))
     )
 
 
 @pytest.mark.parametrize("options", [{"method": "paper"}, {"square": True}])
 def test_options_that_it_would_not_follow_are_refused(options):
     with pytest.raises(InputError, match="while capturing, only"):
-        EstimateObserver(PLANS["reference"], 1.0, ReconstructionOptions(**options))
+        EstimateObserver(_plan("reference"), 1.0, ReconstructionOptions(**options))
 
 
 def test_complex_patterns_are_refused():
@@ -277,9 +285,9 @@ def test_complex_patterns_are_refused():
         EstimateObserver(paper_plan(SIZE, 8, Size(5, 5), offset="none"), 1.0)
 
 
-@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("plan", MAKERS)
 def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
-    whole = PLANS[plan]
+    whole = _plan(plan)
     photos = acquire_in_memory(whole, rig)
     found = ends(whole)
     stripes = [i for i, pattern in enumerate(whole.patterns) if pattern.purpose == "correspondence"]
@@ -295,9 +303,9 @@ def test_a_plan_may_end_where_its_first_photos_can_be_measured(rig, plan):
                 measure(part, slice(0, 1))
 
 
-@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("plan", MAKERS)
 def test_what_is_measured_is_known_before(rig, plan):
-    basis, multiplicity = measured_basis(PLANS[plan])
-    measurements = measure(acquire_in_memory(PLANS[plan], rig), slice(0, 1))
+    basis, multiplicity = measured_basis(_plan(plan))
+    measurements = measure(acquire_in_memory(_plan(plan), rig), slice(0, 1))
     assert basis.frequencies == measurements.basis.frequencies
     np.testing.assert_array_equal(multiplicity, measurements.multiplicity)

@@ -8,7 +8,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.capture import Decision, open_capture
 from nearfar.errors import InputError, PlanError
-from nearfar.plan import choose_plan, paper_plan, parse_plan
+from nearfar.plan import paper_plan, parse_plan
 from nearfar.plan.checks import (
     PHOTOS_OF_EACH,
     PICTURE_SEEDS,
@@ -25,6 +25,7 @@ from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import snr
 from nearfar.workflow.observers.quality import QualityObserver, choose_rows
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
+from tests.plans import chosen_plan
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +40,7 @@ def _rig(scene, **camera):
 
 
 def _run(scene, path, photos, target, **camera):
-    plan = with_checks(choose_plan(scene.projector, photos)[0])
+    plan = with_checks(chosen_plan(scene.projector, photos))
     rig = _rig(scene, **camera)
     qualities = []
     check = QualityObserver(plan, target, rig.full_scale, qualities.append)
@@ -101,7 +102,7 @@ def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_no
         _run(bright, tmp_path / "c.zarr", 150, 90.0)
     assert not (tmp_path / "c.zarr").exists()
     # The lamp fails after the first look: every photo is asked for all the same.
-    plan = with_checks(choose_plan(scene.projector, 60)[0])
+    plan = with_checks(chosen_plan(scene.projector, 60))
     rig = _rig(scene)
     qualities = []
     check = QualityObserver(plan, 90.0, rig.full_scale, qualities.append)
@@ -122,7 +123,7 @@ def test_estimates_are_rarer_the_farther_the_target(scene, tmp_path):
 
 
 def test_checks_stand_behind_the_first_references_and_twice():
-    plan = choose_plan(Size(16, 20), 60)[0]
+    plan = chosen_plan(Size(16, 20), 60)
     checked = with_checks(plan)
     assert len(checked.patterns) == len(plan.patterns) + PHOTOS_OF_EACH * len(PICTURE_SEEDS)
     assert checked.counts["check"] == PHOTOS_OF_EACH * len(PICTURE_SEEDS)
@@ -140,7 +141,7 @@ def test_checks_stand_behind_the_first_references_and_twice():
 @pytest.mark.parametrize("photos", [40, 61, 100, 150])
 @pytest.mark.parametrize("side", [16, 24])
 def test_a_plan_may_end_whenever_white_and_black_come_by(side, photos):
-    plan = with_checks(choose_plan(Size(side, side), photos)[0])
+    plan = with_checks(chosen_plan(Size(side, side), photos))
     found = ends(plan)
     places = [
         i + 1

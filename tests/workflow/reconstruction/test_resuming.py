@@ -20,7 +20,6 @@ from nearfar.errors import (
     MissingFileError,
     UselessPhotosError,
 )
-from nearfar.plan.choose import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -32,6 +31,7 @@ from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.reconstruction.sinks import LOG_NAME
 from tests.absent import NEEDS_PYTORCH
 from tests.cli.conftest import check_done, run_nearfar
+from tests.plans import chosen_plan
 from tests.processes import run_command, start
 from tests.workflow.reconstruction.memory import memory_for
 from tests.worlds import model_transport
@@ -71,7 +71,7 @@ def into(
 def _captured(camera, folder):
     world = model_transport(Size(16, 20), camera, window=5, far=Size(3, 3), channels=1)
     rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
-    return acquire(choose_plan(Size(16, 20), 50)[0], folder / "c.zarr", rig)
+    return acquire(chosen_plan(Size(16, 20), 50), folder / "c.zarr", rig)
 
 
 def _memory(capture):
@@ -199,7 +199,7 @@ def test_a_capture_without_direct_light_leaves_nothing(tmp_path):
     dark = model_transport(Size(16, 20), Size(12, 6), window=5, far=Size(3, 3), channels=1)
     dark = replace(dark, direct=0 * dark.direct, near=0 * dark.near)
     rig = SimulatedRig(dark, "dark", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
-    shot = acquire(choose_plan(Size(16, 20), 50)[0], tmp_path / "c.zarr", rig)
+    shot = acquire(chosen_plan(Size(16, 20), 50), tmp_path / "c.zarr", rig)
     with pytest.raises(UselessPhotosError, match=r"no direct light .* to reconstruct\.$"):
         into(tmp_path / "t.zarr", shot)
     assert [path.name for path in tmp_path.iterdir()] == ["c.zarr"]

@@ -6,24 +6,27 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.base import ESTIMATORS
 from nearfar.photometry.drift_removal import remove_drift
-from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan import paper_plan
 from nearfar.workflow.reconstruction.tiles import memory_of_tile, reference_bytes, tile_rows
+from tests.plans import chosen_plan
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA = Size(16, 20), Size(60, 9)
-PLAN, _ = choose_plan(PROJECTOR, 60, window=5)
 
 
 @pytest.fixture
 def photos(shoot):
-    return shoot(PLAN, model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3), channels=3))
+    return shoot(
+        chosen_plan(PROJECTOR, 60, window=5),
+        model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3), channels=3),
+    )
 
 
 def test_references_of_the_whole_camera_are_counted(photos):
     # A tile is worked at beside what is known of every row.
     drift = remove_drift(photos).drift
     kept = sum(values.nbytes for values in (drift.black, drift.light, drift.unsaturated))
-    assert reference_bytes(PLAN, CAMERA, 3) == kept
+    assert reference_bytes(chosen_plan(PROJECTOR, 60, window=5), CAMERA, 3) == kept
     assert reference_bytes(paper_plan(PROJECTOR, 5, Size(3, 3)), CAMERA, 3) == 0
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.optimize import linprog
-from sklearn.linear_model import ARDRegression, Lasso
 
 from nearfar.arrays import Size
 from nearfar.estimate.matrices import build_matrices
@@ -75,6 +74,9 @@ def test_without_noise_it_is_the_linear_program(dropped, clipped):
 
 @pytest.mark.parametrize("dropped", [Size(1, 1), Size(3, 3)])
 def test_with_noise_it_is_the_lasso(dropped):
+    # Imported here: it takes seconds, in each process that collects tests.
+    from sklearn.linear_model import Lasso
+
     _, n0, unseen, inside = _problem(dropped=dropped, noise=0.05)
     threshold = 0.06
     found, _ = solve(n0, unseen, inside, np.full(len(n0), threshold, np.float32))
@@ -118,6 +120,8 @@ def test_it_is_about_as_good_as_the_papers_bayesian_solver():
 
 
 def test_the_bayesian_reference_agrees_with_a_library():
+    from sklearn.linear_model import ARDRegression
+
     noise = 0.05
     n, n0, unseen, inside = _problem(noise=noise, rows=4, seed=5, dropped=Size(1, 1))
     mine = solve_bayesian(n0, unseen, inside, np.full(len(n0), noise))

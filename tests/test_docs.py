@@ -14,7 +14,7 @@ from nearfar.rigs.tables import RealTable, SimulatedTable
 from nearfar.scenes.cache import cached_scene
 from tests.rigs.displays import one_monitor
 from tests.rigs.loopback import alone_on_the_loopback
-from tests.rigs.test_loop import CAMERA, PROJECTOR, Bench
+from tests.rigs.test_loop import CAMERA, PROJECTOR, SCREEN, Bench
 
 DOCS = Path(__file__).parents[1] / "docs"
 # Pages that the build writes, and records, show nothing to run.
@@ -87,7 +87,7 @@ def rig(tmp_path_factory):
     lights = np.eye(PROJECTOR.pixels, dtype=np.float32).reshape(-1, *PROJECTOR)
     transport = world.pictures(lights).mean(axis=-1).reshape(PROJECTOR.pixels, -1).T
     np.save(folder / "transport.npy", 0.7 / transport.sum(axis=1).max() * transport)
-    with alone_on_the_loopback(), one_monitor() as display:
+    with alone_on_the_loopback(), one_monitor(SCREEN) as display:
         bench = Bench(folder, display, "DESK")
         yield bench
         bench.close()

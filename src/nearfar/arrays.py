@@ -7,12 +7,13 @@ projector pixels are flattened row by row.
 import math
 import os
 from collections.abc import Iterator, Sequence
+from functools import cache
+from importlib import import_module
 from operator import index
 from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 from array_api_compat import array_namespace, device, is_numpy_array, to_device
-from array_api_compat import numpy as numpy_namespace
 from numpy.typing import NDArray
 
 from nearfar.errors import InputError
@@ -174,8 +175,14 @@ def namespace(*values: Any) -> Any:
     """Return the array-API functions for arrays: NumPy's, PyTorch's or CuPy's."""
     # Asked for often, and finding it out takes as long as work on a few camera pixels.
     if all(type(value) is np.ndarray for value in values):
-        return numpy_namespace
+        return _of_numpy()
     return array_namespace(*values)
+
+
+@cache
+def _of_numpy() -> Any:
+    """Return NumPy's array-API functions, whose import takes longer than NumPy's own."""
+    return import_module("array_api_compat.numpy")
 
 
 def beside(constant: NDArray[Any], values: Any) -> Any:

@@ -1,5 +1,8 @@
 """Files: pictures, Zarr stores, and outputs that appear whole or not at all."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from nearfar.files.arrays import read_arrays, write_array
 from nearfar.files.codecs import encode_png
 from nearfar.files.colour import from_srgb, luminance, to_srgb
@@ -18,17 +21,33 @@ from nearfar.files.images import (
 from nearfar.files.kinds import kind_of_store
 from nearfar.files.output import check_output, new_output
 from nearfar.files.resumable import UNFINISHED, check_resumable, resumable_output
-from nearfar.files.stores import (
-    add_array,
-    add_to_store,
-    create_durable_store,
-    create_store,
-    open_array,
-    open_durable_store,
-    open_store,
-    read_array,
-    read_selection,
-)
+
+if TYPE_CHECKING:
+    from nearfar.files.stores import (
+        add_array,
+        add_to_store,
+        create_durable_store,
+        create_store,
+        open_array,
+        open_durable_store,
+        open_store,
+        read_array,
+        read_selection,
+    )
+
+# Loaded when they are first asked for: much of a command's start is Zarr's, and plans and
+# descriptions of rigs are files of other kinds.
+_OF_STORES = {
+    "add_array",
+    "add_to_store",
+    "create_durable_store",
+    "create_store",
+    "open_array",
+    "open_durable_store",
+    "open_store",
+    "read_array",
+    "read_selection",
+}
 
 __all__ = [
     "UNFINISHED",
@@ -63,3 +82,9 @@ __all__ = [
     "write_array",
     "write_picture",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _OF_STORES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module("nearfar.files.stores"), name)

@@ -2,7 +2,6 @@
 
 import re
 import shlex
-import shutil
 import tomllib
 from pathlib import Path
 
@@ -94,41 +93,10 @@ def rig(tmp_path_factory):
         bench.close()
 
 
-def _files(folder):
-    """What lies in a folder, by path; None for a folder."""
-    return {
-        path.relative_to(folder): None if path.is_dir() else path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-    }
-
-
-@pytest.fixture(scope="module")
-def do_once(rig):
-    """Run a command; one that ran before among the same files leaves what it left then.
-
-    Both pages begin with a description of the rig and its calibration, which takes seconds.
-    """
-    done = []
-
-    def do(folder, words):
-        before = _files(folder)
-        for known, there, said, left in done:
-            if (known, there) == (words, before):
-                shutil.copytree(left, folder, dirs_exist_ok=True)
-                return said
-        rig.folder = folder
-        said = rig.do(*words)
-        left = folder.parent / f"{folder.name}-{len(done)}"
-        shutil.copytree(folder, left)
-        done.append((words, before, said, left))
-        return said
-
-    return do
-
-
 @pytest.mark.slow(minutes=0.6)
 @pytest.mark.parametrize("name", ["tutorial.md", "howto/real-rig.md"])
-def test_what_is_shown_on_a_rig_runs_on_one(do_once, name, tmp_path):
+def test_what_is_shown_on_a_rig_runs_on_one(rig, name, tmp_path):
+    rig.folder = tmp_path
     first = True
     for kind, text in fences(DOCS / name):
         if kind != "on-a-rig":
@@ -136,7 +104,7 @@ def test_what_is_shown_on_a_rig_runs_on_one(do_once, name, tmp_path):
         for line in text.strip().splitlines():
             command = shlex.split(line)
             assert command[0] == "nearfar"
-            said = do_once(tmp_path, command[1:])
+            said = rig.do(*command[1:])
             if command[1] == "devices":
                 assert "Aravis-Fake-DESK" in said
             if command[1] == "init":

@@ -22,7 +22,7 @@ from nearfar.errors import (
     PlanError,
     UnreadableFileError,
 )
-from nearfar.files import create_store
+from nearfar.files.stores import create_store
 from nearfar.plan import Plan, paper_plan
 
 PLAN = paper_plan(Size(4, 5), 1, Size(1, 1))

@@ -99,7 +99,6 @@ def test_a_device_that_is_not_there_is_said(devices):
             mover("cuda")
 
 
-@pytest.mark.usefixtures("torch")
 def test_without_pytorch_it_is_said():
     program = "from nearfar.devices import mover\nmover('cuda')"
     assert "pip install 'nearfar[torch]'" in said_without("torch", program)

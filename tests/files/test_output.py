@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from nearfar.errors import ExistingOutputError, InputError, MissingFileError, StorageError
-from nearfar.files import add_array, create_durable_store, create_store, new_output, write_picture
+from nearfar.files import new_output, write_picture
+from nearfar.files.stores import add_array, create_durable_store, create_store
 from tests.waiting import LONGEST_WAIT
 
 
@@ -203,7 +204,8 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from nearfar.errors import StorageError
-from nearfar.files import *
+from nearfar.files import new_output, write_picture
+from nearfar.files.stores import add_array, create_store
 folder = Path(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 def store():
@@ -235,7 +237,8 @@ def test_a_limit_on_files_is_a_sentence(tmp_path: Path) -> None:
 KILLED = """
 import sys, time
 from pathlib import Path
-from nearfar.files import add_array, create_durable_store, new_output
+from nearfar.files import new_output
+from nearfar.files.stores import add_array, create_durable_store
 with new_output(Path(sys.argv[1]), force=True) as partial:
     group = create_durable_store(partial, "nearfar test", 2)
     array = add_array(group, "a", (9**9, 999), "u1", (1, 999))

@@ -11,12 +11,12 @@ import pytest
 import zarr
 
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
-from nearfar.files import (
+from nearfar.files import kind_of_store
+from nearfar.files.stores import (
     add_array,
     add_to_store,
     create_durable_store,
     create_store,
-    kind_of_store,
     open_array,
     open_store,
     read_array,

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from nearfar.errors import StorageError
-from nearfar.files import add_array, add_to_store, new_output, open_store, read_array, stores
-from nearfar.files.stores import create_durable_store, create_store
+from nearfar.files import new_output, stores
+from nearfar.files.stores import (
+    add_array,
+    add_to_store,
+    create_durable_store,
+    create_store,
+    open_store,
+    read_array,
+)
 from nearfar.files.writes import abandon
 from tests.waiting import LONGEST_WAIT
 

@@ -14,7 +14,8 @@ from nearfar.arrays import AnyPath
 from nearfar.capture.checks import as_photo, check_count, check_order, check_photo
 from nearfar.capture.store import Capture, open_capture, white_and_black
 from nearfar.errors import InputError
-from nearfar.files import add_array, new_output, open_durable_store, read_selection
+from nearfar.files import new_output
+from nearfar.files.stores import add_array, open_durable_store, read_selection
 from nearfar.progress import Report, ignore_progress
 
 

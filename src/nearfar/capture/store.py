@@ -13,13 +13,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath, Size
 from nearfar.errors import UnreadableFileError
-from nearfar.files import (
-    UNFINISHED,
-    open_array,
-    open_store,
-    read_array,
-    read_selection,
-)
+from nearfar.files import UNFINISHED
+from nearfar.files.stores import open_array, open_store, read_array, read_selection
 from nearfar.illumination.frequencies import DC
 from nearfar.markup import card, picture
 from nearfar.plan import Plan, Sinusoid, parse_plan

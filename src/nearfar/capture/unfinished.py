@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 from nearfar.arrays import AnyPath
 from nearfar.capture.store import FORMAT_VERSION, KIND, is_positive
 from nearfar.errors import InputError
-from nearfar.files import UNFINISHED, open_store
+from nearfar.files import UNFINISHED
+from nearfar.files.stores import open_store
 
 # A line for each photo that is on the disk; gone once the capture is whole.
 LOG_NAME = "photos.jsonl"

@@ -32,18 +32,17 @@ from nearfar.capture.unfinished import LOG_NAME, Taken, other_plan, require_same
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
-from nearfar.files import (
+from nearfar.files import full_scale_of, new_output
+from nearfar.files.logs import note, read_notes
+from nearfar.files.output import synchronise_entry
+from nearfar.files.stores import (
     add_array,
     create_durable_store,
-    full_scale_of,
-    new_output,
     open_array,
     open_durable_store,
     open_store,
     read_selection,
 )
-from nearfar.files.logs import note, read_notes
-from nearfar.files.output import synchronise_entry
 from nearfar.plan.model import Plan
 from nearfar.progress import OldReport, Report, as_report
 from nearfar.release import version

@@ -12,14 +12,8 @@ from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
-from nearfar.files import (
-    add_array,
-    create_store,
-    new_output,
-    open_store,
-    read_array,
-    read_arrays,
-)
+from nearfar.files import new_output, read_arrays
+from nearfar.files.stores import add_array, create_store, open_store, read_array
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.store import listed, write_in_rows
 

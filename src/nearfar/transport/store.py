@@ -13,14 +13,8 @@ from nearfar.arrays import AnyPath, Floats, Size, blocks
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import UnreadableFileError
-from nearfar.files import (
-    add_array,
-    add_to_store,
-    new_output,
-    open_array,
-    open_store,
-    read_selection,
-)
+from nearfar.files import new_output
+from nearfar.files.stores import add_array, add_to_store, open_array, open_store, read_selection
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent

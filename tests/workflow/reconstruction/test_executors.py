@@ -65,7 +65,7 @@ def _executed(work, executor, report=lambda _what, _share: None):
 
 @pytest.fixture(scope="module")
 def executed(work):
-    """Return what an executor, by its name, makes of the work, and the progress it reports."""
+    """Return a function that runs the work once with each executor, and records its progress."""
 
     @cache
     def execute_once(name):

@@ -165,7 +165,7 @@ def lay_out(
     return Problem(measurements, model, pixels, window)
 
 
-# With its phases, which each sweep of each tile reads.
+# Tiles of camera rows share it, and the phases that it computes once.
 @lru_cache(maxsize=4)
 def _centred(frequencies: tuple[Frequency, ...], projector: Size, window: int) -> CentredBasis:
     return centred_basis(real_basis(frequencies, projector), window_offsets(window))

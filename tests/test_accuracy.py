@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from nearfar.cli.main import main
+from nearfar.cli.application import main
 from nearfar.workflow.experiments.in_theory import WEDGE, acquire_in_theory
 
 # Scene, projector, W, far band; least SNR_b over five pictures and under white, dB. Camera: 30 000

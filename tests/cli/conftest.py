@@ -13,7 +13,7 @@ import pytest
 from scipy import sparse
 
 from nearfar.arrays import Size
-from nearfar.cli.main import main
+from nearfar.cli.application import main
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import save_exact
 from tests.worlds import model_transport

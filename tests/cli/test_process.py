@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from nearfar.cli.commands import COMMANDS
-from nearfar.cli.faults import STOP_SIGNALS
+from nearfar.cli.stopping import STOP_SIGNALS
 from nearfar.release import version
 from tests.cli.conftest import PLAN, check_done, check_sentence, run_nearfar
 from tests.waiting import LONGEST_WAIT
@@ -153,6 +153,39 @@ def test_a_signal_that_is_ignored_stops_no_capture(long_job, tmp_path: Path, sto
         before = sum(1 for _ in (unfinished / "photos").iterdir())
         _wait_for_photo(process, unfinished, before + 20)
         process.kill()
+
+
+INTERRUPTED_WHILE_LOADING = """
+import os, sys
+module, stop = sys.argv[1], int(sys.argv[2])
+del sys.argv[1:3]
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            os.kill(os.getpid(), stop)
+sys.meta_path.insert(0, Finder())
+from nearfar.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "stop"),
+    [
+        # Before the command line is read, while it is, and in the command.
+        ("typer", signal.SIGINT),
+        ("nearfar.cli.plan", signal.SIGINT),
+        ("nearfar.plan.choose", signal.SIGTERM),
+    ],
+)
+def test_an_interrupt_while_a_command_is_loaded_is_a_sentence(module: str, stop: signal.Signals):
+    program = [sys.executable, "-c", INTERRUPTED_WHILE_LOADING]
+    command = [*program, module, str(int(stop)), *PLAN]
+    with _start("default", stop, command) as process:
+        said, complaint = process.communicate()
+    assert process.returncode == 128 + stop
+    assert said == ""
+    assert complaint == "nearfar: interrupted: nothing half-written was left behind.\n"
 
 
 IMPATIENT = (

@@ -14,9 +14,8 @@ import typer
 
 from nearfar.cli.flags import with_flags
 from nearfar.cli.saying import warn
+from nearfar.cli.stopping import NOTHING_LEFT, handled_by
 from nearfar.errors import KeptInterrupt, NearfarError
-
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 # Signals to stop that arrived while the command ran.
 _stops: list[int] = []
@@ -86,23 +85,15 @@ def stopped_cleanly() -> Iterator[None]:
         _stops.append(number)
         raise KeyboardInterrupt
 
-    usual = (signal.SIG_DFL, signal.default_int_handler)
-    # Signals that are ignored, as under nohup, stay ignored.
-    replaced = {n: signal.getsignal(n) for n in STOP_SIGNALS if signal.getsignal(n) in usual}
     _stops.clear()
-    for number in replaced:
-        signal.signal(number, stop)
-    try:
+    with handled_by(stop):
         yield
-    finally:
-        for number, handler in replaced.items():
-            signal.signal(number, handler)
 
 
 def _interrupted(stopped: KeyboardInterrupt | None = None) -> NoReturn:
     status = 128 + (_stops[-1] if _stops else signal.SIGINT)
-    what = "interrupted: nothing half-written was left behind."
-    _fail(with_flags(str(stopped)) if isinstance(stopped, KeptInterrupt) else what, status=status)
+    kept = isinstance(stopped, KeptInterrupt)
+    _fail(with_flags(str(stopped)) if kept else NOTHING_LEFT, status=status)
 
 
 def _discard_stdout() -> None:

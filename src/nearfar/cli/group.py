@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from nearfar.cli.commands import COMMANDS
-from nearfar.cli.faults import faults_in_sentences
+from nearfar.cli.faults import faults_in_sentences, stopped_cleanly
 from nearfar.errors import ExtensionError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _built(name: str, function: "FunctionType") -> Any:
     """
     try:
         # Inside the command, before the parser gives interrupts and faults words of its own.
-        return _by_typer(name, faults_in_sentences()(function))
+        return _by_typer(name, stopped_cleanly()(faults_in_sentences()(function)))
     except Exception as error:
         if name in COMMANDS.own:
             raise

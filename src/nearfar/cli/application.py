@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from nearfar.cli.faults import faults_in_sentences, stopped_cleanly, warnings_in_lines
+from nearfar.cli.faults import faults_in_sentences, warnings_in_lines
 from nearfar.cli.group import CommandGroup
 
 app = typer.Typer(
@@ -39,7 +39,7 @@ def options(
 
 def main() -> None:
     """Run the command line; every fault is one sentence on stderr and exit status 1."""
-    with stopped_cleanly(), warnings_in_lines(), faults_in_sentences():
+    with warnings_in_lines(), faults_in_sentences():
         try:
             app()
         finally:

@@ -1,0 +1,40 @@
+"""Signals to stop a command.
+
+Loading what a command needs takes a good part of its time. Until then it has begun nothing, and
+what is loaded, or reads the command line, has words of its own for an interrupt, or none.
+"""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+NOTHING_LEFT = "interrupted: nothing half-written was left behind."
+
+
+@contextmanager
+def stopped_at_once() -> Iterator[None]:
+    """On a signal to stop say so, and end the process without further ado."""
+    with handled_by(_end):
+        yield
+
+
+@contextmanager
+def handled_by(handle: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Handle signals to stop; those that are ignored, as under nohup, stay ignored."""
+    usual = (signal.SIG_DFL, signal.default_int_handler, _end)
+    replaced = {n: signal.getsignal(n) for n in STOP_SIGNALS if signal.getsignal(n) in usual}
+    for number in replaced:
+        signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        for number, handler in replaced.items():
+            signal.signal(number, handler)
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    os.write(2, f"nearfar: {NOTHING_LEFT}\n".encode())
+    os._exit(128 + number)

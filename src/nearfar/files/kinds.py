@@ -3,11 +3,14 @@
 import json
 from pathlib import Path
 
+# File in which a Zarr folder says what it is.
+METADATA = "zarr.json"
+
 
 def kind_of_store(path: Path) -> str | None:
     """Return the kind that a Zarr names, such as ``"nearfar capture"``; None if it names none."""
     try:
-        metadata = json.loads((path / "zarr.json").read_bytes())
+        metadata = json.loads((path / METADATA).read_bytes())
         return str(metadata["attributes"]["format"])
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -17,10 +17,9 @@ from zarr.errors import ContainsArrayError, ContainsGroupError, NodeNotFoundErro
 from zarr.storage import LocalStore
 
 from nearfar.errors import InputError, MissingFileError, NearfarError, UnreadableFileError
+from nearfar.files.kinds import METADATA
 from nearfar.files.output import synchronise_entry
 from nearfar.files.writes import write_into
-
-_METADATA = "zarr.json"
 
 # What zarr was seen to raise on metadata and chunks cut or changed at every byte.
 _DAMAGE = (
@@ -51,7 +50,7 @@ class _FolderStore(LocalStore):
             await self.set(key, value)
 
 
-class _DurableStore(LocalStore):
+class _DurableStore(_FolderStore):
     """A folder store for writing, in which what is set is on the disk when the call returns."""
 
     async def set(self, key: str, value: Buffer) -> None:
@@ -71,7 +70,7 @@ def _write_durably(path: Path, value: Buffer) -> None:
 
 
 def _written_beside(path: Path, value: Buffer) -> Path:
-    if path.name == _METADATA:
+    if path.name == METADATA:
         path.parent.mkdir(parents=True, exist_ok=True)
     # Other processes may write the same file, and the same into it.
     beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
@@ -96,7 +95,7 @@ class _WholeStore(LocalStore):
             raise UnreadableFileError(
                 f"{path} cannot be read ({error.strerror}): check the disk and its permissions."
             ) from error
-        if value is None and path.name != _METADATA:
+        if value is None and path.name != METADATA:
             raise UnreadableFileError(
                 f"{self.root} is damaged: {key} is missing; copy or make it again."
             )
@@ -138,7 +137,7 @@ def add_to_store(
     path: Path, kind: str, version: int, attributes: Mapping[str, Any] | None = None
 ) -> zarr.Group:
     """Open a group that `create_store` made, to go on writing; make it where it is not there."""
-    if not (path / _METADATA).exists():
+    if not (path / METADATA).exists():
         # Another process that writes here may be quicker than this one.
         with contextlib.suppress(ContainsGroupError):
             return create_store(path, kind, version, attributes)
@@ -166,7 +165,7 @@ def add_array(
 
     An array that was laid out in the same way is opened instead.
     """
-    if not (_root(group.store) / name / _METADATA).exists():
+    if not (_root(group.store) / name / METADATA).exists():
         # Another process that writes here may be quicker than this one.
         with contextlib.suppress(ContainsArrayError):
             return _new_array(group, name, shape, dtype, chunks)
@@ -226,7 +225,7 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
     try:
         if not path.exists():
             raise MissingFileError(f"{path} is not there: check the name.")
-        if not (path / _METADATA).is_file():
+        if not (path / METADATA).is_file():
             raise UnreadableFileError(
                 f"{path} is not {article} {kind}: it is no Zarr folder with a zarr.json; check the "
                 f"name."

@@ -5,14 +5,14 @@ import json
 import random
 import time
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, count, islice
 
 import numpy as np
 import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import CaptureWriter, open_capture, white_and_black, write_capture
-from nearfar.capture.unfinished import LOG_NAME
+from nearfar.capture.unfinished import LOG_NAME, count_photos
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -29,7 +29,8 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
-from tests.cli.conftest import check_done, run_nearfar
+from tests.cli.conftest import check_done, check_sentence, run_nearfar
+from tests.killing import killed_at
 from tests.observers import EndsWhere
 from tests.processes import run_command, start
 from tests.worlds import model_transport
@@ -243,7 +244,7 @@ def test_a_link_is_followed_and_the_folder_named(rig, tmp_path):
 def test_what_was_whole_but_for_its_name_is_not_shot_again(
     rig, undisturbed, tmp_path, monkeypatch, early
 ):
-    def gone(*_arguments):
+    def gone(*_arguments, **_options):
         raise KeyboardInterrupt
 
     def enough(number, _photo):
@@ -401,6 +402,51 @@ def test_kill_9_at_twenty_moments_costs_nothing(tmp_path):
     assert one.plan == other.plan
     assert list((tmp_path / "k").iterdir()) == [killed]
     assert not list(killed.rglob("*.partial"))
+
+
+@pytest.mark.slow
+def test_killed_at_any_step_it_is_resumed_or_begun_anew_by_the_same_command(tmp_path):
+    plan, scene = tmp_path / "plan.json", tmp_path / "T.npy"
+    made = paper_plan(Size(4, 4), 1, Size(1, 1), offset="reference", correspondence="none")
+    plan.write_text(made.to_json())
+    np.save(scene, np.random.default_rng(0).random((3, 4, 4, 4), dtype=np.float32) / 40)
+    whole = ("acquire", plan, tmp_path / "whole.zarr", "--rig", scene, "-q")
+    check_done(run_nearfar(*whole))
+    undisturbed = open_capture(tmp_path / "whole.zarr")
+    kept = []
+    # Every step until the first photos are noted, and from the last photo to the end.
+    for step in chain(range(25), count(52)):
+        folder = tmp_path / f"{step}"
+        folder.mkdir()
+        path = folder / "c.zarr"
+        shoot = ("acquire", plan, path, "--rig", scene, "-q")
+        # Where a file was being written, it is empty every other time.
+        if not killed_at(step, folder, run_command, *shoot, torn=bool(step % 2)):
+            break
+        photos = count_photos(folder / "c.zarr.unfinished")
+        if path.exists():
+            check_sentence(run_nearfar(*shoot), path, "exists already")
+        else:
+            # Begun anew by either where no photo was noted, if there is a folder to go on with.
+            by_resume = photos or (step % 2 and (folder / "c.zarr.unfinished").exists())
+            check_done(run_nearfar(*shoot, *(["--resume"] if by_resume else [])))
+        kept.append(photos)
+        _check_same(open_capture(path), undisturbed)
+    assert kept.count(0) >= 5
+    assert max(kept) == len(made.patterns)
+
+
+@pytest.mark.parametrize("options", [{}, {"resume": True}])
+def test_what_somebody_else_keeps_under_the_name_is_left(rig, tmp_path, options):
+    folder = tmp_path / "c.zarr.unfinished"
+    folder.mkdir()
+    (folder / "precious.txt").write_text("mine")
+    (folder / "photos.txt").write_text("mine")
+    with pytest.raises(ExistingOutputError, match=r"c\.zarr\.unfinished"):
+        acquire(PLAN, tmp_path / "c.zarr", rig, **options)
+    with pytest.raises(ExistingOutputError, match="nearfar did not write"):
+        acquire(PLAN, tmp_path / "c.zarr", rig, force=True)
+    assert sorted(path.name for path in folder.iterdir()) == ["photos.txt", "precious.txt"]
 
 
 def test_observers_all_hear_of_every_photo_and_any_of_them_ends_the_capture(rig, tmp_path):

@@ -1,10 +1,12 @@
 """Plans, outputs and stores that cannot be: one sentence that names it, and status 1."""
 
 import shutil
+from multiprocessing.synchronize import Barrier
 from pathlib import Path
 
 import pytest
 
+from nearfar.files import output, resumable
 from tests.cli.conftest import (
     PLAN,
     Job,
@@ -14,6 +16,7 @@ from tests.cli.conftest import (
     check_sentence,
     run_nearfar,
 )
+from tests.processes import barrier, start
 
 RENDER = ("render", "corner", "--projector", "16x20", "--camera", "8x9")
 SEPARATE = ("separate", "--projector", "16x20")
@@ -129,6 +132,98 @@ def test_force_replaces_what_the_command_made(finished: Job, tmp_path: Path, com
     check_sentence(run_nearfar(*arguments), out, "--force")
     check_done(run_nearfar(*arguments, "--force"))
     assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("command", [name for name in OUTPUTS if name != "demo"])
+def test_a_name_that_somebody_takes_before_the_last_step_is_left(
+    finished: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+):
+    out = tmp_path / f"out{ENDINGS.get(command, '.zarr')}"
+
+    def synchronise(path: Path) -> None:
+        # The last before the name is given.
+        out.write_text("somebody's")
+        output.synchronise_entry(path)
+
+    monkeypatch.setattr(output, "synchronise", synchronise)
+    monkeypatch.setattr(resumable, "synchronise", synchronise)
+    check_sentence(run_nearfar(*OUTPUTS[command](finished, out)), out, "exists already", "--force")
+    assert out.read_text() == "somebody's"
+    # Photos and tiles are not lost for a name.
+    kept = [f"{out.name}.unfinished"] if command in {"acquire", "reconstruct"} else []
+    assert sorted(path.name for path in tmp_path.iterdir()) == [out.name, *kept]
+    if kept:
+        monkeypatch.undo()
+        out.unlink()
+        check_done(run_nearfar(*OUTPUTS[command](finished, out), "--resume"))
+        assert list(tmp_path.iterdir()) == [out]
+
+
+def _export(plan: Path, out: Path, said: Path, others: Barrier) -> None:
+    others.wait()
+    ran = run_nearfar("export", plan, out)
+    said.write_text(f"{ran.status}{ran.err}")
+
+
+def test_of_exports_at_once_to_one_name_one_is_done(finished: Job, tmp_path: Path):
+    others = barrier(3)
+    out, said = tmp_path / "out", [tmp_path / f"{number}.said" for number in range(3)]
+    racers = [start(_export, finished.plan, out, each, others) for each in said]
+    for racer in racers:
+        racer.join()
+    refused = f"1nearfar: {out} exists already: choose another name or add --force.\n"
+    assert sorted(each.read_text() for each in said) == ["0", refused, refused]
+    assert sorted(tmp_path.iterdir()) == sorted([out, *said])
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == {
+        p.name: p.read_bytes() for p in finished.patterns.iterdir()
+    }
+
+
+SECOND_OUTPUTS = {
+    "acquire --transport": lambda job, out, second: (
+        *("acquire", job.plan, out, "--rig", job.truth),
+        *("--transport", f"{second}.zarr"),
+    ),
+    "reconstruct --report": lambda job, out, second: (
+        *("reconstruct", job.capture, out, "--report", f"{second}.html"),
+    ),
+    "check --html": lambda job, out, second: (
+        *("check", job.apart, "--near", 5, "--far", "3x3", "--html", f"{second}.html"),
+    ),
+    "evaluate --report": lambda job, out, second: (
+        *("evaluate", job.transport, "--truth", job.truth, "--report", f"{second}.html"),
+    ),
+    "plan -o": lambda job, out, second: (
+        *("plan", "--projector", "16x20", "--photos", 60, "-o", f"{second}.json"),
+    ),
+}
+
+
+@pytest.mark.parametrize("command", SECOND_OUTPUTS)
+@pytest.mark.parametrize("where", ["a closed folder", "a name that is too long"])
+def test_what_cannot_be_written_beside_is_found_before_any_work(
+    finished: Job,
+    untouched: Untouched,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+    where: str,
+):
+    def work(*_arguments: object, **_options: object) -> None:
+        pytest.fail("the work had begun")
+
+    # What these commands do first that takes long.
+    for name in (
+        "nearfar.rigs.opening.open_rig",
+        "nearfar.capture.open_capture",
+        "nearfar.rigs.simulated.opening.load_world",
+        "nearfar.transport.store.load_transport",
+        "nearfar.plan.choose_plan",
+    ):
+        monkeypatch.setattr(name, work)
+    second = Path("/proc/self/second") if where == "a closed folder" else tmp_path / ("x" * 252)
+    arguments = SECOND_OUTPUTS[command](finished, tmp_path / "out.zarr", second)
+    check_refused(untouched, arguments, second, "could not be written")
 
 
 @pytest.mark.parametrize("command", OUTPUTS)

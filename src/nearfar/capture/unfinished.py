@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from nearfar.arrays import AnyPath
 from nearfar.capture.store import FORMAT_VERSION, KIND, is_positive
 from nearfar.errors import InputError
-from nearfar.files import UNFINISHED
+from nearfar.files import UNFINISHED, ResumableKind
 from nearfar.files.stores import open_store
 
 # A line for each photo that is on the disk; gone once the capture is whole.
@@ -37,6 +37,14 @@ def count_photos(folder: Path) -> int:
         return 0
 
 
+def has_photos(folder: Path) -> bool:
+    """Return whether any photo of a capture that is not finished is on the disk."""
+    return count_photos(folder) > 0
+
+
+RESUMABLE_CAPTURE = ResumableKind(LOG_NAME, has_photos)
+
+
 class UnfinishedCapture(NamedTuple):
     """Log of a capture that was started and not finished.
 
@@ -53,7 +61,7 @@ class UnfinishedCapture(NamedTuple):
 
 
 def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
-    """Read the log of an unfinished capture; the result has no photos if there is no log.
+    """Read the log of an unfinished capture; the result has no exposure if there are no photos.
 
     Raises
     ------
@@ -61,7 +69,7 @@ def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
         If what is there is no such capture.
     """
     folder = Path(f"{Path(path).resolve()}{UNFINISHED}")
-    if not folder.exists():
+    if not has_photos(folder):
         return UnfinishedCapture(0, None)
     exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
     return UnfinishedCapture(count_photos(folder), exposure if is_positive(exposure) else None)

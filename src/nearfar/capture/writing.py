@@ -251,9 +251,6 @@ class CaptureWriter:
         """Resume from the photos on the disk."""
         folder, before = self._folder, dict(group.attrs)
         self._taken = read_notes(folder / LOG_NAME, lambda words: Taken(**words))
-        # Files that were being written when the other writer was killed.
-        for left in folder.rglob(".*.partial"):
-            left.unlink()
         now = json.loads(json.dumps(self._attributes))
         # A capture that ended early has the plan of its photos.
         ended = json.loads(self._plan.first(self.taken).to_json())

@@ -100,7 +100,7 @@ def acquire(
 
     Example: nearfar acquire plan.json capture.zarr --rig cornell --transport transport.zarr
     """
-    from nearfar.capture.unfinished import unfinished_capture
+    from nearfar.capture.unfinished import RESUMABLE_CAPTURE, unfinished_capture
     from nearfar.files import check_resumable
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire as shoot
@@ -119,7 +119,7 @@ def acquire(
     options = ReconstructionOptions(memory=parse_bytes(memory or "2GB"), device=device or "cpu")
     made = _plan_to_shoot(plan_file, with_check_photos=until is not None)
     keep_input(output, plan_file, Path(rig))
-    check_resumable(output, resume=resume, force=force)
+    check_resumable(output, RESUMABLE_CAPTURE, resume=resume, force=force)
     if transport is not None:
         _check_transport(transport, output, plan_file, Path(rig), force=force)
     with ExitStack() as stack:

@@ -87,6 +87,10 @@ def plan(
     expected = None
     if look is not None and photos is None:
         raise typer.BadParameter("--look goes with --photos N only")
+    if output is not None:
+        from nearfar.files import check_output, new_output
+
+        check_output(output, force=force)
     if photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
         typical, noise = (TYPICAL_SCENES, NOISE) if look is None else _looked_at(look, projector)
@@ -111,8 +115,6 @@ def plan(
             correspondence=correspondence or "stripes",
         )
     if output is not None:
-        from nearfar.files import new_output
-
         with new_output(output, force=force) as partial:
             partial.write_text(made.to_json(), encoding="utf-8")
     if as_json:

@@ -87,6 +87,7 @@ def reconstruct(
     from nearfar.files import check_resumable
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+    from nearfar.workflow.reconstruction.sinks import RESUMABLE_TRANSPORT
 
     if device == "cuda" and scheduler is not None:
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
@@ -95,7 +96,7 @@ def reconstruct(
     keep_input(output, *inputs)
     if report is not None:
         check_report_page(report, output, *inputs, force=force)
-    check_resumable(output, resume=resume, force=force)
+    check_resumable(output, RESUMABLE_TRANSPORT, resume=resume, force=force)
     opened = open_capture(capture)
     given = None
     if correspondence is not None:

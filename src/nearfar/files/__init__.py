@@ -20,10 +20,16 @@ from nearfar.files.images import (
 )
 from nearfar.files.kinds import kind_of_store
 from nearfar.files.output import check_output, new_output
-from nearfar.files.resumable import UNFINISHED, check_resumable, resumable_output
+from nearfar.files.resumable import (
+    UNFINISHED,
+    ResumableKind,
+    check_resumable,
+    resumable_output,
+)
 
 __all__ = [
     "UNFINISHED",
+    "ResumableKind",
     "check_output",
     "check_picture_ending",
     "check_resumable",

@@ -3,10 +3,7 @@
 import contextlib
 import errno
 import os
-import secrets
-import shutil
 import stat
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -17,7 +14,9 @@ from nearfar.errors import (
     NearfarError,
     StorageError,
 )
+from nearfar.files.beside import clear_dead, discard, hidden_folder, replace_in_two_steps
 from nearfar.files.kinds import kind_of_store
+from nearfar.files.renaming import exchange, rename_if_free
 from nearfar.files.writes import abandon
 
 _CURES = {
@@ -44,19 +43,22 @@ def is_ours(folder: Path) -> bool:
 def check_output(
     path: Path, *, force: bool = False, replaceable: Callable[[Path], bool] = is_ours
 ) -> None:
-    """Refuse, before any work, what `new_output` would refuse; same parameters and errors."""
-    checked_target(path, force=force, replaceable=replaceable)
+    """Refuse, before any work, what `new_output` would refuse; same parameters and errors.
+
+    A folder in which nothing can be written is refused, too.
+    """
+    require_writable(path, checked_target(path, force=force, replaceable=replaceable))
 
 
 @contextlib.contextmanager
 def new_output(
     path: Path, *, force: bool = False, replaceable: Callable[[Path], bool] = is_ours
 ) -> Iterator[Path]:
-    """Yield a hidden path beside `path` to write a file or a folder to; move it there at the end.
+    """Yield a path in a hidden folder to write a file or a folder to; move it to `path` at the end.
 
     When the body ends well, what it wrote is synchronised to the disk and takes the place of
     `path` in one step; when it raises anything, interrupts too, what it wrote is removed and
-    `path` is as before.
+    `path` is as before. What a killed process leaves is removed by the next that writes there.
 
     Parameters
     ----------
@@ -71,27 +73,32 @@ def new_output(
     Yields
     ------
     Path
-        A path that does not exist yet, with the ending of `path`.
+        A path that does not exist yet, with the name of `path`.
 
     Raises
     ------
     ExistingOutputError, MissingFileError, InputError
         Before the body runs: if `path` exists and must not be replaced, or its folder is missing.
+        After it: if `path` was made meanwhile by somebody else and must not be replaced.
     StorageError
         If the disk is full, read-only or closed to this user, in the body or after.
     """
     target = checked_target(path, force=force, replaceable=replaceable)
-    partial = _beside(target, "partial")
-    try:
-        with storage_faults(path):
+    with storage_faults(path), hidden_folder(target) as folder:
+        partial = folder / target.name
+        try:
             yield partial
             synchronise(partial)
-            move_into_place(partial, target)
-    except BaseException:
-        abandon(partial)
-        raise
-    finally:
-        remove(partial)
+            move_into_place(partial, target, path, force=force, replaceable=replaceable)
+        except BaseException:
+            abandon(partial)
+            raise
+
+
+def require_writable(path: Path, target: Path) -> None:
+    """Raise a `StorageError` if an output `path` cannot be made beside and named as `target`."""
+    with storage_faults(path), hidden_folder(target) as folder:
+        (folder / target.name).touch()
 
 
 @contextlib.contextmanager
@@ -138,58 +145,80 @@ def checked_target(path: Path, *, force: bool, replaceable: Callable[[Path], boo
             raise MissingFileError(
                 f"{path} cannot be written, there is no folder {path.parent}: make it first."
             )
-        try:
-            mode = target.stat().st_mode
-        except FileNotFoundError:
-            return target
-        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            raise InputError(
-                f"{path} is neither a file nor a folder and is left alone: choose another name."
-            )
-        if not force:
-            raise ExistingOutputError(
-                f"{path} exists already: choose another name or add `force=True`."
-            )
-        if stat.S_ISDIR(mode) and not replaceable(target):
-            raise ExistingOutputError(
-                f"{path} is a folder that nearfar did not write, so `force=True` leaves it alone: "
-                f"choose another name, or remove the folder yourself."
-            )
+        # What a killed command let stand aside has its name again before anybody looks.
+        clear_dead(target.parent)
+        _require_replaceable(path, target, force=force, replaceable=replaceable)
     return target
 
 
-def _beside(target: Path, what: str) -> Path:
-    name = f".{target.stem[:60]}.{secrets.token_hex(4)}.{what}{target.suffix[:20]}"
-    return target.with_name(name)
+def _require_replaceable(
+    path: Path, target: Path, *, force: bool, replaceable: Callable[[Path], bool]
+) -> None:
+    try:
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        return
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise InputError(
+            f"{path} is neither a file nor a folder and is left alone: choose another name."
+        )
+    if not force:
+        raise _is_there(path)
+    if stat.S_ISDIR(mode) and not replaceable(target):
+        raise ExistingOutputError(
+            f"{path} is a folder that nearfar did not write, so `force=True` leaves it alone: "
+            f"choose another name, or remove the folder yourself."
+        )
 
 
-def move_into_place(partial: Path, target: Path) -> None:
-    """Let a file or folder take the place of another, and wait for the disk."""
-    if not target.is_dir() and not (target.exists() and partial.is_dir()):
-        partial.replace(target)
-    else:
-        # The system replaces no full folder in one step: the old one steps aside until the new
-        # one stands.
-        old = _beside(target, "old")
-        target.rename(old)
+def _is_there(path: Path) -> ExistingOutputError:
+    return ExistingOutputError(f"{path} exists already: choose another name or add `force=True`.")
+
+
+def move_into_place(
+    new: Path,
+    target: Path,
+    path: Path,
+    *,
+    force: bool,
+    replaceable: Callable[[Path], bool] = is_ours,
+) -> None:
+    """Give a file or folder the name of an output, and wait for the disk.
+
+    What has the name by now is replaced only where `check_output` would allow it: another process
+    may have taken it since that looked. At no moment is the name without the old or the new.
+
+    Parameters
+    ----------
+    new : Path
+        What was made, on the same disk.
+    target : Path
+        Where it goes, links followed.
+    path : Path
+        The same as the user gave it, for messages.
+    force, replaceable
+        As `new_output`.
+    """
+    while True:
         try:
-            partial.rename(target)
-        except BaseException:
-            old.rename(target)
-            raise
-        remove(old)
+            rename_if_free(new, target)
+            break
+        except FileExistsError:
+            if not force:
+                raise _is_there(path) from None
+            _require_replaceable(path, target, force=force, replaceable=replaceable)
+        # What had the name may have gone meanwhile: it is free then.
+        with contextlib.suppress(FileNotFoundError):
+            _replace(new, target)
+            break
     synchronise_entry(target.parent)
 
 
-def remove(path: Path) -> None:
-    """Remove a file or folder, if it is there."""
-    # Another program may still be adding to the folder: try again.
-    for _ in range(100):
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            with contextlib.suppress(OSError):
-                path.unlink(missing_ok=True)
-        if not path.exists():
-            return
-        time.sleep(0.02)
+def _replace(new: Path, target: Path) -> None:
+    if not (new.is_dir() or target.is_dir()):
+        new.replace(target)
+    elif exchange(new, target):
+        # It has the name of the new by now.
+        discard(new)
+    else:
+        replace_in_two_steps(new, target)

@@ -1,28 +1,52 @@
 """Outputs that take long: whatever stops them, what was written is kept and can be resumed."""
 
-import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from nearfar.errors import ExistingOutputError, MissingFileError
 from nearfar.files import output
-from nearfar.files.output import checked_target, is_ours, remove, storage_faults, synchronise
+from nearfar.files.beside import discard, remove
+from nearfar.files.kinds import METADATA
+from nearfar.files.locks import Lock, locked
+from nearfar.files.output import (
+    checked_target,
+    is_ours,
+    require_writable,
+    storage_faults,
+    synchronise,
+    synchronise_entry,
+)
 from nearfar.files.writes import settle
-
-if sys.platform != "win32":
-    import fcntl
 
 # Ending of a folder that is not finished.
 UNFINISHED = ".unfinished"
-# Endings of what stands in it before the store: logs, and files that are being written.
+# Endings of what may stand in it before the store: logs, and files that are being written.
 EARLY_ENTRIES = {".jsonl", ".partial"}
+
+
+class ResumableKind(NamedTuple):
+    """A kind of output that can be resumed.
+
+    Attributes
+    ----------
+    log : str
+        Name of a file in the unfinished folder, made before anything else there, in which it is
+        noted what is on the disk.
+    has_progress : callable
+        From the unfinished folder, returns whether anything is noted that can be resumed. It may
+        be asked while another process is at work there.
+    """
+
+    log: str
+    has_progress: Callable[[Path], bool]
 
 
 @contextmanager
 def resumable_output(
     path: Path,
+    kind: ResumableKind,
     is_worth_keeping: Callable[[Path, BaseException], bool],
     *,
     resume: bool = False,
@@ -34,10 +58,14 @@ def resumable_output(
     stops it, kill -9 too, leaves the folder as it stands, to be resumed. While the body runs, the
     folder is locked against others.
 
+    A folder in which nothing was noted before its process was killed is begun anew, with `resume`
+    and without: the body finds an empty log in it.
+
     Parameters
     ----------
     path : Path
         Folder to make; a link is followed.
+    kind : ResumableKind
     is_worth_keeping : callable
         From the unfinished folder and the exception that stopped the body, returns whether the
         folder is worth keeping; otherwise it is removed.
@@ -56,79 +84,106 @@ def resumable_output(
     MissingFileError
         If there is nothing to go on with.
     ExistingOutputError
-        If there is something, and neither `resume` nor `force`; or if another process is at work on
-        it.
+        If there is something, and neither `resume` nor `force`; if it is not of this kind; or if
+        another process is at work on it.
     NearfarError
         As `new_output`.
     """
-    target, unfinished = _checked(path, resume=resume, force=force)
+    target, unfinished = _checked(path, kind, resume=resume, force=force)
     with storage_faults(path):
-        unfinished.mkdir(exist_ok=resume or force)
-        with _locked(unfinished):
-            if not resume:
-                _clear(unfinished)
+        unfinished.mkdir(exist_ok=True)
+        with locked(unfinished) as lock:
+            if lock is Lock.ANOTHERS:
+                raise ExistingOutputError(
+                    f"another nearfar is at work on {unfinished}: wait for it, or end it first."
+                )
+            # Once more: another process may have worked there until it was locked.
+            _require_ours(unfinished, kind, resume=resume, force=force)
+            _tidy(unfinished, kind, resume=resume)
             try:
                 yield unfinished
                 synchronise(unfinished)
-                output.move_into_place(unfinished, target)
+                output.move_into_place(unfinished, target, path, force=force)
+                # It was needed until now, for this to be resumed if its last step failed.
+                (target / kind.log).unlink(missing_ok=True)
             except BaseException as error:
                 settle()
                 if unfinished.is_dir() and not is_worth_keeping(unfinished, error):
-                    remove(unfinished)
+                    discard(unfinished)
                 raise
 
 
-def check_resumable(path: Path, *, resume: bool = False, force: bool = False) -> None:
-    """Refuse, before any work, what `resumable_output` would refuse, in the same words."""
-    _checked(path, resume=resume, force=force)
+def check_resumable(
+    path: Path, kind: ResumableKind, *, resume: bool = False, force: bool = False
+) -> None:
+    """Refuse, before any work, what `resumable_output` would refuse, in the same words.
+
+    A folder in which nothing can be written is refused, too.
+    """
+    target, unfinished = _checked(path, kind, resume=resume, force=force)
+    for each in (target, unfinished):
+        require_writable(path, each)
 
 
-def _checked(path: Path, *, resume: bool, force: bool) -> tuple[Path, Path]:
+def _checked(path: Path, kind: ResumableKind, *, resume: bool, force: bool) -> tuple[Path, Path]:
+    with storage_faults(path):
+        _remove_log(path.resolve(), kind)
     target = checked_target(path, force=force, replaceable=is_ours)
     unfinished = target.with_name(f"{target.name}{UNFINISHED}")
-    if resume and not unfinished.is_dir():
-        raise MissingFileError(
-            f"{unfinished} is not there, so there is nothing to go on with: leave out "
-            f"`resume=True`."
-        )
-    if not resume and unfinished.exists():
-        if not force:
-            raise ExistingOutputError(
-                f"{unfinished} holds what was not finished: go on with it by `resume=True`, or "
-                f"start anew with `force=True`."
+    with storage_faults(path):
+        if unfinished.exists():
+            _require_ours(unfinished, kind, resume=resume, force=force)
+        elif resume:
+            raise MissingFileError(
+                f"{unfinished} is not there, so there is nothing to go on with: leave out "
+                f"`resume=True`."
             )
-        checked_target(unfinished, force=True, replaceable=_is_unfinished)
     return target, unfinished
 
 
-def _is_unfinished(folder: Path) -> bool:
+def _require_ours(folder: Path, kind: ResumableKind, *, resume: bool, force: bool) -> None:
+    """Refuse an unfinished folder with which a command must not go on, or begin anew."""
+    has_log = (folder / kind.log).is_file()
+    if not folder.is_dir() or (resume and not has_log and any(folder.iterdir())):
+        raise ExistingOutputError(
+            f"{folder} is nothing that this command has left, it has no {kind.log}: choose another "
+            f"name for the output, or move away what is there."
+        )
+    killed_early = not kind.has_progress(folder) and (has_log or not any(folder.iterdir()))
+    if resume or (killed_early and _is_begun(folder)):
+        return
+    if not force:
+        raise ExistingOutputError(
+            f"{folder} holds what was not finished: go on with it by `resume=True`, or start anew "
+            f"with `force=True`."
+        )
+    checked_target(folder, force=True, replaceable=_is_begun)
+
+
+def _is_begun(folder: Path) -> bool:
     """Return whether a folder is ours, or held no more than a log when the process was killed."""
     return is_ours(folder) or all(entry.suffix in EARLY_ENTRIES for entry in folder.iterdir())
 
 
-def _clear(folder: Path) -> None:
-    for entry in folder.iterdir():
-        remove(entry)
+def _remove_log(finished: Path, kind: ResumableKind) -> None:
+    """Remove the log of a process that was killed when all was done but this."""
+    if (finished / kind.log).is_file() and is_ours(finished):
+        with locked(finished) as lock:
+            if lock is Lock.OURS:
+                (finished / kind.log).unlink(missing_ok=True)
 
 
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Keep others from a folder that they would lock, too."""
-    if sys.platform == "win32":
-        yield
+def _tidy(folder: Path, kind: ResumableKind, *, resume: bool) -> None:
+    """Remove what a killed process was writing; all of it, where nothing is to be resumed."""
+    if resume and kind.has_progress(folder):
+        for left in folder.rglob("*.partial"):
+            left.unlink(missing_ok=True)
         return
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # Another process may have given the folder its final name meanwhile.
-            alone = os.fstat(lock).st_ino == folder.stat().st_ino
-        except (BlockingIOError, FileNotFoundError):
-            alone = False
-        if not alone:
-            raise ExistingOutputError(
-                f"another nearfar is at work on {folder}: wait for it, or end it first."
-            )
-        yield
-    finally:
-        os.close(lock)
+    # The log first and the metadata last: the folder is known by them wherever this is stopped.
+    log, metadata = folder / kind.log, folder / METADATA
+    log.write_bytes(b"")
+    for entry in {*folder.iterdir()} - {log, metadata}:
+        remove(entry)
+    remove(metadata)
+    for each in (folder, folder.parent):
+        synchronise_entry(each)

@@ -11,7 +11,12 @@ from nearfar.arrays import AnyPath
 from nearfar.capture import Capture, CaptureWriter, open_capture
 from nearfar.capture.observing import CaptureObserver, is_enough, with_predicate
 from nearfar.capture.replacing import replace_photos
-from nearfar.capture.unfinished import LOG_NAME, count_photos, require_same_rig
+from nearfar.capture.unfinished import (
+    RESUMABLE_CAPTURE,
+    count_photos,
+    has_photos,
+    require_same_rig,
+)
 from nearfar.checks import require_instance
 from nearfar.deprecation import warn_of
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
@@ -99,8 +104,10 @@ def acquire(
     report = as_report(progress, count)
     kept = _Kept(path, count, resume=resume)
     try:
-        with resumable_output(path, kept.is_worth_keeping, resume=resume, force=force) as folder:
-            writer = _writer(folder, plan, rig, resume=resume)
+        with resumable_output(
+            path, RESUMABLE_CAPTURE, kept.is_worth_keeping, resume=resume, force=force
+        ) as folder:
+            writer = _writer(folder, plan, rig)
             kept.folder = folder
             ended, taken, alarms_of_rig = writer.ended, writer.taken, 0
             finder = FaultsWhileCapturing(plan, rig.full_scale)
@@ -136,8 +143,6 @@ def acquire(
         if not kept.photos:
             raise
         raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
-    # The log was needed to resume until the capture had its final name.
-    (path.resolve() / LOG_NAME).unlink(missing_ok=True)
     return open_capture(path)
 
 
@@ -232,7 +237,7 @@ class _Kept:
     def is_worth_keeping(self, folder: Path, error: BaseException) -> bool:
         """Return whether a folder is worth keeping: a single photo is taken again as quickly."""
         useless = isinstance(error, UselessPhotosError) or count_photos(folder) <= 1
-        return self._resume or not useless
+        return (self._resume and has_photos(folder)) or not useless
 
     def __str__(self) -> str:
         again = "`resume=True, force=True`" if self._path.exists() else "`resume=True`"
@@ -242,8 +247,8 @@ class _Kept:
         )
 
 
-def _writer(folder: Path, plan: Plan, rig: Rig, *, resume: bool) -> CaptureWriter:
-    begin = CaptureWriter.resume if resume else CaptureWriter
+def _writer(folder: Path, plan: Plan, rig: Rig) -> CaptureWriter:
+    begin = CaptureWriter.resume if has_photos(folder) else CaptureWriter
     about = rig.describe()
     return begin(folder, plan, full_scale=rig.full_scale, rig=about, exposure=about.get("exposure"))
 

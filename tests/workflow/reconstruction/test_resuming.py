@@ -30,7 +30,7 @@ from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.reconstruction.sinks import LOG_NAME
 from tests.absent import NEEDS_PYTORCH
-from tests.cli.conftest import check_done, run_nearfar
+from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.plans import chosen_plan
 from tests.processes import run_command, start
 from tests.workflow.reconstruction.memory import memory_for
@@ -227,6 +227,28 @@ def test_what_was_killed_before_its_first_block_is_replaced_or_gone_on_with(
         (folder / LOG_NAME).write_bytes(first)
         into(path, capture, memory=memory, **again)
         _check_same(whole, path)
+
+
+@pytest.mark.parametrize("what", ["files", "a capture", "a transport", "a file"])
+def test_a_folder_that_holds_something_else_is_not_gone_on_with(
+    capture, whole, memory, tmp_path, what
+):
+    path, folder = tmp_path / "t.zarr", tmp_path / "t.zarr.unfinished"
+    if what == "files":
+        folder.mkdir()
+        (folder / "precious.txt").write_text("mine")
+    elif what == "a file":
+        folder.write_text("mine")
+    else:
+        shutil.copytree(capture.path if what == "a capture" else whole, folder)
+    before = sorted(folder.rglob("*"))
+    for options in ({"resume": True}, {"resume": True, "force": True}, {}):
+        with pytest.raises(ExistingOutputError, match=r"t\.zarr\.unfinished"):
+            into(path, capture, memory=memory, **options)
+    ran = run_nearfar("reconstruct", capture.path, path, "--resume")
+    check_sentence(ran, folder, "choose another name")
+    assert sorted(folder.rglob("*")) == before
+    assert list(tmp_path.iterdir()) == [folder]
 
 
 @pytest.mark.slow(minutes=1.5)

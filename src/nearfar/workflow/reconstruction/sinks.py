@@ -12,7 +12,7 @@ import numpy as np
 from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence, joined
 from nearfar.errors import InputError, KeptInterrupt, NearfarError, UselessPhotosError
-from nearfar.files import UNFINISHED, new_output, resumable_output
+from nearfar.files import UNFINISHED, ResumableKind, new_output, resumable_output
 from nearfar.files.logs import note, read_notes
 from nearfar.release import version
 from nearfar.transport.model import Transport
@@ -26,6 +26,17 @@ from nearfar.workflow.reconstruction.tiles import Tiling
 # Its first line is the identity of the job; each further line is the summary of a written tile. It
 # is removed once the transport is complete.
 LOG_NAME = "blocks.jsonl"
+
+
+def _has_tiles(folder: Path) -> bool:
+    # Of a job that may be at work: its log is not read as one's own, which is mended.
+    try:
+        return (folder / LOG_NAME).read_bytes().count(b"\n") > 1
+    except FileNotFoundError:
+        return False
+
+
+RESUMABLE_TRANSPORT = ResumableKind(LOG_NAME, _has_tiles)
 
 
 class Store(Protocol):
@@ -183,14 +194,13 @@ def resumable_file(
 
     kept = _Kept(output)
     try:
-        with resumable_output(output, is_worth_keeping, resume=resume, force=force) as folder:
+        with resumable_output(
+            output, RESUMABLE_TRANSPORT, is_worth_keeping, resume=resume, force=force
+        ) as folder:
             if lines := _lines(folder):
                 _require_same(folder, lines[0], identity)
             else:
                 note(folder / LOG_NAME, identity)
-            # Chunks that were being written when the job was killed.
-            for left in folder.rglob(".*.partial"):
-                left.unlink()
             kept.is_at_work = True
             yield FileSink(folder, tiling)
     except KeyboardInterrupt as error:
@@ -201,7 +211,6 @@ def resumable_file(
         if kept.tiles:
             raise type(error)(f"{str(error).removesuffix('.')}; {kept}.") from error
         raise
-    (output.resolve() / LOG_NAME).unlink(missing_ok=True)
 
 
 @contextmanager

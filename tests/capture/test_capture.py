@@ -24,6 +24,7 @@ from nearfar.errors import (
 )
 from nearfar.files.stores import create_store
 from nearfar.plan import Plan, paper_plan
+from tests.metadata import change_attributes
 
 PLAN = paper_plan(Size(4, 5), 1, Size(1, 1))
 COUNT = len(PLAN.patterns)
@@ -204,12 +205,6 @@ def test_a_killed_capture_leaves_the_old(tmp_path: Path) -> None:
         running.stdout.readline()
         running.send_signal(signal.SIGKILL)
     assert open_capture(tmp_path / "a.zarr").read(slice(None)).shape == (COUNT, 5, 6, 3)
-
-
-def change_attributes(path: Path, **changes: Any) -> None:
-    data = json.loads((path / "zarr.json").read_text())
-    data["attributes"].update(changes)
-    (path / "zarr.json").write_text(json.dumps(data))
 
 
 @pytest.mark.parametrize(

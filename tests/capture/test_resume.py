@@ -31,6 +31,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.killing import killed_at
+from tests.metadata import change_attributes
 from tests.observers import EndsWhere
 from tests.processes import run_command, start
 from tests.worlds import model_transport
@@ -347,9 +348,7 @@ def test_what_is_damaged_gets_a_sentence_and_is_left(rig, tmp_path, damage):
     elif damage == "photo":
         (folder / "photos" / "c.0.0.0.0").write_bytes(b"torn")
     elif damage == "attributes":
-        metadata = json.loads((folder / "zarr.json").read_text())
-        metadata["attributes"]["full_scale"] = "much"
-        (folder / "zarr.json").write_text(json.dumps(metadata))
+        change_attributes(folder, full_scale="much")
     else:
         log = (folder / LOG_NAME).read_bytes()
         (folder / LOG_NAME).write_bytes(log * COUNT)

@@ -12,12 +12,14 @@ import zarr
 
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import kind_of_store
+from nearfar.files.checksums import CHECKSUM
 from nearfar.files.stores import (
     add_array,
     add_to_store,
     create_durable_store,
     create_store,
     open_array,
+    open_durable_store,
     open_store,
     read_array,
     read_selection,
@@ -89,24 +91,67 @@ def test_a_chunk_cut_or_changed_anywhere_is_an_error(store: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["zarr.json", "a/zarr.json"])
-def test_metadata_cut_or_changed_anywhere_is_an_error_or_harmless(store: Path, name: str) -> None:
+def test_metadata_cut_or_changed_anywhere_are_an_error_or_harmless(store: Path, name: str) -> None:
     whole = (store / name).read_bytes()
+    attributes = {"format": KIND, "version": 1, "note": [1, "two"]}
     bad = [whole[:length] for length in range(0, len(whole) - 2, 19)]
     bad += [
         bytes(b ^ (bit if i == position else 0) for i, b in enumerate(whole))
-        for position in range(0, len(whole), 7)
+        for position in range(0, len(whole), 5)
         for bit in (1, 16)
     ]
+    refused = 0
     for data in bad:
         (store / name).write_bytes(data)
         try:
-            read = read_array(open_store(store, KIND, 1), "a")
+            group = open_store(store, KIND, 1)
+            read = read_array(group, "a")
         except UnreadableFileError as error:
             assert "a.zarr" in str(error)
+            refused += 1
         else:
-            # Other metadata that make sense cannot be told from the true; the chunks still can.
-            same_kind = (read.shape, read.dtype) == (VALUES.shape, VALUES.dtype)
-            assert not same_kind or np.array_equal(read, VALUES)
+            # The key of the checksum was hit, and nothing else.
+            assert read.dtype == VALUES.dtype
+            np.testing.assert_array_equal(read, VALUES)
+            assert attributes.items() <= dict(group.attrs).items()
+    assert refused >= 0.9 * len(bad)
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "a/zarr.json"])
+def test_metadata_edited_by_hand_are_refused_as_such(store: Path, name: str) -> None:
+    metadata = json.loads((store / name).read_text())
+    metadata["attributes"]["note"] = [1, "three"]
+    (store / name).write_text(json.dumps(metadata))
+    with pytest.raises(UnreadableFileError, match=rf"its {name} is not as it was .* by hand"):
+        read_array(open_store(store, KIND, 1), "a")
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "a/zarr.json"])
+def test_metadata_without_a_checksum_are_read(store: Path, name: str) -> None:
+    """Nearfar wrote none at first."""
+    metadata = json.loads((store / name).read_text())
+    del metadata["attributes"][CHECKSUM]
+    (store / name).write_text(json.dumps(metadata))
+    np.testing.assert_array_equal(read_array(open_store(store, KIND, 1), "a"), VALUES)
+
+
+def test_metadata_laid_out_otherwise_are_the_same(store: Path) -> None:
+    metadata = json.loads((store / "zarr.json").read_text())
+    (store / "zarr.json").write_text(json.dumps(dict(reversed(metadata.items()))))
+    assert open_store(store, KIND, 1).attrs["note"] == [1, "two"]
+
+
+def test_a_checksum_is_that_of_attributes_added_later(tmp_path: Path) -> None:
+    path = tmp_path / "a.zarr"
+    create_durable_store(path, KIND, 1)
+    open_durable_store(path).attrs["note"] = 3
+    assert open_store(path, KIND, 1).attrs["note"] == 3
+    text = (path / "zarr.json").read_text()
+    (path / "zarr.json").write_text(text.replace('"note": 3', '"note": 2'))
+    with pytest.raises(UnreadableFileError, match="is not as it was written"):
+        open_store(path, KIND, 1)
+    with pytest.raises(UnreadableFileError, match="is not as it was written"):
+        open_durable_store(path)
 
 
 def test_a_missing_array_is_an_error(store: Path) -> None:

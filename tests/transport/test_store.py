@@ -29,6 +29,7 @@ from nearfar.transport.store import (
     open_transport,
     save_transport,
 )
+from tests.metadata import change_attributes, change_metadata
 from tests.transport.test_operators import CAMERA, PROJECTOR, _exact, _transport
 
 
@@ -114,7 +115,7 @@ def test_a_damaged_quality_gets_a_sentence(tmp_path, generator):
     path = tmp_path / "t.zarr"
     save_transport(_believed(_transport(generator)), path)
     about = path / "quality_saturated" / "zarr.json"
-    about.write_text(about.read_text().replace('"bool"', '"uint8"'))
+    change_metadata(about, lambda metadata: metadata.update(data_type="uint8"))
     with pytest.raises(UnreadableFileError, match="its quality maps do not fit"):
         load_transport(path)
     about.unlink()
@@ -153,10 +154,10 @@ def test_a_damaged_posterior_gets_a_sentence(tmp_path, generator):
         ({"frequencies": 3}, "does not describe a transport"),
         ({"kinds": [[1.0, 2.0]]}, "does not describe a transport"),
     ):
-        _change_attributes(path, belief={**posterior, **change})
+        change_attributes(path, belief={**posterior, **change})
         with pytest.raises(UnreadableFileError, match=message):
             load_transport(path)
-    _change_attributes(path, belief=posterior)
+    change_attributes(path, belief=posterior)
     chunk = next(p for p in (path / "belief_white").iterdir() if p.name != "zarr.json")
     chunk.unlink()
     with pytest.raises(UnreadableFileError, match=r"t\.zarr"):
@@ -191,12 +192,6 @@ def test_nothing_is_overwritten_without_force(stored, generator):
     np.testing.assert_allclose(load_transport(stored).near, 2 * before.near)
 
 
-def _change_attributes(path: Path, **changes: object) -> None:
-    metadata = json.loads((path / "zarr.json").read_text())
-    metadata["attributes"].update(changes)
-    (path / "zarr.json").write_text(json.dumps(metadata))
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -210,7 +205,7 @@ def _change_attributes(path: Path, **changes: object) -> None:
     ],
 )
 def test_damaged_attributes_get_a_sentence(stored, changes, message):
-    _change_attributes(stored, **changes)
+    change_attributes(stored, **changes)
     with pytest.raises(UnreadableFileError, match=message):
         load_transport(stored)
 

@@ -1,4 +1,7 @@
-"""Zarr groups (version 3) in which a missing or damaged chunk is an error, never zeros."""
+"""Zarr groups (version 3) in which a missing or damaged chunk is an error, never zeros.
+
+Metadata have a checksum, as chunks have; see `nearfar.files.checksums`.
+"""
 
 import contextlib
 import secrets
@@ -17,6 +20,7 @@ from zarr.errors import ContainsArrayError, ContainsGroupError, NodeNotFoundErro
 from zarr.storage import LocalStore
 
 from nearfar.errors import InputError, MissingFileError, NearfarError, UnreadableFileError
+from nearfar.files.checksums import CHECKSUM, ChecksumError, with_checksum, without_checksum
 from nearfar.files.kinds import METADATA
 from nearfar.files.output import synchronise_entry
 from nearfar.files.writes import write_into
@@ -33,7 +37,30 @@ _DAMAGE = (
 )
 
 
-class _FolderStore(LocalStore):
+class _CheckedStore(LocalStore):
+    """A folder store whose metadata must have the checksum with which they were written."""
+
+    async def get(
+        self,
+        key: str,
+        prototype: BufferPrototype | None = None,
+        byte_range: ByteRequest | None = None,
+    ) -> Buffer | None:
+        """Read a file, metadata without their checksum."""
+        value = await super().get(key, prototype, byte_range)
+        if value is None or (self.root / key).name != METADATA:
+            return value
+        try:
+            return type(value).from_bytes(without_checksum(value.to_bytes()))
+        except ChecksumError:
+            raise UnreadableFileError(
+                f"{self.root} is damaged: its {key} is not as it was written, the checksum in it "
+                f"says; copy or make it again, or, if you edited it by hand, undo that or remove "
+                f"{CHECKSUM!r} from its attributes."
+            ) from None
+
+
+class _FolderStore(_CheckedStore):
     """A folder store for writing.
 
     A chunk makes no folder of its own: what zarr's threads still write after one of them has
@@ -74,11 +101,12 @@ def _written_beside(path: Path, value: Buffer) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
     # Other processes may write the same file, and the same into it.
     beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
-    beside.write_bytes(value.as_buffer_like())
+    data = value.as_buffer_like()
+    beside.write_bytes(with_checksum(bytes(data)) if path.name == METADATA else data)
     return beside
 
 
-class _WholeStore(LocalStore):
+class _WholeStore(_CheckedStore):
     """A folder store for reading, in which every chunk must be there."""
 
     async def get(
@@ -91,6 +119,8 @@ class _WholeStore(LocalStore):
         path = self.root / key
         try:
             value = await super().get(key, prototype, byte_range)
+        except NearfarError:
+            raise
         except OSError as error:
             raise UnreadableFileError(
                 f"{path} cannot be read ({error.strerror}): check the disk and its permissions."

@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 from nearfar.arrays import Size
 
 HALF = Fraction(1, 2)
+# With a larger one, products with a pixel's number would not be exact in 64 bits.
+LARGEST_DENOMINATOR = 2**40
+# Longer text is no such fraction, and may take minutes to read.
+MAXIMUM_TEXT = 40
 
 
 class Frequency(NamedTuple):
@@ -55,15 +59,25 @@ def frequency_from_text(parts: Iterable[str]) -> Frequency:
     Raises
     ------
     ValueError
-        If the parts are not two fractions in [-1/2, 1/2).
+        If the parts are not two fractions in [-1/2, 1/2), or of larger whole numbers than
+        `LARGEST_DENOMINATOR`.
     """
     try:
-        fy, fx = (Fraction(part) for part in parts)
-    except (TypeError, ZeroDivisionError) as error:
+        fy, fx = (_fraction(part) for part in parts)
+    except (TypeError, ZeroDivisionError, OverflowError) as error:
         raise ValueError(f"{parts!r} is no frequency: {error}") from None
+    if max(fy.denominator, fx.denominator) > LARGEST_DENOMINATOR:
+        raise ValueError(f"a frequency is a fraction of whole numbers up to {LARGEST_DENOMINATOR}")
     if wrap(fy, fx) != (fy, fx):
         raise ValueError("a frequency lies in [-1/2, 1/2) cycles per pixel on both axes")
     return Frequency(fy, fx)
+
+
+def _fraction(part: str | Fraction) -> Fraction:
+    # An exponent may stand for a number of any length.
+    if isinstance(part, str) and (len(part) > MAXIMUM_TEXT or "e" in part.lower()):
+        raise ValueError("a frequency is two fractions, such as -1/19 and 0")
+    return Fraction(part)
 
 
 def frequency_to_text(frequency: Frequency) -> list[str]:

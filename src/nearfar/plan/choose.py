@@ -33,8 +33,8 @@ from nearfar.illumination.frequencies import (
     wrap,
 )
 from nearfar.illumination.real_basis import real_basis
-from nearfar.plan.model import Plan
-from nearfar.plan.paper import LARGEST_SIDE, sinusoids
+from nearfar.plan.model import LARGEST_SIDE, Plan
+from nearfar.plan.paper import sinusoids
 from nearfar.plan.patterns import Purpose
 from nearfar.plan.references import FEWEST, with_references
 from nearfar.priors.covariance import far_variance, near_covariance

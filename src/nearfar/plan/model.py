@@ -38,8 +38,15 @@ from nearfar.plan.patterns import (
 FORMAT_VERSION = 3
 READABLE_VERSIONS = (1, 2, 3)
 
+# Characters of a message that are quoted from a plan.
+MAXIMUM_REASON = 200
+MAXIMUM_NAME = 60
+
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
 
+
+# No projector has a longer side.
+LARGEST_SIDE = 16384
 
 SizeField = Annotated[Size, BeforeValidator(as_size), PlainSerializer(list)]
 
@@ -83,7 +90,7 @@ class Plan(Frozen):
     format: Literal["nearfar plan"] = "nearfar plan"
     version: Literal[3] = 3
     projector: SizeField
-    window: int = Field(ge=1)
+    window: int = Field(ge=1, strict=True)
     far: SizeField
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
@@ -98,7 +105,7 @@ class Plan(Frozen):
                 NOT_INSTALLED,
                 "needs the correspondence method {name}, which is not installed: install the "
                 "package that adds it, or make the plan with one of {known}",
-                {"name": repr(name), "known": ", ".join(CORRESPONDENCE_METHODS)},
+                {"name": repr(name[:MAXIMUM_NAME]), "known": ", ".join(CORRESPONDENCE_METHODS)},
             )
         return name
 
@@ -115,9 +122,24 @@ class Plan(Frozen):
                 "has patterns of the kind {kind}, which neither nearfar nor its correspondence "
                 "method has: install the package that adds that kind, or make the plan again with "
                 "'nearfar plan -o'",
-                {"kind": repr(min(unknown))},
+                {"kind": repr(min(unknown)[:MAXIMUM_NAME])},
             )
         return pattern_reader(added).validate_python(values)
+
+    @model_validator(mode="after")
+    def _is_a_plan_for_the_projector(self) -> "Plan":
+        # Before anybody works with them for minutes.
+        for name, size, largest in (
+            ("projector", self.projector, Size(LARGEST_SIDE, LARGEST_SIDE)),
+            ("window", Size(self.window, self.window), self.projector),
+            ("far", self.far, self.projector),
+            ("dropped", self.dropped, Size(self.window, self.window)),
+        ):
+            if size.height > largest.height or size.width > largest.width:
+                raise ValueError(f"its {name} of {size} is larger than {largest}")
+        if not self.transport_photos:
+            raise ValueError("it has no photos of transport: direct, near or far")
+        return self
 
     @model_validator(mode="after")
     def _patterns_lie_on_the_projector(self) -> "Plan":
@@ -233,7 +255,7 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
     """
     try:
         data = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UnreadableFileError(
             f"{source} is not a plan: it is no JSON ({error}); make one with 'nearfar plan -o'."
         ) from None
@@ -242,8 +264,9 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
             f"{source} is not a nearfar plan: make one with 'nearfar plan -o'."
         )
     if data.get("version") not in READABLE_VERSIONS:
+        version = repr(data.get("version"))[:MAXIMUM_REASON]
         raise UnreadableFileError(
-            f"{source} is a plan of version {data.get('version')!r}, this nearfar reads versions "
+            f"{source} is a plan of version {version}, this nearfar reads versions "
             f"1 to {FORMAT_VERSION}: make the plan again, or use the nearfar that "
             f"made it."
         )
@@ -254,8 +277,9 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
         if first["type"] == NOT_INSTALLED:
             raise UnreadableFileError(f"{source} {first['msg']}.") from None
         where = ".".join(str(part) for part in first["loc"]) or "plan"
+        reason = " ".join(first["msg"].removeprefix("Value error, ").split()).rstrip(".")
         raise UnreadableFileError(
-            f"{source} is a damaged plan: {where}: {first['msg']}; make it again with "
+            f"{source} is a damaged plan: {where}: {reason[:MAXIMUM_REASON]}; make it again with "
             f"'nearfar plan -o'."
         ) from None
 

@@ -16,12 +16,9 @@ from nearfar.illumination.frequencies import (
     representatives,
 )
 from nearfar.plan.correspondence import CORRESPONDENCE_METHODS
-from nearfar.plan.model import Plan
+from nearfar.plan.model import LARGEST_SIDE, Plan
 from nearfar.plan.patterns import Exponential, Purpose, Sinusoid
 from nearfar.plan.references import with_references
-
-# No projector has a longer side.
-LARGEST_SIDE = 16384
 
 Offset = Literal["inverse", "reference", "none"]
 

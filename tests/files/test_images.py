@@ -2,10 +2,13 @@
 
 import io
 import struct
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 from typing import Any
 
+import imagecodecs
 import numpy as np
 import OpenEXR  # type: ignore[import-not-found]
 import pytest
@@ -59,6 +62,24 @@ def png_bytes(depth: int, kind: int, size: Size, rows: bytes, *chunks: bytes) ->
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in body
     )
+
+
+def bmp_bytes(
+    size: tuple[int, int],
+    bits: int,
+    rows: bytes,
+    palette: bytes = b"",
+    *,
+    compression: int = 0,
+    masks: tuple[int, ...] = (),
+    header: int = 40,
+) -> bytes:
+    """Return a BMP; a negative height is of rows that lie from the top."""
+    (height, width), colours = size, palette + struct.pack(f"<{len(masks)}I", *masks)
+    start = 14 + header + len(colours)
+    number = (header, width, height, 1, bits, compression, len(rows), 0, 0, len(palette) // 4, 0)
+    about = struct.pack("<IiiHHIIiiII", *number)
+    return b"BM" + struct.pack("<IHHI", start + len(rows), 0, 0, start) + about + colours + rows
 
 
 def tiff_bytes(pixels: NDArray[Any], **options: Any) -> bytes:
@@ -197,6 +218,63 @@ def test_other_pngs_give_their_numbers(
     )
 
 
+@pytest.mark.parametrize("shape", SHAPES)
+def test_bmp_is_exact(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    pixels = random_pixels("uint8", shape)
+    path = write(tmp_path, "a.bmp", imagecodecs.bmp_encode(pixels))
+    assert_same(read_picture(path), pixels)
+
+
+COLOURS = bytes([10, 20, 30, 0, 40, 50, 60, 0])
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (bmp_bytes((2, 1), 24, b"\1\2\3\0\4\5\6\0"), [[[6, 5, 4]], [[3, 2, 1]]]),
+        (bmp_bytes((-2, 1), 24, b"\1\2\3\0\4\5\6\0"), [[[3, 2, 1]], [[6, 5, 4]]]),
+        (bmp_bytes((1, 1), 32, b"\1\2\3\4"), [[[3, 2, 1]]]),
+        (
+            bmp_bytes((1, 1), 32, b"\1\2\3\4", compression=3, masks=(0xFF0000, 0xFF00, 0xFF)),
+            [[[3, 2, 1]]],
+        ),
+        (bmp_bytes((1, 2), 8, b"\1\0\0\0", COLOURS), [[[60, 50, 40], [30, 20, 10]]]),
+        (bmp_bytes((1, 2), 4, b"\x10\0\0\0", COLOURS), [[[60, 50, 40], [30, 20, 10]]]),
+        (bmp_bytes((1, 3), 1, b"\xa0\0\0\0", b"\7\7\7\0\5\5\5\0"), [[5, 7, 5]]),
+    ],
+)
+def test_other_bmps_give_their_numbers(tmp_path: Path, data: bytes, expected: Any) -> None:
+    found = read_picture(write(tmp_path, "a.bmp", data))
+    assert_same(found, np.array(expected, dtype=np.uint8))
+
+
+def test_a_damaged_png_says_nothing_of_its_own(tmp_path: Path) -> None:
+    """What libpng has to say reaches nobody: in a process of its own, as pytest hears logs."""
+    path = write(tmp_path, "a.png", png_bytes(8, 0, Size(2, 3), bytes(99)))
+    script = f"""
+import logging
+from pathlib import Path
+from nearfar.files import read_picture
+from nearfar.errors import NearfarError
+try: read_picture(Path({str(path)!r}))
+except NearfarError as error: print(error)
+"""
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stderr == ""
+
+
+@pytest.mark.parametrize("back", [0, 1])
+def test_a_tiff_whose_pages_run_in_a_circle_is_refused(tmp_path: Path, back: int) -> None:
+    pixels = random_pixels("uint8", (2, 5, 7))
+    data = bytearray(tiff_bytes(pixels, photometric="minisblack"))
+    with tifffile.TiffFile(io.BytesIO(data)) as tiff:
+        first, last = (page.offset for page in tiff.pages)
+    (tags,) = struct.unpack_from("<H", data, last)
+    struct.pack_into("<I", data, last + 2 + 12 * tags, (first, last)[back])
+    with pytest.raises(UnreadableFileError, match=r"a\.tif is damaged"):
+        read_picture(write(tmp_path, "a.tif", bytes(data)))
+
+
 def whole_files() -> dict[str, bytes]:
     small, colour = random_pixels("uint16", (20, 30)), random_pixels("float32", (20, 30, 3))
     tiffs = {f"tiff {way}": tiff_bytes(small, **way) for way in TIFF_WAYS}
@@ -208,6 +286,8 @@ def whole_files() -> dict[str, bytes]:
         "png": encode_png(small),
         "png colour": encode_png(random_pixels("uint8", (20, 30, 3))),
         "npy": npy_bytes(colour),
+        "bmp": imagecodecs.bmp_encode(random_pixels("uint8", (20, 30, 3))),
+        "bmp palette": bmp_bytes((3, 4), 4, b"\x01\x10\0\0" * 3, COLOURS),
         "tiff planes": tiff_bytes(planes, photometric="rgb", planarconfig="separate"),
         **tiffs,
         **exrs,
@@ -259,6 +339,18 @@ BAD_FILES: dict[str, tuple[bytes, str]] = {
     "empty.png": (b"", "is empty"),
     "text.png": (b"not a picture", "is no picture"),
     "old.jpg": (b"\xff\xd8\xff\xe0" + bytes(99), "is a JPEG, which has 8 bits and is not linear"),
+    "still.gif": (
+        b"GIF89a" + bytes(99),
+        "of the kind GIF, which is not read: give a PNG",
+    ),
+    "web.webp": (b"RIFF\7\0\0\0WEBPVP8 " + bytes(99), "of the kind WebP"),
+    "phone.heic": (b"\0\0\0\x18ftypheic" + bytes(99), "of the kind HEIC or AVIF"),
+    "old.bmp": (bmp_bytes((1, 1), 24, bytes(4), header=12), "a BMP of OS/2"),
+    "runs.bmp": (bmp_bytes((1, 2), 8, b"\2\1\0\1", COLOURS, compression=1), "save it without"),
+    "sixteen.bmp": (bmp_bytes((1, 2), 16, bytes(4)), "a BMP of 16 bits"),
+    "short.bmp": (bmp_bytes((5, 5), 24, bytes(4)), "is damaged or cut short"),
+    "flat.bmp": (bmp_bytes((0, 5), 24, bytes(4)), "is damaged or cut short"),
+    "colours.bmp": (bmp_bytes((1, 2), 8, b"\7\0\0\0", COLOURS), "is damaged or cut short"),
     "photo.NEF": (b"MM\0*" + bytes(99), "camera raw"),
     "pages.tif": (
         tiff_bytes(np.ones((2, 5, 7), np.uint8), photometric="minisblack"),

@@ -5,6 +5,7 @@ Photos stay as they came, (Cy, Cx, channels) each; a few camera rows at a time b
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from os.path import realpath
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +17,7 @@ from nearfar.baselines.separation import Separation, black_over_white_less_black
 from nearfar.capture.checks import as_photo, check_photo
 from nearfar.errors import InputError
 from nearfar.files import full_scale_of, list_pictures, read_picture
+from nearfar.files.images import PICTURE_KINDS
 from nearfar.rigs.base import Rig
 
 # Values of all photos that are separated at once: some tens of megabytes.
@@ -166,7 +168,7 @@ def read_to_separate(
     dark = ambient or black
     paths = list_pictures(folder)
     if dark is not None:
-        paths = [path for path in paths if path.resolve() != dark.resolve()]
+        paths = [path for path in paths if realpath(path) != realpath(dark)]
     _check_count(folder, len(paths), patterns, with_dark=dark is not None)
     ends_in_black = patterns is not None and len(paths) > patterns
     if black_level is not None and (black is not None or ends_in_black):
@@ -199,7 +201,7 @@ def _check_count(folder: Path, there: int, patterns: int | None, *, with_dark: b
         if there < 2:
             raise InputError(
                 f"{folder} has {there} photo{'' if there == 1 else 's'}: give one for each "
-                f"pattern, two or more, as PNG, TIFF, EXR or NPY."
+                f"pattern, two or more, as {PICTURE_KINDS}."
             )
     elif there != patterns and (with_dark or there != patterns + 1):
         last = "" if with_dark else ", and if you like a last one under black"

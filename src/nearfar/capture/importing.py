@@ -12,6 +12,7 @@ from nearfar.capture.store import Capture
 from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import full_scale_of_file, list_pictures, read_picture
+from nearfar.files.images import PICTURE_KINDS
 from nearfar.plan import Plan
 from nearfar.progress import Report, ignore_progress
 
@@ -84,7 +85,7 @@ def _hint(folder: Path, photos: Sequence[Path]) -> str:
     if photos or not endings:
         return ", or name them with `list_file`"
     (ending, number), *_ = endings.most_common(1)
-    return f" as PNG, TIFF, EXR or NPY (the folder has {number} files that end in {ending})"
+    return f" as {PICTURE_KINDS} (the folder has {number} files that end in {ending})"
 
 
 def _listed(folder: Path, list_file: Path) -> list[Path]:

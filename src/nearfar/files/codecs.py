@@ -1,4 +1,4 @@
-"""Pictures as bytes: PNG, TIFF, OpenEXR and NPY, into the numbers that are stored and back.
+"""Pictures as bytes: PNG, TIFF, BMP, OpenEXR and NPY, into the numbers that are stored and back.
 
 Each decoder gives the whole picture or raises; what their libraries let pass (missing strips,
 cut files, 16 bits turned into 8) is checked here.
@@ -7,8 +7,10 @@ cut files, 16 bits turned into 8) is checked here.
 import io
 import logging
 import math
+import re
 import struct
 import tokenize
+from collections.abc import Iterator
 from typing import Any
 
 import imagecodecs
@@ -17,10 +19,14 @@ import OpenEXR
 import tifffile
 from numpy.typing import NDArray
 
+from nearfar.files.bitmaps import decode_bitmap
+from nearfar.files.unsupported import UnsupportedPictureError
+
 Pixels = NDArray[Any]
 
-# tifffile would print to stderr what is turned into a sentence here.
-logging.getLogger("tifffile").addHandler(logging.NullHandler())
+# They would print to stderr what is turned into a sentence here; imagecodecs logs for libpng.
+for library in ("tifffile", "imagecodecs"):
+    logging.getLogger(library).addHandler(logging.NullHandler())
 
 # What the decoders were seen to raise when fed files cut or changed at every byte.
 DAMAGE = (
@@ -37,8 +43,24 @@ DAMAGE = (
 )
 
 
-class UnsupportedPictureError(Exception):
-    """A valid picture of a kind that is not read; its message completes a sentence."""
+# Kinds of picture that are not read, by regular expressions of the first bytes.
+OTHER_KINDS = {
+    "GIF": rb"GIF8",
+    "WebP": rb"RIFF....WEBP",
+    "HEIC or AVIF": rb"....ftyp(hei|mif|avi|msf)",
+    "JPEG 2000": rb"\0\0\0\x0cjP  |\xff\x4f\xff\x51",
+    "JPEG XL": rb"\0\0\0\x0cJXL |\xff\x0a",
+    "Photoshop": rb"8BPS",
+    "Radiance": rb"#\?R",
+    "PDF": rb"%PDF",
+    "PNM": rb"P[1-7]\s",
+    "PFM": rb"P[Ff]\s",
+}
+
+
+def other_kind(data: bytes) -> str | None:
+    """Return the name of the kind that a picture is of, if it is known and not read."""
+    return next((k for k, start in OTHER_KINDS.items() if re.match(start, data, re.S)), None)
 
 
 def decode_png(data: bytes) -> Pixels:
@@ -81,7 +103,7 @@ def decode_tiff(data: bytes) -> Pixels:
     """Decode a TIFF of one page, compressed or not, in any layout of strips, tiles and planes."""
     with tifffile.TiffFile(io.BytesIO(data)) as tiff:
         # A reduced page is a thumbnail.
-        pages = [p for p in tiff.pages if isinstance(p, tifffile.TiffPage) and not p.is_reduced]
+        pages = [p for p in _pages(tiff) if isinstance(p, tifffile.TiffPage) and not p.is_reduced]
         if not pages:
             raise ValueError("it has no page")
         if len(pages) > 1:
@@ -95,6 +117,16 @@ def decode_tiff(data: bytes) -> Pixels:
         if pixels.ndim == 3 and page.axes.startswith("S"):
             pixels = np.moveaxis(pixels, 0, -1)
         return _without_alpha(pixels)
+
+
+def _pages(tiff: tifffile.TiffFile) -> Iterator[tifffile.TiffPage | tifffile.TiffFrame]:
+    """Yield the pages, each of which names the place of the next."""
+    seen: set[int] = set()
+    for page in tiff.pages:
+        if page.offset in seen:
+            raise ValueError("its pages run in a circle")
+        seen.add(page.offset)
+        yield page
 
 
 def _check_segments(page: tifffile.TiffPage, length: int) -> None:
@@ -213,6 +245,7 @@ def encode_npy(image: NDArray[np.float32]) -> bytes:
 # By the first bytes of the file.
 DECODERS = {
     b"\x89PNG\r\n\x1a\n": decode_png,
+    b"BM": decode_bitmap,
     b"II*\0": decode_tiff,
     b"MM\0*": decode_tiff,
     b"II+\0": decode_tiff,

@@ -13,8 +13,11 @@ from nearfar.files import codecs
 from nearfar.files.colour import from_srgb, to_srgb
 from nearfar.files.output import new_output
 from nearfar.files.raw import decode_raw
+from nearfar.files.unsupported import UnsupportedPictureError
 
-PICTURE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
+PICTURE_ENDINGS = (".png", ".tif", ".tiff", ".bmp", ".exr", ".npy")
+# The same in words.
+PICTURE_KINDS = "PNG, TIFF, BMP, EXR or NPY"
 IMAGE_ENDINGS = (".npy", ".exr", ".tiff", ".tif", ".png")
 RAW_ENDINGS = (".dng", ".nef", ".cr2", ".cr3", ".arw", ".raf", ".orf", ".rw2", ".pef", ".raw")
 
@@ -25,7 +28,7 @@ _DIGITS = re.compile(r"([0-9]+)")
 
 
 def read_picture(path: Path) -> NDArray[Any]:
-    """Read a picture as it is stored: PNG, TIFF, OpenEXR or NPY, recognised by its first bytes.
+    """Read a picture as it is stored: PNG, TIFF, BMP, EXR or NPY, recognised by its first bytes.
 
     Camera raw files, recognised by their names, come as `nearfar.files.raw.decode_raw` gives them.
 
@@ -59,15 +62,18 @@ def decode_picture(data: bytes, path: Path) -> NDArray[Any]:
         return decode_raw(data, path).levels
     if data.startswith(JPEG_SIGNATURE):
         raise UnreadableFileError(
-            f"{path} is a JPEG, which has 8 bits and is not linear: save it as PNG or TIFF."
+            f"{path} is a JPEG, which has 8 bits and is not linear: have the camera save raw "
+            f"files, or give {PICTURE_KINDS}."
         )
     decoder = next((d for magic, d in codecs.DECODERS.items() if data.startswith(magic)), None)
     if decoder is None:
         what = "is no picture that can be read" if data else "is empty"
-        raise UnreadableFileError(f"{path} {what}: give a PNG, TIFF, EXR or NPY file.")
+        if (kind := codecs.other_kind(data)) is not None:
+            what = f"is a picture of the kind {kind}, which is not read"
+        raise UnreadableFileError(f"{path} {what}: give a {PICTURE_KINDS} file.")
     try:
         pixels = decoder(data)
-    except codecs.UnsupportedPictureError as error:
+    except UnsupportedPictureError as error:
         raise UnreadableFileError(f"{path} {error}.") from None
     except codecs.DAMAGE as error:
         raise UnreadableFileError(

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from os.path import realpath
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,7 +69,7 @@ def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
     UnreadableFileError
         If what is there is no such capture.
     """
-    folder = Path(f"{Path(path).resolve()}{UNFINISHED}")
+    folder = Path(f"{realpath(path)}{UNFINISHED}")
     if not has_photos(folder):
         return UnfinishedCapture(0, None)
     exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
 from math import nan
+from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -220,7 +221,7 @@ def _check_transport(transport: Path, capture: Path, *inputs: Path, force: bool)
     from nearfar.files import check_output
 
     keep_input(transport, *inputs)
-    if transport.resolve() == capture.resolve():
+    if realpath(transport) == realpath(capture):
         raise InputError(
             f"{capture} cannot be both capture and transport: choose another name for one."
         )

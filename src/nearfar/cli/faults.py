@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import typer
 
 from nearfar.cli.flags import with_flags
+from nearfar.cli.printable import printable
 from nearfar.cli.saying import warn
 from nearfar.cli.stopping import NOTHING_LEFT, handled_by
 from nearfar.errors import KeptInterrupt, NearfarError
@@ -101,5 +102,5 @@ def _discard_stdout() -> None:
 
 
 def _fail(sentence: str, *, status: int = 1) -> NoReturn:
-    print(f"nearfar: {sentence}", file=sys.stderr)
+    print(f"nearfar: {printable(sentence)}", file=sys.stderr)
     sys.exit(status)

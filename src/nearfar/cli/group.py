@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator, Mapping, MutableMapping
 from inspect import getdoc
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.models import ParameterInfo
 
 from nearfar.cli.commands import COMMANDS
 from nearfar.cli.faults import faults_in_sentences, stopped_cleanly
@@ -82,6 +83,7 @@ def _built(name: str, function: "FunctionType") -> Any:
         If Typer cannot read the signature of another package's function.
     """
     try:
+        _leave_files_to(function)
         # Inside the command, before the parser gives interrupts and faults words of its own.
         return _by_typer(name, stopped_cleanly()(faults_in_sentences()(function)))
     except Exception as error:
@@ -92,6 +94,14 @@ def _built(name: str, function: "FunctionType") -> Any:
             f"the command {name!r} of the module {function.__module__} cannot be used ({reason}): "
             f"update or uninstall that package."
         ) from error
+
+
+def _leave_files_to(function: "FunctionType") -> None:
+    """Let a command itself say that it may not read a file; to Typer that is wrong usage."""
+    for hint in get_type_hints(function, include_extras=True).values():
+        for information in getattr(hint, "__metadata__", ()):
+            if isinstance(information, ParameterInfo):
+                information.readable = False
 
 
 def _broken(name: str, fault: ExtensionError) -> Any:

@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+from os.path import realpath
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +34,7 @@ def keep_input(output: Path, *inputs: Path) -> None:
     ------
     InputError
     """
-    if any(output.resolve() == path.resolve() for path in inputs):
+    if realpath(output) in map(realpath, inputs):
         raise InputError(
             f"{output} is an input of this command and is kept: choose another name for the output."
         )

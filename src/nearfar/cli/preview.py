@@ -30,7 +30,7 @@ def preview(
         )
 
     def started(address: str) -> None:
-        print(f"preview at {address}, Esc on the projector or Ctrl-C here ends it", flush=True)
+        say(f"preview at {address}, Esc on the projector or Ctrl-C here ends it")
         if browser:
             webbrowser.open(address)
 

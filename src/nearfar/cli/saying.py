@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nearfar.cli.flags import with_flags
+from nearfar.cli.printable import printable
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
@@ -12,14 +13,14 @@ if TYPE_CHECKING:
 
 
 def say(text: str, *, quiet: bool = False) -> None:
-    """Print text for people on stdout, unless they want quiet."""
+    """Print text for people on stdout at once, unless they want quiet."""
     if not quiet:
-        print(text)
+        print(printable(text, keep="\n"), flush=True)
 
 
 def warn(text: str) -> None:
     """Print a warning on stderr, with options for the Python in it; see `nearfar.cli.flags`."""
-    print(f"warning: {with_flags(text)}", file=sys.stderr)
+    print(f"warning: {printable(with_flags(text))}", file=sys.stderr)
 
 
 def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:

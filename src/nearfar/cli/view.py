@@ -49,7 +49,7 @@ def view(
         )
 
     def on_start(url: str) -> None:
-        print(f"{transport} at {url}, Ctrl-C here ends it", flush=True)
+        say(f"{transport} at {url}, Ctrl-C here ends it")
         if browser:
             webbrowser.open(url)
 

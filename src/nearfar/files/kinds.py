@@ -12,5 +12,5 @@ def kind_of_store(path: Path) -> str | None:
     try:
         metadata = json.loads((path / METADATA).read_bytes())
         return str(metadata["attributes"]["format"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return None

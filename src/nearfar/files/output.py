@@ -140,7 +140,8 @@ def synchronise_entry(path: Path) -> None:
 def checked_target(path: Path, *, force: bool, replaceable: Callable[[Path], bool]) -> Path:
     """Return where an output goes, links followed; raises as `new_output` before its body."""
     with storage_faults(path):
-        target = path.resolve()
+        # Where links run in a circle, Path.resolve raises an error that is no OSError.
+        target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
             raise MissingFileError(
                 f"{path} cannot be written, there is no folder {path.parent}: make it first."

@@ -1,6 +1,7 @@
 """How well the paper's model holds on a scene: a table, and a page with maps."""
 
 from collections.abc import Mapping
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Si
         maps = "".join(_map(values.reshape(camera), caption) for values, caption in captioned)
         maps = f'<h2>Where it does not</h2><div class="maps">{maps}</div>'
     body = f"""
-<h1>Where the model holds: {name}</h1>
+<h1>Where the model holds: {escape(name)}</h1>
 <p>The method takes each camera pixel's near-range light to come from a window of {check.window} x
 {check.window} projector pixels and to vary no faster than k_near, its far-range light to lie in a
 band of {check.far} frequencies, and both to be silent at the checkerboard. Shares are of energy,

@@ -78,7 +78,7 @@ def reconstruction_page(
     body = f"""
 <h1>{escape(stored.path.name)}</h1>
 <p>The light transport of a scene, reconstructed from the photos in
-{escape(capture.path.name)} by the {stored.provenance["method"]} method.{thinned}</p>
+{escape(capture.path.name)} by the {escape(stored.provenance["method"])} method.{thinned}</p>
 {cards}
 <h2>What to look at</h2>
 {listed(faults) if faults else "<p>The photos give no cause for concern.</p>"}

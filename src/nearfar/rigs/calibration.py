@@ -106,7 +106,7 @@ def read_calibration(folder: Path) -> Calibration | None:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "the file"
         reason = f"{where}: {first['msg']}"
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
     raise UnreadableFileError(
         f"{path} is no calibration that can be read ({reason}): run nearfar calibrate again."

@@ -127,7 +127,7 @@ def read_rig_table(path: Path) -> SimulatedTable | RealTable:
             f"{path} cannot be read as a rig ({error.strerror}): check that it is a file you may "
             f"read."
         ) from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise UnreadableFileError(
             f"{path} cannot be read as a rig ({reason}): correct it, it must be TOML in UTF-8."

@@ -226,6 +226,10 @@ def test_a_killed_capture_leaves_the_old(tmp_path: Path) -> None:
         ({"full_scale": 0}, "does not describe photos"),
         ({"rig": 3}, "does not describe photos"),
         ({"exposure": -1}, "does not describe photos"),
+        ({"alarms": "one"}, "does not describe photos"),
+        ({"conditions": [1]}, "does not describe photos"),
+        ({"conditions": {"heat": [1.0]}}, "does not describe photos"),
+        ({"conditions": {"heat": ["1"] * COUNT}}, "does not describe photos"),
     ],
 )
 def test_a_capture_that_does_not_fit_gets_a_sentence(

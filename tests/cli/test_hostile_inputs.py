@@ -1,9 +1,12 @@
 """Files and names that were made to harm: a sentence, and nothing of theirs on terminal or page."""
 
 import os
+import random
 import re
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -87,6 +90,57 @@ def test_json_without_end_is_no_store(untouched, tmp_path: Path):
         (*PLAN, "-o", path),
     ):
         check_refused(untouched, (*arguments, *(("--force",) * (arguments[0] == "plan"))), path)
+
+
+# Mutated metadata
+
+
+# What no reader expects: of another type, of no size, or of any.
+HOSTILE: tuple[Any, ...] = (
+    *(None, True, 0, -1, 7.5, 10**6, 10**30, 10**400, float("inf"), float("nan"), "", "x", "1/3"),
+    *([], [1], [10**9, 10**9], [None, None], ["1/3", "1/3"], {}, {"a": 1}),
+    *("float16", "complex64", "string", "gzip", "transpose", "NaN", "/"),
+)
+
+
+def _places(data: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield each value in some JSON by what it is in and its key there, but for provenance."""
+    for key in data if isinstance(data, dict) else range(len(data)):
+        if key not in {"provenance", "plan", "rig"}:
+            yield data, key
+            if isinstance(data[key], dict | list):
+                yield from _places(data[key])
+
+
+@pytest.mark.parametrize("kind", ["capture", "transport", "apart"])
+def test_mutated_metadata_give_an_answer_or_a_sentence(job: Job, tmp_path: Path, kind: str):
+    """As files have it that were written before metadata had checksums."""
+    generator = random.Random(1)
+    store, out = getattr(job, kind), tmp_path / "out.npy"
+    commands: list[tuple[object, ...]] = {
+        "capture": [("info", store)],
+        "transport": [("info", store), ("relight", store, job.light, out, "--force")],
+        "apart": [("info", store), ("check", store, *MODEL)],
+    }[kind]
+    files = sorted(store.rglob("zarr.json"))
+    refused = 0
+    for number in range(50):
+        file = generator.choice(files)
+        whole = file.read_bytes()
+
+        def change(metadata: dict[str, Any]) -> None:
+            inside, key = generator.choice(list(_places(metadata)))
+            inside[key] = generator.choice(HOSTILE)
+
+        change_metadata(file, change)
+        ran = run_nearfar(*commands[number % len(commands)])
+        file.write_bytes(whole)
+        if ran.status:
+            assert len(check_sentence(ran)) < 900
+            refused += 1
+        else:
+            assert ran.err == ""
+    assert refused > 20
 
 
 # Control characters

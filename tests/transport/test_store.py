@@ -153,6 +153,12 @@ def test_a_damaged_posterior_gets_a_sentence(tmp_path, generator):
         ({"repeats": [1.0]}, "error bars"),
         ({"frequencies": 3}, "does not describe a transport"),
         ({"kinds": [[1.0, 2.0]]}, "does not describe a transport"),
+        ({"kinds": [[10**400] * 3]}, "does not describe a transport"),
+        ({"kinds": [[float("nan")] * 3]}, "does not describe a transport"),
+        ({"kinds": [[1.0, 2.0, 0]]}, "does not describe a transport"),
+        ({"kinds": [[1.0, -2.0, 1.0]]}, "does not describe a transport"),
+        ({"kinds": [[1e-9, 2.0, 1.0]]}, "does not describe a transport"),
+        ({"repeats": [float("inf")]}, "does not describe a transport"),
     ):
         change_attributes(path, belief={**posterior, **change})
         with pytest.raises(UnreadableFileError, match=message):
@@ -199,6 +205,10 @@ def test_nothing_is_overwritten_without_force(stored, generator):
         ({"format": "nearfar capture"}, "not a nearfar transport but a nearfar capture"),
         ({"projector": None}, "does not describe a transport"),
         ({"projector": [3]}, "does not describe a transport"),
+        ({"projector": [3, 0]}, "does not describe a transport"),
+        ({"projector": [3, 2.0]}, "does not describe a transport"),
+        ({"projector": [3, 10**40]}, "does not describe a transport"),
+        ({"projector": "x" * 999}, "does not describe a transport .{,300}; reconstruct"),
         ({"far_frequencies": [["1/7"]]}, "does not describe a transport"),
         ({"far_frequencies": [["0", "0"]]}, "its far has shape"),
         ({"provenance": 3}, "does not describe a transport"),

@@ -171,14 +171,16 @@ def open_capture(path: AnyPath) -> Capture:
     full_scale, rig = attributes.get("full_scale"), attributes.get("rig")
     exposure = attributes.get("exposure")
     # Imported captures and older ones have none.
-    conditions: Any = attributes.get("conditions")
-    alarms = attributes.get("alarms")
+    conditions, alarms = attributes.get("conditions", {}), attributes.get("alarms", [])
     if (
         not is_positive(full_scale)
         or (exposure is not None and not is_positive(exposure))
         or not isinstance(rig, dict)
         or photos.ndim != 4
         or photos.dtype not in PHOTO_DTYPES
+        or any(values.dtype != np.float64 for values in (times, saturated))
+        or not _are_conditions(conditions, times.size)
+        or not isinstance(alarms, list)
     ):
         raise UnreadableFileError(
             f"{path} is damaged: its zarr.json does not describe photos; copy or make it again."
@@ -198,8 +200,18 @@ def open_capture(path: AnyPath) -> Capture:
         exposure=exposure,
         times=times,
         saturated=saturated,
-        conditions=conditions if isinstance(conditions, dict) else {},
-        alarms=tuple(map(str, alarms)) if isinstance(alarms, list) else (),
+        conditions=conditions,
+        alarms=tuple(map(str, alarms)),
+    )
+
+
+def _are_conditions(found: object, photos: int) -> TypeGuard[dict[str, list[float | None]]]:
+    """Return whether a value is a mapping of lists with a number or None for each photo."""
+    return isinstance(found, dict) and all(
+        isinstance(values, list)
+        and len(values) == photos
+        and all(value is None or isinstance(value, int | float) for value in values)
+        for values in found.values()
     )
 
 

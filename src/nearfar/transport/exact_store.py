@@ -15,7 +15,7 @@ from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import new_output, read_arrays
 from nearfar.files.stores import add_array, create_store, open_store, read_array
 from nearfar.transport.exact import ExactTransport
-from nearfar.transport.store import listed, write_in_rows
+from nearfar.transport.store import MAXIMUM_REASON, stored_size, write_in_rows
 
 KIND = "nearfar exact transport"
 FORMAT_VERSION = 1
@@ -121,8 +121,7 @@ def load_exact(
     try:
         attributes = dict(group.attrs)
         stored_projector, stored_camera = (
-            Size(*(int(side) for side in listed(attributes[name])))
-            for name in ("projector", "camera")
+            stored_size(attributes[name]) for name in ("projector", "camera")
         )
         shape = (stored_camera.pixels, stored_projector.pixels)
         channels = int(str(attributes["channels"]))
@@ -135,9 +134,9 @@ def load_exact(
         return ExactTransport(
             stored_projector, stored_camera, direct, near, far, str(attributes["name"])
         )
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise UnreadableFileError(
-            f"{path} is a damaged exact transport ({error}): render it again."
+            f"{path} is a damaged exact transport ({str(error)[:MAXIMUM_REASON]}): render it again."
         ) from error
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nearfar.arrays import AnyPath, Floats, Size, blocks
+from nearfar.arrays import AnyPath, Floats, Size, as_size, blocks
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import UnreadableFileError
@@ -34,6 +34,16 @@ KIND = "nearfar transport"
 FORMAT_VERSION = 1
 # Bytes of a chunk: large enough for the disk, small enough to read a few rows.
 CHUNK_BYTES = 8 * 2**20
+
+# Of a projector or a camera in a file, in pixels.
+LARGEST_SIDE = 2**20
+
+# Numbers of a prior component, and its lengths but for 0: with others, numbers under- or overflow.
+LARGEST_OF_COMPONENT = 1e6
+LEAST_LENGTH = 0.05
+
+# Characters of a message that are quoted from a file.
+MAXIMUM_REASON = 200
 
 # Memory of a block of a transport that is read block by block.
 READ_BYTES = 2**28
@@ -281,17 +291,17 @@ def open_transport(path: AnyPath) -> StoredTransport:
     arrays = {name: open_array(group, name) for name in FACTORS}
     posterior = None
     try:
-        height, width = (int(side) for side in listed(group.attrs["projector"]))
+        projector = stored_size(group.attrs["projector"])
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
         if POSTERIOR in group.attrs:
             posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UnreadableFileError(
-            f"{path} is damaged: its zarr.json does not describe a transport ({error}); "
-            f"reconstruct it again."
+            f"{path} is damaged: its zarr.json does not describe a transport "
+            f"({str(error)[:MAXIMUM_REASON]}); reconstruct it again."
         ) from None
-    basis = real_basis(frequencies, Size(height, width))
+    basis = real_basis(frequencies, projector)
     each = tuple(int(side) for side in arrays["direct"].shape)
     window = arrays["near"].shape[-1] if arrays["near"].ndim else 0
     shapes = {
@@ -333,13 +343,9 @@ def open_transport(path: AnyPath) -> StoredTransport:
 def _shared_posterior(described: dict[str, Any]) -> dict[str, Any]:
     """Read what all camera pixels share of a posterior."""
     return {
-        "prior_components": tuple(
-            PriorComponent(*(float(value) for value in numbers)) for numbers in described["kinds"]
-        ),
+        "prior_components": tuple(map(_prior_component, listed(described["kinds"]))),
         "frequencies": tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
-        "multiplicity": np.array(
-            [float(count) for count in described["repeats"]], dtype=np.float32
-        ),
+        "multiplicity": np.array(_finite(described["repeats"]), dtype=np.float32),
     }
 
 
@@ -393,6 +399,35 @@ def load_transport(path: AnyPath) -> Transport:
     True
     """
     return open_transport(path).rows()
+
+
+def stored_size(value: Any) -> Size:
+    """Return a size from JSON; ValueError or TypeError if it is none, or larger than any."""
+    size = as_size(listed(value))
+    if max(size) > LARGEST_SIDE:
+        raise ValueError(f"a side is over {LARGEST_SIDE}")
+    return size
+
+
+def _prior_component(value: Any) -> PriorComponent:
+    """Read a prior component; ValueError or TypeError if there can be none such."""
+    component = PriorComponent(*_finite(value))
+    lengths = {component.near_reach, component.far_decay} - {0.0}
+    if (
+        not 0 <= min(component) <= max(component) <= LARGEST_OF_COMPONENT
+        or component.far_decay == 0
+        or min(lengths) < LEAST_LENGTH
+    ):
+        raise ValueError(f"{component} is no prior component")
+    return component
+
+
+def _finite(value: Any) -> list[float]:
+    """Return the numbers of a JSON list; ValueError or TypeError if it is none, or one is not."""
+    numbers = [float(number) for number in listed(value)]
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError("a number is not finite")
+    return numbers
 
 
 def listed(value: Any) -> list[Any]:

@@ -175,6 +175,29 @@ def test_saturated_photos_are_a_warning(job: Job, tmp_path: Path):
     assert ran.err.count("\n") == 1
 
 
+@pytest.mark.parametrize("scale", [1e30, 1e-20])
+def test_floats_of_any_unit_need_their_full_scale(
+    job: Job, untouched: Untouched, tmp_path: Path, scale: float
+):
+    for photo in photos_of(job):
+        np.save(photo, (np.load(photo) / 65535 * scale).astype(np.float32))
+    capture, transport = tmp_path / "c.zarr", tmp_path / "t.zarr"
+    arguments = ("import", job.plan, job.photos, capture)
+    check_refused(untouched, arguments, "pattern-", "of a full scale of 1", "true full scale")
+    check_done(run_nearfar(*arguments, "--full-scale", scale))
+    check_done(run_nearfar("reconstruct", capture, transport, *BY_PAPER))
+    check_done(run_nearfar("relight", transport, job.light, tmp_path / "x.npy"))
+    known = np.load(job.truth)[..., 0].reshape(8, 9, -1) @ np.load(job.light).ravel()
+    np.testing.assert_allclose(np.load(tmp_path / "x.npy"), known, atol=0.01 * known.max())
+
+
+def test_whole_numbers_that_are_next_to_nothing_of_full_scale(
+    finished: Job, untouched: Untouched, tmp_path: Path
+):
+    arguments = ("import", finished.plan, finished.photos, tmp_path / "c.zarr")
+    check_refused(untouched, (*arguments, "--full-scale", 1e30), "of the white pattern", "expose")
+
+
 @pytest.mark.parametrize("scale", ["0", "-5", "nan", "inf", "100"])
 def test_a_full_scale_that_cannot_be(
     finished: Job, untouched: Untouched, tmp_path: Path, scale: str

@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 from nearfar.arrays import Size
 from nearfar.capture.store import PHOTO_DTYPES
 from nearfar.errors import InputError, UselessPhotosError
-from nearfar.files import require_finite
+from nearfar.files import full_scale_of, require_finite
+
+# Floats may be above full scale, and a white far below; beyond these shares the full scale is not
+# theirs, and single precision does not reach.
+MAXIMUM_OF_FULL_SCALE = 1e3
+MINIMUM_OF_FULL_SCALE = 1e-4
 
 
 def as_photo(photo: NDArray[Any] | None, name: str) -> NDArray[Any]:
@@ -53,6 +58,28 @@ def check_photo(photo: NDArray[Any], first: NDArray[Any], scale: float, name: st
         raise InputError(
             f"{name} has values up to {photo.max()}, above the full scale of {scale:g}: give the "
             f"camera's true full scale."
+        )
+
+
+def check_full_scale(photo: NDArray[Any], scale: float, name: str, *, is_white: bool) -> None:
+    """Refuse a photo that is of another full scale, such as floats of any unit.
+
+    Raises
+    ------
+    InputError
+    """
+    largest = float(photo.max())
+    if largest > MAXIMUM_OF_FULL_SCALE * scale:
+        raise InputError(
+            f"{name} has values up to {largest:g}, of a full scale of {scale:g}: give the camera's "
+            f"true full scale."
+        )
+    # A dark photo of whole numbers may be out of order, which other checks tell.
+    possible = largest if photo.dtype.kind == "f" else full_scale_of(photo.dtype)
+    if is_white and 0 < possible < MINIMUM_OF_FULL_SCALE * scale:
+        raise InputError(
+            f"{name}, of the white pattern, has values up to {largest:g}, of a full scale of "
+            f"{scale:g}: expose longer, or give the camera's true full scale."
         )
 
 

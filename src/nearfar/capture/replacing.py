@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath
-from nearfar.capture.checks import as_photo, check_count, check_order, check_photo
+from nearfar.capture.checks import (
+    as_photo,
+    check_count,
+    check_full_scale,
+    check_order,
+    check_photo,
+)
 from nearfar.capture.store import Capture, open_capture, white_and_black
 from nearfar.errors import InputError
 from nearfar.files import new_output
@@ -80,6 +86,8 @@ def replace_photos(
                 check_count(done - 1, len(numbers), more=False)
             photo = as_photo(photo, name)
             check_photo(photo, first, capture.full_scale, name)
+            is_white = ends is not None and number == ends[0]
+            check_full_scale(photo, capture.full_scale, name, is_white=is_white)
             means[number] = photo.mean(dtype=np.float64)
             check_order(ends, means, [f"photo {i}" for i in range(count)])
             stored[number] = photo

@@ -14,6 +14,7 @@ from nearfar.arrays import AnyPath
 from nearfar.capture.checks import (
     as_photo,
     check_count,
+    check_full_scale,
     check_order,
     check_photo,
     check_white_and_black,
@@ -194,6 +195,8 @@ class CaptureWriter:
         first = photo if self._first is None else self._first
         scale = full_scale_of(first.dtype) if self._scale is None else float(self._scale)
         check_photo(photo, first, scale, called)
+        is_white = self._white_black is not None and number == self._white_black[0]
+        check_full_scale(photo, scale, called, is_white=is_white)
         if self._photos is None:
             self._photos = self._create_arrays(first, scale)
         self._first, self._scale = first, scale

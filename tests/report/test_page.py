@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 from nearfar.files import encode_png
-from nearfar.markup import false_colour, picture
-from nearfar.report.page import colour_map, gallery, page
+from nearfar.markup import card, false_colour, numbers, picture
+from nearfar.report.comparison import comparison_page
+from nearfar.report.page import colour_map, facts, gallery, listed, page
+from nearfar.workflow.compare import Comparison
+
+EVIL = "<img src=x onerror=alert(1)>\"'&"
 
 
 def test_a_page_fetches_nothing():
@@ -18,6 +22,26 @@ def test_a_page_fetches_nothing():
     assert "<script" not in text
     assert "a &lt; b" in text
     assert 'alt="white &amp; bright"' in text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        page(EVIL, ""),
+        picture(np.ones((3, 4)), EVIL),
+        gallery([EVIL], [(EVIL, [])]),
+        facts([(EVIL, EVIL)]),
+        listed([EVIL]),
+        numbers([EVIL], [[EVIL]]),
+        colour_map(np.ones((2, 2)), 0, 1, "dB", EVIL),
+        card(EVIL, [(EVIL, EVIL)], [(EVIL, "")]),
+        comparison_page(Comparison(EVIL, (3, 4), (3, 4), (), ())),
+    ],
+    ids=["page", "picture", "gallery", "facts", "listed", "numbers", "map", "card", "comparison"],
+)
+def test_a_name_is_no_part_of_a_page(text):
+    assert "&lt;img src=x onerror=alert(1)&gt;&quot;&#x27;&amp;" in text
+    assert "<img src=x" not in text
 
 
 def test_pictures_are_srgb():

@@ -59,7 +59,7 @@ def report(name: str, plan: Plan, scene: ExactTransport, lights: dict[str, Float
     started = time.perf_counter()
     found = (jointly if plan.correspondence == "phase" else as_the_paper)(plan, photos)
     seconds = time.perf_counter() - started
-    low, middle = np.percentile(row_snr(found, scene).snr_t, [1, 50])
+    low, middle = np.nanpercentile(row_snr(found, scene).snr_t, [1, 50])
     print(
         f"{name:22s} {len(plan.patterns):5d}   {scores(truth, found, lights)}  {low:7.2f} "
         f"{middle:7.2f}  {seconds:6.1f} s",

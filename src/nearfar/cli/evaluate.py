@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -14,18 +14,19 @@ from nearfar.cli.options import (
     TransportPath,
     check_report_page,
 )
-from nearfar.cli.saying import say
+from nearfar.cli.saying import say, warn
 from nearfar.progress import progress_bar
-
-if TYPE_CHECKING:
-    pass
 
 
 def evaluate(
     transport: TransportPath,
     truth: Annotated[
         Path | None,
-        typer.Option(help="What render wrote, or a dense T (.npy, .npz).", metavar="TRUTH"),
+        typer.Option(
+            help="What render wrote, or a dense T of any origin (.npy, .npz), which is scaled to "
+            "the photos where their exposure is not known.",
+            metavar="TRUTH",
+        ),
     ] = None,
     photos: Annotated[
         Path | None,
@@ -51,8 +52,11 @@ def evaluate(
     from nearfar.transport.store import load_transport
     from nearfar.workflow.evaluate import row_snr
     from nearfar.workflow.judge import (
+        REMARKS,
         beside_photos,
         beside_truth,
+        describe_units,
+        find_faults_of_units,
         judge_by_truth,
         judge_pairs,
     )
@@ -69,10 +73,11 @@ def evaluate(
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
             rows = row_snr(opened, known, progress=told)
             found = judge_by_truth(opened, known, rows, progress=told)
+            faults = find_faults_of_units(opened, known, str(truth))
         else:
             assert photos is not None
             rows, pairs = None, beside_photos(opened, photos, full_scale=full_scale)
-            found = judge_pairs(pairs)
+            found, faults = judge_pairs(pairs), []
         if report is not None:
             from nearfar.report.evaluation import evaluation_page
             from nearfar.report.page import write_page
@@ -81,10 +86,13 @@ def evaluate(
                 pairs = beside_truth(opened, known)
             text = evaluation_page(opened, str(truth or photos), found, pairs, rows)
             write_page(report, text, force=force)
+    for fault in faults:
+        warn(fault)
     if as_json:
         print(json.dumps(found, allow_nan=False))
     else:
-        say(_lines(found), quiet=quiet)
+        shown = {name: value for name, value in found.items() if name not in REMARKS}
+        say("\n".join([_lines(shown), *describe_units(found)]), quiet=quiet)
 
 
 def _lines(found: dict[str, Any], indent: str = "") -> str:

@@ -116,8 +116,8 @@ def _row(name: str, light: Floats, transport: Transport, truth: ExactTransport) 
 def _maps(transport: Transport, correspondence: Correspondence, rows: Rows) -> str:
     q = correspondence.q
     height, width = transport.projector
-    low, high = np.percentile(rows.snr_b_of_frequency, [1, 99])
-    low_t, high_t = np.percentile(rows.snr_t, [1, 99])
+    low, high = np.nanpercentile(rows.snr_b_of_frequency, [1, 99])
+    low_t, high_t = np.nanpercentile(rows.snr_t, [1, 99])
     return "".join(
         [
             colour_map(rows.snr_t, low_t, high_t, "dB", "SNR_t of every camera pixel"),

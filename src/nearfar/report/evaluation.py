@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 
 from nearfar.markup import numbers, picture
+from nearfar.report.differences import difference_gain
 from nearfar.report.figures.style import new_figure, styled
-from nearfar.report.page import colour_map, facts, gallery, page, plot
+from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
 from nearfar.report.reconstruction import exposure_of, visible
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import HIGHEST, Rows
-from nearfar.workflow.judge import Pair
-
-DIFFERENCE_GAIN = 10
+from nearfar.workflow.judge import Pair, describe_units
 
 
 def evaluation_page(
@@ -55,14 +54,17 @@ def evaluation_page(
         for name, value in snr_b.items()
     ]
     exposure = exposure_of(transport)
-    gallery_rows = [(name, _cells(name, pair, exposure)) for name, pair in pairs.items()]
-    columns = ["light", "relit", "known", f"difference × {DIFFERENCE_GAIN}"]
+    gain = difference_gain(exposure * (pair.relit - pair.known) for pair in pairs.values())
+    gallery_rows = [(name, _cells(name, pair, exposure, gain)) for name, pair in pairs.items()]
+    columns = ["light", "relit", "known", f"difference × {gain}"]
     body = f"""
 <h1>How close the transport comes</h1>
 <p>Compared with {escape(source)}. SNR_b is 20 log10 of the known picture over the difference,
 SNR_t the same of a camera pixel's row of the transport.</p>
 {facts(cards)}
+{_remarks(judgement)}
 <h2>Relit beside what is known</h2>
+<p>Differences are shown {gain} times as bright as the pictures beside them.</p>
 {gallery(columns, gallery_rows)}
 <h2>Figures</h2>
 {numbers(head, table)}
@@ -72,8 +74,8 @@ SNR_t the same of a camera pixel's row of the transport.</p>
     return page("nearfar: evaluation", body)
 
 
-def _cells(name: str, pair: Pair, exposure: float) -> list[str]:
-    difference = DIFFERENCE_GAIN * np.abs(pair.relit - pair.known)
+def _cells(name: str, pair: Pair, exposure: float, gain: int) -> list[str]:
+    difference = gain * np.abs(pair.relit - pair.known)
     images = {"relit": pair.relit, "known": pair.known, "difference": difference}
     return [picture(pair.light, f"light: {name}")] + [
         picture(visible(exposure * image), f"{what} under {name}") for what, image in images.items()
@@ -92,6 +94,11 @@ def _components(judgement: Mapping[str, Any]) -> str:
     return f"<p></p>{numbers(head, rows)}"
 
 
+def _remarks(judgement: Mapping[str, Any]) -> str:
+    sentences = [f"{text[0].upper()}{text[1:]}." for text in describe_units(judgement)]
+    return listed(sentences) if sentences else ""
+
+
 def _decibels(value: float) -> str:
     return f"{value:.1f} dB" if value > -HIGHEST else "the scene has none"
 
@@ -102,7 +109,7 @@ def _row_section(rows: Rows | None) -> str:
     with styled():
         figure = new_figure(2.2)
         axes = figure.subplots()
-        axes.hist(rows.snr_t.ravel(), bins=60, color="#1f4e9c")
+        axes.hist(rows.snr_t[np.isfinite(rows.snr_t)], bins=60, color="#1f4e9c")
         axes.set(xlabel="SNR_t, dB", ylabel="camera pixels")
     maps = [
         (rows.snr_t, "SNR_t of every camera pixel"),
@@ -110,7 +117,8 @@ def _row_section(rows: Rows | None) -> str:
     ]
     drawn = ""
     for values, caption in maps:
-        low, high = np.percentile(values, [1, 99])
+        known = values[np.isfinite(values)]
+        low, high = np.percentile(known, [1, 99]) if known.size else (0.0, 1.0)
         drawn += colour_map(values, float(low), float(high), "dB", caption)
     return (
         f"<h2>Every camera pixel, every frequency</h2>{plot(figure, 'histogram of SNR_t')}"

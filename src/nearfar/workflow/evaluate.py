@@ -5,6 +5,7 @@ Index convention: rows are (n, channels, P), n camera pixels in a block.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,10 @@ from scipy import fft
 
 from nearfar.arrays import Floats, blocks, processors
 from nearfar.callbacks import OldReport, Report, as_report
-from nearfar.checks import finite_numbers
+from nearfar.checks import as_number, finite_numbers
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
+from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 
@@ -22,6 +24,9 @@ BLOCK = 128
 WORKERS = processors()
 # An exact match has no finite SNR; JSON needs a number.
 HIGHEST = 300.0
+# A row whose energy is below this share of the strongest row's holds no light that a camera sees:
+# a millionth of its amplitude.
+SMALLEST_ENERGY_SHARE = 1e-12
 PERCENTILES = (0, 5, 25, 50, 75, 95, 100)
 
 
@@ -73,7 +78,7 @@ class Rows:
     Attributes
     ----------
     snr_t : ndarray, shape (Cy, Cx)
-        SNR_t of each camera pixel, channels together, dB.
+        SNR_t of each camera pixel, channels together, dB; NaN where the truth holds no light.
     snr_b_of_frequency : ndarray, shape (Py, Px)
         SNR_b under exp(-j 2 pi k.p) for every DFT frequency k, DC in the middle, dB.
     components : mapping
@@ -102,15 +107,60 @@ def require_same_kind(transport: Transport, truth: ExactTransport) -> None:
         )
 
 
-def transport_exposure(transport: Transport) -> float:
-    """Photo units per unit of the truth, as the capture's rig recorded it; 1 if it did not."""
+class Exposure(NamedTuple):
+    """Photo units per unit of the truth.
+
+    Attributes
+    ----------
+    factor : float
+    is_fitted : bool
+        Whether it was fitted, as the rig did not record it.
+    """
+
+    factor: float
+    is_fitted: bool
+
+
+def exposure_of(transport: Transport, truth: ExactTransport) -> Exposure:
+    """Return the exposure that the capture's rig recorded, or that fits best where it did not.
+
+    Only a simulated rig knows it: a real camera has units of its own, and so has a truth that was
+    measured. A transport that was made without photos is in the truth's units.
+    """
     rig = transport.provenance.get("rig")
-    value = rig.get("transport_exposure", 1.0) if isinstance(rig, Mapping) else 1.0
-    return float(value)
+    if not isinstance(rig, Mapping):
+        return Exposure(1.0, is_fitted=False)
+    recorded = rig.get("transport_exposure")
+    if recorded is None:
+        return Exposure(fitted_exposure(transport, truth), is_fitted=True)
+    return Exposure(float(recorded), is_fitted=False)
+
+
+def fitted_exposure(transport: Transport, truth: ExactTransport) -> float:
+    """Return the factor that brings the truth nearest to the transport, by least squares.
+
+    Both are compared by pictures under white, under a random light and under natural pictures.
+
+    Raises
+    ------
+    InputError
+        If the sizes of the two differ.
+    """
+    require_same_kind(transport, truth)
+    lights = np.stack(list(standard_lights(transport.projector).values()))
+    known, found = (each.pictures(lights).astype(np.float64) for each in (truth, transport))
+    energy = float(np.vdot(known, known))
+    along = float(np.vdot(known, found))
+    # Without light in common no factor fits better than another.
+    return along / energy if energy > 0 and along > 0 else 1.0
 
 
 def relighting_snr(
-    transport: Transport, truth: ExactTransport, lights: Mapping[str, Floats]
+    transport: Transport,
+    truth: ExactTransport,
+    lights: Mapping[str, Floats],
+    *,
+    exposure: float | None = None,
 ) -> dict[str, float]:
     """Return SNR_b under each light: how well relit pictures agree with the truth (section 5.1).
 
@@ -120,6 +170,9 @@ def relighting_snr(
     truth : ExactTransport
     lights : mapping of str to ndarray
         Lights by name, (Py, Px) or (Py, Px, channels).
+    exposure : float, optional
+        Photo units per unit of the truth. By default what the capture's rig recorded, or what fits
+        best where it is a real rig, which knows none.
 
     Returns
     -------
@@ -138,18 +191,26 @@ def relighting_snr(
     True
     """
     require_same_kind(transport, truth)
-    exposure = np.float32(transport_exposure(transport))
+    factor = _factor(exposure, transport, truth)
     found = {}
     for name, light in lights.items():
-        picture = exposure * (truth @ light)
+        picture = factor * (truth @ light)
         found[name] = snr(picture, (transport @ light).reshape(picture.shape))
     return found
+
+
+def _factor(exposure: float | None, transport: Transport, truth: ExactTransport) -> np.float32:
+    """Return the exposure as a float32: as given, recorded, or fitted."""
+    if exposure is None:
+        return np.float32(exposure_of(transport, truth).factor)
+    return np.float32(as_number(exposure, "the exposure"))
 
 
 def row_snr(
     transport: Transport,
     truth: ExactTransport,
     *,
+    exposure: float | None = None,
     progress: Report | OldReport | None = None,
 ) -> Rows:
     """Compare every row of T with the truth.
@@ -159,6 +220,8 @@ def row_snr(
     transport : Transport
     truth : ExactTransport
         Where its components are apart, D, N and F are compared as the scene's physics has them.
+    exposure : float, optional
+        As of `relighting_snr`.
     progress : callable, optional
         Called with what is being done and the share of it that is done, 0 to 1.
 
@@ -177,7 +240,7 @@ def row_snr(
     """
     report = as_report(progress)
     require_same_kind(transport, truth)
-    exposure = np.float32(transport_exposure(transport))
+    factor = _factor(exposure, transport, truth)
     pixels, projector = transport.camera.pixels, transport.projector
     signal, error = np.zeros(pixels), np.zeros(pixels)
     signal_k, error_k = np.zeros(projector), np.zeros(projector)
@@ -186,30 +249,38 @@ def row_snr(
         known = truth.component_rows(block) if truth.is_apart else (truth.rows(block),)
         found = transport.component_rows(block)
         rows = _sum(known)
-        rows *= exposure
+        rows *= factor
         off = rows - _sum(found)
         signal[block], error[block] = _energy_of_rows(rows), _energy_of_rows(off)
         signal_k += _energy_of_frequencies(rows.reshape(-1, *projector))
         error_k += _energy_of_frequencies(off.reshape(-1, *projector))
         # Without known components there is nothing to compare apart.
         for name, values, mine in zip(parts, known, found, strict=False):
-            one, other = energies(exposure * values, mine)
+            one, other = energies(factor * values, mine)
             parts[name] = (parts[name][0] + one, parts[name][1] + other)
         report("rows", block.stop / pixels)
     components = {"T": decibels(float(signal.sum()), float(error.sum()))}
     components |= {name: decibels(*pair) for name, pair in parts.items()}
-    with np.errstate(divide="ignore", invalid="ignore"):
-        snr_t = 10 * np.log10(signal / np.maximum(error, 1e-300))
-        snr_k = 10 * np.log10(signal_k / np.maximum(error_k, 1e-300))
     return Rows(
-        np.clip(np.nan_to_num(snr_t, nan=0.0), -HIGHEST, HIGHEST).reshape(transport.camera),
-        np.fft.fftshift(np.clip(snr_k, -HIGHEST, HIGHEST)),
+        snr_where_lit(signal, error).reshape(transport.camera),
+        np.fft.fftshift(snr_where_lit(signal_k, error_k)),
         components,
     )
 
 
+def snr_where_lit(signal: Floats, error: Floats) -> Floats:
+    """Turn energies into dB, between -HIGHEST and HIGHEST; NaN where the truth holds no light.
+
+    Next to no light has no SNR worth a mean: the least error would count as hundreds of dB.
+    """
+    lit = signal > SMALLEST_ENERGY_SHARE * signal.max(initial=0.0)
+    found = np.full(signal.shape, np.nan)
+    found[lit] = 10 * np.log10(signal[lit] / np.maximum(error[lit], 1e-300))
+    return np.asarray(np.clip(found, -HIGHEST, HIGHEST))
+
+
 def snr_of_rows(truth: ExactTransport, found: ExactTransport) -> Floats:
-    """SNR_t of each camera pixel, channels together, of a transport without a model, dB, (C,)."""
+    """SNR_t of each camera pixel of a transport without a model, as of `Rows`, (C,)."""
     signal, error = np.empty(truth.camera.pixels), np.empty(truth.camera.pixels)
     for block in blocks(truth.camera.pixels, BLOCK):
         rows = truth.rows(block)
@@ -217,7 +288,7 @@ def snr_of_rows(truth: ExactTransport, found: ExactTransport) -> Floats:
             _energy_of_rows(rows),
             _energy_of_rows(rows - found.rows(block)),
         )
-    return np.asarray(10 * np.log10(np.maximum(signal, 1e-300) / np.maximum(error, 1e-300)))
+    return snr_where_lit(signal, error)
 
 
 def energies(truth: Floats, estimate: Floats) -> tuple[float, float]:
@@ -252,11 +323,13 @@ def _energy_of_frequencies(rows: Floats) -> Floats:
     return np.concatenate([half, mirrored], axis=1)
 
 
-def model_truth(transport: Transport, truth: ExactTransport) -> Transport:
+def model_truth(
+    transport: Transport, truth: ExactTransport, exposure: float | None = None
+) -> Transport:
     """Fit the transport's own W and far band to the truth, in the transport's photo units."""
     require_same_kind(transport, truth)
     fitted = fit_model(truth, transport.window, transport.far_basis)
-    gain = transport_exposure(transport)
+    gain = float(_factor(exposure, transport, truth))
     return fitted.with_gains(direct=gain, near=gain, far=gain)
 
 
@@ -273,17 +346,20 @@ def split_snr(transport: Transport, model: Transport) -> dict[str, float]:
     return {name: decibels(*pair) for name, pair in totals.items()}
 
 
-def floodlit_snr(transport: Transport, truth: ExactTransport) -> dict[str, float]:
+def floodlit_snr(
+    transport: Transport, truth: ExactTransport, exposure: float | None = None
+) -> dict[str, float]:
     """SNR of the direct, near and far pictures under full white, as physics has them, dB."""
     light = np.ones(transport.projector, dtype=np.float32)
-    exposure = np.float32(transport_exposure(transport))
+    factor = _factor(exposure, transport, truth)
     pairs = zip("DNF", truth.component_pictures(light), transport.components(light), strict=True)
-    return {
-        name: snr(exposure * values, mine.reshape(values.shape)) for name, values, mine in pairs
-    }
+    return {name: snr(factor * values, mine.reshape(values.shape)) for name, values, mine in pairs}
 
 
 def percentiles(values: Floats) -> dict[str, float]:
-    """Mean and percentiles, ready for JSON."""
-    found = {f"p{p}": float(np.percentile(values, p)) for p in PERCENTILES}
-    return {"mean": float(np.mean(values)), **found}
+    """Mean and percentiles of the values that are known, ready for JSON; 0 if there are none."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        known = np.zeros(1)
+    found = {f"p{p}": float(np.percentile(known, p)) for p in PERCENTILES}
+    return {"mean": float(np.mean(known)), **found}

@@ -1,7 +1,6 @@
 """Judge a transport by the truth, or by photos that it never saw."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +14,8 @@ from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import (
     Rows,
+    exposure_of,
+    fitted_exposure,
     floodlit_snr,
     model_truth,
     percentiles,
@@ -23,8 +24,13 @@ from nearfar.workflow.evaluate import (
     row_snr,
     snr,
     split_snr,
-    transport_exposure,
 )
+
+# What a judgement says of units and of dark pixels, beside its decibels.
+REMARKS = ("exposure", "exposure_is_fitted", "pixels_without_light", "pairs_without_light")
+# A truth whose own best exposure is this many times the recorded one, or a part of it, is in
+# other units.
+LARGEST_RATIO_OF_EXPOSURES = 1.25
 
 
 class Pair(NamedTuple):
@@ -64,7 +70,10 @@ def judge_by_truth(
         SNR in dB, ready for JSON: ``snr_b`` per light and ``snr_b_pictures`` their mean over
         natural pictures; ``snr_b_frequency`` and ``snr_t`` as percentiles; ``snr`` of T, D, N
         and F with the physical and the model's split, and of their pictures under full white;
-        ``ceiling``, the same lights with the model fitted to the truth.
+        ``ceiling``, the same lights with the model fitted to the truth. ``exposure`` is the
+        photo units per unit of the truth, ``exposure_is_fitted`` whether they were fitted to it,
+        and ``pixels_without_light`` the camera pixels that the truth leaves dark: they have no
+        SNR_t.
 
     Raises
     ------
@@ -73,11 +82,16 @@ def judge_by_truth(
     """
     report = progress or (lambda _what, _share: None)
     lights = standard_lights(transport.projector)
-    found = relighting_snr(transport, truth, lights)
+    exposure = exposure_of(transport, truth)
+    factor = exposure.factor
+    found = relighting_snr(transport, truth, lights, exposure=factor)
     if rows is None:
-        rows = row_snr(transport, truth, progress=report)
+        rows = row_snr(transport, truth, exposure=factor, progress=report)
     components = dict(rows.components)
     numbers: dict[str, Any] = {
+        "exposure": factor,
+        "exposure_is_fitted": exposure.is_fitted,
+        "pixels_without_light": int(np.isnan(rows.snr_t).sum()),
         "snr_b": found,
         "snr_b_pictures": _mean_of_pictures(found),
         "snr_b_frequency": percentiles(rows.snr_b_of_frequency),
@@ -86,21 +100,65 @@ def judge_by_truth(
     }
     if truth.is_apart:
         report("model's truth", 0.0)
-        fitted = model_truth(transport, truth)
-        ceiling = relighting_snr(fitted_as(transport, fitted), truth, lights)
+        fitted = model_truth(transport, truth, factor)
+        ceiling = relighting_snr(fitted, truth, lights, exposure=factor)
         numbers["snr"] |= {
             "physical": components,
             "model": split_snr(transport, fitted),
-            "floodlit": floodlit_snr(transport, truth),
+            "floodlit": floodlit_snr(transport, truth, factor),
         }
         numbers["ceiling"] = {"snr_b": ceiling, "snr_b_pictures": _mean_of_pictures(ceiling)}
         report("model's truth", 1.0)
     return numbers
 
 
-def fitted_as(transport: Transport, fitted: Transport) -> Transport:
-    """Give a fitted transport the provenance of the measured one, exposure and all."""
-    return replace(fitted, provenance=transport.provenance)
+def describe_units(judgement: Mapping[str, Any]) -> list[str]:
+    """Return sentences on a fitted exposure, and on what was left out as it holds no light."""
+    said = []
+    if judgement.get("exposure_is_fitted"):
+        said.append(
+            f"the truth was multiplied by {judgement['exposure']:.6g}, which fits best: the rig "
+            f"did not record the exposure"
+        )
+    if dark := judgement.get("pixels_without_light"):
+        said.append(
+            f"{dark} camera pixel{'s' if dark > 1 else ''} without light in the truth left out of "
+            f"SNR_t"
+        )
+    if dark := judgement.get("pairs_without_light"):
+        said.append(f"left out of the mean, as the photo holds no light: {', '.join(dark)}")
+    return said
+
+
+def find_faults_of_units(transport: Transport, truth: ExactTransport, name: str) -> list[str]:
+    """Find whether a truth is in other units than the rig recorded.
+
+    Parameters
+    ----------
+    transport : Transport
+    truth : ExactTransport
+    name : str
+        What the truth is called in the sentence.
+
+    Returns
+    -------
+    list of str
+        A sentence, or nothing.
+    """
+    recorded = exposure_of(transport, truth).factor
+    fitted = fitted_exposure(transport, truth)
+    if not recorded > 0:
+        return []
+    ratio = fitted / recorded
+    if 1 / LARGEST_RATIO_OF_EXPOSURES < ratio < LARGEST_RATIO_OF_EXPOSURES:
+        return []
+    lights = standard_lights(transport.projector)
+    reached = _mean_of_pictures(relighting_snr(transport, truth, lights, exposure=fitted))
+    return [
+        f"{name} is in other units than the rig recorded, or the transport is too bright or too "
+        f"dark: multiplied by {ratio:.4g} it would give {reached:.1f} dB under pictures; name the "
+        f"transport that was photographed, or multiply it."
+    ]
 
 
 def _mean_of_pictures(found: dict[str, float]) -> float:
@@ -116,7 +174,7 @@ def beside_truth(transport: Transport, truth: ExactTransport) -> dict[str, Pair]
         If the truth is of other sizes.
     """
     require_same_kind(transport, truth)
-    exposure = np.float32(transport_exposure(transport))
+    exposure = np.float32(exposure_of(transport, truth).factor)
     found = {}
     for name, light in standard_lights(transport.projector).items():
         relit = transport @ light
@@ -125,9 +183,16 @@ def beside_truth(transport: Transport, truth: ExactTransport) -> dict[str, Pair]
 
 
 def judge_pairs(pairs: Mapping[str, Pair]) -> dict[str, Any]:
-    """Return ``snr_b`` per light and ``snr_b_mean``, dB."""
-    found = {name: snr(pair.known, pair.relit) for name, pair in pairs.items()}
-    return {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
+    """Return ``snr_b`` per light and ``snr_b_mean``, dB.
+
+    Photos without any light are left out where there are others, and ``pairs_without_light``
+    lists them.
+    """
+    lit = {name: pair for name, pair in pairs.items() if pair.known.any()} or pairs
+    found = {name: snr(pair.known, pair.relit) for name, pair in lit.items()}
+    dark = [name for name in pairs if name not in lit]
+    judgement = {"snr_b": found, "snr_b_mean": float(np.mean(list(found.values())))}
+    return judgement | ({"pairs_without_light": dark} if dark else {})
 
 
 def beside_photos(

@@ -47,7 +47,7 @@ def draw(data: Data) -> Figure:
 
 def _draw_map(axes: Axes, values: Floats, extent: Any = None) -> None:
     # Without noise the far band is exact: its SNR would take up the whole colour scale.
-    high = float(np.percentile(values, 98))
+    high = float(np.nanpercentile(values, 98))
     image = axes.imshow(values, cmap=SEQUENTIAL, vmin=PAPER_SNR, vmax=high, extent=extent)
     figure = axes.get_figure()
     assert figure is not None
@@ -60,7 +60,7 @@ def _mark(axes: Axes, x: int, y: int, values: Floats) -> None:
     left, right = sorted(axes.get_xlim())
     side = -1 if x > (left + right) / 2 else 1
     axes.annotate(
-        f"lowest {values.min():.1f} dB", (x, y), (8 * side, 8), textcoords="offset points",
+        f"lowest {np.nanmin(values):.1f} dB", (x, y), (8 * side, 8), textcoords="offset points",
         ha="right" if side < 0 else "left", color="white", fontsize=7,
         bbox={"boxstyle": "round,pad=0.15", "fc": "#00000099", "ec": "none"},
     )  # fmt: skip

@@ -113,8 +113,8 @@ def acquire_in_theory(case: Theory, report: Report) -> Data:
     arrays: dict[str, NDArray[Any]] = {"snr_t": rows.snr_t, "snr_b": rows.snr_b_of_frequency}
     arrays |= {f"{name}/light": light for name, light in shown.items()}
     arrays |= relit(transport, truth, shown)
-    worst_b = np.unravel_index(np.argmin(rows.snr_b_of_frequency), rows.snr_b_of_frequency.shape)
-    worst_t = np.unravel_index(np.argmin(rows.snr_t), rows.snr_t.shape)
+    worst_b = np.unravel_index(np.nanargmin(rows.snr_b_of_frequency), rows.snr_b_of_frequency.shape)
+    worst_t = np.unravel_index(np.nanargmin(rows.snr_t), rows.snr_t.shape)
     numbers = {
         "scene": case.scene,
         "projector": list(case.projector),

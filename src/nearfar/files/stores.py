@@ -4,6 +4,7 @@ Metadata have a checksum, as chunks have; see `nearfar.files.checksums`.
 """
 
 import contextlib
+import json
 import secrets
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -277,6 +278,28 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
             f"{version}: make it again, or use the nearfar that made it."
         )
     return group
+
+
+def is_plain_array(path: Path) -> bool:
+    """Return whether a folder is a single Zarr array, as other software writes it."""
+    if (path / ".zarray").is_file():
+        return True
+    try:
+        return bool(json.loads((path / _METADATA).read_bytes())["node_type"] == "array")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return False
+
+
+def read_plain_array(path: Path) -> NDArray[Any]:
+    """Read a single Zarr array; by Zarr's own rule a chunk that is missing holds the fill value.
+
+    Raises
+    ------
+    UnreadableFileError
+        If it is damaged.
+    """
+    with _sentences(path, "it"):
+        return np.asarray(zarr.open_array(LocalStore(path, read_only=True), mode="r")[...])
 
 
 def open_array(group: zarr.Group, name: str) -> zarr.Array[Any]:

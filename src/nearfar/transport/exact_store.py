@@ -13,7 +13,14 @@ from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import new_output, read_arrays
-from nearfar.files.stores import add_array, create_store, open_store, read_array
+from nearfar.files.stores import (
+    add_array,
+    create_store,
+    is_plain_array,
+    open_store,
+    read_array,
+    read_plain_array,
+)
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.store import MAXIMUM_REASON, stored_size, write_in_rows
 
@@ -21,6 +28,9 @@ KIND = "nearfar exact transport"
 FORMAT_VERSION = 1
 # A longer last axis is not one of channels.
 MAXIMUM_CHANNELS = 4
+DENSE_ENDINGS = (".npy", ".npz")
+# What an .npz holds beside matrices.
+SIZES = ("projector", "camera")
 
 
 @path_after_content
@@ -86,14 +96,15 @@ def _read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_ar
 def load_exact(
     path: AnyPath, *, projector: AnySize | None = None, camera: AnySize | None = None
 ) -> ExactTransport:
-    """Read an exact transport: a Zarr of `save_exact`, or a dense .npy or .npz.
+    """Read an exact transport: a Zarr of `save_exact`, or a dense .npy, .npz or Zarr array.
 
     Parameters
     ----------
     path : str or Path
         A dense T is (C, P) or (C, P, channels), or unflattened (Cy, Cx, Py, Px) or
-        (Cy, Cx, Py, Px, channels). An .npz holds it as ``T``, or as ``direct``, ``near`` and
-        ``far``, and may hold ``projector`` and ``camera`` as (height, width).
+        (Cy, Cx, Py, Px, channels). An .npz holds it as ``T``, or as its only array, or as
+        ``direct``, ``near`` and ``far``, and may hold ``projector`` and ``camera`` as
+        (height, width).
     projector, camera : Size or (height, width), optional
         Sizes for a dense T whose file has none. By default the camera has the projector's size
         times the whole number that gives the rows of T.
@@ -115,8 +126,15 @@ def load_exact(
         None if projector is None else as_size(projector, "projector"),
         None if camera is None else as_size(camera, "camera"),
     )
-    if path.suffix.lower() in {".npy", ".npz"}:
+    if path.suffix.lower() in DENSE_ENDINGS:
         return _load_dense(path, *sizes)
+    if path.is_file():
+        raise UnreadableFileError(
+            f"{path} is of no kind that transports are read from: save it by numpy.save as "
+            f"{' or '.join(DENSE_ENDINGS)}, or as a Zarr array."
+        )
+    if is_plain_array(path):
+        return _as_exact({"T": read_plain_array(path)}, *sizes, path)
     group = open_store(path, KIND, FORMAT_VERSION)
     try:
         attributes = dict(group.attrs)
@@ -144,6 +162,16 @@ def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> Exac
     arrays = read_arrays(path)
     if path.suffix.lower() == ".npy":
         arrays = {"T": arrays["array"]}
+    return _as_exact(arrays, projector, camera, path)
+
+
+def _as_exact(
+    arrays: Mapping[str, NDArray[Any]], projector: Size | None, camera: Size | None, path: Path
+) -> ExactTransport:
+    matrices = [name for name in arrays if name not in SIZES]
+    if len(matrices) == 1 and matrices != ["far"]:
+        # Whatever it is called, there is nothing else that could be meant.
+        arrays = {**arrays, "T": arrays[matrices[0]]}
     projector = _stored_size(arrays, "projector", path) or projector
     camera = _stored_size(arrays, "camera", path) or camera
     names = ("direct", "near", "far") if "far" in arrays else ("T",)

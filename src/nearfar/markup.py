@@ -1,6 +1,7 @@
 """Fragments of HTML that need no other files: pictures are embedded, and there are no scripts."""
 
 import base64
+from collections.abc import Collection
 from html import escape
 
 import numpy as np
@@ -45,11 +46,14 @@ def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
     return np.asarray(np.rint(colours).astype(np.uint8))
 
 
-def numbers(head: list[str], rows: list[list[str]]) -> str:
-    """Return a table of figures."""
+def numbers(head: list[str], rows: list[list[str]], marked: Collection[int] = ()) -> str:
+    """Return a table of figures; the rows whose numbers are `marked` stand out."""
     top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
     body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+        ('<tr class="best">' if place in marked else "<tr>")
+        + "".join(f"<td>{escape(cell)}</td>" for cell in row)
+        + "</tr>"
+        for place, row in enumerate(rows)
     )
     return f'<div class="wide"><table class="numbers"><tr>{top}</tr>{body}</table></div>'
 

@@ -25,6 +25,7 @@ __all__ = [
     "as_report",
     "counted",
     "counting",
+    "duration",
     "ignore_progress",
     "progress_bar",
 ]
@@ -33,6 +34,19 @@ __all__ = [
 SECONDS_BEFORE_A_BAR = 1.0
 # A notebook redraws a bar after this share of a job: each drawing is a message to the browser.
 SHARE_BETWEEN_DRAWINGS = 0.01
+
+
+def duration(seconds: float) -> str:
+    """Write a time as people say it, in minutes and seconds.
+
+    Examples
+    --------
+    >>> from nearfar.progress import duration
+    >>> duration(75.2)
+    '1 min 15 s'
+    """
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
 @contextmanager

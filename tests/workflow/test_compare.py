@@ -16,13 +16,15 @@ from nearfar.report.comparison import (
     comparison_page,
     is_comparison,
     table_rows,
+    verdict,
+    winners,
     write_comparison,
 )
-from nearfar.report.comparison import winners as best_of
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
+from nearfar.transport.exact import ExactTransport
 from nearfar.workflow.compare import Comparison, Trial, compare, default_budgets
 from nearfar.workflow.rivals import RIVALS
 from nearfar.workflow.rivals.bench import Bench
@@ -167,6 +169,16 @@ def test_the_page_holds_every_trial(found, tmp_path):
     for row in table_rows(found.equal_photos) + table_rows(found.equal_exposure):
         assert len(row) == len(TABLE_HEAD)
         assert f"<td>{row[3]}</td>" in text
+    assert verdict(found) in text
+    # At equal photos Hadamard and brute force are alone with theirs, and best of nobody.
+    best = [row for row in table_rows(found.equal_photos) if row[-1]]
+    assert sorted(", ".join(row[-1] for row in best).split(", ")) == ["130", "40"]
+    best += [row for row in table_rows(found.equal_exposure) if row[-1]]
+    assert text.count('<tr class="best">') == len(best)
+    for budget in BUDGETS:
+        rivals = [trial for trial in found.equal_photos if trial.budget == budget]
+        highest = f"{max(trial.pictures for trial in rivals):.1f}"
+        assert next(row[3] for row in best if str(budget) in row[-1].split(", ")) == highest
     (folder / "mine.txt").write_text("kept")
     assert not is_comparison(folder)
 
@@ -178,7 +190,44 @@ def test_the_winner_is_the_best_that_was_measured():
         Trial("joint", 100, 100, 100.0, 39.0, 60.0, 50.0),
         Trial("CLT", 50, 50, 50.0, 20.0, 30.0, 25.0),
     ]
-    assert best_of(trials) == [
+    assert winners(trials) == [
         "50: compressive (CLT) 20.0 dB",
         "100: the paper's 40.0 dB, then joint, no stripes 39.0 dB",
     ]
+
+
+def test_a_projector_of_one_row_is_compared_by_what_fits():
+    generator = np.random.default_rng(2)
+    matrix = generator.uniform(size=(6, 16)).astype(np.float32) / 16
+    row = ExactTransport(Size(1, 16), Size(2, 3), (), (), matrix[None], "a row")
+    found = compare(row, [30], methods=["joint", "Hadamard", "brute force"])
+    assert {trial.method for trial in found.equal_photos} == {"Hadamard", "brute force"}
+    assert {failure.method for failure in found.failures} == {"joint"}
+    assert min(trial.pictures for trial in found.equal_photos) > 15
+    assert default_budgets(row.projector)
+
+
+def test_compressive_tells_how_long_it_will_take_and_how_far_it_is(monkeypatch):
+    monkeypatch.setattr("nearfar.workflow.rivals.compressive.FEWEST_TO_ESTIMATE", 1)
+    monkeypatch.setattr("nearfar.workflow.rivals.compressive.SECONDS_TO_ANNOUNCE", 0.0)
+    generator = np.random.default_rng(2)
+    matrix = generator.uniform(size=(24, 64)).astype(np.float32) / 64
+    scene = ExactTransport(Size(8, 8), Size(4, 6), (), (), matrix[None], "noise")
+    notes, told, kept = [], [], []
+    found = compare(
+        scene,
+        [24],
+        methods=["CLT"],
+        note=notes.append,
+        progress=lambda what, share: told.append((what, share)),
+        on_trial=kept.append,
+    )
+    assert len(notes) == 1
+    assert "compressive (CLT), 24 photos: the Lasso of 24 rows takes about" in notes[0]
+    shares = [share for what, share in told if what == "compressive (CLT)"]
+    assert shares == sorted(shares)
+    assert shares[0] == 0.0
+    assert shares[-1] == 1.0
+    assert len(set(shares)) > 5
+    assert [comparison.is_finished for comparison in kept] == [False, True]
+    assert kept[-1] == found

@@ -66,6 +66,7 @@ def best_share(
     rows: int = ROWS_TRIED,
     seed: int = 0,
     shares: Sequence[float] = PENALTY_SHARES,
+    progress: Callable[[float], None] | None = None,
 ) -> Choice:
     """Try shares on random rows, judged by the SNR of T against the truth.
 
@@ -80,6 +81,8 @@ def best_share(
     seed : int
     shares : sequence of float
         In (0, 1], decreasing.
+    progress : callable, optional
+        Called with the share of the values that were tried, of all that may be.
 
     Raises
     ------
@@ -100,7 +103,7 @@ def best_share(
     def judge(found: Floats) -> float:
         return _decibels(known, found - known)
 
-    return _try(measurements, chosen, everything, shares, judge)
+    return _try(measurements, chosen, everything, shares, judge, progress)
 
 
 def held_out_share(
@@ -164,6 +167,7 @@ def _try(
     kept: Integers,
     shares: Sequence[float],
     judge: Callable[[Floats], float],
+    progress: Callable[[float], None] | None = None,
 ) -> Choice:
     """Reconstruct the chosen rows from the patterns kept, with every share, and judge (n, P)."""
     if not shares or not all(0 < share <= 1 for share in shares):
@@ -181,6 +185,8 @@ def _try(
         for scores, coefficients in zip((plain, refitted), found, strict=True):
             pictures = sensing.pictures(coefficients, along)
             scores.append(judge(pictures.reshape(len(chosen), -1)))
+        if progress is not None:
+            progress(len(plain) / len(shares))
         if max(plain[-1], refitted[-1]) < max(*plain, *refitted) - MAXIMUM_DROP_DECIBELS:
             break
     return Choice(tuple(shares[: len(plain)]), tuple(plain), tuple(refitted))

@@ -16,12 +16,14 @@ keeps. lambda is given as a share of the least that leaves the row without wavel
 Index convention: k runs over K patterns, n over wavelets, i over rows: camera pixels and channels.
 """
 
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
-from nearfar.arrays import Floats, blocks
+from nearfar.arrays import Floats, Size, blocks
 from nearfar.baselines.lasso import highest_penalty, refit, solve, start
 from nearfar.baselines.random_patterns import (
     CompressiveMeasurements,
@@ -40,6 +42,7 @@ __all__ = [
     "PENALTY_SHARES",
     "CompressiveMeasurements",
     "bernoulli_patterns",
+    "estimate_seconds",
     "measure_by_rig",
     "measure_without_noise",
     "reconstruct_compressive",
@@ -53,6 +56,8 @@ DEFAULT_PENALTY_SHARE = 1e-3
 PATTERNS_PER_COEFFICIENT = 2
 # Rows that are solved together.
 ROWS_AT_ONCE = 512
+# Camera pixels by whose time that of all is estimated.
+ROWS_TIMED = 64
 
 
 Solver = Callable[[Sensing, Floats], Floats]
@@ -97,6 +102,38 @@ def reconstruct_compressive(
         return refit_few(sensing, responses, found) if refitted else found
 
     return _reconstruct(measurements, solver, progress)
+
+
+def estimate_seconds(
+    measurements: CompressiveMeasurements,
+    share: float = DEFAULT_PENALTY_SHARE,
+    *,
+    refitted: bool = True,
+    rows: int = ROWS_TIMED,
+) -> float:
+    """Estimate how long `reconstruct_compressive` will take, by the time of a few rows.
+
+    Parameters
+    ----------
+    measurements, share, refitted
+        As `reconstruct_compressive`.
+    rows : int
+        Camera pixels to time, evenly spaced.
+
+    Returns
+    -------
+    float
+        In seconds, on all processors.
+    """
+    step = max(1, len(measurements.responses) // rows)
+    some = measurements.responses[::step]
+    part = replace(measurements, camera=Size(1, len(some)), responses=some)
+    before = time.perf_counter()
+    reconstruct_compressive(part, share, refitted=refitted)
+    taken = time.perf_counter() - before
+    # The few rows are one block, which one processor solves.
+    blocks_at_once = min(threads(), -(-len(measurements.rows) // ROWS_AT_ONCE))
+    return taken * len(measurements.responses) / len(some) / blocks_at_once
 
 
 def refit_few(sensing: Sensing, responses: Floats, coefficients: Floats) -> Floats:

@@ -19,7 +19,7 @@ from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import say, say_captured, say_reconstructed, warn
 from nearfar.devices import Device
 from nearfar.errors import InputError
-from nearfar.progress import Report, progress_bar
+from nearfar.progress import Report, duration, progress_bar
 from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
@@ -196,9 +196,7 @@ def _finish(
 
 def _say_time(photos: int, seconds: float, *, quiet: bool) -> None:
     """Print before the first photo how long all of them will take."""
-    minutes, rest = divmod(round(photos * seconds), 60)
-    long = f"{minutes} min {rest} s" if minutes else f"{rest} s"
-    say(f"{photos} photos at {seconds:.2f} s each: about {long}", quiet=quiet)
+    say(f"{photos} photos at {seconds:.2f} s each: about {duration(photos * seconds)}", quiet=quiet)
 
 
 def _say_exposure(rig: "Rig", *, quiet: bool) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from nearfar.files import new_output
 from nearfar.markup import numbers
 from nearfar.report.figures.style import new_figure, save, styled
-from nearfar.report.page import page
+from nearfar.report.page import listed, page, plot
 from nearfar.workflow.compare import Comparison, Trial
 from nearfar.workflow.rivals import RIVALS
 
@@ -23,6 +23,11 @@ TITLE = "nearfar: methods compared"
 # In dB; with a lower SNR_b a relit picture is hardly recognisable.
 MINIMUM_PLOTTED_SNR = 10.0
 MINIMUM_TICK_RATIO = 1.25
+PLOT_SHOWS = "SNR against photos and exposure"
+BEST = (
+    "The best on pictures of each budget at which several methods were tried is marked, with the "
+    "budget."
+)
 
 
 def is_comparison(folder: Path) -> bool:
@@ -96,6 +101,48 @@ def _distinct_ticks(positions: Sequence[int]) -> list[int]:
     return kept
 
 
+def best_of(trials: Sequence[Trial]) -> dict[Trial, list[int]]:
+    """Return the trials that relight pictures best, with the budgets at which they do.
+
+    A budget at which one method alone was tried has no best.
+    """
+    best: dict[Trial, list[int]] = {}
+    for budget in sorted({trial.budget for trial in trials}):
+        rivals = [trial for trial in trials if trial.budget == budget]
+        if len({trial.method for trial in rivals}) > 1:
+            best.setdefault(max(rivals, key=lambda trial: trial.pictures), []).append(budget)
+    return best
+
+
+def verdict(comparison: Comparison) -> str:
+    """Return in a sentence which method relights pictures best at equal photos, and where."""
+    budgets: dict[str, list[int]] = {}
+    for trial, mine in best_of(comparison.equal_photos).items():
+        budgets.setdefault(trial.method, []).extend(mine)
+    if not budgets:
+        return "No two methods were tried at one number of photos."
+    parts = [
+        f"{RIVALS[method].title} at {', '.join(map(str, sorted(mine)))} photos"
+        for method, mine in sorted(budgets.items(), key=lambda pair: -len(pair[1]))
+    ]
+    return f"Best on pictures: {'; '.join(parts)}."
+
+
+def describe_failures(comparison: Comparison) -> list[str]:
+    """Return a sentence for each method that failed, and one if the comparison was stopped."""
+    reasons: dict[tuple[str, str], list[int]] = {}
+    for failure in comparison.failures:
+        reasons.setdefault((failure.method, failure.reason), []).append(failure.budget)
+    said = [
+        f"{RIVALS[method].title} came to nothing at {', '.join(map(str, sorted(set(mine))))}: "
+        f"{reason}"
+        for (method, reason), mine in reasons.items()
+    ]
+    if not comparison.is_finished:
+        said.append("The comparison was stopped before its end: some trials are missing.")
+    return said
+
+
 def winners(trials: Sequence[Trial]) -> list[str]:
     """Return a line for each budget: the best method, the second best, and their SNR_b."""
     lines = []
@@ -111,24 +158,41 @@ def winners(trials: Sequence[Trial]) -> list[str]:
 
 def table_rows(trials: Sequence[Trial]) -> list[list[str]]:
     """Return the rows of a table, sorted by method and number of photos."""
-    methods = list(RIVALS)
-    order = sorted(trials, key=lambda t: (methods.index(t.method), t.photos, t.exposure))
+    best = best_of(trials)
     return [
         [
             RIVALS[trial.method].title,
             f"{trial.photos}",
             f"{trial.exposure:.0f}",
             *(f"{value:.1f}" for value in (trial.pictures, trial.white, trial.random)),
+            ", ".join(map(str, best.get(trial, []))),
         ]
-        for trial in order
+        for trial in _ordered(trials)
     ]
 
 
-TABLE_HEAD = ["method", "photos", "exposure", "pictures", "white", "random"]
+def _ordered(trials: Sequence[Trial]) -> list[Trial]:
+    methods = list(RIVALS)
+    return sorted(trials, key=lambda t: (methods.index(t.method), t.photos, t.exposure))
+
+
+TABLE_HEAD = ["method", "photos", "exposure", "pictures", "white", "random", "best of"]
+
+
+def standalone_page(comparison: Comparison) -> str:
+    """Return the page with the plot inside, which needs no other file."""
+    with styled():
+        figure = draw(comparison)
+    return _page(comparison, plot(figure, PLOT_SHOWS), "")
 
 
 def comparison_page(comparison: Comparison) -> str:
-    """Return the page with the plot and the tables."""
+    """Return the page beside whose file those of the plot and the data lie."""
+    sheet = f'<figure class="sheet"><img src="{PLOT}.png" alt="{PLOT_SHOWS}"></figure>'
+    return _page(comparison, sheet, f'<a href="{PLOT}.pdf">PDF</a>, <a href="{DATA}">data</a>.')
+
+
+def _page(comparison: Comparison, sheet: str, links: str) -> str:
     caption = (
         "Every method sees the same scene, camera and noise, and finds correspondence itself where "
         "it needs it; photos count stripes, inverses, references and black. The paper's method "
@@ -137,12 +201,13 @@ def comparison_page(comparison: Comparison) -> str:
     )
     body = [
         f"<h1>Methods compared on {escape(comparison.scene)}</h1>",
+        f'<p class="verdict">{escape(verdict(comparison))}</p>',
+        listed(describe_failures(comparison)) if describe_failures(comparison) else "",
         f"<p>Projector {comparison.projector}, camera {comparison.camera}. SNR_b in dB: the mean "
         f"over five pictures with the spectra of photographs, under white, and under a random "
         f"pattern.</p>",
-        f'<figure class="sheet"><img src="{PLOT}.png" alt="SNR against photos and exposure">'
-        f'<figcaption>{caption} <a href="{PLOT}.pdf">PDF</a>, <a href="{DATA}">data</a>.'
-        f"</figcaption></figure>",
+        sheet,
+        f"<p>{caption} {links}</p>",
     ]
     for title, text, trials in (
         ("Equal photos", "Each photo is exposed alike.", comparison.equal_photos),
@@ -153,5 +218,8 @@ def comparison_page(comparison: Comparison) -> str:
             comparison.equal_exposure,
         ),
     ):
-        body += [f"<h2>{title}</h2>", f"<p>{text}</p>", numbers(TABLE_HEAD, table_rows(trials))]
+        best = best_of(trials)
+        marked = [place for place, trial in enumerate(_ordered(trials)) if trial in best]
+        table = numbers(TABLE_HEAD, table_rows(trials), marked)
+        body += [f"<h2>{title}</h2>", f"<p>{text} {BEST}</p>", table]
     return page(TITLE, "\n".join(body))

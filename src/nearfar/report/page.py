@@ -56,6 +56,11 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .numbers td:first-child, .numbers th:first-child { text-align: left; }
 .numbers tr:last-child td { border-bottom: 0; }
 .numbers th { color: var(--soft); font-weight: 500; font-size: .85rem; }
+.numbers tr.best td { font-weight: 650; color: var(--far); }
+.verdict { font-size: 1.1rem; font-weight: 600; color: var(--ink); }
+.verdict.good { color: var(--far); }
+.verdict.doubtful { color: var(--near); }
+.verdict.wrong { color: var(--bad); }
 .broad .numbers { max-width: none; }
 .broad .numbers td:first-child { min-width: 14rem; }
 .maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }

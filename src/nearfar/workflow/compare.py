@@ -6,15 +6,15 @@ well under white. At equal total exposure a method with fewer photos exposes eac
 full well deeper in proportion, and a method with many for less.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nearfar.arrays import Floats, Size
 from nearfar.callbacks import Report
-from nearfar.errors import InputError
+from nearfar.errors import InputError, NearfarError, PlanError
 from nearfar.illumination.pictures import standard_lights
 from nearfar.plan.choose import FEWEST_PHOTOS, default_window
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -56,6 +56,24 @@ class Trial(NamedTuple):
     random: float
 
 
+class Failure(NamedTuple):
+    """A method that came to nothing at one budget.
+
+    Attributes
+    ----------
+    method : str
+        Of `nearfar.workflow.rivals.RIVALS`.
+    budget : int
+        Photos, or total exposure, that were allowed.
+    reason : str
+        A sentence.
+    """
+
+    method: str
+    budget: int
+    reason: str
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Trials of one scene.
@@ -68,6 +86,10 @@ class Comparison:
         Each photo exposed alike.
     equal_exposure : tuple of Trial
         Each method's longest plan, at each budget of total exposure.
+    failures : tuple of Failure
+        Methods that failed, which cost no other method its trials.
+    is_finished : bool
+        Whether every method had its turn.
     """
 
     scene: str
@@ -75,6 +97,8 @@ class Comparison:
     camera: Size
     equal_photos: tuple[Trial, ...]
     equal_exposure: tuple[Trial, ...]
+    failures: tuple[Failure, ...] = ()
+    is_finished: bool = True
 
     def numbers(self) -> dict[str, Any]:
         """Return everything as JSON holds it."""
@@ -84,12 +108,20 @@ class Comparison:
             "camera": list(self.camera),
             "equal_photos": [trial._asdict() for trial in self.equal_photos],
             "equal_exposure": [trial._asdict() for trial in self.equal_exposure],
+            "failures": [failure._asdict() for failure in self.failures],
+            "finished": self.is_finished,
         }
 
 
 def default_budgets(projector: Size) -> tuple[int, ...]:
-    """Return shares of the photos of the paper's plan with a default window, the largest last."""
-    total = default_photos(projector)
+    """Return shares of the photos of the paper's plan with a default window, the largest last.
+
+    Where the projector is too small for one, as with a single row, shares of all its pixels.
+    """
+    try:
+        total = default_photos(projector)
+    except PlanError:
+        total = max(projector.pixels, FEWEST_PHOTOS)
     return tuple(total // part for part in BUDGET_DIVISORS if total // part >= FEWEST_PHOTOS)
 
 
@@ -101,12 +133,15 @@ def compare(
     window: int | None = None,
     camera: SimulatedCamera | None = None,
     progress: Report | None = None,
+    on_trial: Callable[[Comparison], None] | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Run methods on a scene at several budgets of photos, and of total exposure.
 
     The rivals are given their best: at each budget, the paper's method has the best of several far
     bands, and compressive light transport the regularisation that fits the truth best.
-    Correspondence is found by each method itself.
+    Correspondence is found by each method itself. A method that fails, such as one whose plans do
+    not fit the projector, is listed with its reason, and the others go on.
 
     Parameters
     ----------
@@ -114,12 +149,17 @@ def compare(
     budgets : sequence of int, optional
         Numbers of photos; `default_budgets` if left out.
     methods : sequence of str, optional
-        Of `nearfar.workflow.rivals.RIVALS`; all if left out.
+        Names of `nearfar.workflow.rivals.RIVALS`; all if left out.
     window : int, optional
         W of the joint estimate's plans; `default_window` if left out.
     camera : SimulatedCamera, optional
     progress : callable, optional
-        Called with what is being done and the share done, 0 to 1.
+        Called with the title of a method and the share of its work that is done, 0 to 1.
+    on_trial : callable, optional
+        Called after each trial with the comparison so far, for whoever wants to keep it should the
+        rest be stopped.
+    note : callable, optional
+        Called with a sentence before work that takes long.
 
     Returns
     -------
@@ -131,12 +171,7 @@ def compare(
         If there is no such method, or no budget that is enough for any.
     """
     methods = known_methods(methods)
-    budgets = sorted(set(default_budgets(scene.projector) if budgets is None else budgets))
-    if not budgets or budgets[0] < FEWEST_PHOTOS:
-        raise InputError(
-            f"a budget of {budgets[0] if budgets else 'no'} photos is too small to compare: "
-            f"choose budgets of {FEWEST_PHOTOS} photos or more."
-        )
+    budgets = known_budgets(scene.projector, budgets)
     lights = standard_lights(scene.projector)
     gain = choose_exposure(None, scene, scene.name)
     truth = {name: np.float32(gain) * (scene @ light) for name, light in lights.items()}
@@ -145,34 +180,115 @@ def compare(
         camera or SimulatedCamera(),
         default_window(scene.projector) if window is None else window,
         gain,
+        note=note or (lambda _sentence: None),
     )
     report = progress or (lambda _what, _share: None)
     jobs = _jobs(scene.projector, methods, budgets)
-    done: list[tuple[Budget, Trial]] = []
-    # Where a method took every photo of its budget, as much total exposure gives the same photos.
-    same: dict[tuple[str, Budget], Trial] = {}
+    found = _Found(scene)
     for number, (method, budget) in enumerate(jobs):
-        report("comparing", number / len(jobs))
-        if (method, budget) in same:
-            done.append((budget, same[method, budget]))
-            continue
-        trials = [
-            _judge(method, budget, attempt, lights, truth)
-            for attempt in RIVALS[method].attempts(bench, budget)
-        ]
-        if trials:
-            best = max(trials, key=lambda trial: trial.pictures)
-            done.append((budget, best))
-            took_all = all(trial.photos == budget.photos for trial in trials)
-            if took_all and budget.total_exposure is None:
-                same[method, Budget(budget.photos, budget.photos)] = best
-    report("compared", 1.0)
-    return Comparison(
-        scene.name,
-        scene.projector,
-        scene.camera,
-        tuple(trial for budget, trial in done if budget.total_exposure is None),
-        tuple(trial for budget, trial in done if budget.total_exposure is not None),
+        told = _of_method(report, jobs, number)
+        told(0.0)
+        try:
+            found.add(method, budget, _best(method, budget, bench, told, lights, truth, found))
+        except NearfarError as error:
+            found.failures.append(Failure(method, _counted(budget), str(error)))
+        told(1.0)
+        if on_trial is not None:
+            on_trial(found.comparison(is_finished=number + 1 == len(jobs)))
+    return found.comparison(is_finished=True)
+
+
+class _Found:
+    """What a comparison has found so far."""
+
+    def __init__(self, scene: ExactTransport) -> None:
+        self.scene = scene
+        self.trials: list[tuple[Budget, Trial]] = []
+        self.failures: list[Failure] = []
+        # Where a method took every photo of its budget, as much total exposure gives the same
+        # photos.
+        self.same: dict[tuple[str, Budget], Trial] = {}
+
+    def add(self, method: str, budget: Budget, trials: Sequence[Trial]) -> None:
+        """Keep the best of a method's trials at a budget."""
+        if not trials:
+            return
+        best = max(trials, key=lambda trial: trial.pictures)
+        self.trials.append((budget, best))
+        took_all = all(trial.photos == budget.photos for trial in trials)
+        if took_all and budget.total_exposure is None:
+            self.same[method, Budget(budget.photos, budget.photos)] = best
+
+    def comparison(self, *, is_finished: bool) -> Comparison:
+        """Return all of it."""
+        return Comparison(
+            self.scene.name,
+            self.scene.projector,
+            self.scene.camera,
+            tuple(trial for budget, trial in self.trials if budget.total_exposure is None),
+            tuple(trial for budget, trial in self.trials if budget.total_exposure is not None),
+            tuple(self.failures),
+            is_finished,
+        )
+
+
+def _best(
+    method: str,
+    budget: Budget,
+    bench: Bench,
+    told: Callable[[float], None],
+    lights: Mapping[str, Floats],
+    truth: Mapping[str, Floats],
+    found: _Found,
+) -> list[Trial]:
+    """Try a method at a budget, or take the trial that saw the same photos."""
+    if (method, budget) in found.same:
+        return [found.same[method, budget]]
+    bench = replace(bench, progress=told)
+    attempts = RIVALS[method].attempts(bench, budget)
+    return [_judge(method, budget, attempt, lights, truth) for attempt in attempts]
+
+
+def _of_method(
+    report: Report, jobs: Sequence[tuple[str, Budget]], number: int
+) -> Callable[[float], None]:
+    """Return a function that reports the share of a method's work, given that of one job."""
+    method = jobs[number][0]
+    mine = [place for place, (name, _) in enumerate(jobs) if name == method]
+    title, before = RIVALS[method].title, mine.index(number)
+    return lambda share: report(title, (before + share) / len(mine))
+
+
+def _counted(budget: Budget) -> int:
+    """Return what a budget allows: photos, or exposure counted in photos."""
+    return budget.photos if budget.total_exposure is None else budget.total_exposure
+
+
+def known_budgets(projector: Size, budgets: Sequence[int] | None) -> list[int]:
+    """Return the budgets to compare at, rising, the default ones if none are given.
+
+    Raises
+    ------
+    InputError
+        If one is too small for any method.
+    """
+    chosen = sorted(set(default_budgets(projector) if budgets is None else budgets))
+    if not chosen or chosen[0] < FEWEST_PHOTOS:
+        raise InputError(
+            f"a budget of {chosen[0] if chosen else 'no'} photos is too small to compare: "
+            f"choose budgets of {FEWEST_PHOTOS} photos or more."
+        )
+    return chosen
+
+
+def describe_work(scene: ExactTransport, methods: Sequence[str], budgets: Sequence[int]) -> str:
+    """Return in a line what `compare` is about to do."""
+    jobs = _jobs(scene.projector, methods, budgets)
+    titles = ", ".join(RIVALS[method].title for method in methods)
+    counts = ", ".join(map(str, budgets))
+    return (
+        f"{scene.name}, projector {scene.projector}, camera {scene.camera}: {titles}, each at "
+        f"{counts} photos and at equal total exposure, {len(jobs)} runs in all"
     )
 
 
@@ -217,7 +333,7 @@ def _judge(
     pictures = [value for name, value in values.items() if name.startswith("picture")]
     return Trial(
         method,
-        budget.photos if budget.total_exposure is None else budget.total_exposure,
+        _counted(budget),
         attempt.photos,
         attempt.photos * budget.exposure(attempt.photos),
         float(np.mean(pictures)),

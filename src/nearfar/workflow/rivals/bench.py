@@ -1,5 +1,6 @@
 """The bench on which rival methods are tried: one scene, one camera, one noise."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -21,12 +22,19 @@ class Bench:
         W of the joint estimate's plans.
     gain : float
         Photo units per unit of the scene's transport.
+    progress : callable
+        For a method that takes long: called with the share of its work at one budget that is
+        done, 0 to 1.
+    note : callable
+        For a method that takes long: called with a sentence that says so, before the work.
     """
 
     scene: ExactTransport
     camera: SimulatedCamera
     window: int
     gain: float
+    progress: Callable[[float], None] = lambda _share: None
+    note: Callable[[str], None] = lambda _sentence: None
 
     def rig(self, exposure: float) -> SimulatedRig:
         """Return a rig that exposes for `exposure` units, its full well deeper in proportion."""

@@ -3,23 +3,53 @@
 from collections.abc import Iterator
 
 from nearfar.baselines.choosing import best_share
-from nearfar.baselines.compressive import reconstruct_compressive
+from nearfar.baselines.compressive import (
+    ROWS_TIMED,
+    estimate_seconds,
+    reconstruct_compressive,
+)
 from nearfar.baselines.random_patterns import bernoulli_patterns, measure_by_rig
+from nearfar.progress import duration
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.rival import Attempt, Budget, Rival
+
+# Of a budget's work, about the share that the choice of lambda takes.
+SHARE_OF_CHOOSING = 0.2
+# For fewer camera pixels the estimate would take as long as the work.
+FEWEST_TO_ESTIMATE = 8 * ROWS_TIMED
+# What ends sooner is not announced.
+SECONDS_TO_ANNOUNCE = 15.0
+TITLE = "compressive (CLT)"
 
 
 def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
     # One photo is of black.
     patterns = bernoulli_patterns(bench.scene.projector, budget.photos - 1, 0)
     measurements = measure_by_rig(bench.rig(budget.exposure(budget.photos)), patterns)
-    choice = best_share(measurements, bench.scene, exposure=bench.gain)
-    found = reconstruct_compressive(measurements, choice.share, refitted=choice.is_refitted)
+    choice = best_share(
+        measurements,
+        bench.scene,
+        exposure=bench.gain,
+        progress=lambda share: bench.progress(SHARE_OF_CHOOSING * share),
+    )
+    if len(measurements.responses) >= FEWEST_TO_ESTIMATE:
+        seconds = estimate_seconds(measurements, choice.share, refitted=choice.is_refitted)
+        if seconds >= SECONDS_TO_ANNOUNCE:
+            bench.note(
+                f"{TITLE}, {budget.photos} photos: the Lasso of {len(measurements.rows)} rows "
+                f"takes about {duration(seconds)}"
+            )
+    found = reconstruct_compressive(
+        measurements,
+        choice.share,
+        refitted=choice.is_refitted,
+        progress=lambda share: bench.progress(SHARE_OF_CHOOSING + (1 - SHARE_OF_CHOOSING) * share),
+    )
     yield Attempt(measurements.photos, found)
 
 
 COMPRESSIVE = Rival(
-    title="compressive (CLT)",
+    title=TITLE,
     line={"color": "#c2561a", "marker": "^", "linestyle": "-."},
     attempts=_attempts,
 )

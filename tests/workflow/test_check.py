@@ -9,8 +9,11 @@ from nearfar.errors import InputError
 from nearfar.illumination.frequencies import near_frequencies
 from nearfar.illumination.patterns import exponential
 from nearfar.transport.exact import ExactTransport
-from nearfar.workflow.check import check_model
+from nearfar.transport.model import Transport
+from nearfar.workflow.check import check_model, dropped_of
+from nearfar.workflow.check_verdict import describe_verdict, judge_check
 from nearfar.workflow.conditioning import condition_near
+from nearfar.workflow.model_fit import split_by_model
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA = Size(16, 20), Size(8, 9)
@@ -115,6 +118,79 @@ def test_what_cannot_be_checked_is_refused():
     for wrong in ({"sample": 0}, {"k_near": -1.0}):
         with pytest.raises(InputError, match="above 0"):
             check_model(world, 5, Size(3, 3), **wrong)
-    together = ExactTransport(PROJECTOR, CAMERA, (), (), _nothing()[None].astype(np.float32))
-    with pytest.raises(InputError, match="not known apart"):
-        check_model(together, 5, Size(3, 3))
+    dark = ExactTransport(PROJECTOR, CAMERA, (), (), _nothing()[None].astype(np.float32))
+    with pytest.raises(InputError, match="holds no light at all"):
+        check_model(dark, 5, Size(3, 3))
+
+
+def _together(world: Transport) -> ExactTransport:
+    """All of T in one matrix, as a measured one comes."""
+    dense = np.ascontiguousarray(np.moveaxis(world.dense(), 1, 0))
+    return ExactTransport(world.projector, world.camera, (), (), dense)
+
+
+def test_a_dense_transport_is_split_as_the_model_does():
+    world = model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3), channels=2)
+    check = check_model(_together(world), 5, Size(3, 3))
+    assert check.is_split_by_model
+    assert not check_model(world, 5, Size(3, 3)).is_split_by_model
+    # Its q is found, and D + N + F of the model holds all of it.
+    split = split_by_model(_together(world), 5, Size(3, 3))
+    off = np.linalg.norm(split.correspondence - world.correspondence, axis=-1)
+    assert np.median(off) < 0.2
+    assert off.max() < 1
+    assert check.best_pictures > 60
+    assert check.best_rows > 60
+    assert check.lit == 1.0
+    assert check.far_beyond < 1e-5
+    assert judge_check(check).grade == "good"
+    for rows, part in zip(split.component_rows(slice(4, 9)), "DNF", strict=True):
+        assert rows.shape == (5, 2, PROJECTOR.pixels), part
+    direct, rest = split.floodlit()
+    light = np.ones(PROJECTOR, dtype=np.float32)
+    np.testing.assert_allclose(direct + rest, world @ light, rtol=1e-5)
+
+
+def _lamps() -> ExactTransport:
+    """Every camera pixel sees a wide, smooth mix of all projector pixels."""
+    y, x = np.indices(PROJECTOR).reshape(2, -1)
+    rows = np.linspace(0, 15, CAMERA.height).repeat(CAMERA.width)
+    columns = np.tile(np.linspace(0, 19, CAMERA.width), CAMERA.height)
+    away = (rows[:, None] - y) ** 2 + (columns[:, None] - x) ** 2
+    return ExactTransport(PROJECTOR, CAMERA, (), (), np.exp(-away / 60)[None].astype(np.float32))
+
+
+def test_the_verdict_follows_what_the_model_can_hold():
+    lamps = check_model(_lamps(), 5, Size(3, 3))
+    assert lamps.lit == 0.0
+    verdict = judge_check(lamps)
+    assert verdict.grade == "wrong"
+    assert "100% of the camera pixels see no direct light" in verdict.causes[0]
+    # As many frequencies as it has hold it all the same.
+    assert judge_check(check_model(_lamps(), 5, Size(15, 19))).grade == "good"
+    y = np.indices(PROJECTOR)[0]
+    wave = 0.01 * (1 + np.cos(2 * np.pi * (3 * y / 16))).ravel()
+    outside = check_model(_exact(_nothing(), np.tile(wave, (CAMERA.pixels, 1))), 5, Size(3, 3))
+    assert "of the energy of F lies beyond the far band" in judge_check(outside).causes[0]
+    assert describe_verdict(judge_check(outside)).startswith(f"{judge_check(outside).grade}: The")
+
+
+def test_a_projector_of_one_row_is_checked():
+    generator = np.random.default_rng(1)
+    matrix = generator.uniform(size=(6, 24)).astype(np.float32)
+    matrix[np.arange(6), 4 * np.arange(6)] = 20.0
+    for projector, far in ((Size(1, 24), Size(1, 5)), (Size(24, 1), Size(5, 1))):
+        row = ExactTransport(projector, Size(2, 3), (), (), matrix[None], "a row")
+        check = check_model(row, 5, far)
+        assert check.lit == 1.0
+        assert 15 < check.best_rows < 60
+        assert dropped_of(projector, 5, far, None) == Size(1, 1)
+
+
+def test_camera_pixels_without_light_count_neither_way():
+    world = model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3))
+    dark = _together(world)
+    dark.far[:, :20] = 0.0
+    check = check_model(dark, 5, Size(3, 3))
+    assert check.lit == 1.0
+    assert check.best_rows > 60

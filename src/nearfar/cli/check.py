@@ -7,7 +7,18 @@ from typing import Annotated
 import typer
 
 from nearfar.arrays import Size
-from nearfar.cli.options import AsJson, Force, Quiet, check_report_page, size
+from nearfar.cli.options import (
+    AsJson,
+    DenseCamera,
+    DenseProjector,
+    Force,
+    OldReportPath,
+    Quiet,
+    ReportPath,
+    check_report_page,
+    only_report,
+    size,
+)
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -16,7 +27,8 @@ def check(
     transport: Annotated[
         Path,
         typer.Argument(
-            metavar="TRANSPORT", help="What render or reconstruct wrote, with its components apart."
+            metavar="TRANSPORT",
+            help="What render or reconstruct wrote, or a dense T of any origin (.npy, .npz, Zarr).",
         ),
     ],
     near: Annotated[int, typer.Option(min=1, help="W of the near-range window.", metavar="W")],
@@ -27,39 +39,44 @@ def check(
         Size | None,
         typer.Option(parser=size, metavar="HxW", help="Near frequencies left out; as in plan."),
     ] = None,
-    page: Annotated[
-        Path | None,
-        typer.Option("--html", help="Write a page with maps to this file.", metavar="FILE.html"),
-    ] = None,
+    projector: DenseProjector = None,
+    camera: DenseCamera = None,
+    report: ReportPath = None,
+    html: OldReportPath = None,
     as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Check where the paper's assumptions hold on a scene, and where they do not.
 
-    Example: nearfar check truth.zarr --near 19 --far 13x13 --html check.html
+    The last line is the verdict: good, doubtful or wrong, and why.
+
+    Example: nearfar check truth.zarr --near 19 --far 13x13 --report check.html
     """
-    from nearfar.files import new_output
-    from nearfar.plan import paper_plan
     from nearfar.report.model_check import check_page, check_rows
+    from nearfar.report.page import write_page
     from nearfar.rigs.simulated.opening import load_world
-    from nearfar.workflow.check import DEFAULT_SAMPLE, check_model, numbers_of
+    from nearfar.workflow.check import DEFAULT_SAMPLE, check_model, dropped_of
+    from nearfar.workflow.check_verdict import describe_verdict, judge_check, numbers_of
     from nearfar.workflow.conditioning import condition_near
 
+    page = only_report(report, html, "--html")
     if page is not None:
         check_report_page(page, transport, force=force)
-    with progress_bar("checking", quiet=quiet) as report:
-        world = load_world(transport, None, None)
-        plan = paper_plan(world.projector, near, far, dropped=drop, correspondence="none")
+    with progress_bar("checking", quiet=quiet) as told:
+        world = load_world(transport, projector, camera)
+        dropped = dropped_of(world.projector, near, far, drop)
         sample = DEFAULT_SAMPLE if page is None else world.camera.pixels
-        found = check_model(world, near, far, sample=sample, progress=report)
-        condition = condition_near(world.projector, near, plan.dropped)
+        found = check_model(world, near, far, sample=sample, progress=told)
+        condition = condition_near(world.projector, near, dropped)
         if page is not None:
-            with new_output(page, force=force) as partial:
-                text = check_page(transport.name, found, condition, world.camera)
-                partial.write_text(text, encoding="utf-8")
+            write_page(
+                page, check_page(transport.name, found, condition, world.camera), force=force
+            )
+    numbers = numbers_of(found, condition)
     if as_json:
-        print(json.dumps(numbers_of(found, condition), allow_nan=False))
+        print(json.dumps(numbers, allow_nan=False))
         return
-    for what, assumed, measured in check_rows(numbers_of(found, condition)):
+    for what, assumed, measured in check_rows(numbers):
         say(f"{what}: {measured}" + (f" (assumed: {assumed})" if assumed else ""), quiet=quiet)
+    say(describe_verdict(judge_check(found)), quiet=quiet)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from nearfar.arrays import Size, parse_size
+from nearfar.cli.saying import warn
 from nearfar.errors import InputError
 
 
@@ -58,6 +59,16 @@ def check_report_page(page: Path, *others: Path, force: bool) -> None:
     check_output(page, force=force)
 
 
+def only_report(report: Path | None, old: Path | None, name: str) -> Path | None:
+    """Return the page of --report, or of an option that was called otherwise, with a warning."""
+    if old is None:
+        return report
+    if report is not None:
+        raise typer.BadParameter("is the old name of --report: give one.", param_hint=name)
+    warn(f"{name} will be removed in the next release: write the page with --report.")
+    return old
+
+
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print nothing but errors and warnings.")
 ]
@@ -69,6 +80,25 @@ NewCapture = Annotated[Path, typer.Argument(metavar="CAPTURE.zarr", help="Captur
 ReportPath = Annotated[
     Path | None,
     typer.Option("--report", help="Write a page of pictures and maps too.", metavar="REPORT.html"),
+]
+OldReportPath = Annotated[Path | None, typer.Option("--html", hidden=True)]
+DenseProjector = Annotated[
+    Size | None,
+    typer.Option(
+        "--projector",
+        parser=size,
+        metavar="HxW",
+        help="Pattern grid of a dense T whose file does not tell it.",
+    ),
+]
+DenseCamera = Annotated[
+    Size | None,
+    typer.Option(
+        "--camera",
+        parser=size,
+        metavar="HxW",
+        help="Camera of a dense T whose file does not tell it.",
+    ),
 ]
 Port = Annotated[
     int, typer.Option(help="Port to serve on, 0 for any that is free.", min=0, max=65535)

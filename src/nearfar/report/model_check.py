@@ -8,11 +8,54 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.markup import numbers
-from nearfar.report.page import colour_map, facts, page
-from nearfar.workflow.check import ModelCheck, numbers_of
+from nearfar.report.page import colour_map, facts, listed, page
+from nearfar.workflow.check import ModelCheck
+from nearfar.workflow.check_verdict import (
+    DOUBTFUL_DECIBELS,
+    DOUBTFUL_ROW_DECIBELS,
+    GOOD_DECIBELS,
+    GOOD_ROW_DECIBELS,
+    judge_check,
+    numbers_of,
+)
 from nearfar.workflow.conditioning import Conditioning
 
+# What the table and the maps speak of, for readers who have not read the method.
+WORDS = (
+    ("D, direct light", "of each camera pixel: comes from the projector pixels at q, four at most"),
+    ("q", "the projector pixel that lights a camera pixel directly"),
+    ("N, near-range light", "comes from projector pixels about q: scattered under the surface"),
+    ("W, the window", "the square of W x W projector pixels about q that is to hold N"),
+    ("F, far-range light", "comes from everywhere by way of other surfaces, and varies slowly"),
+    ("far band, k_far", "the few low frequencies, over the whole projector, that are to hold F"),
+    ("k_near", "the frequency beyond which N is taken to be silent, cycles per projector pixel"),
+    (
+        "checkerboard",
+        "the finest pattern, every other pixel lit: D alone should answer to it, and the paper's "
+        "estimate of D takes all of the answer for D",
+    ),
+    (
+        "condition",
+        "by how much noise in the direction of a window that the patterns see worst exceeds that "
+        "in the best one; 1 is ideal",
+    ),
+    (
+        "SNR_b, SNR_t",
+        "20 log10 of a relit picture's, or a row's, length over that of its error: 20 dB is 10 % "
+        "off",
+    ),
+    (
+        "good, doubtful, wrong",
+        f"good: the best D + N + F with this W and far band, without noise, relights pictures at "
+        f"{GOOD_DECIBELS:g} dB or more and has an SNR_t of {GOOD_ROW_DECIBELS:g} dB or more; "
+        f"doubtful: {DOUBTFUL_DECIBELS:g} and {DOUBTFUL_ROW_DECIBELS:g} dB; wrong: less",
+    ),
+)
 HEAD = ("", "assumed", "measured")
+SPLIT_BY_MODEL = (
+    " The transport's components are not known apart, so they are split as the model fits them "
+    "best: q where a row peaks, N inside the window by definition, F the rest."
+)
 
 
 def check_rows(check: Mapping[str, Any]) -> list[list[str]]:
@@ -20,6 +63,13 @@ def check_rows(check: Mapping[str, Any]) -> list[list[str]]:
     condition = check["condition"]
     far = "x".join(str(side) for side in check["far"])
     return [
+        [
+            "the best that the model can do, without noise",
+            "",
+            f"{check['best_pictures']:.1f} dB under pictures, {check['best_rows']:.1f} dB SNR_t of "
+            f"the median camera pixel",
+        ],
+        ["camera pixels with direct light", "all", f"{check['lit']:.1%}"],
         ["N outside the window", "none", f"{check['near_outside']:.2%} of its energy"],
         [
             f"N beyond k_near = {check['k_near']:.3f} cycles/pixel",
@@ -68,6 +118,7 @@ def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Si
     condition : Conditioning
     camera : Size
     """
+    verdict = judge_check(check)
     shares = facts([(f"{share:.1%}", f"{part} light") for part, share in check.floodlit.items()])
     maps = ""
     if check.camera_pixels == camera.pixels:
@@ -79,13 +130,17 @@ def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Si
         maps = f'<h2>Where it does not</h2><div class="maps">{maps}</div>'
     body = f"""
 <h1>Where the model holds: {escape(name)}</h1>
+<p class="verdict {verdict.grade}">{verdict.grade}: {escape(verdict.says)}</p>
+{listed(list(verdict.causes)) if verdict.causes else ""}
 <p>The method takes each camera pixel's near-range light to come from a window of {check.window} x
 {check.window} projector pixels and to vary no faster than k_near, its far-range light to lie in a
 band of {check.far} frequencies, and both to be silent at the checkerboard. Shares are of energy,
-over {check.camera_pixels} camera pixels.</p>
+over {check.camera_pixels} camera pixels.{SPLIT_BY_MODEL if check.is_split_by_model else ""}</p>
 {shares}
 {numbers(list(HEAD), check_rows(numbers_of(check, condition)))}
 {maps}
+<h2>Words</h2>
+{numbers(["word", "meaning"], [list(pair) for pair in WORDS])}
 """
     return page(f"nearfar: where the model holds on {name}", body)
 

@@ -1,7 +1,8 @@
 """Where the paper's assumptions hold on a scene (sections 3.2, 3.3 and 4.2).
 
 The method takes N to lie in a window and to be silent beyond k_near, F to be silent beyond k_far,
-and both to be silent at the checkerboard. `check_model` says how much of each lies elsewhere.
+and both to be silent at the checkerboard. `check_model` says how much of each lies elsewhere, and
+how well the best D + N + F of the model would relight.
 
 Index convention: rows are (n, channels, Py, Px), n camera pixels in a block.
 """
@@ -9,7 +10,6 @@ Index convention: rows are (n, channels, Py, Px), n camera pixels in a block.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import gcd
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,15 @@ from nearfar.arrays import AnySize, Floats, Size, as_size, blocks
 from nearfar.callbacks import OldReport, Report, as_report
 from nearfar.checks import as_count, as_number
 from nearfar.errors import InputError
-from nearfar.illumination.frequencies import band
+from nearfar.illumination.frequencies import band, default_dropped
+from nearfar.illumination.pictures import standard_lights
+from nearfar.plan import paper_plan
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
-from nearfar.workflow.conditioning import Conditioning
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.model import Transport
+from nearfar.workflow.evaluate import decibels, snr_where_lit
+from nearfar.workflow.model_fit import far_basis_of, held_by_model, split_by_model
 
 PIXELS_AT_ONCE = 64
 # Camera pixels that are examined by default, evenly spaced.
@@ -61,6 +66,13 @@ class ModelCheck:
     far_beyond_map, checkerboard_map : ndarray, shape (n,)
         Per camera pixel examined: share of F beyond k_far that is outside the window, and
         |N + F| over D at the checkerboard (NaN without direct light).
+    best_pictures, best_rows : float
+        The most that the model with this W and far band can reach, without noise, in dB: SNR_b
+        under natural pictures, their mean, and SNR_t of the median camera pixel that sees light.
+    lit : float
+        Share of direct light's camera pixels among those that see any light.
+    is_split_by_model : bool
+        Whether the components were not known apart, and are those of `nearfar.workflow.model_fit`.
     """
 
     window: int
@@ -78,6 +90,10 @@ class ModelCheck:
     checkerboard_far: float
     far_beyond_map: Floats
     checkerboard_map: Floats
+    best_pictures: float
+    best_rows: float
+    lit: float
+    is_split_by_model: bool
 
 
 def default_k_near(window: int) -> float:
@@ -90,7 +106,7 @@ def default_k_near(window: int) -> float:
 
 
 def check_model(
-    transport: Apart,
+    transport: ExactTransport | Transport,
     window: int,
     far: AnySize,
     *,
@@ -103,7 +119,7 @@ def check_model(
     Parameters
     ----------
     transport : ExactTransport or Transport
-        With its components apart.
+        If its components are not known apart, they are split as the model fits them best.
     window : int
         W.
     far : Size or (height, width)
@@ -122,7 +138,7 @@ def check_model(
     Raises
     ------
     InputError
-        If W or the far band do not fit the projector, or the components are not apart.
+        If W or the far band do not fit the projector, or the transport holds no light.
 
     Examples
     --------
@@ -133,16 +149,14 @@ def check_model(
     report = as_report(progress)
     projector, far = transport.projector, as_size(far, "far band")
     window, sample = as_count(window, "window"), as_count(sample, "the sample of camera pixels")
-    if not 1 <= window <= min(projector) or far.height > projector[0] or far.width > projector[1]:
+    if (
+        not 1 <= window <= largest_window(projector)
+        or far.height > projector[0]
+        or far.width > projector[1]
+    ):
         raise InputError(
             f"W = {window} and a far band of {far} do not fit a projector of {projector}: choose "
             f"smaller ones."
-        )
-    if getattr(transport, "is_apart", True) is False:
-        raise InputError(
-            "the transport's components are not known apart, so there is nothing to check: name "
-            "a built-in scene's, which 'nearfar render' writes, or what 'nearfar reconstruct' "
-            "wrote."
         )
     limit = default_k_near(window) if k_near is None else as_number(k_near, "k_near")
     if sample < 1 or not limit > 0:
@@ -150,6 +164,9 @@ def check_model(
             f"a sample of {sample} camera pixels and k_near = {limit} tell nothing: both must be "
             f"above 0."
         )
+    apart: Apart = transport
+    if isinstance(transport, ExactTransport) and not transport.is_apart:
+        apart = split_by_model(transport, window, far)
     totals = _Totals(projector, window, far)
     pixels = transport.camera.pixels
     step = max(1, pixels // sample)
@@ -157,18 +174,40 @@ def check_model(
     while step > 1 and gcd(step, transport.camera.width) > 1:
         step += 1
     chosen = np.arange(0, pixels, step)
-    centres = near.centre(transport.correspondence, projector)
-    lit = np.isfinite(transport.correspondence[..., 0]).ravel()
+    q = apart.correspondence.reshape(-1, 2)
+    centres = near.centre(q, projector)
+    lit = np.isfinite(q[:, 0])
     for block in blocks(len(chosen), PIXELS_AT_ONCE):
         mine = chosen[block]
         part = slice(int(mine[0]), int(mine[-1]) + 1, step)
         rows = [
             np.asarray(component).reshape(len(mine), -1, *projector)
-            for component in transport.component_rows(part)
+            for component in apart.component_rows(part)
         ]
         totals.add(rows, centres[mine], lit[mine])
+        totals.fit(rows, q[mine])
         report("rows", block.stop / len(chosen))
-    return totals.result(limit)
+    return totals.result(limit, lit[chosen], is_split_by_model=apart is not transport)
+
+
+def dropped_of(projector: Size, window: int, far: Size, dropped: Size | None) -> Size:
+    """Return the near frequencies that the paper's plan of this W and far band drops.
+
+    Raises
+    ------
+    PlanError
+        If there is no such plan.
+    """
+    if min(projector) > 1:
+        plan = paper_plan(projector, window, far, dropped=dropped, correspondence="none")
+        return plan.dropped
+    # No plan fits a projector of one row or column: its windows run all along it.
+    return default_dropped(window, far, projector) if dropped is None else dropped
+
+
+def largest_window(projector: Size) -> int:
+    """Return the largest W that is checked: a projector of one row has windows all along it."""
+    return min(projector) if min(projector) > 1 else max(projector)
 
 
 class _Totals:
@@ -190,6 +229,13 @@ class _Totals:
         self.board = np.zeros(3)  # energies of D, N and F at the checkerboard, lit pixels
         self.far_maps: list[Floats] = []
         self.board_maps: list[Floats] = []
+        self.basis = far_basis_of(far, projector)
+        pictures = [
+            light for name, light in standard_lights(projector).items() if name.startswith("pict")
+        ]
+        self.pictures = np.stack(pictures).reshape(len(pictures), -1)
+        self.picture_energies = np.zeros((2, len(pictures)))  # of the truth, of the error
+        self.row_energies: list[NDArray[np.float64]] = []
 
     def add(self, rows: list[Floats], centres: NDArray[np.int64], lit: NDArray[np.bool_]) -> None:
         self.flood += [float(part.sum(dtype=np.float64)) for part in rows]
@@ -215,6 +261,15 @@ class _Totals:
         own = np.sqrt(np.sum(boards[0] ** 2, axis=1))
         self.board_maps.append(np.where(lit, other / np.maximum(own, 1e-300), np.nan))
 
+    def fit(self, rows: list[Floats], q: Floats) -> None:
+        """Add what the model can hold at best of these rows."""
+        whole = rows[0] + rows[1] + rows[2]
+        off = whole - sum(held_by_model(whole, q, self.window, self.basis))
+        flat = [part.reshape(-1, self.projector.pixels).astype(np.float64) for part in (whole, off)]
+        self.picture_energies += [np.sum((part @ self.pictures.T) ** 2, axis=0) for part in flat]
+        squares = [np.square(part).reshape(len(whole), -1).sum(axis=1) for part in flat]
+        self.row_energies.append(np.stack(squares))
+
     def _windows(self, centres: NDArray[np.int64]) -> NDArray[np.bool_]:
         mask = np.zeros((len(centres), self.projector.pixels), dtype=bool)
         inside = near.inside(centres, self.window, self.projector)
@@ -223,10 +278,14 @@ class _Totals:
         mask[number, places[number, entry]] = True
         return mask.reshape(-1, *self.projector)
 
-    def result(self, k_near: float) -> ModelCheck:
+    def result(
+        self, k_near: float, lit: NDArray[np.bool_], *, is_split_by_model: bool
+    ) -> ModelCheck:
         n, f = self.spectrum
         d_board = max(self.board[0], 1e-300)
         total = max(float(self.flood.sum()), 1e-300)
+        best = snr_where_lit(*np.concatenate(self.row_energies, axis=1))
+        bright = np.isfinite(best)
         return ModelCheck(
             window=self.window,
             far=self.far,
@@ -246,6 +305,12 @@ class _Totals:
             checkerboard_far=float(np.sqrt(self.board[2] / d_board)),
             far_beyond_map=np.concatenate(self.far_maps),
             checkerboard_map=np.concatenate(self.board_maps),
+            best_pictures=float(
+                np.mean([decibels(*pair) for pair in self.picture_energies.T.tolist()])
+            ),
+            best_rows=float(np.median(best[bright])) if bright.any() else 0.0,
+            lit=float(lit[bright].mean()) if bright.any() else 0.0,
+            is_split_by_model=is_split_by_model,
         )
 
     def _bandwidth(self, energy: Floats) -> dict[float, float]:
@@ -267,13 +332,3 @@ def _whole(count: int) -> NDArray[np.int64]:
 
 def _share(part: float, whole: float) -> float:
     return float(part / whole) if whole > 0 else 0.0
-
-
-def numbers_of(check: ModelCheck, condition: Conditioning) -> dict[str, Any]:
-    """Return a check's numbers as JSON holds them: all but its maps."""
-    found = {
-        name: value for name, value in vars(check).items() if not isinstance(value, np.ndarray)
-    }
-    for name in ("near_bandwidth", "far_bandwidth"):
-        found[name] = {str(share): k for share, k in found[name].items()}
-    return found | {"far": list(check.far), "condition": vars(condition)}

@@ -14,7 +14,8 @@ from nearfar.callbacks import Report
 from nearfar.illumination.frequencies import as_array, far_frequencies, near_frequencies
 from nearfar.illumination.pictures import white
 from nearfar.scenes.cache import cached_scene
-from nearfar.workflow.check import check_model, numbers_of
+from nearfar.workflow.check import check_model
+from nearfar.workflow.check_verdict import numbers_of
 from nearfar.workflow.conditioning import condition_near
 from nearfar.workflow.experiments.acquired import Acquisition, thin
 from nearfar.workflow.experiments.data import Data

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from nearfar import Size, load_exact, load_transport, snr
+from nearfar.arrays import parse_size
 from nearfar.baselines.separation_patterns import checkerboards, sinusoids
 from nearfar.files import read_picture
 from nearfar.scenes import SCENES
@@ -401,9 +402,8 @@ def test_patterns_that_do_not_fit(tmp_path: Path, untouched, options, words):
     _refused(untouched, (tmp_path / "out", "--export", *GRID, *options), words)
 
 
-def test_a_truth_that_does_not_fit(finished, tmp_path: Path, untouched):
+def test_a_truth_that_does_not_fit(finished, tmp_path: Path):
     command = (tmp_path / "out", "--rig", finished.truth, *GRID)
-    _refused(untouched, (*command, "--truth", finished.truth), "without its components")
     other = tmp_path / "other.zarr"
     check_done(run_nearfar("render", "corner", other, "--projector", "16x16"))
     _refused(lambda: True, (*command, "--truth", other), "16x16", "8x9")
@@ -461,3 +461,49 @@ def test_force_replaces_patterns_by_pictures_but_no_other_folder(
 def test_photos_are_kept(tmp_path: Path, shot, untouched):
     photos = shot()
     _refused(untouched, (photos / ".." / "photos", "--photos", photos, "--force"), "is kept")
+
+
+# A dense T of any origin
+
+
+@pytest.mark.parametrize("grid", ["16x20", "1x32", "32x1"])
+@pytest.mark.parametrize("pattern", ["checkerboard", "sinusoid"])
+def test_a_dense_transport_is_shot_and_compared_with(tmp_path: Path, grid: str, pattern: str):
+    projector = parse_size(grid)
+    # A mirror for the direct light, at every other projector pixel, and a grey wall for the rest.
+    direct = np.zeros((4, 4, projector.pixels), dtype=np.float32)
+    direct.reshape(16, -1)[np.arange(16), 2 * np.arange(16)] = 300.0
+    wall = np.full_like(direct, 200.0 / projector.pixels)
+    path = tmp_path / "t.npy"
+    np.save(path, (direct + wall).reshape(4, 4, *projector))
+    out = tmp_path / "out"
+    # Each camera pixel sees one projector pixel.
+    options = ("--pattern", pattern, *(("--side", 1) if pattern == "checkerboard" else ()))
+    ran = run_nearfar("separate", out, "--rig", path, "--truth", path, *options)
+    assert ran.status == 0, ran.err
+    snr_of = json.loads((out / "numbers.json").read_text())["snr"]["truth"]
+    # The grid is the file's own, and the direct light is found where rows peak.
+    assert snr_of["direct"] > 25
+    assert snr_of["global"] > 25
+
+
+def test_the_exposure_of_own_photos_is_fitted_to_the_truth(finished, tmp_path: Path, shot):
+    photos, grey = shot("--side", "1"), tmp_path / "grey.npy"
+    for units in (1.0, 1000.0):
+        np.save(grey, units * np.load(finished.truth)[..., 0])
+        command = ("separate", tmp_path / f"out-{units}", "--photos", photos, "--side", "1")
+        check_done(run_nearfar(*command, "--truth", grey))
+    one, other = (
+        json.loads((tmp_path / f"out-{units}" / "numbers.json").read_text())["snr"]["truth"]
+        for units in (1.0, 1000.0)
+    )
+    assert other == pytest.approx(one, abs=0.01)
+    assert one["global"] > 10
+
+
+def test_one_pixel_shows_no_pattern(tmp_path: Path):
+    path = tmp_path / "t.npy"
+    np.save(path, np.ones((3, 3, 1, 1), dtype=np.float32))
+    for pattern in ("checkerboard", "sinusoid"):
+        ran = run_nearfar("separate", tmp_path / "out", "--rig", path, "--pattern", pattern)
+        check_sentence(ran, "1x1 shows no pattern")

@@ -39,7 +39,7 @@ def checkerboards(
     Parameters
     ----------
     projector : Size
-        Pattern grid, at least two squares on both axes.
+        Pattern grid, at least two squares on both axes, or on one if it has a single row or column.
     side : int
         Side of a square, projector pixels.
     step : int, optional
@@ -56,10 +56,11 @@ def checkerboards(
         If the squares do not fit the projector or the step does not fit the squares.
     """
     step = default_step(side) if step is None else step
-    if side < 1 or 2 * side > min(projector):
+    shorter = shorter_axis(projector)
+    if side < 1 or 2 * side > shorter:
         raise InputError(
             f"`side={side}` does not fit a projector of {projector}, which holds squares of 1 to "
-            f"{min(projector) // 2} pixels: choose one of these."
+            f"{shorter // 2} pixels: choose one of these."
         )
     offsets = _offsets(side, step)
     drawn = []
@@ -71,6 +72,22 @@ def checkerboards(
             board = (np.uint8(255) * white).astype(np.uint8)
             drawn += [board, invert(board)]
     return np.stack(drawn)
+
+
+def shorter_axis(projector: Size) -> int:
+    """Return the shorter side that patterns can vary along, which one of a single pixel is not.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    sides = [side for side in projector if side > 1]
+    if not sides:
+        raise InputError(
+            f"a projector of {projector} shows no pattern to separate by: give a larger one."
+        )
+    return min(sides)
 
 
 def count_checkerboards(side: int = DEFAULT_SIDE, step: int | None = None) -> int:
@@ -95,7 +112,8 @@ def sinusoids(
     Parameters
     ----------
     projector : Size
-        Pattern grid, at least a period on both axes.
+        Pattern grid, at least a period on both axes. Along an axis of a single pixel nothing
+        varies: the patterns of the other are drawn twice.
     period : int
         Projector pixels, at least 2.
     shifts : int
@@ -111,14 +129,20 @@ def sinusoids(
     InputError
         If there are too few shifts or the period does not fit the projector.
     """
-    if not 2 <= period <= min(projector):
+    shorter = shorter_axis(projector)
+    if not 2 <= period <= shorter:
         raise InputError(
             f"`period={period}` does not fit a projector of {projector}: choose a period of 2 to "
-            f"{min(projector)} pixels."
+            f"{shorter} pixels."
         )
     count = count_sinusoids(shifts) // 2
     drawn: list[NDArray[np.uint8]] = []
-    for cycles in ((Fraction(1, period), Fraction(0)), (Fraction(0), Fraction(1, period))):
+    down, across = (Fraction(1, period), Fraction(0)), (Fraction(0), Fraction(1, period))
+    if projector.height == 1:
+        down = across
+    elif projector.width == 1:
+        across = down
+    for cycles in (down, across):
         start = phase(wrap(*cycles), projector)
         shifted = [
             quantise(0.5 + 0.5 * np.cos(2 * np.pi * (start + j / count))) for j in range(count)

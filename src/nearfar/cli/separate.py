@@ -47,7 +47,9 @@ def separate(
     projector: Annotated[
         Size | None,
         typer.Option(
-            parser=size, metavar="HxW", help="Pattern grid; a scene's own if left out with --rig."
+            parser=size,
+            metavar="HxW",
+            help="Pattern grid; a scene's or a stored transport's own if left out with --rig.",
         ),
     ] = None,
     pattern: Annotated[
@@ -109,7 +111,11 @@ def separate(
     ] = None,
     truth: Annotated[
         Path | None,
-        typer.Option(help="Compare with what render wrote of the scene.", metavar="TRUTH"),
+        typer.Option(
+            help="Compare with what render wrote of the scene, or with a dense T of any origin, "
+            "split as the model fits it best.",
+            metavar="TRUTH",
+        ),
     ] = None,
     transport: Annotated[
         Path | None,
@@ -162,7 +168,8 @@ def separate(
     if export:
         steps.export_patterns(output, method, projector, scale, native, force=force, quiet=quiet)
         return
-    exposure = 1.0
+    # Only a simulated rig knows how its photos relate to the truth.
+    exposure: float | None = None
     with progress_bar("separating", quiet=quiet) as report:
         if photos is not None:
             taken = steps.read_photos(
@@ -172,7 +179,7 @@ def separate(
         else:
             assert rig is not None
             taken, rig_says = steps.shoot_photos(rig, projector, method, report)
-            described, exposure = {"rig": rig_says}, rig_says.get("transport_exposure", 1.0)
+            described, exposure = {"rig": rig_says}, rig_says.get("transport_exposure")
         found = take_apart(
             taken, method.separate, progress=lambda share: report("separating", share)
         )

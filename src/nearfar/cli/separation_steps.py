@@ -77,14 +77,9 @@ def shoot_photos(
     """Shoot a method's patterns; return the photos and the rig's description."""
     from nearfar.baselines.separation_photos import shoot_to_separate
     from nearfar.rigs.opening import open_rig
-    from nearfar.scenes import SCENES, sizes
 
     if projector is None:
-        if rig not in SCENES:
-            raise typer.BadParameter(
-                f"--rig {rig} needs the pattern grid.", param_hint="--projector"
-            )
-        projector, _ = sizes(rig)
+        projector = _projector_of(rig)
     assert method.draw is not None
     # Patterns that do not fit are refused before a scene is computed.
     patterns = method.draw(projector)
@@ -95,11 +90,24 @@ def shoot_photos(
         return shoot_to_separate(opened, patterns, progress=progress), opened.describe()
 
 
+def _projector_of(rig: str) -> Size:
+    """Return the pattern grid of a scene, or of a stored transport that knows it."""
+    from nearfar.rigs.simulated.opening import load_world
+    from nearfar.scenes import SCENES, sizes
+
+    if rig in SCENES:
+        return sizes(rig)[0]
+    path = Path(rig)
+    if path.suffix.lower() in {".toml", ".xml"} or not path.exists():
+        raise typer.BadParameter(f"--rig {rig} needs the pattern grid.", param_hint="--projector")
+    return load_world(path, None, None).projector
+
+
 def compare(
     found: "Separation",
     truth: Path | None,
     transport: Path | None,
-    exposure: float,
+    exposure: float | None,
     projector: Size | None,
 ) -> dict[str, dict[str, float]]:
     """Return the SNR of direct and global against a truth or a reconstruction, in dB."""

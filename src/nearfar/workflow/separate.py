@@ -15,10 +15,12 @@ from nearfar.errors import InputError
 from nearfar.faults.of_capture import find_saturation
 from nearfar.files import encode_png, new_output, write_picture
 from nearfar.illumination.frames import FrameLayout, draw_frame, fit_frame
+from nearfar.plan.choose import default_window
 from nearfar.release import version
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import snr
+from nearfar.workflow.model_fit import split_by_model
 
 NUMBERS_NAME = "numbers.json"
 PICTURE_NAMES = ("direct", "global")
@@ -184,32 +186,49 @@ def is_separation(folder: Path) -> bool:
 
 
 def compare_to_truth(
-    found: Separation, truth: ExactTransport, exposure: float = 1.0
+    found: Separation, truth: ExactTransport, exposure: float | None = 1.0
 ) -> dict[str, float]:
-    """SNR of direct and global under full white, as physics has them (global = N + F), dB.
+    """SNR of direct and global under full white (global = N + F), dB.
 
     Parameters
     ----------
     found : Separation
     truth : ExactTransport
-        With its components apart.
-    exposure : float
-        Photo units per unit of the truth.
+        Its components are as physics has them where they are known apart, and else as the model
+        with the window and far band of the paper's plans fits them best.
+    exposure : float, optional
+        Photo units per unit of the truth; fitted to the sum of both pictures if left out.
 
     Raises
     ------
     InputError
-        If its components are not known, or its camera or channels differ from those of `found`.
+        If the truth holds no light, or its camera or channels differ from those of `found`.
     """
-    if not truth.is_apart:
-        raise InputError(
-            f"the truth {truth.name} holds T without its components, so its direct light is not "
-            f"known: give what nearfar render wrote of a built-in scene."
-        )
-    light = np.ones(truth.projector, dtype=np.float32)
-    direct, near, far = truth.component_pictures(light)
-    scale = np.float32(exposure)
-    return _snr_of(found, Separation(scale * direct, scale * (near + far)), "truth")
+    if truth.is_apart:
+        light = np.ones(truth.projector, dtype=np.float32)
+        direct, near, far = truth.component_pictures(light)
+        known = Separation(direct, near + far)
+    else:
+        window, band = default_model(truth.projector)
+        known = Separation(*split_by_model(truth, window, band).floodlit())
+    _require_same_sizes(found, known, "truth")
+    scale = np.float32(_fitted(found, known) if exposure is None else exposure)
+    return _snr_of(found, Separation(*(scale * picture for picture in known)), "truth")
+
+
+def default_model(projector: Size) -> tuple[int, Size]:
+    """Return the window and the far band by which a dense T is split: those of usual plans."""
+    window = default_window(projector)
+    # About 0.1 of each side, odd.
+    band = Size(*(2 * round(side / 20) + 1 for side in projector))
+    return window, Size(*(min(part, side) for part, side in zip(band, projector, strict=True)))
+
+
+def _fitted(found: Separation, known: Separation) -> float:
+    """Return the factor that brings the known floodlit picture nearest to the one found."""
+    ours, theirs = ((pair.direct + pair.global_).astype(np.float64) for pair in (found, known))
+    energy = float(np.vdot(theirs, theirs))
+    return float(np.vdot(theirs, ours)) / energy if energy > 0 else 1.0
 
 
 def compare_to_transport(found: Separation, transport: Transport) -> dict[str, float]:
@@ -229,6 +248,12 @@ def compare_to_transport(found: Separation, transport: Transport) -> dict[str, f
 
 
 def _snr_of(found: Separation, known: Separation, what: str) -> dict[str, float]:
+    _require_same_sizes(found, known, what)
+    pairs = zip(PICTURE_NAMES, known, found, strict=True)
+    return {name: snr(values, mine) for name, values, mine in pairs}
+
+
+def _require_same_sizes(found: Separation, known: Separation, what: str) -> None:
     if found.direct.shape != known.direct.shape:
         ours, theirs = (
             f"{Size(*pictures.direct.shape[:2])} with {pictures.direct.shape[2]} channels"
@@ -238,5 +263,3 @@ def _snr_of(found: Separation, known: Separation, what: str) -> dict[str, float]
             f"the photos are {ours}, the {what}'s camera is {theirs}: compare two of the same "
             f"scene and sizes."
         )
-    pairs = zip(PICTURE_NAMES, known, found, strict=True)
-    return {name: snr(values, mine) for name, values, mine in pairs}

@@ -72,7 +72,8 @@ def test_the_demo_ends_in_a_page_and_is_as_accurate(tmp_path: Path, monkeypatch,
     assert "nan dB" not in text
     judged = json.loads((tmp_path / "out" / "numbers.json").read_text())
     assert f"{judged['snr_b_pictures']:.1f} dB" in text
-    # cornell, W = 11, far band 7x7, as in `CASES`.
+    assert "117</b><span>photos in all" in text
+    assert "35.0×</b><span>fewer than 4096" in text
     _check_accuracy(judged, 40.3, 48.0)
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"plan.json", "capture.zarr", "transport.zarr", "report.html", "numbers.json"}

@@ -10,7 +10,7 @@ from typing import Any
 from nearfar.arrays import Size
 from nearfar.files import new_output
 from nearfar.illumination.pictures import natural_picture, penguin, white
-from nearfar.plan import paper_plan
+from nearfar.plan import choose_plan
 from nearfar.report.demo_page import demo_page
 from nearfar.rigs.opening import open_rig
 from nearfar.scenes.cache import cached_scene
@@ -22,8 +22,8 @@ from nearfar.workflow.reconstruction.reconstruct import reconstruct
 
 SCENE = "cornell"
 PROJECTOR = Size(64, 64)
-WINDOW = 11
-FAR_BAND = Size(7, 7)
+# A quarter of what the paper's plan takes, and about as accurate.
+PHOTOS = 117
 
 PLAN, CAPTURE, TRANSPORT, REPORT = "plan.json", "capture.zarr", "transport.zarr", "report.html"
 NUMBERS = "numbers.json"
@@ -71,7 +71,7 @@ def run_demo(
 
     with new_output(output, force=force, replaceable=is_demo) as partial:
         partial.mkdir()
-        plan = paper_plan(PROJECTOR, WINDOW, FAR_BAND)
+        plan, _ = choose_plan(PROJECTOR, PHOTOS, progress=report)
         (partial / PLAN).write_text(plan.to_json(), encoding="utf-8")
         with timed("scene"):
             truth = cached_scene(SCENE, PROJECTOR, progress=report)
@@ -79,7 +79,7 @@ def run_demo(
             rig = open_rig(SCENE, PROJECTOR)
             capture = acquire(plan, partial / CAPTURE, rig, progress=report)
         with timed("reconstruction"):
-            transport, correspondence = reconstruct(capture, method="paper", progress=report)
+            transport, correspondence = reconstruct(capture, progress=report)
         save_transport(transport, partial / TRANSPORT)
         with timed("evaluation"):
             judgement = judge_by_truth(transport, truth, progress=report)

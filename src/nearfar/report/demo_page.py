@@ -9,12 +9,11 @@ from nearfar.arrays import Floats
 from nearfar.correspondence import Correspondence
 from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
+from nearfar.report.differences import difference_gain
 from nearfar.report.page import colour_map, facts, gallery, page
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import Rows
-
-DIFFERENCE_GAIN = 20
 
 
 def demo_page(
@@ -46,21 +45,23 @@ def demo_page(
         Duration of each step, by name.
     """
     snr_b = judgement["snr_b"]
+    photos, brute_force = len(plan.patterns), plan.projector.pixels
     cards = facts(
         [
-            (str(plan.transport_photos), "photos of transport"),
-            (f"{plan.savings:.1f}×", f"fewer than {plan.projector.pixels} by brute force"),
-            (str(plan.counts["correspondence"]), "photos of stripes for correspondence"),
+            (str(photos), "photos in all, those of white and black too"),
+            (f"{brute_force / photos:.1f}×", f"fewer than {brute_force} by brute force"),
             (f"{snr_b['white']:.1f} dB", "SNR_b under floodlight"),
             (f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of five pictures"),
             (f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"),
         ]
     )
+    gain = difference_gain((transport @ light) - (truth @ light) for light in lights.values())
     columns = ["light", "direct", "near-range", "far-range", "sum: relit", "photo (exact)"]
-    columns.append(f"difference × {DIFFERENCE_GAIN}")
-    galleries = gallery(
-        columns, [(name, _row(name, light, transport, truth)) for name, light in lights.items()]
-    )
+    columns.append(f"difference × {gain}")
+    rows_of_pictures = [
+        (name, _row(name, light, transport, truth, gain)) for name, light in lights.items()
+    ]
+    galleries = gallery(columns, rows_of_pictures)
     ceiling = judgement["ceiling"]["snr_b"]
     table = numbers(
         ["light", "SNR_b", "ceiling of the model, no noise"],
@@ -80,17 +81,17 @@ def demo_page(
 <h1>A scene's light transport, taken apart</h1>
 <p>A projector of {plan.projector} pixels and a camera of {transport.camera} look at a box with red
 and green walls, a glossy cup and a translucent candle. The photos are simulated with shot and read
-noise. Every camera pixel's transport was reconstructed from {len(plan.patterns)} of them, and the
-scene relit under light that was never projected.</p>
+noise. Every camera pixel's transport was reconstructed from {photos} of them, which also tell the
+projector pixel that lights it, and the scene relit under light that was never projected.</p>
 {cards}
 <h2>Relighting, components apart</h2>
 <p>Direct light holds the highlights; light under the candle's skin is near-range; the walls' red
 and green on candle and cup are far-range. Near-range is shown twice as bright. The exact picture
-stands beside the sum.</p>
+stands beside the sum, and their difference, {gain} times as bright.</p>
 {galleries}
 <h2>How close</h2>
 <p>SNR_b compares relit pictures with exact ones. The ceiling is the best that direct light, a
-window of {plan.window} × {plan.window} and a far band of {plan.far} could do on this scene.</p>
+window of {transport.window} × {transport.window} and the far band could do on this scene.</p>
 {table}
 <p></p>
 {parts}
@@ -102,10 +103,12 @@ window of {plan.window} × {plan.window} and a far band of {plan.far} could do o
     return page("nearfar: light transport, taken apart", body)
 
 
-def _row(name: str, light: Floats, transport: Transport, truth: ExactTransport) -> list[str]:
+def _row(
+    name: str, light: Floats, transport: Transport, truth: ExactTransport, gain: int
+) -> list[str]:
     parts = transport.components(light)
     relit, exact = parts.direct + parts.near + parts.far, truth @ light
-    difference = DIFFERENCE_GAIN * np.abs(relit - exact)
+    difference = gain * np.abs(relit - exact)
     images = [light, parts.direct, 2 * parts.near, parts.far, relit, exact, difference]
     names = ["light", "direct", "near-range", "far-range", "relit", "exact", "difference"]
     return [

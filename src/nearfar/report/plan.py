@@ -20,7 +20,8 @@ def describe_plan(plan: Plan) -> str:
             f"projector {plan.projector}, W = {plan.window}, far band {plan.far}, "
             f"near frequencies dropped {plan.dropped}, offset {plan.offset}",
             f"{len(plan.patterns)} photos: {counts}",
-            f"{plan.transport_photos} photos of transport against {plan.projector.pixels} by brute "
-            f"force: {plan.savings:.2f} times fewer",
+            f"{plan.projector.pixels / len(plan.patterns):.2f} times fewer than the "
+            f"{plan.projector.pixels} of brute force; counting the {plan.transport_photos} of "
+            f"transport alone, {plan.savings:.2f} times",
         ]
     )

@@ -1,5 +1,6 @@
 """Dense transports of any origin: every file and shape that holds one gives the same."""
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import zarr
 from nearfar.arrays import Size
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import kind_of_store
-from nearfar.transport.exact_store import load_exact
+from nearfar.transport.exact import ExactTransport
+from nearfar.transport.exact_store import load_exact, save_exact
 
 PROJECTOR, CAMERA, CHANNELS = Size(3, 5), Size(4, 2), 3
 GRID = np.random.default_rng(5).uniform(size=(*CAMERA, *PROJECTOR, CHANNELS)).astype(np.float32)
@@ -82,3 +84,16 @@ def test_what_holds_no_transport_is_refused(tmp_path: Path):
     (broken / "c" / "0" / "0" / "0" / "0" / "0").write_bytes(b"no chunk")
     with pytest.raises(UnreadableFileError, match="is damaged"):
         load_exact(broken)
+
+
+def test_a_scene_is_read_without_a_second_copy_of_it(tmp_path: Path):
+    far = np.zeros((1, 4096, 2048), dtype=np.float32)
+    save_exact(ExactTransport(Size(32, 64), Size(64, 64), (), (), far), tmp_path / "t.zarr")
+    tracemalloc.start()
+    try:
+        found = load_exact(tmp_path / "t.zarr")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert found.far.shape == far.shape
+    assert peak < 1.7 * far.nbytes

@@ -16,7 +16,7 @@ from nearfar.cli.choices import choice
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
 from nearfar.cli.reshoot import photo_numbers, take_again
-from nearfar.cli.saying import say, say_captured, say_reconstructed, warn
+from nearfar.cli.saying import say, say_captured, say_memory, say_reconstructed, warn
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.progress import Report, duration, progress_bar
@@ -123,6 +123,7 @@ def acquire(
     check_resumable(output, RESUMABLE_CAPTURE, resume=resume, force=force)
     if transport is not None:
         _check_transport(transport, output, plan_file, Path(rig), force=force)
+    say_memory(rig, made.projector, quiet=quiet)
     with ExitStack() as stack:
         report = stack.enter_context(progress_bar("opening the rig", quiet=quiet))
         # A capture that is resumed keeps the exposure that it started with.

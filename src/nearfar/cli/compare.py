@@ -20,7 +20,7 @@ from nearfar.cli.options import (
     check_report_page,
     scene_names,
 )
-from nearfar.cli.saying import say, warn
+from nearfar.cli.saying import say, say_memory, warn
 from nearfar.errors import KeptInterrupt
 from nearfar.progress import Report, progress_bar
 from nearfar.scenes import SCENES
@@ -97,7 +97,7 @@ def compare(
         check_report_page(report, Path(scene), *([output] if output else []), force=force)
     budgets, methods = _budgets(photos), known_methods(method)
     with outputs.kept(), progress_bar("comparing", quiet=quiet or as_json) as told:
-        truth = _load(scene, projector, camera, told)
+        truth = _load(scene, projector, camera, told, quiet=quiet or as_json)
         budgets = known_budgets(truth.projector, budgets)
         say(describe_work(truth, methods, budgets), quiet=quiet or as_json)
         run(
@@ -188,13 +188,14 @@ class _Outputs:
 
 
 def _load(
-    scene: str, projector: Size | None, camera: Size | None, report: Report
+    scene: str, projector: Size | None, camera: Size | None, report: Report, *, quiet: bool
 ) -> "ExactTransport":
     """Compute a scene, or load a transport."""
     from nearfar.scenes.cache import cached_scene
     from nearfar.transport.exact_store import load_exact
 
     if scene in SCENES:
+        say_memory(scene, projector, camera, quiet=quiet)
         return cached_scene(scene, projector, camera, progress=report)
     return load_exact(Path(scene), projector=projector, camera=camera)
 

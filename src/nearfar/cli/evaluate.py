@@ -13,6 +13,7 @@ from nearfar.cli.options import (
     ReportPath,
     TransportPath,
     check_report_page,
+    require_reconstructed,
 )
 from nearfar.cli.saying import say, warn
 from nearfar.progress import progress_bar
@@ -68,6 +69,7 @@ def evaluate(
             report, transport, *(path for path in (truth, photos) if path), force=force
         )
     with progress_bar("evaluating", quiet=quiet) as told:
+        require_reconstructed(transport)
         opened = load_transport(transport)
         if truth is not None:
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)

@@ -2,13 +2,14 @@
 
 from os.path import realpath
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
 
 from nearfar.arrays import Size, parse_size
 from nearfar.cli.saying import warn
-from nearfar.errors import InputError
+from nearfar.errors import InputError, UnreadableFileError
 
 
 def size(text: str | Size) -> Size:
@@ -57,6 +58,29 @@ def check_report_page(page: Path, *others: Path, force: bool) -> None:
         raise InputError(f"{page} does not end in .html: choose a name that does.")
     keep_input(page, *others)
     check_output(page, force=force)
+
+
+def require_reconstructed(path: Path) -> None:
+    """Refuse what must be photographed or reconstructed first, and name the next command.
+
+    Raises
+    ------
+    UnreadableFileError
+    """
+    from nearfar.files import kind_of_store
+
+    kind, here = kind_of_store(path), quote(str(path))
+    if kind == "nearfar exact transport":
+        raise UnreadableFileError(
+            f"{path} is a scene's exact transport, not one that was reconstructed: photograph it "
+            f"by 'nearfar acquire PLAN.json CAPTURE.zarr --rig {here}', then run 'nearfar "
+            f"reconstruct CAPTURE.zarr TRANSPORT.zarr'."
+        )
+    if kind == "nearfar capture":
+        raise UnreadableFileError(
+            f"{path} is a capture, of which no transport is made yet: run 'nearfar reconstruct "
+            f"{here} TRANSPORT.zarr'."
+        )
 
 
 def only_report(report: Path | None, old: Path | None, name: str) -> Path | None:

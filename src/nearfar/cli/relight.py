@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -69,6 +69,7 @@ def relight(
     keep_input(output, transport, light)
     check_output(output, force=force)
     with progress_bar("relighting", quiet=quiet):
+        require_reconstructed(transport)
         opened = open_transport(transport)
         projected = read_light(light, opened.projector, srgb=srgb)
         projected = as_channels_see(projected, opened.channels, opened.provenance)

@@ -14,7 +14,7 @@ from nearfar.cli.options import (
     keep_input,
     scene_names,
 )
-from nearfar.cli.saying import say, warn
+from nearfar.cli.saying import say, say_memory, warn
 from nearfar.progress import Report, progress_bar
 from nearfar.scenes import SCENES
 
@@ -66,6 +66,7 @@ def render(
             "a built-in scene is computed without chance: leave it out.",
             param_hint="--samples" if samples is not None else "--seed",
         )
+    say_memory(scene, projector, camera, quiet=quiet)
     with progress_bar("rendering", quiet=quiet) as report:
         if from_file:
             transport = _render_file(scene, projector, camera, samples, seed or 0, report)

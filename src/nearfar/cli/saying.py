@@ -4,8 +4,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nearfar.arrays import Size, parse_size
 from nearfar.cli.flags import with_flags
 from nearfar.cli.printable import printable
+
+# A scene that takes less is not announced.
+BYTES_TO_ANNOUNCE = 10**9
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
@@ -21,6 +25,40 @@ def say(text: str, *, quiet: bool = False) -> None:
 def warn(text: str) -> None:
     """Print a warning on stderr, with options for the Python in it; see `nearfar.cli.flags`."""
     print(f"warning: {printable(with_flags(text))}", file=sys.stderr)
+
+
+def say_memory(
+    scene: str, projector: Size | None = None, camera: Size | None = None, *, quiet: bool
+) -> None:
+    """Print how much memory a scene takes before it is computed or read, if that is much.
+
+    Parameters
+    ----------
+    scene : str
+        Name of a scene, or the path of a RIG.toml that names one; nothing is said of others.
+    projector, camera : Size, optional
+    quiet : bool
+    """
+    from nearfar.rigs.tables import SimulatedTable, read_rig_table
+    from nearfar.scenes import SCENES
+    from nearfar.scenes.cache import scene_memory
+
+    name = scene
+    if Path(scene).suffix.lower() == ".toml":
+        table = read_rig_table(Path(scene))
+        if not isinstance(table, SimulatedTable) or table.scene.name is None:
+            return
+        name = table.scene.name
+        camera = parse_size(table.scene.camera) if table.scene.camera else camera
+    if name not in SCENES:
+        return
+    memory = scene_memory(name, projector, camera)
+    if memory.peak < BYTES_TO_ANNOUNCE:
+        return
+    text = f"the scene {name} takes about {memory.peak / 1e9:.1f} GB of memory"
+    if memory.peak > memory.kept:
+        text += f" while it is computed, {memory.kept / 1e9:.1f} GB from then on"
+    say(text, quiet=quiet)
 
 
 def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:

@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.cli import separation_steps as steps
 from nearfar.cli.choices import choice
 from nearfar.cli.options import AsJson, Force, Quiet, keep_input, scene_names, size
-from nearfar.cli.saying import say, warn
+from nearfar.cli.saying import say, say_memory, warn
 from nearfar.progress import progress_bar
 from nearfar.scenes import SCENES
 
@@ -170,6 +170,8 @@ def separate(
         return
     # Only a simulated rig knows how its photos relate to the truth.
     exposure: float | None = None
+    if rig is not None:
+        say_memory(rig, projector, quiet=quiet or as_json)
     with progress_bar("separating", quiet=quiet) as report:
         if photos is not None:
             taken = steps.read_photos(

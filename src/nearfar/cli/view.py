@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
-from nearfar.cli.options import Browser, Port, Quiet, TransportPath
+from nearfar.cli.options import Browser, Port, Quiet, TransportPath, require_reconstructed
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
@@ -43,6 +43,7 @@ def view(
     from nearfar.viewer.view import run_view
 
     available = parse_bytes(memory)
+    require_reconstructed(transport)
     with progress_bar("reading", quiet=quiet) as report:
         interactive = InteractiveTransport(
             transport, memory=available, progress=lambda share: report("reading", share)

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 from nearfar.arrays import Size
 from nearfar.callbacks import Report
@@ -13,6 +14,15 @@ from nearfar.scenes import SCENES, build, sizes
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact, save_exact
 
+# Of the scenes by radiosity, the large ones: floats, red, green and blue, and at most one patch
+# without light for so many projector pixels (`nearfar.scenes.patches`).
+BYTES_PER_ENTRY = 4
+CHANNELS = 3
+PIXELS_PER_CELL = 8
+# Matrices of form factors between all patches that are there at once, and what factoring them
+# takes: measured.
+FORM_FACTORS_AT_ONCE = 2.5
+
 
 def cache_folder() -> Path:
     """Folder of cached scenes: $NEARFAR_CACHE, or the user's cache folder."""
@@ -20,6 +30,53 @@ def cache_folder() -> Path:
         return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "nearfar"
+
+
+class SceneMemory(NamedTuple):
+    """Memory of a scene's transport, in bytes.
+
+    Attributes
+    ----------
+    peak : int
+        While it is computed, or read where it was computed before.
+    kept : int
+        As long as it is used.
+    """
+
+    peak: int
+    kept: int
+
+
+def scene_memory(
+    name: str, projector: Size | None = None, camera: Size | None = None
+) -> SceneMemory:
+    """Estimate the memory that `cached_scene` takes.
+
+    Parameters
+    ----------
+    name, projector, camera
+        As `nearfar.scenes.build`.
+
+    Raises
+    ------
+    InputError
+        If there is no scene of that name.
+    """
+    projector, camera = sizes(name, projector, camera)
+    matrix = BYTES_PER_ENTRY * camera.pixels * projector.pixels
+    kept = CHANNELS * matrix
+    if _path(name, projector, camera).exists():
+        return SceneMemory(kept, kept)
+    patches = projector.pixels * (1 + 1 / PIXELS_PER_CELL)
+    between = FORM_FACTORS_AT_ONCE * BYTES_PER_ENTRY * patches**2
+    # All but the last channel of the transport are there by then.
+    return SceneMemory(max(kept, int(between + kept - matrix)), kept)
+
+
+def _path(name: str, projector: Size, camera: Size) -> Path:
+    # A scene of another package may have a name with characters that a file name cannot have.
+    known_as = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+    return cache_folder() / f"{known_as}-{projector}-{camera}-{_fingerprint(name)}.zarr"
 
 
 def cached_scene(
@@ -46,9 +103,7 @@ def cached_scene(
         As `nearfar.scenes.build`.
     """
     projector, camera = sizes(name, projector, camera)
-    # A scene of another package may have a name with characters that a file name cannot have.
-    known_as = re.sub(r"[^A-Za-z0-9_-]", "_", name)
-    path = cache_folder() / f"{known_as}-{projector}-{camera}-{_fingerprint(name)}.zarr"
+    path = _path(name, projector, camera)
     if path.exists():
         try:
             return load_exact(path)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
+from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size, blocks
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
@@ -17,9 +17,11 @@ from nearfar.files.stores import (
     add_array,
     create_store,
     is_plain_array,
+    open_array,
     open_store,
     read_array,
     read_plain_array,
+    read_selection,
 )
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.store import MAXIMUM_REASON, stored_size, write_in_rows
@@ -148,7 +150,7 @@ def load_exact(
         near = tuple(_read_sparse(group, f"near-{i}", shape) for i in apart)
         far = np.empty((channels, *shape), dtype=np.float32)
         for i in range(channels):
-            far[i] = read_array(group, f"far-{i}")
+            _read_rows(group, f"far-{i}", far[i])
         return ExactTransport(
             stored_projector, stored_camera, direct, near, far, str(attributes["name"])
         )
@@ -156,6 +158,15 @@ def load_exact(
         raise UnreadableFileError(
             f"{path} is a damaged exact transport ({str(error)[:MAXIMUM_REASON]}): render it again."
         ) from error
+
+
+def _read_rows(group: Any, name: str, out: Floats) -> None:
+    """Read a matrix into its place chunk by chunk: a second copy of a large one would not fit."""
+    stored = open_array(group, name)
+    if stored.shape != out.shape:
+        raise ValueError(f"{name} has the shape {stored.shape} instead of {out.shape}")
+    for block in blocks(len(out), stored.chunks[0]):
+        out[block] = read_selection(stored, (block, slice(None)))
 
 
 def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> ExactTransport:

@@ -222,8 +222,9 @@ def test_compressive_tells_how_long_it_will_take_and_how_far_it_is(monkeypatch):
         progress=lambda what, share: told.append((what, share)),
         on_trial=kept.append,
     )
-    assert len(notes) == 1
-    assert "compressive (CLT), 24 photos: the Lasso of 24 rows takes about" in notes[0]
+    assert len(notes) == 2
+    assert "compressive (CLT), 24 photos: choosing the regularisation has taken" in notes[0]
+    assert "compressive (CLT), 24 photos: the Lasso of 24 rows takes about" in notes[1]
     shares = [share for what, share in told if what == "compressive (CLT)"]
     assert shares == sorted(shares)
     assert shares[0] == 0.0

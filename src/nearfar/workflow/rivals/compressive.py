@@ -1,6 +1,7 @@
 """Compressive light transport: random patterns, with the regularisation nearest to the truth."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 
 from nearfar.baselines.choosing import best_share
 from nearfar.baselines.compressive import (
@@ -30,7 +31,7 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
         measurements,
         bench.scene,
         exposure=bench.gain,
-        progress=lambda share: bench.progress(SHARE_OF_CHOOSING * share),
+        progress=_telling_of_long_choices(bench, budget),
     )
     if len(measurements.responses) >= FEWEST_TO_ESTIMATE:
         seconds = estimate_seconds(measurements, choice.share, refitted=choice.is_refitted)
@@ -46,6 +47,26 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
         progress=lambda share: bench.progress(SHARE_OF_CHOOSING + (1 - SHARE_OF_CHOOSING) * share),
     )
     yield Attempt(measurements.photos, found)
+
+
+def _telling_of_long_choices(bench: Bench, budget: Budget) -> Callable[[float], None]:
+    """Return a callback of the choice of lambda that says once if the choice takes long."""
+    begun, said = time.monotonic(), False
+
+    def tell(share: float) -> None:
+        nonlocal said
+        bench.progress(SHARE_OF_CHOOSING * share)
+        passed = time.monotonic() - begun
+        # How long a value takes grows as lambda falls, by how much only the photos tell.
+        if passed >= SECONDS_TO_ANNOUNCE and not said:
+            said = True
+            bench.note(
+                f"{TITLE}, {budget.photos} photos: choosing the regularisation has taken "
+                f"{duration(passed)} for {share:.0%} of its values, and may take several times as "
+                f"long"
+            )
+
+    return tell
 
 
 COMPRESSIVE = Rival(

@@ -190,3 +190,26 @@ def test_an_evaluation_by_photos(made, world, tmp_path):
     assert "a&lt;b" in text
     assert "a<b" not in text
     shutil.rmtree(folder)
+
+
+def test_an_evaluation_in_other_units_says_so_on_the_terminal_and_in_its_page(
+    made, world, tmp_path
+):
+    dense = np.moveaxis(world.dense(), 1, 2).reshape(*CAMERA, *PROJECTOR, 3)
+    np.save(tmp_path / "T.npy", 1000 * dense)
+    page = tmp_path / "e.html"
+    ran = run_nearfar("evaluate", made / "t.zarr", "--truth", tmp_path / "T.npy", "--report", page)
+    assert ran.status == 0
+    assert "is in other units than the rig recorded" in ran.err
+    text = page.read_text()
+    stands_alone(text)
+    assert "is in other units than the rig recorded" in text
+    assert "difference × 1<" in text
+    np.save(tmp_path / "T.npy", dense)
+    ran = run_nearfar(
+        "evaluate", made / "t.zarr", "--truth", tmp_path / "T.npy", "--report", page, "--force"
+    )
+    assert ran.err == ""
+    gain = int(re.search(r"difference × (\d+)<", page.read_text())[1])
+    assert gain > 1
+    assert f"shown {gain} times as bright" in page.read_text()

@@ -86,7 +86,7 @@ def evaluate(
 
             if truth is not None:
                 pairs = beside_truth(opened, known)
-            text = evaluation_page(opened, str(truth or photos), found, pairs, rows)
+            text = evaluation_page(opened, str(truth or photos), found, pairs, rows, faults)
             write_page(report, text, force=force)
     for fault in faults:
         warn(fault)

@@ -1,6 +1,6 @@
 """The report of an evaluation: relit pictures beside known ones, and signal-to-noise ratios."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -22,6 +22,7 @@ def evaluation_page(
     judgement: Mapping[str, Any],
     pairs: Mapping[str, Pair],
     rows: Rows | None = None,
+    faults: Sequence[str] = (),
 ) -> str:
     """Return the report of an evaluation as one self-contained HTML page.
 
@@ -36,6 +37,8 @@ def evaluation_page(
         Relit and known picture under each light, by the light's name.
     rows : Rows, optional
         SNR of each row; given if the true transport is known.
+    faults : sequence of str
+        What is wrong with what was compared, a sentence each.
     """
     snr_b: Mapping[str, float] = judgement["snr_b"]
     ceiling = judgement.get("ceiling", {}).get("snr_b", {})
@@ -62,9 +65,10 @@ def evaluation_page(
 <p>Compared with {escape(source)}. SNR_b is 20 log10 of the known picture over the difference,
 SNR_t the same of a camera pixel's row of the transport.</p>
 {facts(cards)}
-{_remarks(judgement)}
+{_remarks(judgement, faults)}
 <h2>Relit beside what is known</h2>
-<p>Differences are shown {gain} times as bright as the pictures beside them.</p>
+<p>Differences are shown {f"{gain} times " if gain > 1 else ""}as bright as the pictures beside
+them.</p>
 {gallery(columns, gallery_rows)}
 <h2>Figures</h2>
 {numbers(head, table)}
@@ -94,8 +98,9 @@ def _components(judgement: Mapping[str, Any]) -> str:
     return f"<p></p>{numbers(head, rows)}"
 
 
-def _remarks(judgement: Mapping[str, Any]) -> str:
-    sentences = [f"{text[0].upper()}{text[1:]}." for text in describe_units(judgement)]
+def _remarks(judgement: Mapping[str, Any], faults: Sequence[str]) -> str:
+    units = [f"{text[0].upper()}{text[1:]}." for text in describe_units(judgement)]
+    sentences = [*faults, *units]
     return listed(sentences) if sentences else ""
 
 

@@ -285,7 +285,7 @@ def is_plain_array(path: Path) -> bool:
     if (path / ".zarray").is_file():
         return True
     try:
-        return bool(json.loads((path / _METADATA).read_bytes())["node_type"] == "array")
+        return bool(json.loads((path / METADATA).read_bytes())["node_type"] == "array")
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 

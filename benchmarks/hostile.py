@@ -1,0 +1,199 @@
+"""Estimates of transports that are not direct + near + far, beside what assumes nothing of them.
+
+Run ``python benchmarks/hostile.py [--scenes] [--bars] [NAME ...]``. Transports are those of
+`nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in scenes
+with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels P, it
+prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of one
+projector pixel, for
+
+- joint: the joint estimate from a plan that was chosen for the budget, q by phase;
+- DFT: the inverse DFT of the responses of the same photos, 0 where none was measured;
+- paper: the best of the paper's plans that the budget allows;
+- Hadamard, brute force: where the budget allows them.
+
+``--alone`` leaves out all but the joint estimate; ``--budgets`` takes other shares of P. With
+``--bars`` it prints for the joint estimate how many errors lie within one standard deviation,
+in per cent, in place of the others.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+
+from nearfar import ErrorBars, ExactTransport, Size, choose_plan, snr
+from nearfar.arrays import Floats
+from nearfar.correspondence import correspond_by_phase
+from nearfar.errors import PlanError
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.illumination.pictures import natural_picture, random_pattern
+from nearfar.illumination.real_basis import real_basis
+from nearfar.photometry.measure import measure
+from nearfar.photometry.measurements import Measurements
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.scenes.cache import cached_scene
+from nearfar.scenes.hostile import HOSTILE, hostile_transport
+from nearfar.transport.model import Transport
+from nearfar.workflow.acquire import acquire_in_memory
+from nearfar.workflow.rivals.bench import Bench
+from nearfar.workflow.rivals.brute_force import BRUTE_FORCE
+from nearfar.workflow.rivals.hadamard import HADAMARD
+from nearfar.workflow.rivals.paper import PAPER
+from nearfar.workflow.rivals.rival import Budget, Relights
+
+# Sizes of projector and camera.
+SIZES = {
+    "dense": (Size(12, 12), Size(16, 16)),
+    "caustics": (Size(16, 16), Size(20, 20)),
+    "glass": (Size(16, 16), Size(20, 20)),
+    "hair": (Size(14, 18), Size(20, 20)),
+    "lamps": (Size(15, 15), Size(20, 20)),
+    "permuted": (Size(16, 16), Size(20, 20)),
+}
+SCENES = {
+    "cornell": (Size(32, 32), Size(32, 32)),
+    "cornell-aside": (Size(32, 32), Size(64, 64)),
+    "wedge": (Size(34, 50), Size(34, 50)),
+}
+# Noise of a photo, as a share of full scale.
+NOISES = (1 / 2000, 1 / 200, 1 / 60)
+# Photos, as shares of the projector's pixels.
+BUDGETS = (0.2, 0.4, 0.7, 1.0, 1.2)
+SCENE_BUDGETS = (0.06, 0.12, 0.25, 0.5)
+RANDOM_LIGHTS = 4
+PICTURES = 5
+# White reaches this share of full scale; the black level keeps noise from being cut off.
+EXPOSURE = 0.8
+
+
+def camera_of(noise: float) -> SimulatedCamera:
+    """Return a camera of constant noise, a share of full scale."""
+    return SimulatedCamera(
+        full_well=1e6, read_noise=noise * 1e6, bits=16, black_level=0.12, shot_noise=False
+    )
+
+
+def lights_of(projector: Size) -> dict[str, list[Floats]]:
+    """Return the lights to relight under, by kind."""
+    single = np.eye(projector.pixels, dtype=np.float32).reshape(-1, *projector)
+    return {
+        "pictures": [natural_picture(projector, seed) for seed in range(PICTURES)],
+        "random": [random_pattern(projector, seed) for seed in range(RANDOM_LIGHTS)],
+        "single": list(single),
+    }
+
+
+def pictures_under(world: Relights, lights: list[Floats]) -> list[Floats]:
+    """Relight under each light, each picture flat."""
+    return [np.asarray(world @ light).ravel() for light in lights]
+
+
+def inverse_dft(measurements: Measurements) -> Floats:
+    """Return T by the inverse DFT of what was measured, (C, channels, P)."""
+    basis = measurements.basis
+    return real_basis(basis.frequencies, basis.projector).synthesise(measurements.responses)
+
+
+class Dense:
+    """A transport that is a dense matrix, (C, channels, P)."""
+
+    def __init__(self, matrix: Floats) -> None:
+        self._matrix = matrix
+
+    def __matmul__(self, light: Floats) -> Floats:
+        """Return the flat picture under a light."""
+        return np.asarray(self._matrix @ light.ravel())
+
+
+def scores(bench: Bench, found: Relights, lights: dict[str, list[Floats]]) -> list[float]:
+    """Return SNR_b under pictures and random lights, and the 10th percentile of single pixels."""
+    values = {}
+    for kind, shown in lights.items():
+        pairs = zip(pictures_under(bench.scene, shown), pictures_under(found, shown), strict=True)
+        values[kind] = [snr(bench.gain * truth, one) for truth, one in pairs if truth.any()]
+    return [
+        float(np.mean(values["pictures"])),
+        float(np.mean(values["random"])),
+        float(np.percentile(values["single"], 10)),
+    ]
+
+
+def coverage(bench: Bench, found: Transport, lights: dict[str, list[Floats]]) -> list[float]:
+    """Return how many errors lie within one standard deviation, in per cent."""
+    bars, shares = ErrorBars(found), []
+    for shown in lights.values():
+        some = shown[:: max(1, len(shown) // 40)]
+        within = [
+            np.abs(np.asarray(found @ light).ravel() - bench.gain * truth)
+            < bars.picture(light).ravel()
+            for light, truth in zip(some, pictures_under(bench.scene, some), strict=True)
+        ]
+        shares.append(100.0 * float(np.mean(within)))
+    return shares
+
+
+def estimates(bench: Bench, photos: int, *, rivals: bool) -> Iterator[tuple[str, Relights]]:
+    """Yield every estimate that a budget allows."""
+    plan, _ = choose_plan(bench.scene.projector, photos, window=bench.window or None)
+    measurements = measure(acquire_in_memory(plan, bench.rig(1.0)))
+    q = correspond_by_phase(measurements).q
+    yield "joint", estimate_jointly(measurements, q, plan.window, plan.far)
+    if not rivals:
+        return
+    yield "DFT", Dense(inverse_dft(measurements))
+    for name, rival in (("paper", PAPER), ("Hadamard", HADAMARD), ("brute", BRUTE_FORCE)):
+        if rival.photos is not None and rival.photos(bench.scene.projector) > photos:
+            continue
+        try:
+            for attempt in rival.attempts(bench, Budget(photos)):
+                yield name, attempt.transport
+        except PlanError:
+            continue
+
+
+def run(
+    scene: ExactTransport, camera: SimulatedCamera, label: str, options: argparse.Namespace
+) -> None:
+    """Measure one transport by one camera."""
+    gain = EXPOSURE if not options.scenes else 1.0
+    bench = Bench(scene, camera, 0, gain)
+    lights = lights_of(scene.projector)
+    for share in options.budgets or (SCENE_BUDGETS if options.scenes else BUDGETS):
+        photos = max(24, round(share * scene.projector.pixels))
+        best: dict[str, list[float]] = {}
+        for name, found in estimates(bench, photos, rivals=not (options.bars or options.alone)):
+            if options.bars:
+                assert isinstance(found, Transport)
+                best[name] = coverage(bench, found, lights)
+                continue
+            score = scores(bench, found, lights)
+            best[name] = max(best.get(name, score), score)
+        values = "   ".join(
+            f"{name} " + " ".join(f"{value:6.2f}" for value in score)
+            for name, score in best.items()
+        )
+        print(f"{label:20s} {photos:4d}   {values}", flush=True)
+
+
+def main() -> None:
+    """Measure what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--scenes", action="store_true")
+    parser.add_argument("--bars", action="store_true")
+    parser.add_argument("--alone", action="store_true", help="the joint estimate alone")
+    parser.add_argument("--budgets", nargs="*", type=float, help="photos, as shares of P")
+    options = parser.parse_args()
+    if options.scenes:
+        for name in options.names or SCENES:
+            run(cached_scene(name, *SCENES[name]), SimulatedCamera(), name, options)
+        return
+    for name in options.names or HOSTILE:
+        scene = hostile_transport(name, *SIZES[name])
+        for noise in NOISES:
+            run(scene, camera_of(noise), f"{name} 1/{round(1 / noise)}", options)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -65,6 +65,18 @@ def test_the_lowest_frequencies_come_first_and_are_repeated():
     assert np.mean(repeated) < np.mean(list(cycles.values()))
 
 
+@pytest.mark.parametrize("projector", [Size(12, 10), Size(9, 11), Size(8, 9)])
+@pytest.mark.parametrize("more", [14, 40])
+def test_with_as_many_photos_as_unknowns_every_frequency_is_shown(projector, more):
+    photos = projector.pixels + more
+    plan, expected = choose_plan(projector, photos)
+    counts = choose_frequencies(projector, photos, 5).frequencies
+    basis = real_basis([DC, *counts], projector)
+    assert np.linalg.matrix_rank(basis.patterns.astype(float)) == projector.pixels
+    assert len(plan.patterns) <= photos
+    assert expected.random > choose_plan(projector, projector.pixels)[1].random - 1.0
+
+
 def test_more_noise_asks_for_more_repeats():
     quiet, loud = (choose_frequencies(Size(24, 24), 120, 5, noise=n) for n in (0.002, 0.05))
     assert len(loud.frequencies) < len(quiet.frequencies)

@@ -5,13 +5,14 @@ of its response b_k to every frequency k follows before any photo. The amplitude
 pictures fall as 1/f, so the expected error of relighting is the sum over k of that variance times
 the picture's spectral density; under a random light all frequencies count alike. Starting from
 nothing, the pattern that lowers both errors most is added, again and again: a new frequency, or a
-frequency once more.
+frequency once more. With as many photos as unknowns, every frequency is measured before any is
+repeated, whatever scenes are expected to be.
 
 Index convention: k runs over candidate frequencies, j over prior components with cosines and sines
 apart, which are independent because a window's prior is the same to both sides of q.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -63,6 +64,8 @@ REFERENCE_INTERVAL = 10
 # cornell-aside gains 0.9 dB under a random light at 117 photos, corner loses 0.8 dB under pictures
 # at 261.
 LIGHT_WEIGHTS = np.array([1.0, 1.2])
+# Up to this many frequencies, what those of a complete plan tell of one another is counted.
+MOST_TOGETHER = 1024
 # Squared mean of a picture, and the variance about it, as shares of white squared.
 PICTURE_SQUARED_MEAN, PICTURE_VARIANCE = 0.25, 0.06
 
@@ -207,6 +210,13 @@ def candidates(projector: Size, window: int) -> list[Frequency]:
     return [k for k in representatives(listed) if k != DC]
 
 
+def _lowest_first(projector: Size) -> list[Frequency]:
+    """All frequencies of the projector's DFT, one of each +-k, without DC, the lowest first."""
+    listed = [k for k in representatives(grid(projector, projector)) if k != DC]
+    cycles = np.linalg.norm(as_array(listed) * np.array(projector), axis=1)
+    return [listed[i] for i in np.argsort(cycles, kind="stable")]
+
+
 def _on_grid(part: Fraction, side: int) -> Fraction:
     return Fraction(round(part * side), side)
 
@@ -217,18 +227,7 @@ class _ExpectedErrors:
     def __init__(
         self, frequencies: list[Frequency], projector: Size, window: int, typical: TypicalScenes
     ) -> None:
-        basis = real_basis(frequencies, projector)
-        angle = 2 * np.pi * (as_array(frequencies) @ window_offsets(window).T)
-        cosines, sines = np.cos(angle), np.sin(angle)
-        paired = np.array([not k.is_own_negative for k in frequencies])
-        parts = []
-        for prior_component, scale in typical.prior_components:
-            covariance = near_covariance(prior_component, window)
-            far = np.diag(far_variance(basis, prior_component)[~basis.is_sine])
-            direct = np.full_like(far, TYPICAL_DIRECT_DEVIATION**2)
-            squared = scale**2
-            parts.append(direct + squared * (cosines @ covariance @ cosines.T + far))
-            parts.append(squared * (sines @ covariance @ sines.T + far) * np.outer(paired, paired))
+        parts = list(_covariances(frequencies, projector, window, typical))
         self.covariance = np.stack(parts)
         self.shares = np.repeat(typical.shares, 2, axis=1)
         self.weights = _weights(frequencies, projector)
@@ -251,6 +250,65 @@ class _ExpectedErrors:
         # One at a time, which stays in the processor's cache.
         for covariance, mine, of_one in zip(self.covariance, column, measured, strict=True):
             np.subtract(covariance, mine[:, None] * (mine / of_one), out=covariance)
+
+
+class _ErrorsApart:
+    """`_ExpectedErrors` of a plan that has measured every frequency once.
+
+    What one frequency tells of others hardly counts from then on.
+    """
+
+    def __init__(
+        self,
+        frequencies: list[Frequency],
+        projector: Size,
+        window: int,
+        typical: TypicalScenes,
+        noise: float,
+    ) -> None:
+        squared = noise**2
+        if len(frequencies) > MOST_TOGETHER:
+            self.variance = np.full((2 * len(typical.prior_components), len(frequencies)), squared)
+        else:
+            unit = squared * np.eye(len(frequencies))
+            left = [
+                squared * (1.0 - squared * np.diagonal(np.linalg.inv(covariance + unit)))
+                for covariance in _covariances(frequencies, projector, window, typical)
+            ]
+            self.variance = np.stack(left)
+        self.shares = np.repeat(typical.shares, 2, axis=1)
+        self.weights = _weights(frequencies, projector)
+
+    def errors(self) -> Floats:
+        """Return the expected squared errors, as `_ExpectedErrors.errors`."""
+        return np.asarray(self.shares @ self.variance @ self.weights.T)
+
+    def gains(self, noise: float) -> Floats:
+        """Return by how much measuring each candidate would lower them, (scenes, 2, K)."""
+        lowered = self.shares @ (self.variance**2 / (self.variance + noise**2))
+        return np.asarray(lowered[:, None] * self.weights)
+
+    def condition_on(self, candidate: int, noise: float) -> None:
+        """Condition on one measurement of a candidate."""
+        column = self.variance[:, candidate]
+        self.variance[:, candidate] = column * noise**2 / (column + noise**2)
+
+
+def _covariances(
+    frequencies: list[Frequency], projector: Size, window: int, typical: TypicalScenes
+) -> Iterator[Floats]:
+    """Yield the covariances of cosines, and of sines, of each prior component, (K, K)."""
+    basis = real_basis(frequencies, projector)
+    angle = 2 * np.pi * (as_array(frequencies) @ window_offsets(window).T)
+    cosines, sines = np.cos(angle), np.sin(angle)
+    paired = np.array([not k.is_own_negative for k in frequencies])
+    for prior_component, scale in typical.prior_components:
+        covariance = near_covariance(prior_component, window)
+        far = np.diag(far_variance(basis, prior_component)[~basis.is_sine])
+        direct = np.full_like(far, TYPICAL_DIRECT_DEVIATION**2)
+        squared = scale**2
+        yield direct + squared * (cosines @ covariance @ cosines.T + far)
+        yield squared * (sines @ covariance @ sines.T + far) * np.outer(paired, paired)
 
 
 def _weights(frequencies: list[Frequency], projector: Size) -> Floats:
@@ -298,27 +356,43 @@ def choose_frequencies(
     -------
     FrequencyChoice
     """
-    listed = candidates(projector, window)
-    cost = np.array([1 if k.is_own_negative else 2 for k in listed])
-    expected_errors = _ExpectedErrors(listed, projector, window, typical)
     references = max(FEWEST, photos // (REFERENCE_INTERVAL + 2))
+    # With as many photos as unknowns, nothing is left to what scenes are expected to be. For that,
+    # half of the references are given up.
+    unknowns = projector.pixels - 1
+    is_complete = photos - 2 * max(FEWEST, references // 2) >= unknowns
+    expected_errors: _ExpectedErrors | _ErrorsApart
+    if is_complete:
+        references = min(references, (photos - unknowns) // 2)
+        listed = _lowest_first(projector)
+        expected_errors = _ErrorsApart(listed, projector, window, typical, noise)
+    else:
+        listed = candidates(projector, window)
+        expected_errors = _ExpectedErrors(listed, projector, window, typical)
+    cost = np.array([1 if k.is_own_negative else 2 for k in listed])
     left = photos - 2 * references
     chosen: dict[Frequency, int] = {}
 
     def take(place: int) -> None:
         nonlocal left
-        expected_errors.condition_on(place, noise)
         chosen[listed[place]] = chosen.get(listed[place], 0) + 1
         left -= int(cost[place])
 
-    take(listed.index(CHECKERBOARD))
+    if is_complete:
+        for place in range(len(listed)):
+            take(place)
+    else:
+        take(listed.index(CHECKERBOARD))
+        expected_errors.condition_on(listed.index(CHECKERBOARD), noise)
     while left > 0:
         relative = expected_errors.gains(noise) / expected_errors.errors()[..., None]
         per_photo = typical.weights @ np.einsum("l,slk->sk", LIGHT_WEIGHTS, relative) / cost
         per_photo[cost > left] = -np.inf
         if not np.isfinite(per_photo.max()):
             break
-        take(int(np.argmax(per_photo)))
+        best = int(np.argmax(per_photo))
+        take(best)
+        expected_errors.condition_on(best, noise)
         if progress is not None:
             progress(photos - left)
     # White has twice the light of a sinusoid, and is one response and not half of one; its error

@@ -36,7 +36,7 @@ from nearfar.estimate.joint.problem import Model, lay_out
 from nearfar.photometry.measure import measure
 from nearfar.plan.choose import choose_frequencies
 from nearfar.priors.component import PriorComponent
-from nearfar.priors.fitted import LIT_COMPONENTS, PRIOR_SCALES, TYPICAL_SCENES
+from nearfar.priors.fitted import FREE, LIT_COMPONENTS, PRIOR_SCALES, TYPICAL_SCENES
 from nearfar.priors.responses import response_prior
 from nearfar.priors.typical import TypicalScenes, typical_scenes
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -58,7 +58,7 @@ CANDIDATES = tuple(
     for values in product(NEAR_REACHES, FAR_DEVIATIONS, FAR_DECAYS, DIRECT_SPREADS)
 )
 # Those of the table that were chosen, not added by hand.
-STANDING = tuple(one for one in LIT_COMPONENTS if one.roughness == 0)
+STANDING = tuple(one for one in LIT_COMPONENTS if not one.roughness and one.far_decay < FREE)
 # Scenes of each row of the planner's table, and octaves of prior scale that make one row.
 TYPICAL = ((("cornell", "wedge", "corner"), len(PRIOR_SCALES)), (("corner",), 2))
 # What the planner's table leaves out of either scene.

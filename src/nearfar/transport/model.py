@@ -67,6 +67,8 @@ class Transport(NoArray):
     far : ndarray, shape (Cy, Cx, channels, M), float32
         Responses of F to the cosines and sines of `far_basis`.
     far_basis : RealBasis
+        Frequencies of F: of a joint estimate, those of the far band and all others that were
+        measured on the DFT grid of the projector.
     black : ndarray, shape (Cy, Cx, channels), float32
         The photo under black: ambient light and black level.
     noise : ndarray, shape (Cy, Cx, channels), float32

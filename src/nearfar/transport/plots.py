@@ -11,9 +11,9 @@ from nearfar.arrays import Floats
 from nearfar.checks import as_place
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
-from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
+from nearfar.transport.band import Banded, band_edge
 from nearfar.transport.posterior import deviation_of_mean
 
 if TYPE_CHECKING:
@@ -26,12 +26,8 @@ LINE_DECADES = 6.0
 PARTS = ("direct", "near", "far")
 
 
-class Drawable(Apart, Protocol):
+class Drawable(Apart, Banded, Protocol):
     """The attributes of `nearfar.Transport` that the drawings need."""
-
-    @property
-    def far_basis(self) -> RealBasis:
-        """Frequencies of the far band."""
 
     def __matmul__(self, light: Floats) -> Floats: ...
 
@@ -167,7 +163,7 @@ class Plots:
             decibels, extent=(-0.5, 0.5, 0.5, -0.5), cmap="magma", vmax=0, aspect="auto"
         )
         drawn.figure.colorbar(image, ax=drawn, label="dB below its largest")
-        ky, kx = np.abs(transport.far_basis.cycles).max(axis=0, initial=0.0)
+        ky, kx = band_edge(transport)
         drawn.plot([-kx, kx, kx, -kx, -kx], [-ky, -ky, ky, ky, -ky], color="white", label="k_far")
         drawn.set(xlabel="fx, cycles per projector pixel", ylabel="fy")
         drawn.set_title(f"spectrum of camera pixel ({y}, {x})")

@@ -11,6 +11,7 @@ from nearfar.arrays import Floats, Size
 from nearfar.estimate.joint import ErrorBars
 from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
+from nearfar.transport.band import band_edge
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import deviation_of_mean
 
@@ -85,7 +86,7 @@ def _spectrum(row: Floats) -> Floats:
 
 def _bands(transport: Transport) -> dict[str, Any]:
     """Return k_far, k_near and the measured frequencies, in cycles per projector pixel."""
-    far = np.abs(transport.far_basis.cycles).max(axis=0, initial=0.0)
+    far = band_edge(transport)
     if transport.posterior is not None:
         measured = [(float(k.fy), float(k.fx)) for k in transport.posterior.frequencies]
     else:

@@ -11,25 +11,36 @@ from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
 from nearfar.estimate.joint.spikes import away_from_q
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
-from nearfar.illumination.frequencies import DC, far_frequencies
+from nearfar.illumination.frequencies import DC, Frequency, far_frequencies
 from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.transport import near
+from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 
+# Side of the square of projector pixels about q that direct light can touch.
+FOOTPRINT_SIDE = 3
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
 
 
 def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
-    """Return the transport, with f at the far band's frequencies; its DC is white less d and n."""
+    """Return the transport.
+
+    f is kept at the measured frequencies of the far band, and at those others that lie on the DFT
+    grid of the projector: there light is held that no window holds. Its DC is white less d and n.
+    """
     measurements, centred, pixels = problem.measurements, problem.model.centred, problem.pixels
     wanted = set(far_frequencies(far, measurements.projector))
     measured = centred.basis
-    low = [k for k in measured.frequencies if k in wanted or -k in wanted]
+    low = [
+        k
+        for k in measured.frequencies
+        if k in wanted or -k in wanted or _on_grid(k, measurements.projector)
+    ]
     basis = real_basis([DC, *low], measurements.projector)
     kept = np.flatnonzero(np.isin(measured.index, [measured.frequencies.index(k) for k in low]))
     share_of_white = _share_of_white(measurements).astype(np.float32)
@@ -38,7 +49,8 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
         beside(values, rows.near)
         for values in (measurements.responses[..., dc_index(measurements)], share_of_white, kept)
     )
-    direct = xp.clip(rows.amplitudes[..., 1], min=0.0) * pixels.lit[:, None]
+    rows = _without_negative_direct(problem, rows)
+    direct = rows.amplitudes[..., 1] * pixels.lit[:, None]
     rest = white - share * rows.amplitudes[..., 0] - direct - xp.sum(rows.near, axis=-1)
     far_range = xp.concat([rest[..., None], rows.far[..., far_indices]], axis=-1)
     of_far = centred_basis(basis, window_offsets(problem.window))
@@ -72,6 +84,28 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
             light_noise=measurements.light_noise.reshape(shape),
             share_of_white=share_of_white.reshape(shape),
         ),
+    )
+
+
+def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
+    """Raise d to 0 where it is negative, and lower the window's entries at q by as much light."""
+    xp, window = namespace(rows.near), problem.window
+    negative = xp.clip(rows.amplitudes[..., 1], max=0.0) * problem.pixels.lit[:, None]
+    amplitudes = xp.asarray(rows.amplitudes, copy=True)
+    amplitudes[..., 1] -= negative
+    if window < FOOTPRINT_SIDE:
+        return rows._replace(amplitudes=amplitudes)
+    windows = xp.asarray(rows.near, copy=True)
+    weights = direct_weights(problem.pixels.correspondence, problem.pixels.centres)[:, 0]
+    around = np.flatnonzero(~away_from_q(window**2))
+    windows[..., beside(around, windows)] += negative[..., None] * weights[:, None]
+    return rows._replace(amplitudes=amplitudes, near=windows)
+
+
+def _on_grid(frequency: Frequency, projector: Size) -> bool:
+    """Return whether a frequency is a whole number of cycles per pattern grid."""
+    return all(
+        (part * side).denominator == 1 for part, side in zip(frequency, projector, strict=True)
     )
 
 

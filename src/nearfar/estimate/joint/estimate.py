@@ -10,13 +10,14 @@ from itertools import zip_longest
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size, beside, namespace
+from nearfar.arrays import Booleans, Floats, Size, beside, namespace
 from nearfar.devices import Device
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.photometry.measurements import Measurements
+from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.transport.model import Transport
 
 # Prior components and scales of camera pixels, one choice for each sweep.
@@ -48,11 +49,13 @@ def estimate_jointly(
         With white, and at least one other frequency.
     correspondence : ndarray, shape (Cy, Cx, 2)
         q as (y, x), NaN where there is no direct light. In the transport it is rounded where it is
-        nearly whole, and elsewhere shifted a little to fit the photos.
+        nearly whole, and elsewhere shifted a little to fit the photos; it is NaN also where the
+        photos are more probable without direct light.
     window : int
         W, an upper bound of how far near-range light reaches.
     far : Size
-        Far band: f is kept at its measured frequencies.
+        Far band: f is kept at its measured frequencies, and at other measured ones that are whole
+        numbers of cycles per pattern grid.
     sweeps : int
         Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
     chosen : Choices
@@ -110,14 +113,18 @@ def _sweep(
             progress((number + share) / sweeps)
 
         rows = sweep_once(problem, rows, report, choice)
-        pixels = problem.pixels._replace(correspondence=_moved(problem, rows))
+        lit = rows.choices[-1].prior_component < len(LIT_COMPONENTS)
+        pixels = problem.pixels._replace(lit=lit, correspondence=_moved(problem, rows, lit))
         problem = problem._replace(pixels=pixels)
     assert rows is not None
     return problem, rows
 
 
-def _moved(problem: Problem, rows: EstimatedRows) -> Floats:
-    """Shift q by its estimated error, at most to where it would round to another pixel."""
+def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans) -> Floats:
+    """Shift q by its estimated error, at most to where it would round to another pixel.
+
+    It is NaN where the photos turned out to show no direct light.
+    """
     xp = namespace(rows.amplitudes)
     amplitudes = xp.astype(rows.amplitudes, xp.float64)
     direct = amplitudes[..., 1]
@@ -131,4 +138,5 @@ def _moved(problem: Problem, rows: EstimatedRows) -> Floats:
     lowest = xp.clip(centres - LARGEST_FROM_CENTRE, min=0.0)
     highest = xp.minimum(centres + LARGEST_FROM_CENTRE, last)
     moved: Floats = xp.maximum(xp.minimum(pixels.correspondence + off, highest), lowest)
-    return moved
+    seen: Floats = xp.where(lit[:, None], moved, xp.nan)
+    return seen

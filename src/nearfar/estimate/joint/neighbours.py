@@ -3,25 +3,33 @@
 Near- and far-range light, as shares of white, change slowly over a surface. Where neighbours differ
 by no more than their noise, their mean is expected. Where they differ by more, the expectation is
 closer to the camera pixel's own value, so that edges are kept (the local linear minimum mean square
-error filter; Lee, IEEE PAMI 2, 1980).
+error filter; Lee, IEEE PAMI 2, 1980). Where they differ in the highest frequencies, they hardly
+have a say at all.
 
 Index convention: arrays are (Cy, Cx, channels, j), j over coefficients.
 """
 
 import math
 
-from nearfar.arrays import Booleans, Floats, blocks, namespace
+from nearfar.arrays import Booleans, Floats, Integers, blocks, namespace
 from nearfar.parallel import side_by_side
 
 # Standard deviation, as a share of white, below which noise counts as this much.
 DEVIATION_FLOOR = 1e-6
 # Keeps divisions defined where no neighbour has any weight.
 DIVISOR_FLOOR = 1e-30
+# Neighbours on one surface agree in the highest frequencies. Where they do not, their rows have
+# nothing in common, and every coefficient is taken to differ by this many times as much: estimates
+# are shrunk, so that their scatter is too small. With 4, random light on dense transports gains 0.6
+# dB; with 8, that on lamps loses 1.5 dB.
+HIGHEST_FACTOR = 4.0
 # Bytes of coefficients filtered at once.
 BYTES_AT_ONCE = 2**22
 
 
-def expect_each(values: Floats, variance: Floats, multiplicity: Floats) -> Floats:
+def expect_each(
+    values: Floats, variance: Floats, multiplicity: Floats, highest: Integers
+) -> Floats:
     """Filter each coefficient with a gain of its own.
 
     Parameters
@@ -32,6 +40,8 @@ def expect_each(values: Floats, variance: Floats, multiplicity: Floats) -> Float
         Of their noise if measured once; above 0.
     multiplicity : ndarray, shape (J,)
         How often each was measured.
+    highest : ndarray of int
+        Coefficients of the highest frequencies.
 
     Returns
     -------
@@ -40,13 +50,20 @@ def expect_each(values: Floats, variance: Floats, multiplicity: Floats) -> Float
     xp = namespace(values)
     found: Floats = xp.empty_like(values)
     precision = xp.astype(1.0 / variance[..., None], values.dtype)
+    # Scatter that noise alone has, relative to its variance, and two standard deviations of the
+    # mean of that of nine values.
+    by_noise = 1.0 + 1.0 / math.sqrt(len(highest))
 
     def work(rows: slice) -> None:
         some, weight = _with_neighbours(values, rows), _with_neighbours(precision, rows)
         total = _sum(weight)
         mean, scatter = _mean_and_scatter(some, weight, total)
-        change = xp.clip(scatter - 1.0 / (total * multiplicity), min=0.0)
-        gain = change / (change + variance[rows, ..., None] / multiplicity)
+        noise = variance[rows, ..., None] / multiplicity
+        change = scatter - 1.0 / (total * multiplicity)
+        relative = scatter[..., highest] / noise[..., highest]
+        common = xp.mean(relative, axis=-1, keepdims=True) - by_noise
+        change = xp.clip(xp.maximum(change, HIGHEST_FACTOR * common * noise), min=0.0)
+        gain = change / (change + noise)
         found[rows] = mean + gain * (values[rows] - mean)
 
     side_by_side(work, _row_blocks(values))

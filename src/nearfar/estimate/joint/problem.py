@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers, Size
+from nearfar.arrays import Floats, Integers, Size, namespace
 from nearfar.devices import Device, mover
 from nearfar.errors import InputError
 from nearfar.estimate.joint.batch import (
@@ -49,9 +49,10 @@ class ComponentChoice(NamedTuple):
     prior_component: Integers
     prior_scale: Floats
 
-    def of(self, selected: Integers, first: int) -> "ComponentChoice":
-        """Return those of some camera pixels, components counted from `first`."""
-        return ComponentChoice(self.prior_component[selected] - first, self.prior_scale[selected])
+    def of(self, selected: slice) -> "ComponentChoice":
+        """Return those of some camera pixels, as a copy."""
+        xp = namespace(self.prior_scale)
+        return ComponentChoice(*(xp.asarray(values[selected], copy=True) for values in self))
 
 
 class EstimatedRows(NamedTuple):
@@ -70,7 +71,7 @@ class Model(NamedTuple):
     centred: CentredBasis
     multiplicity: Floats
     lit: PriorSet
-    unlit: PriorSet | None
+    unlit: PriorSet
 
 
 class Problem(NamedTuple):
@@ -82,9 +83,7 @@ class Problem(NamedTuple):
     window: int
 
 
-def build_model(
-    measured: RealBasis, multiplicity: Floats, window: int, device: Device, *, unlit: bool
-) -> Model:
+def build_model(measured: RealBasis, multiplicity: Floats, window: int, device: Device) -> Model:
     """Build the priors for the measured frequencies; the last few are cached for other tiles.
 
     Parameters
@@ -95,8 +94,6 @@ def build_model(
         How often each response is measured.
     window : int
     device : {"cpu", "cuda", "torch"}
-    unlit : bool
-        Whether there are camera pixels without direct light.
 
     Raises
     ------
@@ -121,7 +118,7 @@ def build_model(
         centred.put(move),
         move(multiplicity[indices]),
         _prior_set(LIT_COMPONENTS, *key, device),
-        _prior_set(UNLIT_COMPONENTS, *key, device) if unlit else None,
+        _prior_set(UNLIT_COMPONENTS, *key, device),
     )
 
 
@@ -147,9 +144,7 @@ def lay_out(
     close = np.abs(correspondence - rounded) < WHOLE_PIXEL_DISTANCE
     correspondence = np.where(close, rounded, correspondence).astype(np.float64)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
-    model = build_model(
-        measurements.basis, measurements.multiplicity, window, device, unlit=not lit.all()
-    )
+    model = build_model(measurements.basis, measurements.multiplicity, window, device)
     white = white_scale(measurements)
     pixels = AllPixels(
         responses=measurements.responses[..., model.centred.response_indices],

@@ -7,6 +7,7 @@ Index convention: arrays are (C, channels, ...); r runs over real responses, w o
 """
 
 from collections.abc import Callable, Iterator
+from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import AllPixels, PixelBatch, gather
 from nearfar.estimate.joint.clipped import rounded_ratio, solve_clipped
-from nearfar.estimate.joint.evidence import PriorSet, most_probable
+from nearfar.estimate.joint.evidence import most_probable
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
-from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem
+from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Model, Problem
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
 from nearfar.estimate.joint.spikes import (
     LEAST_GAIN,
@@ -86,27 +87,20 @@ def sweep_once(
     def choose(selected: slice) -> None:
         """Choose prior components, and estimate the camera pixels whose windows are whole."""
         batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
-        for lit, first, candidates in (
-            (True, 0, model.lit),
-            (False, len(LIT_COMPONENTS), model.unlit),
-        ):
-            (mine,) = xp.nonzero(batch.lit == lit)
-            if not len(mine) or candidates is None:
-                continue
-            given = chosen and chosen.of(selected.start + mine, first)
-            component, scale = _choose(batch.only(mine), candidates, given)
-            choice.prior_component[selected.start + mine] = component + first
-            choice.prior_scale[selected.start + mine] = scale
-            whole = ~clipped[selected.start + mine]
-            for place in np.unique(fetch(component[whole])).tolist():
-                (alike,) = xp.nonzero(whole & (component == place))
-                some = batch.only(mine[alike])
-                ratio = variance_ratio(some, scale[alike])
-                put(
-                    selected.start + mine[alike],
-                    some,
-                    _with_spikes(some, candidates.priors[place], ratio, solve_whole, centred),
-                )
+        given = chosen and chosen.of(selected)
+        component, scale = _choose(batch, model, given, is_first=start is None)
+        choice.prior_component[selected], choice.prior_scale[selected] = component, scale
+        seen = component < len(LIT_COMPONENTS)
+        weights = batch.direct_weights * seen[:, None, None]
+        batch = batch._replace(lit=seen, direct_weights=weights)
+        whole = ~clipped[selected] | ~seen
+        priors = model.lit.priors + model.unlit.priors
+        for place in np.unique(fetch(component[whole])).tolist():
+            (alike,) = xp.nonzero(whole & (component == place))
+            some = batch.only(alike)
+            ratio = variance_ratio(some, scale[alike])
+            found = _with_spikes(some, priors[place], ratio, solve_whole, centred)
+            put(selected.start + alike, some, found)
         done[0] += selected.stop - selected.start
         report(done[0] / count)
 
@@ -119,6 +113,7 @@ def sweep_once(
         put(selected, batch, _with_spikes(batch, prior, ratio, solve_clipped, centred))
 
     side_by_side(choose, blocks(count, BATCH_PIXELS))
+    clipped = clipped & (choice.prior_component < len(LIT_COMPONENTS))
     side_by_side(estimate_clipped, _clipped_alike(pixels, choice.prior_component, clipped))
     if start is None:
         return rows
@@ -161,20 +156,43 @@ def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows
 
 
 def _choose(
-    batch: PixelBatch, candidates: PriorSet, given: ComponentChoice | None
-) -> tuple[Integers, Floats]:
-    """Choose prior components, indices of candidates, where they are not given."""
+    batch: PixelBatch, model: Model, given: ComponentChoice | None, *, is_first: bool
+) -> ComponentChoice:
+    """Choose prior components where they are not given.
+
+    In the first sweep a camera pixel for which q was found may turn out to have no direct light.
+    """
+    xp = namespace(batch.white)
     if given is None:
-        component, scale, _ = most_probable(batch, candidates)
-        return component, namespace(scale).astype(scale, namespace(scale).float32)
-    xp = namespace(given.prior_component)
-    # Chosen when the camera pixel was lit and is not now, or the reverse.
-    absent = (given.prior_component < 0) | (given.prior_component >= len(candidates.priors))
-    (left,) = xp.nonzero(absent)
-    if len(left):
-        component, scale = _choose(batch.only(left), candidates, None)
-        given.prior_component[left], given.prior_scale[left] = component, scale
+        (left,) = xp.nonzero(xp.ones_like(batch.lit))
+        given = ComponentChoice(xp.zeros_like(left), xp.zeros_like(batch.white[:, 0]))
+    else:
+        # Chosen when the camera pixel was lit and is not now, or the reverse.
+        (left,) = xp.nonzero(batch.lit != (given.prior_component < len(LIT_COMPONENTS)))
+    some = batch.only(left)
+    (lit,), (dark,) = xp.nonzero(some.lit), xp.nonzero(~some.lit)
+    for mine, candidates, first in (
+        (lit, model.lit, 0),
+        (dark, model.unlit, len(LIT_COMPONENTS)),
+    ):
+        if not len(mine):
+            continue
+        of_mine = some.only(mine)
+        component, scale, evidence = most_probable(of_mine, candidates)
+        component = component + first
+        if is_first and first == 0:
+            other, its_scale, without = most_probable(_without_direct(of_mine), model.unlit)
+            # q was chosen among all projector pixels.
+            none = without > evidence - log(model.centred.basis.projector.pixels)
+            component = xp.where(none, other + len(LIT_COMPONENTS), component)
+            scale = xp.where(none, its_scale, scale)
+        given.prior_component[left[mine]] = component
+        given.prior_scale[left[mine]] = xp.astype(scale, xp.float32)
     return given
+
+
+def _without_direct(batch: PixelBatch) -> PixelBatch:
+    return batch._replace(direct_weights=batch.direct_weights[:, :1] * 0.0)
 
 
 def _clipped_alike(
@@ -242,7 +260,14 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     tiny = float(np.finfo(np.float32).tiny) ** 0.5
     noise = beside(measurements.noise.reshape(shape), rows.near)
     variance = xp.clip((noise / white[..., 0]) ** 2, min=tiny)
-    far = expect_each(rows.far.reshape((*shape, -1)) / white, variance, problem.model.multiplicity)
+    basis = problem.model.centred.basis
+    cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
+    far = expect_each(
+        rows.far.reshape((*shape, -1)) / white,
+        variance,
+        problem.model.multiplicity,
+        beside(np.flatnonzero(cycles >= np.median(cycles)), white),
+    )
     windows = expect_together(
         rows.near.reshape((*shape, -1)) / white,
         rows.near_noise.reshape(shape) / white[..., 0] ** 2,

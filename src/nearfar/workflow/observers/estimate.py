@@ -257,7 +257,7 @@ class EstimateObserver:
         )
         # The estimate from all photos finds its matrices in the cache.
         basis, multiplicity = measured_basis(self._plan)
-        build_model(basis, multiplicity, plan.window, self._options.device, unlit=True)
+        build_model(basis, multiplicity, plan.window, self._options.device)
         return _EarlyChoice(taken, components, time.monotonic() - start)
 
     def _stop_if_ended(self, _done: float) -> None:

@@ -1,0 +1,85 @@
+"""What photos say beyond the prior, on transports that are not direct + near + far."""
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.correspondence import correspond_by_phase
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.error_bars import ErrorBars
+from nearfar.photometry.measure import measure
+from nearfar.plan import choose_plan
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.scenes.hostile import hostile_transport
+from nearfar.workflow.acquire import acquire_in_memory
+
+PROJECTOR, CAMERA = Size(12, 12), Size(12, 12)
+
+
+def shot(name, photos, noise):
+    """Photograph a hostile transport: the truth in photo units, plan and measurements."""
+    scene = hostile_transport(name, PROJECTOR, CAMERA)
+    plan, _ = choose_plan(PROJECTOR, photos)
+    camera = SimulatedCamera(
+        full_well=1e6, read_noise=1e6 * noise, bits=16, black_level=0.1, shot_noise=False
+    )
+    rig = SimulatedRig(scene, name, SimulatedProjector(), camera, 0.8, 0)
+    return 0.8 * scene.rows(slice(None)), plan, measure(acquire_in_memory(plan, rig))
+
+
+def decibels(truth, found):
+    return 10 * np.log10(np.sum(truth**2) / np.sum((found - truth) ** 2))
+
+
+def inverse_dft(measurements):
+    return measurements.basis.synthesise(measurements.responses)
+
+
+@pytest.mark.parametrize("photos", [60, 120])
+def test_direct_light_that_photos_do_not_show_is_not_believed(photos):
+    truth, plan, measurements = shot("dense", photos, 1 / 200)
+    # The brightest entry of each row, where direct light would seem to come from.
+    q = np.stack(np.divmod(truth[:, 0].argmax(axis=1), PROJECTOR.width), axis=-1)
+    q = q.reshape(*CAMERA, 2).astype(np.float32)
+    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    assert not found.lit.any()
+    assert not found.direct.any()
+    assert not found.near.any()
+    assert decibels(truth, found.rows(slice(None))) > decibels(truth, inverse_dft(measurements))
+
+
+@pytest.mark.parametrize("name", ["dense", "hair", "glass"])
+def test_with_as_many_photos_as_unknowns_the_estimate_is_least_squares(name):
+    truth, plan, measurements = shot(name, 173, 1 / 2000)
+    q = correspond_by_phase(measurements).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    by_least_squares = decibels(truth, inverse_dft(measurements))
+    assert by_least_squares > 30
+    assert decibels(truth, found.rows(slice(None))) > by_least_squares - 0.3
+
+
+def test_errors_of_rows_without_order_lie_within_their_bars():
+    truth, plan, measurements = shot("dense", 90, 1 / 200)
+    q = correspond_by_phase(measurements).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    bars = ErrorBars(found)
+    random = np.random.default_rng(0).random((4, *PROJECTOR))
+    single = np.eye(PROJECTOR.pixels)[::13].reshape(-1, *PROJECTOR)
+    for lights in (random, single):
+        within = [
+            np.abs((found @ light).ravel() - truth[:, 0] @ light.ravel())
+            < bars.picture(light).ravel()
+            for light in lights
+        ]
+        assert 0.6 < np.mean(within) < 0.78
+
+
+def test_the_light_of_a_row_stays_where_direct_light_would_be_negative():
+    truth, plan, measurements = shot("hair", 173, 1 / 2000)
+    q = correspond_by_phase(measurements).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    error = np.linalg.norm(found.rows(slice(None)) - truth, axis=-1)
+    assert found.direct.min() >= 0
+    assert error.max() < 0.02 * np.linalg.norm(truth, axis=-1).max()

@@ -18,7 +18,6 @@ from nearfar.errors import (
     InputError,
     KeptInterrupt,
     MissingFileError,
-    UselessPhotosError,
 )
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -195,14 +194,18 @@ def test_what_is_refused_says_nothing_of_tiles_of_an_earlier_job(capture, memory
         assert "kept in" not in str(refused.value)
 
 
-def test_a_capture_without_direct_light_leaves_nothing(tmp_path):
+def test_a_capture_without_direct_light_is_relit_by_far_range_light_alone(tmp_path):
     dark = model_transport(Size(16, 20), Size(12, 6), window=5, far=Size(3, 3), channels=1)
     dark = replace(dark, direct=0 * dark.direct, near=0 * dark.near)
     rig = SimulatedRig(dark, "dark", SimulatedProjector(), SimulatedCamera(), 0.5, 0)
     shot = acquire(chosen_plan(Size(16, 20), 50), tmp_path / "c.zarr", rig)
-    with pytest.raises(UselessPhotosError, match=r"no direct light .* to reconstruct\.$"):
-        into(tmp_path / "t.zarr", shot)
-    assert [path.name for path in tmp_path.iterdir()] == ["c.zarr"]
+    summary = into(tmp_path / "t.zarr", shot)
+    found = load_transport(tmp_path / "t.zarr")
+    assert summary.lit == 0
+    assert not found.lit.any()
+    light = np.random.default_rng(0).random((16, 20))
+    truth = 0.5 * (dark @ light)
+    assert np.linalg.norm(found @ light - truth) < 0.03 * np.linalg.norm(truth)
 
 
 def test_what_was_stopped_before_its_first_block_leaves_nothing(capture, memory, tmp_path):

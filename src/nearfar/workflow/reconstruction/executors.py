@@ -13,7 +13,6 @@ from nearfar.progress import Report
 from nearfar.workflow.reconstruction.job import Job, reconstruct_tile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.sinks import Sink, Store
-from nearfar.workflow.reconstruction.sources import without_light
 from nearfar.workflow.reconstruction.summary import Summary
 from nearfar.workflow.reconstruction.tiles import Tiling
 
@@ -156,8 +155,6 @@ def execute(work: Work, executor: Executor, sink: Sink, report: Report) -> Summa
 
     Raises
     ------
-    InputError
-        If no camera pixel has direct light.
     NearfarError
         As the executor and the sink.
     """
@@ -171,8 +168,6 @@ def execute(work: Work, executor: Executor, sink: Sink, report: Report) -> Summa
     whole = Summary()
     for first in sorted(summaries):
         whole = whole.with_tile(summaries[first])
-    if not whole.lit:
-        raise without_light(work.capture)
     sink.finish(whole)
     return whole
 

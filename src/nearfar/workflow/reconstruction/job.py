@@ -21,7 +21,6 @@ from nearfar.workflow.reconstruction.sources import (
     camera_source,
     photos_without_drift,
     square_source,
-    without_light,
 )
 from nearfar.workflow.reconstruction.summary import provenance_of
 from nearfar.workflow.reconstruction.tiles import Tiling, rows_to_measure, tile_rows
@@ -118,8 +117,6 @@ def prepare(
         As `nearfar.reconstruct`.
     """
     require_device(options.device)
-    if correspondence is not None and not correspondence.lit.any():
-        raise without_light(capture)
     tiling = tiling_of(capture, options, given=correspondence is not None)
     drift_free = photos_without_drift(photos or capture, report)
     chosen = estimator or options.estimator

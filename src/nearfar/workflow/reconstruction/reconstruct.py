@@ -21,7 +21,6 @@ from nearfar.workflow.reconstruction.executors import (
 from nearfar.workflow.reconstruction.job import prepare, tiling_of
 from nearfar.workflow.reconstruction.options import DEFAULT_MEMORY, ReconstructionOptions
 from nearfar.workflow.reconstruction.sinks import MemorySink, identity_of, resumable_file
-from nearfar.workflow.reconstruction.sources import without_light
 from nearfar.workflow.reconstruction.summary import Summary
 
 
@@ -146,8 +145,6 @@ def reconstruct_to_file(
     """
     _require(capture, correspondence)
     options, output = options or ReconstructionOptions(), Path(output)
-    if correspondence is not None and not correspondence.lit.any():
-        raise without_light(capture)
     executor = executor_of(options)
     if scheduler is not None:
         if options.tiles_at_once != 1:

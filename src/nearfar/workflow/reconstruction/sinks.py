@@ -245,7 +245,7 @@ def identity_of(
 
 def summary_of(part: ReconstructedTile) -> Summary:
     """Return the summary of a tile."""
-    lit = part.correspondence.lit
+    lit = part.transport.lit
     return Summary(int(lit.sum()), int(lit.size), dict(part.transport.provenance))
 
 

@@ -167,7 +167,11 @@ def square_source(
         with _with_capture_named(capture):
             found = _find_correspondence(photos, tiles, measured, report)
     if not found.lit.any():
-        raise without_light(capture)
+        raise UselessPhotosError(
+            f"{capture.path} shows no direct light at any camera pixel, and rows of a square T are "
+            f"means over the camera pixels that a projector pixel lights directly: reconstruct "
+            f"without `square`."
+        )
     whole, q = onto_projector(measured, found)
     excess = max((part.excess_of_sums for part in measured), key=abs)
     whole = replace(whole, excess_of_sums=excess, brightest=_largest_white(whole))
@@ -243,14 +247,6 @@ def _with_capture_named(capture: Capture) -> Iterator[None]:
         raise type(error)(
             f"{capture.path}: {reason}, or give `correspondence` to reconstruct."
         ) from None
-
-
-def without_light(capture: Capture) -> UselessPhotosError:
-    """Return the error for a capture that shows no direct light."""
-    return UselessPhotosError(
-        f"{capture.path} shows no direct light at any camera pixel: check that the camera "
-        f"sees the projector's light, or give `correspondence` to reconstruct."
-    )
 
 
 def _largest_white(measurements: Measurements) -> float:

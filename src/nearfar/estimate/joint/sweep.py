@@ -35,6 +35,8 @@ from nearfar.priors.responses import ResponsePrior
 from nearfar.transport import near
 from nearfar.transport.direct import footprint, look_up_each
 
+# Where direct light explains this share of the power of the responses, it is there.
+CERTAIN_SHARE = 0.5
 # Camera pixels of a batch; and of one whose windows the border clips.
 BATCH_PIXELS = 2048
 CLIPPED_BATCH_PIXELS = 512
@@ -181,14 +183,28 @@ def _choose(
         component, scale, evidence = most_probable(of_mine, candidates)
         component = component + first
         if is_first and first == 0:
-            other, its_scale, without = most_probable(_without_direct(of_mine), model.unlit)
-            # q was chosen among all projector pixels.
-            none = without > evidence - log(model.centred.basis.projector.pixels)
-            component = xp.where(none, other + len(LIT_COMPONENTS), component)
-            scale = xp.where(none, its_scale, scale)
+            (doubted,) = xp.nonzero(_is_doubtful(of_mine, model.centred))
+            if len(doubted):
+                dark_ones = _without_direct(of_mine.only(doubted))
+                other, its_scale, without = most_probable(dark_ones, model.unlit)
+                # q was chosen among all projector pixels.
+                none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
+                unlit = other + len(LIT_COMPONENTS)
+                component[doubted] = xp.where(none, unlit, component[doubted])
+                scale[doubted] = xp.where(none, its_scale, scale[doubted])
         given.prior_component[left[mine]] = component
         given.prior_scale[left[mine]] = xp.astype(scale, xp.float32)
     return given
+
+
+def _is_doubtful(batch: PixelBatch, centred: CentredBasis) -> Booleans:
+    """Return at which camera pixels direct light explains little of the responses, shape (n,)."""
+    xp = namespace(batch.responses)
+    direct = product(batch.direct_weights[:, :1], centred.on_footprint.T)
+    along = xp.sum(batch.responses * direct, axis=-1) ** 2
+    power = xp.sum(batch.responses**2, axis=-1) * xp.sum(direct**2, axis=-1)
+    doubtful: Booleans = xp.sum(along, axis=1) < CERTAIN_SHARE * xp.sum(power, axis=1)
+    return doubtful
 
 
 def _without_direct(batch: PixelBatch) -> PixelBatch:

@@ -76,7 +76,9 @@ def run(name: str) -> None:
     papers = paper_plan(scene.projector, window, far)
     report("the paper's", papers, scene, lights)
     for share in SHARES:
-        plan, _ = choose_plan(scene.projector, len(papers.patterns) // share, window=window)
+        plan, _ = choose_plan(
+            scene.projector, len(papers.patterns) // share, window=window, checks=0
+        )
         report(f"joint, 1/{share}", plan, scene, lights)
 
 

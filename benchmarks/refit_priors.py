@@ -86,7 +86,7 @@ def drawn_pixels(
     scene: ExactTransport, window: int, photos: int, count: int
 ) -> tuple[PixelBatch, Model]:
     """Photograph a scene, and gather some of its lit camera pixels."""
-    plan, _ = choose_plan(scene.projector, photos, window=window)
+    plan, _ = choose_plan(scene.projector, photos, window=window, checks=0)
     measurements = measure(shoot(plan, scene, SimulatedCamera()))
     problem = lay_out(measurements, scene.correspondence, window, "cpu")
     lit = np.flatnonzero(problem.pixels.lit)

@@ -41,7 +41,7 @@ def test_the_page_has_tables_and_maps(finished: Job, tmp_path: Path):
     assert text.startswith("<!doctype html>")
     assert text.count("data:image/png;base64,") == 2
     assert "http" not in text
-    assert '<p class="verdict good">good: The model with W = 5' in text
+    assert '<p class="verdict good"><b>good.</b> The model with W = 5' in text
     for word in ("k_near", "checkerboard", "condition", "good, doubtful, wrong"):
         assert f"<td>{word}" in text or f"{word}</td>" in text
     check_sentence(run_nearfar("check", finished.apart, *MODEL, "--report", page), page, "--force")

@@ -38,7 +38,8 @@ def test_json_has_these_keys_and_stands_alone(options, photos, total, savings, q
     ran = check_done(run_nearfar("plan", "--projector", *options, "--json", *quiet))
     found = json.loads(ran.out)
     assert list(found) == ["photos", "transport_photos", "total_photos", "brute_force", "savings"]
-    assert list(found["photos"]) == ["direct", "near", "far", "reference", "correspondence"]
+    purposes = ["direct", "near", "far", "reference", "correspondence", "check"]
+    assert list(found["photos"]) == purposes
     assert found["transport_photos"] == photos
     assert found["total_photos"] == total == sum(found["photos"].values())
     assert found["savings"] == pytest.approx(savings, rel=1e-12)

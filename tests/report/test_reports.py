@@ -16,6 +16,7 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.store import load_transport, open_transport
 from nearfar.workflow.acquire import acquire
+from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
 from tests.worlds import model_transport
 
@@ -59,7 +60,8 @@ def test_a_report_tells_of_a_reconstruction(made):
     transport = load_transport(made / "t.zarr")
     for name, compute in maps_of(transport).items():
         assert compute().title in text, name
-    assert "The photos give no cause for concern." in text
+    assert '<p class="verdict good"><b>good.</b> Relit pictures are off by' in text
+    assert "<td>picture 101</td>" in text
     # Lights and their parts, maps, and the histogram.
     assert text.count("<img") == 10 + len(maps_of(transport)) + 1
     assert "white and black, to measure against" in text
@@ -143,7 +145,8 @@ def test_a_large_camera_is_thinned_out(made, monkeypatch):
     monkeypatch.setattr(
         "nearfar.report.reconstruction.MAXIMUM_DISPLAYED_PIXELS", CAMERA.pixels // 3
     )
-    page = reconstruction_page(open_transport(made / "t.zarr"), open_capture(made / "capture.zarr"))
+    stored, capture = open_transport(made / "t.zarr"), open_capture(made / "capture.zarr")
+    page = reconstruction_page(stored, capture, judge_reconstruction(stored, capture))
     assert "One in 2 of the camera's rows and columns is shown" in page
     assert CAMERA.pixels < MAXIMUM_DISPLAYED_PIXELS
 

@@ -11,9 +11,9 @@ from nearfar.illumination.patterns import exponential
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.check import check_model, dropped_of
-from nearfar.workflow.check_verdict import describe_verdict, judge_check
 from nearfar.workflow.conditioning import condition_near
 from nearfar.workflow.model_fit import split_by_model
+from nearfar.workflow.verdict.model_check import describe_verdict, judge_check
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA = Size(16, 20), Size(8, 9)

@@ -57,8 +57,8 @@ def check(
     from nearfar.report.page import write_page
     from nearfar.rigs.simulated.opening import load_world
     from nearfar.workflow.check import DEFAULT_SAMPLE, check_model, dropped_of
-    from nearfar.workflow.check_verdict import describe_verdict, judge_check, numbers_of
     from nearfar.workflow.conditioning import condition_near
+    from nearfar.workflow.verdict.model_check import describe_verdict, judge_check, numbers_of
 
     page = only_report(report, html, "--html")
     if page is not None:

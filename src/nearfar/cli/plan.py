@@ -65,6 +65,14 @@ def plan(
             metavar="TRANSPORT.zarr",
         ),
     ] = None,
+    no_check: Annotated[
+        bool,
+        typer.Option(
+            "--no-check",
+            help="Leave out the check photos, from which nothing is estimated and which tell how "
+            "far the result can be trusted.",
+        ),
+    ] = False,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Write the plan to this file.", metavar="FILE"),
@@ -85,8 +93,9 @@ def plan(
     from nearfar.report.plan import describe_plan
 
     expected = None
-    if look is not None and photos is None:
-        raise typer.BadParameter("--look goes with --photos N only")
+    if photos is None and (look is not None or no_check):
+        flag = "--no-check" if look is None else "--look"
+        raise typer.BadParameter(f"{flag} goes with --photos N only")
     if output is not None:
         from nearfar.files import check_output, new_output
 
@@ -101,6 +110,7 @@ def plan(
                 window=near,
                 typical=typical,
                 noise=noise,
+                checks=0 if no_check else None,
                 progress=report,
             )
     elif near is None or far is None:

@@ -1,5 +1,6 @@
 """``nearfar reconstruct``."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -9,6 +10,7 @@ from nearfar.arrays import parse_bytes
 from nearfar.cli.choices import choice
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import (
+    AsJson,
     CapturePath,
     Force,
     Quiet,
@@ -22,6 +24,7 @@ from nearfar.progress import progress_bar
 if TYPE_CHECKING:
     from nearfar.capture import Capture
     from nearfar.devices import Device
+    from nearfar.workflow.verdict.verdict import Verdict
 
 
 def reconstruct(
@@ -75,6 +78,7 @@ def reconstruct(
         typer.Option("--resume", help="Go on with the tiles of a reconstruction that was stopped."),
     ] = False,
     report: ReportPath = None,
+    as_json: AsJson = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -85,9 +89,11 @@ def reconstruct(
     from nearfar.capture import open_capture
     from nearfar.correspondence import read_correspondence
     from nearfar.files import check_resumable
+    from nearfar.transport.store import open_transport
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
     from nearfar.workflow.reconstruction.sinks import RESUMABLE_TRANSPORT
+    from nearfar.workflow.verdict.verdict import judge_reconstruction
 
     if device == "cuda" and scheduler is not None:
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
@@ -102,6 +108,7 @@ def reconstruct(
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
     options = ReconstructionOptions(method, square, available, cast("Device", device), half)
+    quiet = quiet or as_json
     with progress_bar("reconstructing", quiet=quiet) as progress:
         summary = reconstruct_to_file(
             opened,
@@ -113,16 +120,22 @@ def reconstruct(
             force=force,
             progress=progress,
         )
+        verdict = judge_reconstruction(open_transport(output), opened, progress)
     say_reconstructed(summary, opened, output, quiet=quiet)
     if report is not None:
-        _write_report(report, output, opened, force=force)
+        _write_report(report, output, opened, verdict, force=force)
         say(f"report written to {report}", quiet=quiet)
+    if as_json:
+        print(json.dumps(verdict.as_json()))
+    say(str(verdict), quiet=quiet)
 
 
-def _write_report(report: Path, output: Path, capture: "Capture", *, force: bool) -> None:
+def _write_report(
+    report: Path, output: Path, capture: "Capture", verdict: "Verdict", *, force: bool
+) -> None:
     from nearfar.report.page import write_page
     from nearfar.report.reconstruction import reconstruction_page
     from nearfar.transport.store import open_transport
 
-    text = reconstruction_page(open_transport(output), capture, with_flags)
+    text = reconstruction_page(open_transport(output), capture, verdict, with_flags)
     write_page(report, text, force=force)

@@ -55,6 +55,20 @@ def black_column(index: int, size: Size) -> NDArray[np.float64]:
     return pattern
 
 
+def left_half(size: Size) -> NDArray[np.float64]:
+    """White on the left half of the columns; the middle one of an odd number is black."""
+    pattern = np.zeros(size)
+    pattern[:, : size.width // 2] = 1.0
+    return pattern
+
+
+def top_half(size: Size) -> NDArray[np.float64]:
+    """White on the upper half of the rows; the middle one of an odd number is black."""
+    pattern = np.zeros(size)
+    pattern[: size.height // 2] = 1.0
+    return pattern
+
+
 def gray_bits(length: int) -> int:
     """Return the number of bits of Gray code for a number of rows or columns."""
     return (length - 1).bit_length()

@@ -1,20 +1,90 @@
-"""Check pictures: patterns whose photos no estimate uses, to measure how well it relights."""
+"""Check photos: photos that no estimate uses, to measure how well it relights.
+
+Check patterns come with their inverses. What a pattern and its inverse show sums to white, which is
+measured anyway, so that the noise of a pair is known without a model of it.
+"""
 
 from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.plan.model import Plan
-from nearfar.plan.patterns import Pattern, Picture, Sinusoid
+from nearfar.plan.patterns import HalfScreen, Pattern, Picture, Sinusoid
+from nearfar.plan.references import parts_a_pair
 
-# Seeds of the pictures, other than those that `nearfar evaluate` relights under.
-PICTURE_SEEDS = (101, 102, 103)
-# Photos of each picture: what two have in common is not noise.
-PHOTOS_OF_EACH = 2
+# Seeds of the pictures, other than those that `nearfar evaluate` relights under, start here.
+FIRST_PICTURE_SEED = 101
+# Share of all photos of a plan that are check photos, at least one pair.
+CHECK_SHARE = 0.04
+# Pictures to check by while a capture is taken.
+PICTURES_ON_THE_WAY = 3
+
+
+class CheckLight(NamedTuple):
+    """A check pattern and its photos.
+
+    Attributes
+    ----------
+    pattern : Pattern
+        Not the inverse.
+    photos, inverses : tuple of int
+        Numbers of the photos of the pattern, and of its inverse.
+    """
+
+    pattern: Pattern
+    photos: tuple[int, ...]
+    inverses: tuple[int, ...]
+
+
+def check_pairs(photos: int) -> int:
+    """Return the number of check patterns, each with its inverse, for a plan of some photos."""
+    return max(1, round(CHECK_SHARE * photos / 2))
+
+
+def check_patterns(pairs: int) -> list[Pattern]:
+    """Return check patterns, each followed by its inverse: pictures, and half-screens among them.
+
+    Every second pattern is a half-screen as long as there are some.
+    """
+    halves: list[Pattern] = [
+        HalfScreen(kind="left half-screen"),
+        HalfScreen(kind="top half-screen"),
+    ]
+    chosen: list[Pattern] = []
+    seed = FIRST_PICTURE_SEED
+    for number in range(pairs):
+        if number % 2 and halves:
+            chosen.append(halves.pop(0))
+        else:
+            chosen.append(Picture(seed=seed))
+            seed += 1
+    return [p for pattern in chosen for p in (pattern, _inverse(pattern))]
+
+
+def _inverse(pattern: Pattern) -> Pattern:
+    return pattern.model_copy(update={"inverse": True})
+
+
+def spread_checks(patterns: Sequence[Pattern], checks: Sequence[Pattern]) -> list[Pattern]:
+    """Spread pairs of check patterns evenly through others; no cosine is parted from its sine."""
+    pairs = [checks[i : i + 2] for i in range(0, len(checks), 2)]
+    places = [i for i in range(len(patterns) + 1) if not parts_a_pair(patterns, i)]
+    found: list[Pattern] = []
+    done = 0
+    for number, pair in enumerate(pairs):
+        wanted = (2 * number + 1) * len(patterns) / (2 * len(pairs))
+        place = min(places, key=lambda i: abs(i - wanted))
+        found += [*patterns[done:place], *pair]
+        done = place
+    return [*found, *patterns[done:]]
 
 
 def with_checks(plan: Plan) -> Plan:
-    """Insert check pictures after the first white and black of a plan.
+    """Move the check patterns of a plan after its first white and black, and add pictures to three.
+
+    So what the photos so far are worth can be measured from the first photos on.
 
     Raises
     ------
@@ -27,9 +97,14 @@ def with_checks(plan: Plan) -> Plan:
             "or Gray code, can be estimated from only after its last photo, so that there is "
             "nothing to check on the way: make the plan with `photos`."
         )
-    start = next(i for i, pattern in enumerate(plan.patterns) if not is_reference(pattern))
-    checks = tuple(Picture(seed=seed) for _ in range(PHOTOS_OF_EACH) for seed in PICTURE_SEEDS)
-    patterns = (*plan.patterns[:start], *checks, *plan.patterns[start:])
+    checks = [pattern for pattern in plan.patterns if pattern.purpose == "check"]
+    for seed in range(FIRST_PICTURE_SEED, FIRST_PICTURE_SEED + PICTURES_ON_THE_WAY):
+        picture = Picture(seed=seed)
+        if picture not in checks:
+            checks += [picture, _inverse(picture)]
+    others = [pattern for pattern in plan.patterns if pattern.purpose != "check"]
+    start = next(i for i, pattern in enumerate(others) if not is_reference(pattern))
+    patterns = (*others[:start], *checks, *others[start:])
     return plan.model_copy(update={"patterns": patterns})
 
 
@@ -38,13 +113,17 @@ def is_reference(pattern: Pattern) -> bool:
     return isinstance(pattern, Sinusoid) and pattern.frequency == DC
 
 
-def check_photos(plan: Plan) -> dict[int, list[int]]:
-    """Return the photo numbers of each check picture by its seed."""
-    found: dict[int, list[int]] = {}
+def check_lights(plan: Plan) -> list[CheckLight]:
+    """Return the check patterns of a plan with the numbers of their photos."""
+    found: dict[Pattern, tuple[list[int], list[int]]] = {}
     for number, pattern in enumerate(plan.patterns):
-        if isinstance(pattern, Picture):
-            found.setdefault(pattern.seed, []).append(number)
-    return found
+        if isinstance(pattern, Picture | HalfScreen):
+            light = pattern.model_copy(update={"inverse": False})
+            found.setdefault(light, ([], []))[pattern.inverse].append(number)
+    return [
+        CheckLight(light, tuple(photos), tuple(inverses))
+        for light, (photos, inverses) in found.items()
+    ]
 
 
 def ends(plan: Plan) -> list[int]:

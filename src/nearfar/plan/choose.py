@@ -34,6 +34,7 @@ from nearfar.illumination.frequencies import (
     wrap,
 )
 from nearfar.illumination.real_basis import real_basis
+from nearfar.plan.checks import check_pairs, check_patterns, spread_checks
 from nearfar.plan.model import LARGEST_SIDE, Plan
 from nearfar.plan.paper import sinusoids
 from nearfar.plan.patterns import Purpose
@@ -101,6 +102,7 @@ def choose_plan(
     window: int | None = None,
     typical: TypicalScenes | None = None,
     noise: float = NOISE,
+    checks: int | None = None,
     progress: Report | OldReport | None = None,
 ) -> tuple[Plan, Expected]:
     """Choose a plan of at most `photos` photos, whose own phase gives correspondence.
@@ -109,13 +111,16 @@ def choose_plan(
     ----------
     projector : Size
     photos : int
-        All photos, whites and blacks included.
+        All photos, whites, blacks and check photos included.
     window : int, optional
         W, an upper bound of how far near-range light reaches; `default_window` if left out.
     typical : TypicalScenes
         What to plan for: the simulated scenes, or a quick first estimate of this one.
     noise : float
         Standard deviation of the response to a sinusoid, as a share of white.
+    checks : int, optional
+        Check patterns, pictures and half-screens that no estimate sees; each is photographed with
+        its inverse. By default about 4 % of the photos, and at least one pattern.
     progress : callable, optional
         Called with what is being done and the share of it that is done, 0 to 1.
 
@@ -158,8 +163,15 @@ def choose_plan(
             f"W = {window} does not fit a projector of {projector}: choose `window` between 1 and "
             f"{min(projector)}."
         )
+    checks = check_pairs(photos) if checks is None else as_count(checks, "checks", 0)
+    own = photos - 2 * checks
+    if own < FEWEST_PHOTOS - 2:
+        raise PlanError(
+            f"{checks} check patterns and their inverses leave too few of {photos} photos: plan "
+            f"with `photos={FEWEST_PHOTOS + 2 * checks}` or more."
+        )
     choice = choose_frequencies(
-        projector, photos, window, typical=typical or TYPICAL_SCENES, noise=noise, progress=report
+        projector, own, window, typical=typical or TYPICAL_SCENES, noise=noise, progress=report
     )
     band = Size(*(min(FAR_BAND_SIDE, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))
@@ -185,7 +197,9 @@ def choose_plan(
         dropped=Size(1, 1),
         offset="reference",
         correspondence="phase",
-        patterns=with_references(patterns, choice.references, choice.references),
+        patterns=with_references(
+            spread_checks(patterns, check_patterns(checks)), choice.references, choice.references
+        ),
     )
     return plan, choice.expected
 

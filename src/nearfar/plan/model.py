@@ -34,15 +34,16 @@ from nearfar.plan.patterns import (
 )
 
 # Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
-# 3 Gray code; a plan of an earlier version is one of the next as well.
-FORMAT_VERSION = 3
-READABLE_VERSIONS = (1, 2, 3)
+# 3 Gray code, version 4 half-screens and inverse pictures; a plan of an earlier version is one of
+# the next as well.
+FORMAT_VERSION = 4
+READABLE_VERSIONS = (1, 2, 3, 4)
 
 # Characters of a message that are quoted from a plan.
 MAXIMUM_REASON = 200
 MAXIMUM_NAME = 60
 
-PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence")
+PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence", "check")
 
 
 # No projector has a longer side.
@@ -88,7 +89,7 @@ class Plan(Frozen):
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[3] = 3
+    version: Literal[4] = 4
     projector: SizeField
     window: int = Field(ge=1, strict=True)
     far: SizeField
@@ -149,7 +150,7 @@ class Plan(Frozen):
 
     @property
     def counts(self) -> dict[Purpose, int]:
-        """Number of photos for each purpose; checks are left out where there are none."""
+        """Number of photos for each purpose."""
         # Not cached: a copy with other patterns would take the cached counts along.
         counted: Counter[Purpose] = Counter(pattern.purpose for pattern in self.patterns)
         return {**dict.fromkeys(PURPOSES, 0), **counted}

@@ -181,20 +181,22 @@ class GrayCode(Pattern):
 
 
 class Picture(Pattern):
-    """A natural picture that no estimate sees, to check relighting by."""
+    """A natural picture that no estimate sees, or its inverse, to check relighting by."""
 
     kind: Literal["picture"] = "picture"
     seed: int = Field(ge=0)
+    inverse: bool = False
     purpose: Literal["check"] = "check"
 
     @property
     def description(self) -> str:
         """The pattern in a few words."""
-        return f"picture {self.seed} to check by"
+        return f"picture {self.seed} to check by{', inverse' if self.inverse else ''}"
 
     def draw(self, size: Size) -> NDArray[np.uint8]:
         """Draw the 8-bit pattern, shape (Py, Px)."""
-        return _picture(size, self.seed).copy()
+        drawn = _picture(size, self.seed)
+        return patterns.invert(drawn) if self.inverse else drawn.copy()
 
 
 # Each picture is shown twice, and again compared with in each estimate of a capture.
@@ -203,7 +205,33 @@ def _picture(size: Size, seed: int) -> NDArray[np.uint8]:
     return patterns.quantise(natural_picture(size, seed).astype(np.float64))
 
 
-OWN_PATTERNS: tuple[type[Pattern], ...] = (Sinusoid, Exponential, Stripe, GrayCode, Picture)
+class HalfScreen(Pattern):
+    """Half of the screen white and the other half black, or its inverse, to check relighting by."""
+
+    kind: Literal["left half-screen", "top half-screen"]
+    inverse: bool = False
+    purpose: Literal["check"] = "check"
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        return f"{self.kind} to check by{', inverse' if self.inverse else ''}"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        shape = patterns.left_half if self.kind == "left half-screen" else patterns.top_half
+        drawn = patterns.quantise(shape(size))
+        return patterns.invert(drawn) if self.inverse else drawn
+
+
+OWN_PATTERNS: tuple[type[Pattern], ...] = (
+    Sinusoid,
+    Exponential,
+    Stripe,
+    GrayCode,
+    Picture,
+    HalfScreen,
+)
 
 
 def kinds_of(pattern: type[Pattern]) -> frozenset[str]:

@@ -77,17 +77,30 @@ def _spread(count: int, last: int) -> list[int]:
 
 
 def _between_pairs(patterns: Sequence[Pattern], upto: int) -> int:
-    """Move a place that would separate a cosine from its sine behind the sine.
+    """Move a place that would part a pair, such as a cosine and its sine, behind the pair.
 
     So all measurements are complete wherever white and black are projected.
     """
-    if not 0 < upto < len(patterns):
-        return upto
-    one, other = patterns[upto - 1], patterns[upto]
-    if not (isinstance(one, Sinusoid) and isinstance(other, Sinusoid)):
-        return upto
-    parted = (one.kind, other.kind) == ("cosine", "sine") and one.frequency == other.frequency
-    return upto + parted
+    return upto + parts_a_pair(patterns, upto)
+
+
+def parts_a_pair(patterns: Sequence[Pattern], place: int) -> bool:
+    """Return whether a place is between a cosine and its sine, or a check pattern and its inverse.
+
+    Parameters
+    ----------
+    patterns : sequence of patterns
+    place : int
+        The number of patterns before it.
+    """
+    if not 0 < place < len(patterns):
+        return False
+    before, after = patterns[place - 1], patterns[place]
+    if before.purpose == "check":
+        return after == before.model_copy(update={"inverse": True})
+    if not (isinstance(before, Sinusoid) and isinstance(after, Sinusoid)):
+        return False
+    return (before.kind, after.kind) == ("cosine", "sine") and before.frequency == after.frequency
 
 
 def _uniform(purpose: Purpose, *, black: bool) -> Sinusoid:

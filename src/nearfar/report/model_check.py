@@ -8,9 +8,10 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.markup import numbers
-from nearfar.report.page import colour_map, facts, listed, page
+from nearfar.report.page import colour_map, facts, listed, page, verdict_box
 from nearfar.workflow.check import ModelCheck
-from nearfar.workflow.check_verdict import (
+from nearfar.workflow.conditioning import Conditioning
+from nearfar.workflow.verdict.model_check import (
     DOUBTFUL_DECIBELS,
     DOUBTFUL_ROW_DECIBELS,
     GOOD_DECIBELS,
@@ -18,7 +19,6 @@ from nearfar.workflow.check_verdict import (
     judge_check,
     numbers_of,
 )
-from nearfar.workflow.conditioning import Conditioning
 
 # What the table and the maps speak of, for readers who have not read the method.
 WORDS = (
@@ -130,7 +130,7 @@ def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Si
         maps = f'<h2>Where it does not</h2><div class="maps">{maps}</div>'
     body = f"""
 <h1>Where the model holds: {escape(name)}</h1>
-<p class="verdict {verdict.grade}">{verdict.grade}: {escape(verdict.says)}</p>
+{verdict_box(verdict.grade, verdict.says)}
 {listed(list(verdict.causes)) if verdict.causes else ""}
 <p>The method takes each camera pixel's near-range light to come from a window of {check.window} x
 {check.window} projector pixels and to vary no faster than k_near, its far-range light to lie in a

@@ -49,6 +49,12 @@ table { border-collapse: collapse; width: 100%; }
 .gallery th.row { text-align: right; padding-right: .7rem; white-space: nowrap; }
 img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
   border-radius: 4px; }
+.verdict { background: var(--card); border: 1px solid var(--line); border-left: 6px solid
+  var(--far);
+  border-radius: 10px; padding: .8rem 1rem; margin: 1.2rem 0; color: var(--ink); max-width: none; }
+.verdict b { text-transform: capitalize; }
+.verdict.doubtful { border-left-color: var(--near); }
+.verdict.wrong { border-left-color: var(--bad); }
 .numbers { background: var(--card); border: 1px solid var(--line); border-radius: 10px;
   max-width: 46rem; }
 .numbers td, .numbers th { padding: .45rem .9rem; border-bottom: 1px solid var(--line);
@@ -57,10 +63,6 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .numbers tr:last-child td { border-bottom: 0; }
 .numbers th { color: var(--soft); font-weight: 500; font-size: .85rem; }
 .numbers tr.best td { font-weight: 650; color: var(--far); }
-.verdict { font-size: 1.1rem; font-weight: 600; color: var(--ink); }
-.verdict.good { color: var(--far); }
-.verdict.doubtful { color: var(--near); }
-.verdict.wrong { color: var(--bad); }
 .broad .numbers { max-width: none; }
 .broad .numbers td:first-child { min-width: 14rem; }
 .maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }
@@ -93,6 +95,11 @@ def colour_map(values: Floats, low: float, high: float, unit: str, caption: str)
         f'<div class="scale"><span>{low:.0f} {unit}</span><span>{high:.0f} {unit}</span></div>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
+
+
+def verdict_box(grade: str, text: str) -> str:
+    """Return a verdict as HTML: its grade, and what it means, one sentence or more."""
+    return f'<p class="verdict {grade}"><b>{grade}.</b> {escape(text)}</p>'
 
 
 def listed(sentences: list[str]) -> str:

@@ -16,9 +16,10 @@ from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
 from nearfar.report.figures.style import new_figure, styled
 from nearfar.report.maps import Map, maps_of
-from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
+from nearfar.report.page import colour_map, facts, gallery, listed, page, plot, verdict_box
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
+from nearfar.workflow.verdict.verdict import Verdict
 
 # Larger cameras are displayed at every second row and column, every third, and so on.
 MAXIMUM_DISPLAYED_PIXELS = 2**17
@@ -33,7 +34,10 @@ PURPOSES = {
 
 
 def reconstruction_page(
-    stored: StoredTransport, capture: Capture, reword: Callable[[str], str] = str
+    stored: StoredTransport,
+    capture: Capture,
+    verdict: Verdict,
+    reword: Callable[[str], str] = str,
 ) -> str:
     """Return the report of a transport as one self-contained HTML page.
 
@@ -42,6 +46,8 @@ def reconstruction_page(
     stored : StoredTransport
     capture : Capture
         The capture that it was reconstructed from.
+    verdict : Verdict
+        On the transport.
     reword : callable, optional
         Rewords a fault, such as for readers who use the command line.
 
@@ -79,9 +85,9 @@ def reconstruction_page(
 <h1>{escape(stored.path.name)}</h1>
 <p>The light transport of a scene, reconstructed from the photos in
 {escape(capture.path.name)} by the {escape(stored.provenance["method"])} method.{thinned}</p>
+{verdict_box(verdict.grade, str(verdict).partition(": ")[2])}
 {cards}
-<h2>What to look at</h2>
-{listed(faults) if faults else "<p>The photos give no cause for concern.</p>"}
+{f"<h2>What to look at</h2>{listed(faults)}" if faults else ""}
 <h2>Relit, and taken apart</h2>
 <p>Direct light comes from one projector pixel, near-range light from the window around it,
 far-range light from everywhere. {_exposure_note(exposure)}</p>
@@ -92,12 +98,39 @@ far-range light from everywhere. {_exposure_note(exposure)}</p>
 <h2>How sure</h2>
 <p>{_explain(snr)}</p>
 {plot(_histogram(snr), "histogram of " + snr.title)}
+{_held_out(verdict)}
 <h2>The plan</h2>
 {_plan_table(plan)}
 <h2>Where it comes from</h2>
 {numbers(["what", "value"], _provenance(stored, capture))}
 """
     return page(f"nearfar: {stored.path.name}", body)
+
+
+def _held_out(verdict: Verdict) -> str:
+    """Compare the transport with each of the check photos."""
+    if verdict.held_out is None:
+        return ""
+
+    def written(decibels: float | None) -> str:
+        return "" if decibels is None else f"{decibels:.1f}"
+
+    rows = [
+        [
+            light.description.removesuffix(" to check by"),
+            written(light.snr),
+            written(light.expected_snr),
+            written(light.photo_snr),
+        ]
+        for light in verdict.held_out.lights
+    ]
+    head = ["pattern, with its inverse", "held-out SNR_b", "expected", "one photo over its noise"]
+    return f"""<h2>Checked</h2>
+<p>The transport was relit under patterns from whose photos nothing was estimated, and compared with
+these photos; all in dB. Where it is much worse than expected, the scene or the photos break an
+assumption.</p>
+{numbers(head, rows)}
+"""
 
 
 def exposure_of(transport: Transport) -> float:

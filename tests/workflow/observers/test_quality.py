@@ -10,13 +10,12 @@ from nearfar.capture import Decision, open_capture
 from nearfar.errors import InputError, PlanError
 from nearfar.plan import paper_plan, parse_plan
 from nearfar.plan.checks import (
-    PHOTOS_OF_EACH,
-    PICTURE_SEEDS,
-    check_photos,
+    check_lights,
     ends,
     is_reference,
     with_checks,
 )
+from nearfar.plan.patterns import Picture
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -60,8 +59,8 @@ def test_a_capture_ends_when_it_is_good_enough_and_is_whole(scene, tmp_path):
     transport, _ = reconstruct(again)
     # What was said is what the estimate does under pictures that it never saw.
     values = []
-    for numbers in check_photos(plan).values():
-        light = plan.draw(numbers[0]) / np.float32(255)
+    for check in check_lights(plan):
+        light = plan.draw(check.photos[0]) / np.float32(255)
         values.append(snr(scene @ light, transport @ light))
     assert np.mean(values) == pytest.approx(qualities[-1].snr, abs=1.0)
 
@@ -71,8 +70,8 @@ def test_the_check_is_not_fooled_by_noise(scene, tmp_path):
     _, capture, qualities = _run(scene, tmp_path / "c.zarr", 150, 90.0, full_well=1000.0)
     transport, _ = reconstruct(capture)
     values = []
-    for numbers in check_photos(capture.plan).values():
-        light = capture.plan.draw(numbers[0]) / np.float32(255)
+    for check in check_lights(capture.plan):
+        light = capture.plan.draw(check.photos[0]) / np.float32(255)
         values.append(snr(scene @ light, transport @ light))
     assert np.mean(values) == pytest.approx(qualities[-1].snr, abs=1.0)
     assert qualities[-1].photos == len(capture.plan.patterns)
@@ -118,24 +117,27 @@ def test_photos_that_cannot_be_measured_end_a_capture_early_and_later_ones_do_no
 
 def test_estimates_are_rarer_the_farther_the_target(scene, tmp_path):
     _, _, far = _run(scene, tmp_path / "far.zarr", 100, 90.0)
-    _, _, close = _run(scene, tmp_path / "close.zarr", 100, 43.5)
+    _, _, close = _run(scene, tmp_path / "close.zarr", 100, 40.6)
     assert len(far) < len(close)
 
 
-def test_checks_stand_behind_the_first_references_and_twice():
+def test_checks_stand_behind_the_first_references_with_their_inverses():
     plan = chosen_plan(Size(16, 20), 60)
     checked = with_checks(plan)
-    assert len(checked.patterns) == len(plan.patterns) + PHOTOS_OF_EACH * len(PICTURE_SEEDS)
-    assert checked.counts["check"] == PHOTOS_OF_EACH * len(PICTURE_SEEDS)
-    assert "check" not in plan.counts
-    assert all(len(numbers) == PHOTOS_OF_EACH for numbers in check_photos(checked).values())
-    first = min(n for numbers in check_photos(checked).values() for n in numbers)
+    # The plan's own picture is the first of the three.
+    assert plan.counts["check"] == 2
+    assert checked.counts["check"] == 6
+    assert len(checked.patterns) == len(plan.patterns) + 4
+    lights = check_lights(checked)
+    assert [light.pattern for light in lights] == [Picture(seed=seed) for seed in (101, 102, 103)]
+    assert all(len(light.photos) == len(light.inverses) == 1 for light in lights)
+    first = min(light.photos[0] for light in lights)
     assert all(is_reference(pattern) for pattern in checked.patterns[:first])
-    assert tuple(p for p in checked.patterns if p.purpose != "check") == plan.patterns
+    others = [tuple(p for p in each.patterns if p.purpose != "check") for each in (plan, checked)]
+    assert others[0] == others[1]
     assert parse_plan(checked.to_json()) == checked
-    shown = checked.draw(first)
-    assert shown.dtype == np.uint8
-    assert shown.std() > 10
+    assert with_checks(checked) == checked
+    assert checked.draw(first).std() > 10
 
 
 @pytest.mark.parametrize("photos", [40, 61, 100, 150])

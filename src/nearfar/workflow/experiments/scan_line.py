@@ -15,10 +15,10 @@ from nearfar.illumination.frequencies import as_array, far_frequencies, near_fre
 from nearfar.illumination.pictures import white
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.check import check_model
-from nearfar.workflow.check_verdict import numbers_of
 from nearfar.workflow.conditioning import condition_near
 from nearfar.workflow.experiments.acquired import Acquisition, thin
 from nearfar.workflow.experiments.data import Data
+from nearfar.workflow.verdict.model_check import numbers_of
 
 # Singular values above this share of the largest of T count towards a rank.
 RANK_TOLERANCE = 1e-3

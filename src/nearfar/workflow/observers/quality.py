@@ -2,33 +2,29 @@
 
 The plan has a few pictures that the estimate does not use. At every later white and black, the
 transport of some rows of the camera is estimated from the photos so far and relit under those
-pictures. Each picture is photographed twice. The errors against the two photos share the
-estimate's own error and have independent noise, so the mean of their product is the mean square
-of the estimate's error, without a model of the noise.
+pictures; see `nearfar.workflow.verdict.check_pairs`.
 
 Index convention: photos are (n, rows, Cx, channels), the chosen rows of the camera only.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Integers, blocks
+from nearfar.arrays import Integers, blocks
 from nearfar.capture import Decision
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
-from nearfar.estimate.joint import ErrorBars, estimate_jointly
+from nearfar.estimate.joint import estimate_jointly
 from nearfar.photometry.drift_removal import remove_drift
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure
-from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
-from nearfar.plan.checks import check_photos, ends
-from nearfar.transport.model import Transport
-from nearfar.workflow.evaluate import HIGHEST, decibels
+from nearfar.plan.checks import check_lights, ends
+from nearfar.workflow.evaluate import HIGHEST
+from nearfar.workflow.verdict.held_out import HeldOut, bars_of, compare_light
 
 # The chosen rows of the camera come in bands of this many, because the estimate of a camera pixel
 # uses its neighbours.
@@ -47,9 +43,6 @@ MAXIMUM_MISSING_DECIBELS = 8.0
 # Where the power of the error exceeds this many times what the error bars expect, the model does
 # not fit the scene.
 MODEL_ERROR_RATIO = 2.0
-# Noise is scaled by this to find the error that photos without noise would leave: that of
-# frequencies that were not measured.
-NOISE_FACTOR = 1e-3
 
 Limit = Literal["noise", "model", "photos"]
 
@@ -109,7 +102,7 @@ class QualityObserver:
         self._photos: list[NDArray[Any]] = []
         self._rows: Integers = np.zeros(0, dtype=np.int64)
         self._ends = set(ends(plan))
-        self._next_estimate = MINIMUM_PHOTOS + sum(map(len, check_photos(plan).values()))
+        self._next_estimate = MINIMUM_PHOTOS + plan.counts["check"]
 
     def after_photo(self, number: int, photo: NDArray[Any]) -> Decision:
         """Keep the chosen rows of a photo, (Cy, Cx, channels), and estimate if it is time.
@@ -153,21 +146,16 @@ class QualityObserver:
             return CaptureQuality(taken, -HIGHEST, "photos")
         estimate = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
         every = slice(0, photos_so_far.camera.height)
-        values, errors, expected, unmeasured = [], [], 0.0, 0.0
-        bars, noiseless_bars = ErrorBars(estimate), ErrorBars(_without_noise(estimate))
-        for numbers in check_photos(plan).values():
-            light = plan.draw(numbers[0]) / np.float32(255)
-            relit = (estimate @ light).reshape(*photos_so_far.camera, -1)
-            photographed = photos.read(numbers, every) - _black(measurements)
-            signal, error = (_mean_product(part) for part in (photographed, photographed - relit))
-            values.append(decibels(signal, max(error, 0.0)))
-            errors.append(error)
-            expected += float(np.mean(bars.picture(light).astype(np.float64) ** 2))
-            unmeasured += float(np.mean(noiseless_bars.picture(light).astype(np.float64) ** 2))
-        limit: Limit = "photos" if unmeasured > expected / 2 else "noise"
-        if sum(errors) > MODEL_ERROR_RATIO * expected:
+        bars = bars_of(estimate)
+        held_out = HeldOut(
+            tuple(
+                compare_light(estimate, bars, photos, light, every) for light in check_lights(plan)
+            )
+        )
+        limit: Limit = "photos" if (held_out.unmeasured_share or 0.0) > 0.5 else "noise"
+        if (held_out.error_ratio or 0.0) > MODEL_ERROR_RATIO:
             limit = "model"
-        return CaptureQuality(taken, float(np.mean(values)), limit)
+        return CaptureQuality(taken, held_out.snr, limit)
 
 
 def choose_rows(height: int, width: int) -> Integers:
@@ -179,35 +167,3 @@ def choose_rows(height: int, width: int) -> Integers:
     starts = [block.start for block in blocks(height, max(1, height // bands))][:bands]
     rows = [np.arange(start, min(start + ROWS_PER_BAND, height)) for start in starts]
     return np.concatenate(rows)
-
-
-def _black(measurements: Measurements) -> Floats:
-    return measurements.black.reshape(*measurements.camera, measurements.channels)
-
-
-def _mean_product(photos: Floats) -> float:
-    """Return the mean product of different photos of one picture, to which noise adds nothing.
-
-    Parameters
-    ----------
-    photos : ndarray, shape (n, rows, Cx, channels)
-    """
-    flat = photos.reshape(len(photos), -1).astype(np.float64)
-    count = len(flat)
-    products = np.sum(flat.sum(axis=0) ** 2) - np.sum(flat**2)
-    return float(products / (count * (count - 1) * flat.shape[1]))
-
-
-def _without_noise(estimate: Transport) -> Transport:
-    """Return the estimate with the posterior of photos that have hardly any noise."""
-    posterior = estimate.posterior
-    assert posterior is not None
-    return replace(
-        estimate,
-        noise=NOISE_FACTOR * estimate.noise,
-        posterior=replace(
-            posterior,
-            offset_noise=NOISE_FACTOR * posterior.offset_noise,
-            light_noise=NOISE_FACTOR * posterior.light_noise,
-        ),
-    )

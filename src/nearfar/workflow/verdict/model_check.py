@@ -1,14 +1,13 @@
 """The verdict on a model check: good, doubtful or wrong, and why."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from nearfar.workflow.check import ModelCheck
 from nearfar.workflow.conditioning import Conditioning
-
-Grade = Literal["good", "doubtful", "wrong"]
+from nearfar.workflow.verdict.grades import Grade
 
 # The best that the model can do without noise, in dB, under pictures and in the median row: from
 # the first on, errors of relit pictures are hardly seen (2 %); below the second, they are plain

@@ -1,0 +1,291 @@
+"""What spoils photos: which ones, how, and what to do, a sentence each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+Cause = Literal[
+    "order",
+    "turned",
+    "torn",
+    "exposure",
+    "colours",
+    "moved",
+    "focus",
+    "not-linear",
+    "compressed",
+    "unknown",
+]
+
+SHOOT_AGAIN = "shoot again from there on, or all, with camera, projector and scene at rest"
+
+
+def listed_numbers(numbers: Sequence[int], most: int = 8) -> str:
+    """Return photo numbers for a message: runs as ranges, and how many more there are."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    texts = [str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs]
+    more = sum(map(len, runs[most:]))
+    return ", ".join(texts[:most]) + (f" and {more} more" if more else "")
+
+
+def _photos(numbers: Sequence[int]) -> str:
+    return f"photo{'s' if len(numbers) > 1 else ''} {listed_numbers(numbers)}"
+
+
+@dataclass(frozen=True)
+class ShowsOtherPattern:
+    """Photos that are of the patterns of other photos.
+
+    Attributes
+    ----------
+    photos : tuple of int
+    others : tuple of int
+        For each photo, the number of the one whose pattern it is of.
+    """
+
+    photos: tuple[int, ...]
+    others: tuple[int, ...]
+    cause: ClassVar[Cause] = "order"
+
+    def __str__(self) -> str:
+        pairs = dict(zip(self.photos, self.others, strict=True))
+        if len(pairs) > 1 and all(pairs.get(other) == photo for photo, other in pairs.items()):
+            swaps = [(a, b) for a, b in pairs.items() if a < b]
+            what = ", ".join(f"{a} and {b}" for a, b in swaps)
+            return f"photos {what} are swapped: put them in the order of the plan, or shoot again."
+        shift = {photo - other for photo, other in pairs.items()}
+        if len(shift) == 1 and abs(*shift) == 1:
+            late = "the photo before" if shift == {1} else "the photo after"
+            return (
+                f"{_photos(self.photos)} show{'s' if len(pairs) == 1 else ''} the pattern of "
+                f"{late}: camera and projector were out of step; shoot again with "
+                f"more time between a pattern and its photo."
+            )
+        what = ", ".join(f"{a} is of pattern {b}" for a, b in list(pairs.items())[:4])
+        return f"photos are out of order ({what}): put them in the order of the plan."
+
+
+@dataclass(frozen=True)
+class PhotosTurned:
+    """Photos that are rotated or mirrored.
+
+    Attributes
+    ----------
+    photos : tuple of int
+    how : {"rotated by 180 degrees", "mirrored left to right", "mirrored top to bottom"}
+    """
+
+    photos: tuple[int, ...]
+    how: str
+    cause: ClassVar[Cause] = "turned"
+
+    def __str__(self) -> str:
+        return f"{_photos(self.photos)} {_is(self.photos)} {self.how}: turn back, or shoot again."
+
+
+@dataclass(frozen=True)
+class PhotosTorn:
+    """Photos that show two patterns, one in some rows and one in the others.
+
+    Attributes
+    ----------
+    photos : tuple of int
+    others : tuple of int
+        For each photo, the number of the one whose pattern it shows in part.
+    is_interlaced : bool
+        Whether every second row is of the other pattern.
+    """
+
+    photos: tuple[int, ...]
+    others: tuple[int, ...]
+    is_interlaced: bool
+    cause: ClassVar[Cause] = "torn"
+
+    def __str__(self) -> str:
+        how = "every second row" if self.is_interlaced else "part of the rows"
+        return (
+            f"{_photos(self.photos)} show{'s' if len(self.photos) == 1 else ''} in {how} the "
+            f"pattern of photo {listed_numbers(self.others)}: the pattern changed during the "
+            f"exposure; shoot again with more time between them, and no interlacing."
+        )
+
+
+@dataclass(frozen=True)
+class ColoursSwapped:
+    """Photos whose colour channels are in another order than those of the others."""
+
+    photos: tuple[int, ...]
+    cause: ClassVar[Cause] = "colours"
+
+    def __str__(self) -> str:
+        return (
+            f"{_photos(self.photos)} {_is(self.photos)} with colours in another order than the "
+            f"others: read all photos in one order of red, green and blue."
+        )
+
+
+@dataclass(frozen=True)
+class ExposureChanged:
+    """Photos under another exposure, lamp or ambient light than the others.
+
+    Attributes
+    ----------
+    photos : tuple of int
+    gain : float
+        Largest change of lamp or exposure, as a share.
+    offset : float
+        Largest change of ambient light, as a share of white.
+    """
+
+    photos: tuple[int, ...]
+    gain: float
+    offset: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        if abs(self.offset) > abs(self.gain):
+            what = f"other light, {self.offset:+.1%} of white"
+            cure = "shut out other light"
+        else:
+            what = f"another exposure or lamp, {self.gain:+.1%}"
+            cure = "turn off automatic exposure and gain"
+        return f"{_photos(self.photos)} {_is(self.photos)} under {what}: {cure}, and shoot again."
+
+
+@dataclass(frozen=True)
+class LampFlickers:
+    """Brightness that changes from photo to photo.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of lamp or exposure, as a share.
+    """
+
+    deviation: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"brightness changes by {self.deviation:.1%} from photo to photo: turn off automatic "
+            f"exposure and contrast, and expose for a whole number of the projector's refreshes."
+        )
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Camera, scene or projector moved, or its focus changed, while photos were taken.
+
+    Attributes
+    ----------
+    what : {"camera", "scene", "projector", "camera's focus"}
+        The projector's focus looks like its motion.
+    photo : int
+        First photo after it.
+    pixels : float or None
+        How far, in camera pixels, where that is known.
+    """
+
+    what: str
+    photo: int
+    pixels: float | None
+
+    @property
+    def cause(self) -> Cause:
+        """Cause of a verdict."""
+        return "focus" if self.what == "camera's focus" else "moved"
+
+    def __str__(self) -> str:
+        where = f"before photo {self.photo}: {SHOOT_AGAIN}."
+        match self.what:
+            case "projector":
+                return f"the projector moved, or its focus changed, {where}"
+            case "camera's focus":
+                return f"the camera's focus changed {where}"
+            case _:
+                what = "the camera" if self.what == "camera" else "part of the scene"
+                return f"{what} moved by about {self.pixels or 0.0:.2g} camera pixels {where}"
+
+
+@dataclass(frozen=True)
+class BlackClipped:
+    """Dark values are cut off at one level."""
+
+    share: float
+    cause: ClassVar[Cause] = "not-linear"
+
+    def __str__(self) -> str:
+        return (
+            f"{self.share:.0%} of the camera pixels read the lowest level in every photo of black: "
+            f"black is clipped; set the camera's black level above 0, or shoot raw."
+        )
+
+
+@dataclass(frozen=True)
+class NotLinear:
+    """Photos that are not proportional to light.
+
+    Attributes
+    ----------
+    encoding : str
+        The response that explains it best, such as "sRGB"; empty if none does.
+    """
+
+    encoding: str
+    cause: ClassVar[Cause] = "not-linear"
+
+    def __str__(self) -> str:
+        if self.encoding:
+            return (
+                f"the photos seem to be encoded by {self.encoding}: shoot raw, or decode them to "
+                f"linear light before."
+            )
+        return "projector or camera is not linear: run nearfar calibrate, and shoot raw."
+
+
+@dataclass(frozen=True)
+class Compressed:
+    """Photos with the blocks of JPEG."""
+
+    cause: ClassVar[Cause] = "compressed"
+
+    def __str__(self) -> str:
+        return "the photos show the 8 x 8 blocks of JPEG: shoot raw, or store PNG or TIFF."
+
+
+@dataclass(frozen=True)
+class PhotosMisfit:
+    """Photos that do not fit the others, for no reason that is known."""
+
+    photos: tuple[int, ...]
+    cause: ClassVar[Cause] = "unknown"
+
+    def __str__(self) -> str:
+        return (
+            f"{_photos(self.photos)} do{'es' if len(self.photos) == 1 else ''} not fit the others: "
+            f"look at {'it' if len(self.photos) == 1 else 'them'}, and shoot again."
+        )
+
+
+def _is(photos: Sequence[int]) -> str:
+    return "is" if len(photos) == 1 else "are"
+
+
+Spoilt = (
+    ShowsOtherPattern
+    | PhotosTurned
+    | PhotosTorn
+    | ColoursSwapped
+    | ExposureChanged
+    | LampFlickers
+    | Moved
+    | BlackClipped
+    | NotLinear
+    | Compressed
+    | PhotosMisfit
+)

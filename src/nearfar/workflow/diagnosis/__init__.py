@@ -1,0 +1,1 @@
+"""What spoils the photos of a capture, by how they fit the transport that was made of them."""

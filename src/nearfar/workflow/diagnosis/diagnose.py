@@ -1,0 +1,73 @@
+"""What spoils the photos of a capture, by all checks."""
+
+import numpy as np
+
+from nearfar.capture import Capture
+from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
+from nearfar.progress import Report, ignore_progress
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.diagnosis.misfit import fit_photos, normal_equations
+from nearfar.workflow.diagnosis.sample import sample_camera
+from nearfar.workflow.diagnosis.single_photos import find_spoilt_photos
+from nearfar.workflow.diagnosis.whole_capture import (
+    find_changes,
+    find_clipped_black,
+    find_compression,
+    name_encoding,
+)
+
+# What a response that is not linear, or JPEG, looks like.
+OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
+
+
+def find_what_spoils(
+    transport: StoredTransport, capture: Capture, progress: Report = ignore_progress
+) -> list[Spoilt]:
+    """Find what spoils the photos of a capture.
+
+    Parameters
+    ----------
+    transport : StoredTransport
+        Reconstructed from the capture.
+    capture : Capture
+    progress : callable
+        Called with the step and the share of it that is done.
+
+    Returns
+    -------
+    list of Spoilt
+        The worst first; empty if all is well, or if the photos cannot tell: those of a plan of
+        inverse pairs, and a transport that was not estimated jointly.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the transport or the capture is damaged.
+    """
+    if capture.plan.offset != "reference" or transport.provenance["square"]:
+        return []
+    if transport.provenance["method"] != "joint":
+        return []
+    step = "comparing photos"
+    sample = sample_camera(capture, lambda share: progress(step, share / 2))
+    photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
+    usable = photos.drift.unsaturated
+    fits = fit_photos(sample, photos, sample.of_transport(transport), usable)
+    progress(step, 3 / 4)
+    spoilt = find_spoilt_photos(sample, fits, usable)
+    progress(step, 1.0)
+    if spoilt.certain:
+        return [*spoilt.certain, *spoilt.probable]
+    found = find_changes(
+        normal_equations(sample, fits), fits.misfit, photos.drift.references.whites
+    )
+    response = [*find_compression(sample, fits), *find_clipped_black(sample)]
+    if found and not response and (encoding := name_encoding(sample)):
+        response.append(NotLinear(encoding))
+    if response:
+        found = [each for each in found if not isinstance(each, OF_RESPONSE)]
+    return [
+        *response,
+        *(found or ([] if response else spoilt.probable)),
+        *find_compression(sample, fits),
+    ]

@@ -1,0 +1,245 @@
+"""How photos differ from the pictures of the transport that was estimated from them.
+
+The misfit of a photo is the mean over camera pixels of its squared difference from the relit
+picture, divided by the variance that noise and a small error of the model give it: about 1 if all
+is well.
+
+The difference is also compared with what several causes would make of it, by weighted least
+squares: another lamp or ambient light, a shift of camera or projector, another focus, a response
+that is not linear. The normal equations of each photo are kept. Any model of how a cause develops
+from photo to photo can be fitted to them afterwards.
+
+Index convention: photos are (photos, rows, columns, channels) of a camera sample; normal equations
+are (photos, regions, causes, causes) and (photos, regions, causes).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.illumination.frequencies import DC
+from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.plan import Plan, Sinusoid
+from nearfar.plan.checks import is_reference
+from nearfar.transport.model import Transport
+from nearfar.workflow.diagnosis.sample import PATCH, CameraSample
+
+# Error of the model that counts as noise, as a share of the camera pixel's white and of the mean's.
+MODEL_ERROR = 0.002
+MODEL_ERROR_OF_MEAN = 0.0005
+# The picture is divided into as many regions down and across.
+REGIONS_A_SIDE = 3
+
+# Places of the causes in the normal equations.
+(
+    GAIN,
+    OFFSET,
+    DOWN,
+    ACROSS,
+    CAMERA_FOCUS,
+    PROJECTOR_DOWN,
+    PROJECTOR_ACROSS,
+    PROJECTOR_FOCUS,
+    BEND,
+) = range(9)
+CAUSES = 9
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoFits:
+    """Photos of a sample beside relit pictures.
+
+    Attributes
+    ----------
+    photos, relit, variance : ndarray, shape (photos, rows, columns, channels)
+        Without drift; relit pictures with the light of black; variance of their difference.
+    black : ndarray, shape (rows, columns, channels)
+    white : ndarray, shape (rows, columns, channels)
+        Relit under white, without black.
+    """
+
+    photos: Floats
+    relit: Floats
+    variance: Floats
+    black: Floats
+    white: Floats
+
+    @property
+    def misfit(self) -> Floats:
+        """Of each photo, (photos,)."""
+        return np.asarray(((self.photos - self.relit) ** 2 / self.variance).mean(axis=(1, 2, 3)))
+
+
+def fit_photos(
+    sample: CameraSample, photos: PhotosWithoutDrift, transport: Transport, usable: Booleans
+) -> PhotoFits:
+    """Relight a sample under every pattern of its plan.
+
+    Parameters
+    ----------
+    sample : CameraSample
+    photos : PhotosWithoutDrift
+        All photos of the sample.
+    transport : Transport
+        Of the sample's camera pixels.
+    usable : ndarray of bool, shape (rows, columns, channels)
+        Others count for nothing.
+    """
+    size = (*sample.size, transport.channels)
+    lights = np.stack([drawn(sample.plan, i) for i in range(len(sample.plan.patterns))])
+    relit = transport.pictures(lights)
+    relit += transport.black
+    every = slice(0, sample.size.height)
+    taken = photos.read(range(len(lights)), every)
+    white = np.asarray(
+        transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
+    ).reshape(size)
+    model = (MODEL_ERROR * white) ** 2 + (MODEL_ERROR_OF_MEAN * white.mean()) ** 2
+    variance = np.stack(
+        [
+            photos.variance(np.maximum(a, b).reshape(-1, size[2])).reshape(size)
+            for a, b in zip(taken, relit, strict=True)
+        ]
+    )
+    variance += model
+    variance[:, ~usable] = np.inf
+    return PhotoFits(taken, relit, variance.astype(np.float32), transport.black, white)
+
+
+def drawn(plan: Plan, number: int) -> Floats:
+    """Return the pattern of a photo as light, (Py, Px)."""
+    return plan.draw(number) / np.float32(255)
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Of the weighted regression of each photo's difference on the causes, in each region.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (photos, regions, causes, causes)
+    vector : ndarray, shape (photos, regions, causes)
+    values : int
+        Values of a photo: what its misfit is the mean of.
+    """
+
+    matrix: NDArray[np.float64]
+    vector: NDArray[np.float64]
+    values: int
+
+    @property
+    def whole(self) -> "NormalEquations":
+        """Of the whole picture: one region."""
+        return NormalEquations(
+            self.matrix.sum(axis=1, keepdims=True),
+            self.vector.sum(axis=1, keepdims=True),
+            self.values,
+        )
+
+
+def normal_equations(sample: CameraSample, fits: PhotoFits) -> NormalEquations:
+    """Return the normal equations of all photos of a sample."""
+    plan = sample.plan
+    region = _regions(sample)
+    count = REGIONS_A_SIDE**2
+    numbers = len(plan.patterns)
+    matrix = np.zeros((numbers, count, CAUSES, CAUSES))
+    vector = np.zeros((numbers, count, CAUSES))
+    partner = _partners(plan)
+    scale = float(fits.white.max()) or 1.0
+    for number in range(numbers):
+        causes = _effects(fits, plan, number, partner.get(number), scale)
+        weight = 1 / fits.variance[number]
+        difference = fits.photos[number] - fits.relit[number]
+        for place in range(count):
+            where = region == place
+            if not where.any():
+                continue
+            effects = causes[:, where].reshape(CAUSES, -1).astype(np.float64)
+            weighted = effects * weight[where].ravel()
+            matrix[number, place] = weighted @ effects.T
+            vector[number, place] = weighted @ difference[where].ravel()
+    return NormalEquations(matrix, vector, fits.photos[0].size)
+
+
+def _effects(
+    fits: PhotoFits, plan: Plan, number: int, partner: int | None, scale: float
+) -> NDArray[np.float32]:
+    """Return what a unit of each cause adds to a photo, (causes, rows, columns, channels)."""
+    relit, pattern = fits.relit[number], plan.patterns[number]
+    lit = relit - fits.black
+    effects = np.zeros((CAUSES, *relit.shape), dtype=np.float32)
+    effects[GAIN], effects[OFFSET] = lit, 1.0
+    effects[DOWN], effects[ACROSS] = _derivatives(relit)
+    effects[CAMERA_FOCUS] = _derivatives(effects[DOWN])[0] + _derivatives(effects[ACROSS])[1]
+    # A bend that leaves black and half of white as they are: the gain is not of interest.
+    effects[BEND] = lit**2 / scale - lit / 2
+    if isinstance(pattern, Sinusoid) and pattern.frequency != DC:
+        cycles = 2 * np.pi * np.array([float(part) for part in pattern.frequency])
+        modulation = lit - fits.white / 2
+        effects[PROJECTOR_FOCUS] = float(cycles @ cycles) * modulation
+        if partner is not None:
+            # The derivative of a cosine is the sine, of a sine less the cosine.
+            sign = 1.0 if pattern.kind == "cosine" else -1.0
+            other = sign * (fits.relit[partner] - fits.black - fits.white / 2)
+            effects[PROJECTOR_DOWN], effects[PROJECTOR_ACROSS] = (
+                np.float32(part) * other for part in cycles
+            )
+    return effects
+
+
+def _partners(plan: Plan) -> dict[int, int]:
+    """Return for each cosine a photo of its sine, and the other way round."""
+    first: dict[tuple[object, str], int] = {}
+    for number, pattern in enumerate(plan.patterns):
+        if isinstance(pattern, Sinusoid) and not pattern.inverse and not is_reference(pattern):
+            first.setdefault((pattern.frequency, pattern.kind), number)
+    found = {}
+    for number, pattern in enumerate(plan.patterns):
+        if isinstance(pattern, Sinusoid) and not pattern.inverse and not is_reference(pattern):
+            other = first.get((pattern.frequency, "sine" if pattern.kind == "cosine" else "cosine"))
+            if other is not None:
+                found[number] = other
+    return found
+
+
+def _derivatives(picture: Floats) -> tuple[Floats, Floats]:
+    """Return the derivatives down and across of a sample, within its patches."""
+    found = []
+    for axis in (0, 1):
+        length = picture.shape[axis]
+        if length % PATCH or length < 2 * PATCH:
+            parts = [picture]
+        else:
+            parts = np.split(picture, length // PATCH, axis=axis)
+        found.append(
+            np.concatenate(
+                [
+                    np.gradient(part, axis=axis) if part.shape[axis] > 1 else np.zeros_like(part)
+                    for part in parts
+                ],
+                axis=axis,
+            )
+        )
+    return found[0], found[1]
+
+
+def _regions(sample: CameraSample) -> Integers:
+    """Return the region of each sampled camera pixel, (rows, columns)."""
+    down, across = (
+        lines * REGIONS_A_SIDE // max(1, side)
+        for lines, side in zip((sample.rows, sample.columns), sample.camera, strict=True)
+    )
+    return np.add.outer(REGIONS_A_SIDE * down, across)
+
+
+def is_check(plan: Plan) -> Booleans:
+    """Return which photos of a plan are check photos, (photos,)."""
+    return np.array([pattern.purpose == "check" for pattern in plan.patterns])
+
+
+def is_white_or_black(plan: Plan) -> Booleans:
+    """Return which photos of a plan are of white or black, (photos,)."""
+    return np.array([is_reference(pattern) for pattern in plan.patterns])

@@ -1,0 +1,302 @@
+"""What spoils a capture as a whole: motion, focus, flicker, a response that is not linear, JPEG.
+
+How much of the photos' misfits each of them explains is read off the normal equations of
+`nearfar.workflow.diagnosis.misfit`, in misfits summed over photos: 1 is a photo's noise.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Integers
+from nearfar.faults.of_photos import (
+    BlackClipped,
+    Compressed,
+    ExposureChanged,
+    LampFlickers,
+    Moved,
+    NotLinear,
+    Spoilt,
+)
+from nearfar.files import from_srgb
+from nearfar.photometry.drift import find_references
+from nearfar.plan.checks import check_lights
+from nearfar.workflow.diagnosis.misfit import (
+    ACROSS,
+    BEND,
+    CAMERA_FOCUS,
+    DOWN,
+    GAIN,
+    OFFSET,
+    PROJECTOR_ACROSS,
+    PROJECTOR_DOWN,
+    PROJECTOR_FOCUS,
+    NormalEquations,
+    PhotoFits,
+)
+from nearfar.workflow.diagnosis.sample import CameraSample
+
+# What a cause has to explain at least.
+LEAST_EXPLAINED = 1.0
+# Share of the misfits beyond 1 for each photo that a change at one moment has to explain.
+LEAST_SHARE = 0.05
+# A change at one moment lies at least so many photos from both ends.
+FROM_THE_ENDS = 4
+# And of the photos of white alone, where it is camera or scene that moved.
+LEAST_OF_WHITE = 0.3
+# A bend of the response has to explain at least this.
+LEAST_BEND = 0.5
+# Exposure explains this many times what a bend does where it changes from photo to photo.
+EXPOSURE_OVER_BEND = 7.0
+# Above this, light changes from photo to photo, not in a few.
+FLICKER = 8.0
+# Of the photos, the share in which it does.
+FLICKER_SHARE = 0.2
+# Encodings of light, each with its inverse, and what of the sums' excess is left if it is one.
+DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
+    "sRGB": lambda values: from_srgb(np.clip(values, 0.0, 1.0)),
+    "a gamma of 2.2": lambda values: np.maximum(values, 0.0) ** 2.2,
+}
+NAMED_SHARE = 0.2
+# Share of camera pixels at which all photos of black read the lowest level.
+CLIPPED_SHARE = 0.2
+# Squared differences of neighbours across borders of JPEG's blocks, over those within: over their
+# mean, and over the largest.
+BLOCK_RATIO = 1.15
+CLEAR_RATIO = 1.07
+BLOCK = 8
+
+
+class Step(NamedTuple):
+    """A change between two photos.
+
+    Attributes
+    ----------
+    explained : float
+        Misfit, summed over photos.
+    photo : int
+        The first photo after it.
+    size : ndarray
+        Effects after it less those before.
+    """
+
+    explained: float
+    photo: int
+    size: NDArray[np.float64]
+
+
+def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -> list[Spoilt]:
+    """Find what changed while photos were taken, at one moment or all the time.
+
+    Parameters
+    ----------
+    equations : NormalEquations
+    misfit : ndarray, shape (photos,)
+    whites : ndarray of int
+        Numbers of the photos of white.
+
+    Returns
+    -------
+    list of Spoilt
+        The one that explains most first.
+    """
+    least = max(LEAST_EXPLAINED, LEAST_SHARE * float(np.maximum(misfit - 1, 0).sum()))
+    whole = equations.whole
+    found: list[tuple[float, Spoilt]] = []
+    camera = _step(whole, [DOWN, ACROSS], whites=whites)
+    regions = [
+        _step(equations, [DOWN, ACROSS], i, whites) for i in range(equations.matrix.shape[1])
+    ]
+    in_regions = sum(step.explained for step in regions)
+    projector = max(
+        (
+            _step(whole, causes)
+            for causes in ([PROJECTOR_DOWN, PROJECTOR_ACROSS], [PROJECTOR_FOCUS])
+        ),
+        key=lambda step: step.explained,
+    )
+    focus = _step(whole, [CAMERA_FOCUS])
+    # White looks the same wherever the projector is.
+    if _explained_of_white(equations, whites) > LEAST_OF_WHITE:
+        projector = projector._replace(explained=0.0)
+    if projector.explained > max(least, in_regions, focus.explained):
+        found.append((projector.explained, Moved("projector", projector.photo, None)))
+    elif focus.explained > max(least, in_regions):
+        found.append((focus.explained, Moved("camera's focus", focus.photo, None)))
+    elif camera.explained > max(least, in_regions / 2):
+        # A camera that moves does so everywhere.
+        pixels = _shift(whole, camera.photo, whites)
+        found.append((camera.explained, Moved("camera", camera.photo, pixels)))
+    elif in_regions > least:
+        region = max(range(len(regions)), key=lambda i: regions[i].explained)
+        photo = regions[region].photo
+        pixels = _shift(equations, photo, whites, region)
+        found.append((in_regions, Moved("scene", photo, pixels)))
+    light = find_changes_of_light(whole)
+    bend = _explained(whole.matrix.sum(axis=(0, 1)), whole.vector.sum(axis=(0, 1)), [BEND])
+    bend /= whole.values
+    if bend > LEAST_BEND and (light is None or light[0] < EXPOSURE_OVER_BEND * bend):
+        found.append((light[0] if light else bend, NotLinear("")))
+    elif light is not None and light[0] > least:
+        found.append(light)
+    found.sort(key=lambda each: -each[0])
+    return [each for explained, each in found if explained > found[0][0] / 4]
+
+
+def _explained_of_white(equations: NormalEquations, whites: Integers) -> float:
+    """Return the misfit of the photos of white that a motion of what they show explains."""
+    steps = [
+        _best_step(
+            equations.matrix[whites, region][:, [DOWN, ACROSS]][:, :, [DOWN, ACROSS]],
+            equations.vector[whites, region][:, [DOWN, ACROSS]],
+            np.arange(1, len(whites)),
+        )
+        for region in range(equations.matrix.shape[1])
+    ]
+    return sum(step.explained for step in steps) / equations.values
+
+
+def _shift(equations: NormalEquations, photo: int, whites: Integers, region: int = 0) -> float:
+    """Return by how many pixels pictures of white after a photo are shifted from those before.
+
+    These are all of one pattern, so that the transport takes the mean of their places. Other photos
+    are nearly alone with their pattern, and the transport goes with them.
+    """
+    causes = [DOWN, ACROSS]
+    sizes = []
+    for chosen in (whites[whites < photo], whites[whites >= photo]):
+        matrix = equations.matrix[chosen, region].sum(axis=0)[np.ix_(causes, causes)]
+        sizes.append(_solved(matrix, equations.vector[chosen, region].sum(axis=0)[causes]))
+    return float(np.hypot(*(sizes[1] - sizes[0])))
+
+
+def find_changes_of_light(equations: NormalEquations) -> tuple[float, Spoilt] | None:
+    """Find photos under other light than the transport's, or light that changes all the time."""
+    causes = [GAIN, OFFSET]
+    matrix = equations.matrix[:, 0][:, causes][:, :, causes]
+    vector = equations.vector[:, 0][:, causes]
+    effects = np.array([_solved(m, v) for m, v in zip(matrix, vector, strict=True)])
+    explained = np.einsum("np,np->n", vector, effects) / equations.values
+    total = float(explained.sum())
+    changed = np.flatnonzero(explained > LEAST_EXPLAINED)
+    if total > FLICKER and np.mean(explained > FLICKER / 40) > FLICKER_SHARE:
+        return total, LampFlickers(float(effects[:, 0].std()))
+    if not len(changed):
+        return None
+    gains, offsets = effects[changed].T
+    return total, ExposureChanged(
+        tuple(changed.tolist()),
+        float(max(gains, key=abs)),
+        float(max(offsets, key=abs)),
+    )
+
+
+def _step(
+    equations: NormalEquations,
+    causes: list[int],
+    region: int = 0,
+    whites: Integers | None = None,
+) -> Step:
+    """Return the best change of some causes between two photos.
+
+    The photos of white, where they tell of the causes, tell best between which two of them it was:
+    the transport does not bend to them.
+    """
+    matrix = equations.matrix[:, region][:, causes][:, :, causes]
+    vector = equations.vector[:, region][:, causes]
+    last = len(matrix)
+    candidates = np.arange(FROM_THE_ENDS, last - FROM_THE_ENDS)
+    if whites is not None and len(whites) > 2:
+        place = _best_step(matrix[whites], vector[whites], np.arange(1, len(whites))).photo
+        candidates = np.arange(whites[place - 1] + 1, whites[place] + 1)
+    best = _best_step(matrix, vector, candidates)
+    return best._replace(explained=best.explained / equations.values)
+
+
+def _best_step(
+    matrix: NDArray[np.float64], vector: NDArray[np.float64], candidates: Integers
+) -> Step:
+    """Return the change that explains most, before one of some photos."""
+    matrix, vector = matrix.cumsum(axis=0), vector.cumsum(axis=0)
+    best = Step(-1.0, int(candidates[0]), np.zeros(vector.shape[1]))
+    for photo in candidates.tolist():
+        before = _solved(matrix[photo - 1], vector[photo - 1])
+        after = _solved(matrix[-1] - matrix[photo - 1], vector[-1] - vector[photo - 1])
+        explained = float(before @ vector[photo - 1] + after @ (vector[-1] - vector[photo - 1]))
+        if explained > best.explained:
+            best = Step(explained, photo, after - before)
+    return best
+
+
+def _explained(
+    matrix: NDArray[np.float64], vector: NDArray[np.float64], causes: list[int]
+) -> float:
+    part = vector[causes]
+    return float(part @ _solved(matrix[np.ix_(causes, causes)], part))
+
+
+def _solved(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve normal equations; causes without any effect come out as 0."""
+    scale = np.sqrt(np.maximum(np.diagonal(matrix), 1e-300))
+    scaled = matrix / np.outer(scale, scale)
+    return np.asarray(np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ (vector / scale) / scale)
+
+
+def find_clipped_black(sample: CameraSample) -> list[Spoilt]:
+    """Find camera pixels that read the lowest level of all in every photo of black."""
+    blacks: Integers = find_references(sample.plan).blacks
+    lowest = float(sample.photos.min())
+    share = float(np.mean((sample.photos[blacks] <= lowest).all(axis=0)))
+    return [BlackClipped(share)] if share > CLIPPED_SHARE else []
+
+
+def find_compression(sample: CameraSample, fits: PhotoFits) -> list[Spoilt]:
+    """Find the blocks of JPEG in what photos differ from their relit pictures.
+
+    Neighbours differ more across the border of two blocks than within one.
+    """
+    difference = fits.photos - fits.relit
+    by_place = np.zeros(BLOCK)
+    for axis, lines in ((1, sample.rows), (2, sample.columns)):
+        power = np.diff(difference, axis=axis) ** 2
+        # The median, because edges of the scene outweigh all else in a mean.
+        each = np.median(power, axis=tuple(i for i in range(4) if i != axis))
+        neighbours = np.diff(lines) == 1
+        for place in range(BLOCK):
+            chosen = each[neighbours & (lines[1:] % BLOCK == place)]
+            if not len(chosen):
+                return []
+            by_place[place] += float(np.median(chosen)) / max(float(np.median(each)), 1e-300)
+    border, within = by_place[0], by_place[1:]
+    is_compressed = border > BLOCK_RATIO * within.mean() and border > CLEAR_RATIO * within.max()
+    return [Compressed()] if is_compressed else []
+
+
+def name_encoding(sample: CameraSample) -> str:
+    """Return the encoding without which patterns and their inverses sum to white; or nothing."""
+    plan = sample.plan
+    whites, blacks = find_references(plan)
+    white, black = (sample.photos[numbers].mean(axis=0) for numbers in (whites, blacks))
+    usable = (sample.photos[whites] < 1.0).all(axis=0)
+    pairs = [
+        (sample.photos[list(light.photos)], sample.photos[list(light.inverses)])
+        for light in check_lights(plan)
+        if light.photos and light.inverses
+    ]
+
+    def excess(decode: Callable[[Floats], Floats]) -> float:
+        light = decode(white) - decode(black)
+        both = sum(
+            decode(one).mean(axis=0) + decode(other).mean(axis=0) - 2 * decode(black) - light
+            for one, other in pairs
+        )
+        return abs(float(np.sum(both * usable))) / max(float(np.sum(light * usable)), 1e-300)
+
+    as_they_are = excess(lambda values: values)
+    decoded = {name: excess(decode) for name, decode in DECODINGS.items()}
+    if not pairs or not decoded:
+        return ""
+    best = min(decoded, key=lambda name: decoded[name])
+    return best if decoded[best] < NAMED_SHARE * as_they_are else ""

@@ -1,0 +1,1 @@
+"""How far a transport can be trusted, by photos that its estimate never saw."""

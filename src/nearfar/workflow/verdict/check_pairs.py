@@ -1,0 +1,128 @@
+"""The error of relighting under a pattern, by one photo of it and one of its inverse.
+
+The two photos sum to white, which is photographed many times. So what the two differ from their
+relit pictures by sums to noise, and what the differences hold besides it is the transport's error.
+No model of the noise is as good: the error may be a twentieth of it.
+
+Index convention: pictures are (..., channels), any camera pixels.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Floats
+
+# Where the differences of a pair sum to this many times the power of the noise that the model
+# expects, the sum is not noise alone, and the model's noise counts.
+LARGEST_NOISE_RATIO = 1.2
+
+
+@dataclass(frozen=True)
+class CheckPair:
+    """What the photos of a check pattern and of its inverse say of a transport.
+
+    Mean squares over camera pixels and channels, in photo units.
+
+    Attributes
+    ----------
+    values : int
+        Number of camera pixels times channels.
+    signal : float
+        The pattern's photo without black.
+    difference : float
+        A photo less the relit picture, the mean of both photos.
+    of_sum : float
+        The two differences' sum.
+    excess : float
+        Mean, not mean square: the two differences' sum.
+    white : float
+        Mean of the picture relit under white.
+    noise : float
+        Variance of one photo by the model of its noise.
+    error_of_white : float
+        Mean square of the error of the picture relit under white, as expected from the noise.
+    share_of_pattern : float
+        Expected power of the error under the pattern, over the mean of it and the inverse's.
+    """
+
+    values: int
+    signal: float
+    difference: float
+    of_sum: float
+    excess: float
+    white: float
+    noise: float
+    error_of_white: float
+    share_of_pattern: float
+
+    def __add__(self, other: "CheckPair") -> "CheckPair":
+        """Return the pair of both sets of camera pixels."""
+        values = self.values + other.values
+        share = self.values / max(1, values)
+        mine, theirs = vars(self), vars(other)
+        means = {
+            name: share * mine[name] + (1 - share) * theirs[name]
+            for name in mine
+            if name != "values"
+        }
+        return CheckPair(values, **means)
+
+    @property
+    def photo_noise(self) -> float:
+        """Mean variance of one photo's noise."""
+        # The differences sum to the noise of both photos, and to the error of white.
+        shown = max(self.of_sum - self.error_of_white, 0.0) / 2
+        return min(shown, self.noise) if shown > LARGEST_NOISE_RATIO * self.noise else shown
+
+    @property
+    def error(self) -> float:
+        """Mean square of the error under the pattern; by chance it may come out below 0."""
+        return self.share_of_pattern * (self.difference - self.photo_noise)
+
+    @property
+    def error_deviation(self) -> float:
+        """Standard deviation of `error`, from the noise of the photos."""
+        return float(self.share_of_pattern * self.photo_noise / np.sqrt(max(1, self.values)))
+
+    @property
+    def excess_share(self) -> float:
+        """What the pattern and its inverse show beyond white, as a share of white."""
+        return self.excess / self.white if self.white > 0 else 0.0
+
+
+def compare_pair(
+    shown: Floats,
+    inverse: Floats,
+    relit: Floats,
+    *,
+    white: Floats,
+    noise: float,
+    error_of_white: float,
+    share_of_pattern: float = 1.0,
+) -> CheckPair:
+    """Compare the photos of a pattern and of its inverse with the transport's pictures.
+
+    Parameters
+    ----------
+    shown, inverse : ndarray, shape (..., channels)
+        The photos without black.
+    relit, white : ndarray, shape (..., channels)
+        The pictures under the pattern and under white.
+    noise, error_of_white, share_of_pattern : float
+        As `CheckPair`.
+    """
+    first = (shown - relit).astype(np.float64)
+    second = (inverse - (white - relit)).astype(np.float64)
+    both = first + second
+    return CheckPair(
+        values=first.size,
+        signal=float(np.mean(np.square(shown, dtype=np.float64))),
+        difference=float(np.mean(first**2) + np.mean(second**2)) / 2,
+        of_sum=float(np.mean(both**2)),
+        excess=float(both.mean()),
+        white=float(np.mean(white, dtype=np.float64)),
+        noise=noise,
+        error_of_white=error_of_white,
+        share_of_pattern=share_of_pattern,
+    )

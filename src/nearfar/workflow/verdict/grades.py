@@ -1,0 +1,5 @@
+"""The grades of verdicts."""
+
+from typing import Literal
+
+Grade = Literal["good", "doubtful", "wrong"]

@@ -1,0 +1,187 @@
+"""The verdict on a transport: good, doubtful or wrong, and why."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from nearfar.capture import Capture
+from nearfar.faults import of_photos
+from nearfar.faults.of_capture import find_faults
+from nearfar.faults.of_photos import NotLinear, Spoilt
+from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
+from nearfar.progress import Report, ignore_progress
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.diagnosis.diagnose import find_what_spoils
+from nearfar.workflow.verdict.grades import Grade
+from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
+
+Cause = (
+    of_photos.Cause | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "unchecked"]
+)
+
+# What a pattern and its inverse may show beyond white, as a share of white.
+LARGEST_EXCESS = 0.01
+# Power of the errors over what the error bars expect: above the first the transport is doubtful,
+# above the second it is wrong.
+DOUBTFUL_ERROR_RATIO = 2.0
+WRONG_ERROR_RATIO = 20.0
+# Held-out SNR_b in dB above which no error, however unexpected, makes a transport doubtful.
+GOOD_DECIBELS = 40.0
+# Held-out SNR_b in dB below which a transport is doubtful, or wrong, whatever was expected.
+DOUBTFUL_DECIBELS = 25.0
+WRONG_DECIBELS = 15.0
+
+# Photos that are of something else: what was estimated from them is wrong.
+WRONG_PHOTOS: tuple[Cause, ...] = ("order", "turned", "torn", "colours")
+CAUSES_OF_FAULTS: Mapping[type[Any], Cause] = {
+    PairsDoNotAdd: "not-linear",
+    LightDrifted: "lamp",
+    PhotosSaturated: "saturated",
+}
+# What is wrong, and what to do.
+SENTENCES: Mapping[Cause, str] = {
+    "not-linear": str(NotLinear("")),
+    "lamp": "the light changed meanwhile: let the lamp warm up, and shut out other light.",
+    "saturated": "photos are saturated: expose less.",
+    "model": "the scene has light that the model cannot represent, or something moved.",
+    "noise": "the photos are noisy: expose longer, or average several.",
+    "too-few-photos": "too little was measured: plan for more photos.",
+    "unchecked": "nothing was checked: the plan has no check photos.",
+}
+
+
+class Reason(NamedTuple):
+    """Why a transport is not good.
+
+    Attributes
+    ----------
+    cause : str
+    sentence : str
+        What is wrong, with the photos that it concerns, and what to do.
+    """
+
+    cause: Cause
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What check photos, and faults of the others, say of a transport.
+
+    Attributes
+    ----------
+    grade : {"good", "doubtful", "wrong"}
+    held_out : HeldOut or None
+        None if nothing was checked.
+    reasons : tuple of Reason
+        Why the transport is not good, the most probable first.
+    """
+
+    grade: Grade
+    held_out: HeldOut | None
+    reasons: tuple[Reason, ...]
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """Causes of the reasons, each once."""
+        return tuple(dict.fromkeys(reason.cause for reason in self.reasons))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what ``nearfar reconstruct --json`` prints."""
+        held_out = self.held_out
+        return {
+            "verdict": self.grade,
+            "held_out_dB": None if held_out is None else held_out.snr,
+            "expected_dB": None if held_out is None else held_out.expected_snr,
+            "causes": list(self.causes),
+            "reasons": [reason.sentence for reason in self.reasons],
+        }
+
+    def __str__(self) -> str:
+        sentences = [reason.sentence for reason in self.reasons]
+        if self.held_out is not None:
+            snr, expected = self.held_out.snr, self.held_out.expected_snr
+            beside = "" if expected is None else f", {expected:.1f} dB expected"
+            sentences.append(
+                f"relit pictures are off by {100 * 10 ** (-snr / 20):.2g} % (held-out SNR_b "
+                f"{snr:.1f} dB{beside})."
+            )
+        return f"{self.grade}: {' '.join(each[:1].upper() + each[1:] for each in sentences)}"
+
+
+def judge_reconstruction(
+    transport: StoredTransport, capture: Capture, progress: Report = ignore_progress
+) -> Verdict:
+    """Return the verdict on a transport, by the capture that it was reconstructed from.
+
+    Parameters
+    ----------
+    transport : StoredTransport
+    capture : Capture
+    progress : callable
+        Called with the step and the share of it that is done.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the transport or the capture is damaged.
+    """
+    square = transport.provenance["square"]
+    held_out = None if square else measure_held_out(transport, capture, progress)
+    return judge(
+        held_out,
+        find_faults(capture, transport.provenance),
+        find_what_spoils(transport, capture, progress),
+    )
+
+
+def judge(
+    held_out: HeldOut | None, faults: Sequence[Fault], spoilt: Sequence[Spoilt] = ()
+) -> Verdict:
+    """Return the verdict on a transport.
+
+    Parameters
+    ----------
+    held_out : HeldOut or None
+        None if nothing was checked.
+    faults : sequence of Fault
+        Of the capture.
+    spoilt : sequence of Spoilt
+        What spoils its photos.
+    """
+    reasons = [Reason(each.cause, str(each)) for each in spoilt]
+
+    def add(cause: Cause) -> None:
+        if all(reason.cause != cause for reason in reasons):
+            reasons.append(Reason(cause, SENTENCES[cause]))
+
+    for fault in faults:
+        # What is known of the photos says more.
+        if (cause := CAUSES_OF_FAULTS.get(type(fault))) is not None and (
+            not spoilt or cause == "saturated"
+        ):
+            add(cause)
+    if held_out is None:
+        add("unchecked")
+        wrong = any(reason.cause in WRONG_PHOTOS for reason in reasons)
+        return Verdict("wrong" if wrong else "doubtful", None, tuple(reasons))
+    if not spoilt:
+        if abs(held_out.nonlinear_excess) > LARGEST_EXCESS:
+            add("not-linear")
+        elif abs(held_out.lamp_excess) > LARGEST_EXCESS:
+            add("lamp")
+    ratio = held_out.error_ratio
+    surprises = ratio is not None and ratio > DOUBTFUL_ERROR_RATIO
+    if surprises and held_out.snr < GOOD_DECIBELS and not reasons:
+        add("model")
+    if held_out.snr < DOUBTFUL_DECIBELS and not reasons:
+        few = (held_out.unmeasured_share or 0.0) > 1 / 2
+        add("too-few-photos" if few else "noise")
+    wrong = (
+        held_out.snr < WRONG_DECIBELS
+        or (ratio is not None and ratio > WRONG_ERROR_RATIO)
+        or any(reason.cause in WRONG_PHOTOS for reason in reasons)
+    )
+    return Verdict(
+        "wrong" if wrong else "doubtful" if reasons else "good", held_out, tuple(reasons)
+    )

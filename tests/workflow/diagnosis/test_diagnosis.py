@@ -1,0 +1,101 @@
+"""What spoils photos is told by name, and good photos are not accused."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from benchmarks.spoils import SPOILS, shoot
+
+from nearfar.arrays import Size
+from nearfar.capture.writing import write_capture
+from nearfar.faults.of_photos import ShowsOtherPattern
+from nearfar.progress import ignore_progress
+from nearfar.transport.store import open_transport
+from nearfar.workflow.diagnosis.diagnose import find_what_spoils
+from nearfar.workflow.diagnosis.sample import PATCH, sample_camera, sampled_lines
+from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+
+
+@pytest.fixture(scope="module")
+def shot():
+    return shoot("cornell", Size(16, 16), 60)
+
+
+@pytest.fixture(scope="module")
+def spoilt_by(shot, tmp_path_factory):
+    @cache
+    def diagnose(name=None, strength=0.0):
+        folder = tmp_path_factory.mktemp("spoilt")
+        photos = shot.photos if name is None else SPOILS[name].apply(shot, strength)
+        capture = write_capture(
+            shot.plan, folder / "c.zarr", list(photos), full_scale=shot.full_scale
+        )
+        reconstruct_to_file(capture, folder / "t.zarr")
+        return find_what_spoils(open_transport(folder / "t.zarr"), capture)
+
+    return diagnose
+
+
+def test_good_photos_are_not_accused(spoilt_by):
+    assert spoilt_by() == []
+
+
+@pytest.mark.parametrize(
+    ("name", "strength"),
+    [
+        ("gamma", 1.1),
+        ("black clipped", 0.05),
+        ("camera moved, pixels", 0.3),
+        ("projector moved, pixels", 0.2),
+        ("photos rotated", 1),
+        ("photos doubled", 1),
+        ("photos torn", 1),
+        ("exposure of three photos", 0.2),
+        ("colours swapped", 1),
+    ],
+)
+def test_what_spoils_photos_is_named(spoilt_by, name, strength):
+    found = spoilt_by(name, strength)
+    assert found[0].cause in SPOILS[name].causes, "; ".join(map(str, found))
+
+
+@pytest.mark.parametrize("name", ["photos rotated", "photos torn", "photos doubled"])
+def test_the_photo_is_named(shot, spoilt_by, name):
+    (found,) = spoilt_by(name, 1)
+    assert list(found.photos) == shot.chosen(1)
+
+
+def test_photos_that_are_swapped_explain_each_other(shot, spoilt_by):
+    (found,) = spoilt_by("photos swapped", 2)
+    assert isinstance(found, ShowsOtherPattern)
+    assert list(found.photos) == shot.chosen(2)
+    assert found.others == found.photos[::-1]
+    assert "are swapped" in str(found)
+
+
+def test_the_moment_of_a_motion_is_named(shot, spoilt_by):
+    found, *_ = spoilt_by("camera moved, pixels", 0.3)
+    assert found.photo == pytest.approx(shot.half, abs=3)
+    assert found.pixels == pytest.approx(0.3, rel=0.3)
+
+
+@pytest.mark.parametrize("camera", [Size(1080, 1920), Size(999, 1601), Size(8, 40_000)])
+def test_large_cameras_are_sampled_the_same_way_when_turned(camera):
+    for lines, side in zip(sampled_lines(camera), camera, strict=True):
+        assert np.array_equal(side - 1 - lines[::-1], lines)
+        assert len(lines) % PATCH == 0
+    rows, columns = sampled_lines(camera)
+    assert len(rows) * len(columns) < camera.pixels / 4
+
+
+def test_a_sample_holds_the_photos_at_its_places(shot):
+    photos = np.arange(2 * 300 * 400, dtype=np.float32).reshape(2, 300, 400, 1)
+    capture = SimpleNamespace(
+        camera=Size(300, 400),
+        channels=1,
+        plan=SimpleNamespace(patterns=[None, None]),
+        read=lambda numbers, rows: photos[numbers][:, rows],
+    )
+    sample = sample_camera(capture, lambda share: ignore_progress("", share))
+    assert np.array_equal(sample.photos, photos[:, sample.rows][:, :, sample.columns])

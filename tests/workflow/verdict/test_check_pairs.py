@@ -1,0 +1,82 @@
+"""The error of a transport, from two photos that are noisier than it."""
+
+import numpy as np
+import pytest
+
+from nearfar.workflow.verdict.check_pairs import compare_pair
+
+VALUES = 40_000
+
+
+def _pictures(seed):
+    generator = np.random.default_rng(seed)
+    white = generator.uniform(0.1, 0.9, VALUES)
+    return generator, white, white * generator.uniform(0, 1, VALUES)
+
+
+def _compare(seed=0, *, error=0.01, noise=0.03, gain=1.0, claimed=None, bend=0.0):
+    """Relight with an error, and photograph with noise, a lamp's gain and a bent response."""
+    generator, white, known = _pictures(seed)
+    relit = known + error * generator.normal(size=VALUES)
+    taken = []
+    for picture in (known, white - known):
+        share = picture / white
+        shown = gain * white * (share - bend * share * (1 - share))
+        taken.append(shown + noise * generator.normal(size=VALUES))
+    variance = noise**2 if claimed is None else claimed
+    return compare_pair(*taken, relit, white=white, noise=variance, error_of_white=0.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("error", "noise"), [(0.01, 0.03), (0.005, 0.02), (0.02, 0.005)])
+def test_the_error_is_found_below_the_noise(seed, error, noise):
+    pair = _compare(seed, error=error, noise=noise)
+    assert pair.error == pytest.approx(error**2, abs=4 * pair.error_deviation + 0.03 * error**2)
+    assert pair.photo_noise == pytest.approx(noise**2, rel=0.05)
+
+
+def test_noise_alone_is_no_error():
+    errors = [_compare(seed, error=0.0) for seed in range(20)]
+    scaled = [pair.error / pair.error_deviation for pair in errors]
+    assert np.std(scaled) == pytest.approx(1.0, abs=0.5)
+    assert abs(np.mean(scaled)) < 1.0
+
+
+@pytest.mark.parametrize("claimed", [0.0, 1e-5, 1.0])
+def test_a_model_of_the_noise_that_is_wrong_in_scale_hides_no_error(claimed):
+    # What the noise is said to be matters where the photos show more, never where they show less.
+    pair = _compare(error=0.02, noise=0.03, claimed=claimed)
+    assert pair.error > 0.9 * 0.02**2
+
+
+def test_a_lamp_that_changed_is_no_noise():
+    pair = _compare(error=0.0, noise=0.001, gain=1.05)
+    assert pair.excess_share == pytest.approx(0.05, rel=0.02)
+    # 5 % of the picture and of its inverse.
+    assert pair.error == pytest.approx(0.05**2 * pair.signal / 1.05**2, rel=0.05)
+
+
+@pytest.mark.parametrize("bend", [0.2, -0.2])
+def test_a_bent_response_does_not_add_up_to_white(bend):
+    pair = _compare(error=0.0, noise=0.001, bend=bend)
+    # Both are off by the same at every share of white, a sixth of white on average.
+    assert pair.excess_share == pytest.approx(-2 * bend / 6, rel=0.05)
+
+
+def test_parts_of_a_camera_count_as_the_whole():
+    generator, white, known = _pictures(0)
+    taken = [known + 0.1 * generator.normal(size=VALUES), white - known]
+
+    def of(part):
+        return compare_pair(
+            taken[0][part],
+            taken[1][part],
+            known[part] * 1.1,
+            white=white[part],
+            noise=1e-3,
+            error_of_white=1e-4,
+        )
+
+    whole, joined = of(slice(None)), of(slice(0, 999)) + of(slice(999, None))
+    assert joined.values == whole.values == VALUES
+    assert vars(joined) == pytest.approx(vars(whole))

@@ -1,0 +1,128 @@
+"""Verdicts: good where all is well, and the cause by name where it is not."""
+
+import json
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan.checks import check_lights
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.transport.store import open_transport
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.evaluate import decibels, exposure_of
+from nearfar.workflow.reconstruction.options import ReconstructionOptions
+from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+from nearfar.workflow.verdict.held_out import CAMERA_PIXELS, bands, measure_held_out
+from nearfar.workflow.verdict.verdict import judge_reconstruction
+from tests.cli.conftest import run_nearfar
+
+PROJECTOR = Size(24, 24)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return cached_scene("cornell", PROJECTOR)
+
+
+@pytest.fixture(scope="module")
+def reconstructed(box, tmp_path_factory):
+    """Return the capture and the transport of a rig, by what is wrong with it."""
+
+    @cache
+    def make(photos=80, gamma=1.0, full_well=30_000.0, checks=None, exposure=0.9):
+        folder = tmp_path_factory.mktemp("made")
+        plan, _ = choose_plan(PROJECTOR, photos, checks=checks)
+        camera = SimulatedCamera(full_well=full_well)
+        brightest = float((box @ np.ones(PROJECTOR)).max())
+        rig = SimulatedRig(
+            box, "cornell", SimulatedProjector(gamma=gamma), camera, exposure / brightest, 0
+        )
+        capture = acquire(plan, folder / "c.zarr", rig)
+        reconstruct_to_file(capture, folder / "t.zarr")
+        return capture, open_transport(folder / "t.zarr")
+
+    return make
+
+
+@pytest.mark.parametrize(
+    "made", [{}, {"photos": 50}, {"full_well": 3000.0}, {"photos": 120, "full_well": 1e6}]
+)
+def test_held_out_snr_is_the_true_one(box, reconstructed, made):
+    capture, stored = reconstructed(**made)
+    held_out = measure_held_out(stored, capture)
+    transport = stored.rows()
+    exposure = exposure_of(transport, box).factor
+    true = []
+    for light in check_lights(capture.plan):
+        pattern = light.pattern.draw(PROJECTOR) / np.float32(255)
+        known, relit = ((each @ pattern).ravel() for each in (box, transport))
+        known = known * np.float32(exposure)
+        true.append(decibels(np.sum(known**2), np.sum((known - relit) ** 2)))
+    assert held_out.snr == pytest.approx(np.mean(true), abs=1.5)
+    assert judge_reconstruction(stored, capture).grade == "good"
+
+
+def test_a_rig_that_is_not_linear_is_wrong_and_named(reconstructed):
+    capture, stored = reconstructed(gamma=2.2)
+    verdict = judge_reconstruction(stored, capture)
+    assert verdict.grade == "wrong"
+    assert verdict.causes[0] == "not-linear"
+    assert "is not linear" in str(verdict)
+
+
+def test_without_check_photos_nothing_was_checked(reconstructed):
+    capture, stored = reconstructed(checks=0)
+    verdict = judge_reconstruction(stored, capture)
+    assert verdict.held_out is None
+    assert verdict.causes == ("unchecked",)
+    assert verdict.as_json() == {
+        "verdict": "doubtful",
+        "held_out_dB": None,
+        "expected_dB": None,
+        "causes": ["unchecked"],
+        "reasons": ["nothing was checked: the plan has no check photos."],
+    }
+
+
+def test_plans_of_the_paper_and_square_transports_are_not_checked(box, tmp_path):
+    rig = SimulatedRig(box, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    for plan, square in (
+        (paper_plan(PROJECTOR, 5, (3, 3)), False),
+        (choose_plan(PROJECTOR, 60)[0], True),
+    ):
+        capture = acquire(plan, tmp_path / f"{square}.zarr", rig)
+        made = tmp_path / f"t-{square}.zarr"
+        reconstruct_to_file(capture, made, options=ReconstructionOptions(square=square))
+        assert judge_reconstruction(open_transport(made), capture).causes == ("unchecked",)
+
+
+def test_the_command_ends_with_the_verdict(reconstructed, tmp_path):
+    capture, _ = reconstructed()
+    said = run_nearfar("reconstruct", capture.path, tmp_path / "t.zarr")
+    assert said.status == 0, said.err
+    assert said.out.splitlines()[-1].startswith("good: Relit pictures are off by ")
+    said = run_nearfar("reconstruct", capture.path, tmp_path / "t.zarr", "--force", "--json")
+    found = json.loads(said.out)
+    assert list(found) == ["verdict", "held_out_dB", "expected_dB", "causes", "reasons"]
+    assert found["verdict"] == "good"
+    assert abs(found["held_out_dB"] - found["expected_dB"]) < 3
+    assert found["causes"] == []
+
+
+@pytest.mark.parametrize("camera", [Size(5, 7), Size(64, 64), Size(1000, 2000), Size(3, 400_000)])
+def test_bands_are_spread_and_few(camera):
+    found = bands(camera)
+    assert found
+    assert all(0 <= rows.start < rows.stop <= camera.height for rows in found)
+    assert all(b.start >= a.stop for a, b in pairwise(found))
+    count = sum(rows.stop - rows.start for rows in found) * camera.width
+    assert count <= max(2 * CAMERA_PIXELS, 8 * camera.width)
+    if camera.pixels <= CAMERA_PIXELS:
+        assert count == camera.pixels

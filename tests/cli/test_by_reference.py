@@ -160,7 +160,7 @@ def test_a_capture_until_it_is_good_enough(finished: Job, tmp_path: Path):
     assert ran.status == 0
     assert "90 dB is not reached" in ran.err
     assert "plan" in ran.err
-    assert len(open_capture(capture).plan.patterns) == 96
+    assert len(open_capture(capture).plan.patterns) == 94
 
 
 @pytest.mark.parametrize("text", ["much", "-3dB", "0", "nandB", "500dB"])

@@ -275,7 +275,7 @@ def test_rigs_whose_transport_does_not_fit(finished: Job, untouched: Untouched, 
     refuse("dense.npy", "black")
     np.save(tmp_path / "dense.npy", np.ones((8, 9, 20, 16), dtype=np.float32))
     refuse("dense.npy", "--projector 20x16")
-    np.savez(tmp_path / "dense.npz", direct=np.ones((72, 320)))
+    np.savez(tmp_path / "dense.npz", direct=np.ones((72, 320)), other=np.ones(3))
     write("dense.npz")
     refuse("dense.npz", "no T")
 

@@ -56,7 +56,7 @@ def test_an_input_that_is_a_loop_of_links(finished: Job, untouched, tmp_path: Pa
         ("acquire", finished.plan, out, "--rig", loop),
         ("reconstruct", loop, out),
         ("relight", finished.transport, loop, f"{out}.npy"),
-        ("check", loop, *MODEL, "--html", f"{out}.html"),
+        ("check", loop, *MODEL, "--report", f"{out}.html"),
         ("separate", out, "--photos", loop),
         ("separate", out, "--photos", finished.photos, "--pattern", "any", "--ambient", loop),
     ):
@@ -210,7 +210,7 @@ def test_names_are_escaped_in_pages(finished: Job, tmp_path: Path):
     shutil.move(folder / "apart.zarr", folder / f"{evil}.zarr")
     shutil.move(folder / "capture.zarr", folder / f"c{evil}.zarr")
     pages = {
-        "check": (f"{evil}.zarr", *MODEL, "--html"),
+        "check": (f"{evil}.zarr", *MODEL, "--report"),
         "reconstruct": (f"c{evil}.zarr", f"t{evil}.zarr", *BY_PAPER, "--report"),
         "evaluate": (f"t{evil}.zarr", "--truth", f"{evil}.zarr", "--report"),
     }

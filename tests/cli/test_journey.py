@@ -245,7 +245,8 @@ def test_a_transport_made_while_capturing(tmp_path: Path, until: tuple[str, ...]
         "acquire", plan, capture, "--rig", "cornell", *until, "--transport", transport
     )
     lines = check_done(made).out.splitlines()
-    assert re.fullmatch(r"\d+\.\d s after the last photo", lines[-2 if until else -1])
+    assert re.fullmatch(r"\d+\.\d s after the last photo", lines[-3 if until else -2])
+    assert re.match("(good|doubtful|wrong): ", lines[-2 if until else -1])
     check_done(run_nearfar("reconstruct", capture, tmp_path / "after.zarr"))
     told, dense = [], []
     for name in ("t.zarr", "after.zarr"):

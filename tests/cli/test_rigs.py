@@ -142,7 +142,13 @@ def test_info_tells_what_each_file_is(finished, tmp_path: Path):
     np.savez(tmp_path / "apart.npz", direct=np.zeros((4, 9)), far=np.ones((4, 9)))
     (tmp_path / "rig.toml").write_text('[scene]\nname = "wedge"\n')
     for path, *words in (
-        (finished.plan, "nearfar plan", "projector 16x20", "W = 5", "68 photos of transport"),
+        (
+            finished.plan,
+            "nearfar plan",
+            "projector 16x20",
+            "W = 5",
+            "counting the 68 of transport alone",
+        ),
         (tmp_path / "theory.json", "offset none"),
         (finished.capture, "nearfar capture", "8x9", "3 channels", "uint16"),
         (finished.transport, "nearfar transport", "projector 16x20", "camera 8x9", "direct"),

@@ -148,7 +148,7 @@ def test_what_is_no_gray_code_is_said(shoot):
     assert not has_gray_code(missing)
     with pytest.raises(ValueError, match="no bit 4"):
         type(plan).model_validate(
-            {**plan.model_dump(), "patterns": [GrayCode(kind="gray rows", bit=4)]}
+            {**plan.model_dump(), "patterns": [*plan.patterns, GrayCode(kind="gray rows", bit=4)]}
         )
 
 

@@ -89,8 +89,7 @@ def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:
         ]
 
     if of_transport(before) and of_transport(before) == of_transport(now):
-        checked = len(patterns_of(before)) > len(of_transport(before))
-        if checked:
+        if len(patterns_of(before)) > len(patterns_of(now)):
             return (
                 f"{folder} was started with `with_checks(plan)`: give `with_checks(plan)` with "
                 f"`resume=True`."

@@ -141,9 +141,8 @@ def acquire(
             warn(note)
         check = estimate = None
         if until is not None:
-            check = QualityObserver(
-                made, until, opened.full_scale, partial(_say_quality, quiet=quiet)
-            )
+            said = partial(_say_quality, quiet=quiet)
+            check = QualityObserver(made, until, opened.full_scale, said)
         if transport is not None:
             estimate = stack.enter_context(EstimateObserver(made, opened.full_scale, options))
         taken = shoot(

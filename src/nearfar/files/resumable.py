@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from os.path import realpath
 from pathlib import Path
 from typing import NamedTuple
 
@@ -127,7 +128,7 @@ def check_resumable(
 
 def _checked(path: Path, kind: ResumableKind, *, resume: bool, force: bool) -> tuple[Path, Path]:
     with storage_faults(path):
-        _remove_log(path.resolve(), kind)
+        _remove_log(Path(realpath(path)), kind)
     target = checked_target(path, force=force, replaceable=is_ours)
     unfinished = target.with_name(f"{target.name}{UNFINISHED}")
     with storage_faults(path):

@@ -186,7 +186,7 @@ def test_memory_for_no_row_is_refused_with_the_first_photo(rig, tmp_path):
 
 def test_a_capture_that_ends_early_is_estimated_from_what_there_is(rig, tmp_path):
     plan = _plan("reference")
-    end = next(end for end in ends(plan) if end > 0.6 * len(plan.patterns))
+    end = next(end for end in ends(plan) if end > 0.7 * len(plan.patterns))
     with Patient(plan, rig.full_scale) as estimate:
         capture = acquire(
             plan,

@@ -66,6 +66,8 @@ CLIPPED_SHARE = 0.2
 # mean, and over the largest.
 BLOCK_RATIO = 1.15
 CLEAR_RATIO = 1.07
+# Borders of blocks down, and across, from which they are told.
+FEWEST_BORDERS = 3
 BLOCK = 8
 
 
@@ -118,8 +120,9 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
         key=lambda step: step.explained,
     )
     focus = _step(whole, [CAMERA_FOCUS])
-    # White looks the same wherever the projector is.
-    if _explained_of_white(equations, whites) > LEAST_OF_WHITE:
+    # White looks the same wherever the projector is, and under any lamp but for its brightness.
+    of_white = _explained_of_white(equations, whites) > LEAST_OF_WHITE
+    if of_white:
         projector = projector._replace(explained=0.0)
     if projector.explained > max(least, in_regions, focus.explained):
         found.append((projector.explained, Moved("projector", projector.photo, None)))
@@ -141,7 +144,8 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
         found.append((light[0] if light else bend, NotLinear("")))
     elif light is not None and light[0] > least:
         found.append(light)
-    found.sort(key=lambda each: -each[0])
+    if not of_white:
+        found.sort(key=lambda each: -each[0])
     return [each for explained, each in found if explained > found[0][0] / 4]
 
 
@@ -258,20 +262,21 @@ def find_compression(sample: CameraSample, fits: PhotoFits) -> list[Spoilt]:
     Neighbours differ more across the border of two blocks than within one.
     """
     difference = fits.photos - fits.relit
-    by_place = np.zeros(BLOCK)
     for axis, lines in ((1, sample.rows), (2, sample.columns)):
+        by_place = np.zeros(BLOCK)
         power = np.diff(difference, axis=axis) ** 2
         # The median, because edges of the scene outweigh all else in a mean.
         each = np.median(power, axis=tuple(i for i in range(4) if i != axis))
         neighbours = np.diff(lines) == 1
         for place in range(BLOCK):
             chosen = each[neighbours & (lines[1:] % BLOCK == place)]
-            if not len(chosen):
+            if len(chosen) < FEWEST_BORDERS:
                 return []
-            by_place[place] += float(np.median(chosen)) / max(float(np.median(each)), 1e-300)
-    border, within = by_place[0], by_place[1:]
-    is_compressed = border > BLOCK_RATIO * within.mean() and border > CLEAR_RATIO * within.max()
-    return [Compressed()] if is_compressed else []
+            by_place[place] = float(np.median(chosen))
+        border, within = by_place[0], by_place[1:]
+        if border <= max(BLOCK_RATIO * within.mean(), CLEAR_RATIO * within.max()):
+            return []
+    return [Compressed()]
 
 
 def name_encoding(sample: CameraSample) -> str:

@@ -31,8 +31,6 @@ from nearfar.workflow.verdict.held_out import HeldOut, bars_of, compare_light
 ROWS_PER_BAND = 8
 # Camera pixels in the chosen rows, about.
 CAMERA_PIXELS = 6144
-# Sweeps of the joint estimate: one fewer than usual, for time.
-SWEEPS = 2
 # Photos before the first estimate, besides those of the pictures.
 MINIMUM_PHOTOS = 20
 # Twice as many photos gain at most this many dB. The next estimate waits for the number of photos
@@ -144,7 +142,7 @@ class QualityObserver:
         except InputError:
             # Too few frequencies to determine q yet.
             return CaptureQuality(taken, -HIGHEST, "photos")
-        estimate = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
+        estimate = estimate_jointly(measurements, q, plan.window, plan.far)
         every = slice(0, photos_so_far.camera.height)
         bars = bars_of(estimate)
         held_out = HeldOut(

@@ -88,12 +88,15 @@ class HeldOut:
     def snr(self) -> float:
         """Held-out SNR_b, dB: the mean over the check patterns.
 
-        Where noise hides the error of a pattern, that of all patterns over what the error bars
-        expect stands for its own.
+        Where noise hides the error of a pattern, that of all patterns of its kind over what the
+        error bars expect stands for its own. Pictures and half-screens weigh frequencies
+        differently.
         """
-        ratio, values = self.error_ratio, []
+        values = []
         for light in self.lights:
+            kind = tuple(each for each in self.lights if each.is_binary == light.is_binary)
             hidden = light.pair.error < HIDDEN_DEVIATIONS * light.pair.error_deviation
+            ratio = HeldOut(kind).error_ratio
             if hidden and ratio is not None and light.expected_snr is not None:
                 values.append(light.expected_snr - decibels(ratio, 1.0))
             else:

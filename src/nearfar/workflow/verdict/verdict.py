@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 from nearfar.capture import Capture
 from nearfar.faults import of_photos
 from nearfar.faults.of_capture import find_faults
-from nearfar.faults.of_photos import NotLinear, Spoilt
+from nearfar.faults.of_photos import LampFlickers, NotLinear, Spoilt
 from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
@@ -30,6 +30,10 @@ GOOD_DECIBELS = 40.0
 # Held-out SNR_b in dB below which a transport is doubtful, or wrong, whatever was expected.
 DOUBTFUL_DECIBELS = 25.0
 WRONG_DECIBELS = 15.0
+
+# Above this, pictures and their inverses say surely that the response is not linear, unless the
+# half-screens show a quarter of it.
+SURE_EXCESS = 0.05
 
 # Photos that are of something else: what was estimated from them is wrong.
 WRONG_PHOTOS: tuple[Cause, ...] = ("order", "turned", "torn", "colours")
@@ -149,6 +153,9 @@ def judge(
     spoilt : sequence of Spoilt
         What spoils its photos.
     """
+    if held_out is not None and _bends(held_out):
+        # What bends the response makes pictures of other brightness than expected, too.
+        spoilt = [NotLinear("") if isinstance(each, LampFlickers) else each for each in spoilt]
     reasons = [Reason(each.cause, str(each)) for each in spoilt]
 
     def add(cause: Cause) -> None:
@@ -185,3 +192,9 @@ def judge(
     return Verdict(
         "wrong" if wrong else "doubtful" if reasons else "good", held_out, tuple(reasons)
     )
+
+
+def _bends(held_out: HeldOut) -> bool:
+    """Return whether pictures and their inverses do not sum to white, but half-screens do."""
+    excess = abs(held_out.nonlinear_excess)
+    return excess > SURE_EXCESS and abs(held_out.lamp_excess) < excess / 4

@@ -8,7 +8,7 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.misfit import fit_photos, normal_equations
 from nearfar.workflow.diagnosis.sample import sample_camera
-from nearfar.workflow.diagnosis.single_photos import find_spoilt_photos
+from nearfar.workflow.diagnosis.single_photos import SpoiltPhotos, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
     find_changes,
     find_clipped_black,
@@ -52,22 +52,23 @@ def find_what_spoils(
     sample = sample_camera(capture, lambda share: progress(step, share / 2))
     photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
     usable = photos.drift.unsaturated
-    fits = fit_photos(sample, photos, sample.of_transport(transport), usable)
+    sampled = sample.of_transport(transport)
+    fits = fit_photos(sample, photos, sampled, usable)
     progress(step, 3 / 4)
-    spoilt = find_spoilt_photos(sample, fits, usable)
+    clipped = find_clipped_black(sample)
+    # Where dark photos are cut off, many do not fit the others.
+    single = SpoiltPhotos([], [])
+    if not clipped:
+        single = find_spoilt_photos(sample, fits, usable, sampled.correspondence)
     progress(step, 1.0)
-    if spoilt.certain:
-        return [*spoilt.certain, *spoilt.probable]
+    if single.certain:
+        return [*single.certain, *single.probable]
     found = find_changes(
         normal_equations(sample, fits), fits.misfit, photos.drift.references.whites
     )
-    response = [*find_compression(sample, fits), *find_clipped_black(sample)]
+    response = [*find_compression(sample, fits), *clipped]
     if found and not response and (encoding := name_encoding(sample)):
         response.append(NotLinear(encoding))
     if response:
-        found = [each for each in found if not isinstance(each, OF_RESPONSE)]
-    return [
-        *response,
-        *(found or ([] if response else spoilt.probable)),
-        *find_compression(sample, fits),
-    ]
+        return [*response, *(each for each in found if not isinstance(each, OF_RESPONSE))]
+    return found or single.probable

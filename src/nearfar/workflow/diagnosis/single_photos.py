@@ -39,7 +39,7 @@ LEFT_OUT_AT_ONCE = 6
 # Rounds of leaving out.
 ROUNDS = 3
 # Every frequency is left out in one of so many estimates.
-TURNS_OF_LEAVING = 4
+TURNS_OF_LEAVING = 8
 # An explanation leaves at most this share of the misfit: by exposure, and by anything else.
 EXPOSURE_SHARE = 0.4
 OTHER_SHARE = 0.1
@@ -108,7 +108,9 @@ class SpoiltPhotos(NamedTuple):
     probable: list[Spoilt]
 
 
-def find_spoilt_photos(sample: CameraSample, fits: PhotoFits, usable: Booleans) -> SpoiltPhotos:
+def find_spoilt_photos(
+    sample: CameraSample, fits: PhotoFits, usable: Booleans, known: Floats
+) -> SpoiltPhotos:
     """Find photos that do not fit the others, and why.
 
     Parameters
@@ -117,24 +119,28 @@ def find_spoilt_photos(sample: CameraSample, fits: PhotoFits, usable: Booleans) 
     fits : PhotoFits
         To the transport that was estimated from all photos.
     usable : ndarray of bool, shape (rows, columns, channels)
+    known : ndarray, shape (rows, columns, 2)
+        q as it was found from all photos.
     """
     plan = sample.plan
     fixed = is_white_or_black(plan)
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
+    if not _suspects(fits.misfit, good & ~fixed):
+        return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)
-        without = _fit_without(sample, good, suspects, usable) if suspects else None
+        without = _fit_without(sample, good, suspects, usable, known) if suspects else None
         found = _explain_all(without, plan, suspects) if without is not None else {}
         if not found:
             break
         explained |= found
         good[list(found)] = False
-        again = _fit_without(sample, good, [], usable)
+        again = _fit_without(sample, good, [], usable, known)
         if again is None:
             break
         fits = again
-    explained |= _explain_by_turns(sample, fits, good, explained, usable)
+    explained |= _explain_by_turns(sample, fits, good, explained, usable, known)
     certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     probable = {n: e for n, e in explained.items() if n not in certain}
     return SpoiltPhotos(_as_faults(certain), _as_faults(probable))
@@ -156,6 +162,7 @@ def _explain_by_turns(
     good: Booleans,
     explained: dict[int, Explanation | None],
     usable: Booleans,
+    known: Floats,
 ) -> dict[int, Explanation | None]:
     """Explain photos by pictures none of which was estimated from a photo of its own pattern.
 
@@ -172,7 +179,7 @@ def _explain_by_turns(
     measured = good & ~is_check(plan) & ~is_white_or_black(plan)
     for turn in range(TURNS_OF_LEAVING):
         left_out = np.flatnonzero(measured & (turns == turn))
-        without = _fit_without(sample, good, left_out.tolist(), usable)
+        without = _fit_without(sample, good, left_out.tolist(), usable, known)
         if without is not None:
             relit[left_out] = without.relit[left_out]
     by_turns = replace(fits, relit=relit)
@@ -193,7 +200,7 @@ def _explain_by_turns(
 
 
 def _fit_without(
-    sample: CameraSample, good: Booleans, left_out: list[int], usable: Booleans
+    sample: CameraSample, good: Booleans, left_out: list[int], usable: Booleans, known: Floats
 ) -> PhotoFits | None:
     """Estimate without some photos, and fit all; None if too few remain."""
     plan = sample.plan
@@ -210,12 +217,15 @@ def _fit_without(
             other = "sine" if pattern.kind == "cosine" else "cosine"
             keep[number] &= (pattern.frequency, other) in kept
     try:
-        chosen = sample.without_drift(np.flatnonzero(keep))
-        measurements = measure(chosen)
-        q = correspond_by_phase(measurements).q
-        transport = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
+        measurements = measure(sample.without_drift(np.flatnonzero(keep)))
     except InputError:
         return None
+    try:
+        q = correspond_by_phase(measurements).q
+    except InputError:
+        # The lowest frequencies, which place q, are among those that were left out.
+        q = known
+    transport = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
     every = sample.without_drift(np.arange(len(plan.patterns)))
     return fit_photos(sample, every, transport, usable)
 

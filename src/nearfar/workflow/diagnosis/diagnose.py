@@ -21,7 +21,11 @@ OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
 
 
 def find_what_spoils(
-    transport: StoredTransport, capture: Capture, progress: Report = ignore_progress
+    transport: StoredTransport,
+    capture: Capture,
+    progress: Report = ignore_progress,
+    *,
+    suspected: bool = False,
 ) -> list[Spoilt]:
     """Find what spoils the photos of a capture.
 
@@ -32,6 +36,8 @@ def find_what_spoils(
     capture : Capture
     progress : callable
         Called with the step and the share of it that is done.
+    suspected : bool
+        Whether there is reason to search photos that seem to fit.
 
     Returns
     -------
@@ -59,7 +65,9 @@ def find_what_spoils(
     # Where dark photos are cut off, many do not fit the others.
     single = SpoiltPhotos([], [])
     if not clipped:
-        single = find_spoilt_photos(sample, fits, usable, sampled.correspondence)
+        single = find_spoilt_photos(
+            sample, fits, usable, sampled.correspondence, suspected=suspected
+        )
     progress(step, 1.0)
     if single.certain:
         return [*single.certain, *single.probable]

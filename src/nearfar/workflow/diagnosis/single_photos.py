@@ -109,7 +109,12 @@ class SpoiltPhotos(NamedTuple):
 
 
 def find_spoilt_photos(
-    sample: CameraSample, fits: PhotoFits, usable: Booleans, known: Floats
+    sample: CameraSample,
+    fits: PhotoFits,
+    usable: Booleans,
+    known: Floats,
+    *,
+    suspected: bool,
 ) -> SpoiltPhotos:
     """Find photos that do not fit the others, and why.
 
@@ -121,12 +126,15 @@ def find_spoilt_photos(
     usable : ndarray of bool, shape (rows, columns, channels)
     known : ndarray, shape (rows, columns, 2)
         q as it was found from all photos.
+    suspected : bool
+        Whether there is reason to search where no photo has a large misfit: a photo that alone
+        tells of its frequency fits itself.
     """
     plan = sample.plan
     fixed = is_white_or_black(plan)
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
-    if not _suspects(fits.misfit, good & ~fixed):
+    if not suspected and not _suspects(fits.misfit, good & ~fixed):
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)

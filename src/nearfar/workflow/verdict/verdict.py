@@ -35,6 +35,9 @@ WRONG_DECIBELS = 15.0
 # half-screens show a quarter of it.
 SURE_EXCESS = 0.05
 
+# Below this, error bars expect so much more error than there is that photos contradict each other.
+SMALLEST_ERROR_RATIO = 0.5
+
 # Photos that are of something else: what was estimated from them is wrong.
 WRONG_PHOTOS: tuple[Cause, ...] = ("order", "turned", "torn", "colours")
 CAUSES_OF_FAULTS: Mapping[type[Any], Cause] = {
@@ -135,7 +138,9 @@ def judge_reconstruction(
     return judge(
         held_out,
         find_faults(capture, transport.provenance),
-        find_what_spoils(transport, capture, progress),
+        find_what_spoils(
+            transport, capture, progress, suspected=held_out is not None and _contradicts(held_out)
+        ),
     )
 
 
@@ -198,3 +203,9 @@ def _bends(held_out: HeldOut) -> bool:
     """Return whether pictures and their inverses do not sum to white, but half-screens do."""
     excess = abs(held_out.nonlinear_excess)
     return excess > SURE_EXCESS and abs(held_out.lamp_excess) < excess / 4
+
+
+def _contradicts(held_out: HeldOut) -> bool:
+    """Return whether error bars are far too large, as where photos contradict each other."""
+    ratio = held_out.error_ratio
+    return ratio is not None and ratio < SMALLEST_ERROR_RATIO

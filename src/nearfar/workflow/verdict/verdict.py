@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 from nearfar.capture import Capture
 from nearfar.faults import of_photos
 from nearfar.faults.of_capture import find_faults
-from nearfar.faults.of_photos import LampFlickers, NotLinear, Spoilt
+from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
 from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
@@ -160,7 +160,7 @@ def judge(
     """
     if held_out is not None and _bends(held_out):
         # What bends the response makes pictures of other brightness than expected, too.
-        spoilt = [NotLinear("") if isinstance(each, LampFlickers) else each for each in spoilt]
+        spoilt = [NotLinear("") if _is_of_brightness(each) else each for each in spoilt]
     reasons = [Reason(each.cause, str(each)) for each in spoilt]
 
     def add(cause: Cause) -> None:
@@ -209,3 +209,10 @@ def _contradicts(held_out: HeldOut) -> bool:
     """Return whether error bars are far too large, as where photos contradict each other."""
     ratio = held_out.error_ratio
     return ratio is not None and ratio < SMALLEST_ERROR_RATIO
+
+
+def _is_of_brightness(each: Spoilt) -> bool:
+    """Return whether photos are brighter or darker by a factor."""
+    if isinstance(each, ExposureChanged):
+        return abs(each.gain) > abs(each.offset)
+    return isinstance(each, LampFlickers)

@@ -34,7 +34,7 @@ def start(work: Callable[..., object], *arguments: object) -> BaseProcess:
 
 
 def barrier(processes: int) -> Barrier:
-    """Return what so many processes wait at for one another."""
+    """Return a barrier for a number of processes."""
     return _FORKS.Barrier(processes)
 
 

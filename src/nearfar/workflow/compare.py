@@ -260,7 +260,7 @@ def _of_method(
 
 
 def _counted(budget: Budget) -> int:
-    """Return what a budget allows: photos, or exposure counted in photos."""
+    """Return a budget as a number: of photos, or the total exposure in units of one photo's."""
     return budget.photos if budget.total_exposure is None else budget.total_exposure
 
 

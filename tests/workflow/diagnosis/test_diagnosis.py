@@ -23,16 +23,23 @@ def shot():
 
 
 @pytest.fixture(scope="module")
-def spoilt_by(shot, tmp_path_factory):
-    @cache
-    def diagnose(name=None, strength=0.0):
+def diagnosed(shot, tmp_path_factory):
+    def diagnose(photos):
         folder = tmp_path_factory.mktemp("spoilt")
-        photos = shot.photos if name is None else SPOILS[name].apply(shot, strength)
         capture = write_capture(
             shot.plan, folder / "c.zarr", list(photos), full_scale=shot.full_scale
         )
         reconstruct_to_file(capture, folder / "t.zarr")
         return find_what_spoils(open_transport(folder / "t.zarr"), capture)
+
+    return diagnose
+
+
+@pytest.fixture(scope="module")
+def spoilt_by(shot, diagnosed):
+    @cache
+    def diagnose(name=None, strength=0.0):
+        return diagnosed(shot.photos if name is None else SPOILS[name].apply(shot, strength))
 
     return diagnose
 
@@ -86,6 +93,22 @@ def test_large_cameras_are_sampled_the_same_way_when_turned(camera):
         assert len(lines) % PATCH == 0
     rows, columns = sampled_lines(camera)
     assert len(rows) * len(columns) < camera.pixels / 4
+
+
+def test_black_at_the_lowest_level_is_not_clipped_where_photos_fit(shot, diagnosed):
+    # A camera without an offset: only noise below black is lost.
+    black = np.median(shot.photos[0])
+    assert diagnosed(np.maximum(shot.photos.astype(float) - black, 0).astype(np.uint16)) == []
+
+
+def test_a_sample_of_saturated_camera_pixels_tells_nothing(shot, diagnosed):
+    photos = shot.photos.repeat(4, axis=1).repeat(4, axis=2)
+    rows, columns = sampled_lines(Size(64, 64))
+    assert len(rows) < 64
+    sampled = np.ix_(range(len(photos)), rows, columns)
+    bright = 10.0 * photos[sampled]
+    photos[sampled] = np.minimum(bright, shot.full_scale).astype(photos.dtype)
+    assert diagnosed(photos) == []
 
 
 def test_a_sample_holds_the_photos_at_its_places(shot):

@@ -3,12 +3,13 @@
 import numpy as np
 
 from nearfar.capture import Capture
+from nearfar.errors import InputError
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.misfit import fit_photos, normal_equations
 from nearfar.workflow.diagnosis.sample import sample_camera
-from nearfar.workflow.diagnosis.single_photos import SpoiltPhotos, find_spoilt_photos
+from nearfar.workflow.diagnosis.single_photos import find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
     find_changes,
     find_clipped_black,
@@ -56,27 +57,27 @@ def find_what_spoils(
         return []
     step = "comparing photos"
     sample = sample_camera(capture, lambda share: progress(step, share / 2))
-    photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
-    usable = photos.drift.unsaturated
+    try:
+        photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
+    except InputError:
+        # Nothing but saturated camera pixels were sampled.
+        return []
     sampled = sample.of_transport(transport)
-    fits = fit_photos(sample, photos, sampled, usable)
+    fits = fit_photos(capture.plan, photos, sampled)
     progress(step, 3 / 4)
-    clipped = find_clipped_black(sample)
-    # Where dark photos are cut off, many do not fit the others.
-    single = SpoiltPhotos([], [])
-    if not clipped:
-        single = find_spoilt_photos(
-            sample, fits, usable, sampled.correspondence, suspected=suspected
-        )
+    single = find_spoilt_photos(sample, fits, sampled.correspondence, suspected=suspected)
     progress(step, 1.0)
     if single.certain:
         return [*single.certain, *single.probable]
     found = find_changes(
         normal_equations(sample, fits), fits.misfit, photos.drift.references.whites
     )
-    response = [*find_compression(sample, fits), *clipped]
-    if found and not response and (encoding := name_encoding(sample)):
-        response.append(NotLinear(encoding))
+    if not found:
+        return [*find_compression(sample, fits), *single.probable]
+    # Black may well be at the lowest level; it is clipped if photos do not fit.
+    response = [*find_compression(sample, fits), *find_clipped_black(sample)]
+    if not response and (encoding := name_encoding(sample)):
+        response = [NotLinear(encoding)]
     if response:
-        return [*response, *(each for each in found if not isinstance(each, OF_RESPONSE))]
-    return found or single.probable
+        found = [each for each in found if not isinstance(each, OF_RESPONSE)]
+    return [*response, *found]

@@ -53,6 +53,8 @@ class PhotoFits:
 
     Attributes
     ----------
+    without_drift : PhotosWithoutDrift
+        The photos of the sample.
     photos, relit, variance : ndarray, shape (photos, rows, columns, channels)
         Without drift; relit pictures with the light of black; variance of their difference.
     black : ndarray, shape (rows, columns, channels)
@@ -60,6 +62,7 @@ class PhotoFits:
         Relit under white, without black.
     """
 
+    without_drift: PhotosWithoutDrift
     photos: Floats
     relit: Floats
     variance: Floats
@@ -72,27 +75,25 @@ class PhotoFits:
         return np.asarray(((self.photos - self.relit) ** 2 / self.variance).mean(axis=(1, 2, 3)))
 
 
-def fit_photos(
-    sample: CameraSample, photos: PhotosWithoutDrift, transport: Transport, usable: Booleans
-) -> PhotoFits:
+def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> PhotoFits:
     """Relight a sample under every pattern of its plan.
+
+    What is saturated under white counts for nothing.
 
     Parameters
     ----------
-    sample : CameraSample
+    plan : Plan
     photos : PhotosWithoutDrift
         All photos of the sample.
     transport : Transport
         Of the sample's camera pixels.
-    usable : ndarray of bool, shape (rows, columns, channels)
-        Others count for nothing.
     """
-    size = (*sample.size, transport.channels)
-    lights = np.stack([drawn(sample.plan, i) for i in range(len(sample.plan.patterns))])
+    size = (*transport.camera, transport.channels)
+    numbers = range(len(plan.patterns))
+    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
     relit = transport.pictures(lights)
     relit += transport.black
-    every = slice(0, sample.size.height)
-    taken = photos.read(range(len(lights)), every)
+    taken = photos.read(numbers, slice(0, transport.camera.height))
     white = np.asarray(
         transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
     ).reshape(size)
@@ -104,13 +105,8 @@ def fit_photos(
         ]
     )
     variance += model
-    variance[:, ~usable] = np.inf
-    return PhotoFits(taken, relit, variance.astype(np.float32), transport.black, white)
-
-
-def drawn(plan: Plan, number: int) -> Floats:
-    """Return the pattern of a photo as light, (Py, Px)."""
-    return plan.draw(number) / np.float32(255)
+    variance[:, ~photos.drift.unsaturated] = np.inf
+    return PhotoFits(photos, taken, relit, variance.astype(np.float32), transport.black, white)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +163,7 @@ def normal_equations(sample: CameraSample, fits: PhotoFits) -> NormalEquations:
 def _effects(
     fits: PhotoFits, plan: Plan, number: int, partner: int | None, scale: float
 ) -> NDArray[np.float32]:
-    """Return what a unit of each cause adds to a photo, (causes, rows, columns, channels)."""
+    """Return the derivatives of a photo by the causes, (causes, rows, columns, channels)."""
     relit, pattern = fits.relit[number], plan.patterns[number]
     lit = relit - fits.black
     effects = np.zeros((CAUSES, *relit.shape), dtype=np.float32)

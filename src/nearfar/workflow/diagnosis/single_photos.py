@@ -109,12 +109,7 @@ class SpoiltPhotos(NamedTuple):
 
 
 def find_spoilt_photos(
-    sample: CameraSample,
-    fits: PhotoFits,
-    usable: Booleans,
-    known: Floats,
-    *,
-    suspected: bool,
+    sample: CameraSample, fits: PhotoFits, known: Floats, *, suspected: bool
 ) -> SpoiltPhotos:
     """Find photos that do not fit the others, and why.
 
@@ -123,7 +118,6 @@ def find_spoilt_photos(
     sample : CameraSample
     fits : PhotoFits
         To the transport that was estimated from all photos.
-    usable : ndarray of bool, shape (rows, columns, channels)
     known : ndarray, shape (rows, columns, 2)
         q as it was found from all photos.
     suspected : bool
@@ -138,26 +132,26 @@ def find_spoilt_photos(
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)
-        without = _fit_without(sample, good, suspects, usable, known) if suspects else None
+        without = _fit_without(sample, fits, good, suspects, known) if suspects else None
         found = _explain_all(without, plan, suspects) if without is not None else {}
         if not found:
             break
         explained |= found
         good[list(found)] = False
-        again = _fit_without(sample, good, [], usable, known)
+        again = _fit_without(sample, fits, good, [], known)
         if again is None:
             break
         fits = again
-    explained |= _explain_by_turns(sample, fits, good, explained, usable, known)
+    explained |= _explain_by_turns(sample, fits, good, explained, known)
     certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     probable = {n: e for n, e in explained.items() if n not in certain}
     return SpoiltPhotos(_as_faults(certain), _as_faults(probable))
 
 
-def _suspects(misfit: Floats, usable: Booleans) -> list[int]:
-    """Return the photos with the largest misfits, if these are unusual."""
-    candidates = np.where(usable, misfit, 0.0)
-    usual = max(1.0, float(np.median(misfit[usable])))
+def _suspects(misfit: Floats, tried: Booleans) -> list[int]:
+    """Return the photos with the largest misfits of those that are tried, if they are unusual."""
+    candidates = np.where(tried, misfit, 0.0)
+    usual = max(1.0, float(np.median(misfit[tried])))
     most = max(LEFT_OUT_AT_ONCE, round(LEFT_OUT_SHARE * len(misfit)))
     return [
         int(n) for n in np.argsort(-candidates)[:most] if candidates[n] > SUSPECT_MISFIT * usual
@@ -169,7 +163,6 @@ def _explain_by_turns(
     fits: PhotoFits,
     good: Booleans,
     explained: dict[int, Explanation | None],
-    usable: Booleans,
     known: Floats,
 ) -> dict[int, Explanation | None]:
     """Explain photos by pictures none of which was estimated from a photo of its own pattern.
@@ -187,7 +180,7 @@ def _explain_by_turns(
     measured = good & ~is_check(plan) & ~is_white_or_black(plan)
     for turn in range(TURNS_OF_LEAVING):
         left_out = np.flatnonzero(measured & (turns == turn))
-        without = _fit_without(sample, good, left_out.tolist(), usable, known)
+        without = _fit_without(sample, fits, good, left_out.tolist(), known)
         if without is not None:
             relit[left_out] = without.relit[left_out]
     by_turns = replace(fits, relit=relit)
@@ -208,9 +201,9 @@ def _explain_by_turns(
 
 
 def _fit_without(
-    sample: CameraSample, good: Booleans, left_out: list[int], usable: Booleans, known: Floats
+    sample: CameraSample, fits: PhotoFits, good: Booleans, left_out: list[int], known: Floats
 ) -> PhotoFits | None:
-    """Estimate without some photos, and fit all; None if too few remain."""
+    """Return the fits of all photos to an estimate without some; None if too few remain."""
     plan = sample.plan
     keep = good & ~is_check(plan)
     keep[left_out] = False
@@ -234,8 +227,7 @@ def _fit_without(
         # The lowest frequencies, which place q, are among those that were left out.
         q = known
     transport = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
-    every = sample.without_drift(np.arange(len(plan.patterns)))
-    return fit_photos(sample, every, transport, usable)
+    return fit_photos(plan, fits.without_drift, transport)
 
 
 def _explain_all(fits: PhotoFits, plan: Plan, suspects: list[int]) -> dict[int, Explanation | None]:

@@ -280,7 +280,10 @@ def find_compression(sample: CameraSample, fits: PhotoFits) -> list[Spoilt]:
 
 
 def name_encoding(sample: CameraSample) -> str:
-    """Return the encoding without which patterns and their inverses sum to white; or nothing."""
+    """Name the encoding by which photos do not add; empty if none does.
+
+    Once it is undone, the photos of a pattern and of its inverse sum to those of white and black.
+    """
     plan = sample.plan
     whites, blacks = find_references(plan)
     white, black = (sample.photos[numbers].mean(axis=0) for numbers in (whites, blacks))
@@ -290,6 +293,8 @@ def name_encoding(sample: CameraSample) -> str:
         for light in check_lights(plan)
         if light.photos and light.inverses
     ]
+    if not pairs:
+        return ""
 
     def excess(decode: Callable[[Floats], Floats]) -> float:
         light = decode(white) - decode(black)
@@ -301,7 +306,5 @@ def name_encoding(sample: CameraSample) -> str:
 
     as_they_are = excess(lambda values: values)
     decoded = {name: excess(decode) for name, decode in DECODINGS.items()}
-    if not pairs or not decoded:
-        return ""
     best = min(decoded, key=lambda name: decoded[name])
     return best if decoded[best] < NAMED_SHARE * as_they_are else ""

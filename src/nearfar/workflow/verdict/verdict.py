@@ -94,7 +94,7 @@ class Verdict:
         return tuple(dict.fromkeys(reason.cause for reason in self.reasons))
 
     def as_json(self) -> dict[str, Any]:
-        """Return what ``nearfar reconstruct --json`` prints."""
+        """Return the verdict as a mapping of JSON types, for ``nearfar reconstruct --json``."""
         held_out = self.held_out
         return {
             "verdict": self.grade,

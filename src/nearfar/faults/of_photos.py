@@ -250,12 +250,12 @@ class NotLinear:
 
 @dataclass(frozen=True)
 class Compressed:
-    """Photos with the blocks of JPEG."""
+    """Photos that were stored as JPEG."""
 
     cause: ClassVar[Cause] = "compressed"
 
     def __str__(self) -> str:
-        return "the photos show the 8 x 8 blocks of JPEG: shoot raw, or store PNG or TIFF."
+        return "the photos were stored as JPEG: shoot raw, or store PNG or TIFF."
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from nearfar.errors import InputError
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
-from nearfar.workflow.diagnosis.misfit import fit_photos, normal_equations
+from nearfar.workflow.diagnosis.compression import find_compression
+from nearfar.workflow.diagnosis.misfit import fit_photos, is_white_or_black, normal_equations
 from nearfar.workflow.diagnosis.sample import sample_camera
 from nearfar.workflow.diagnosis.single_photos import find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
     find_changes,
     find_clipped_black,
-    find_compression,
     name_encoding,
 )
 
@@ -72,10 +72,11 @@ def find_what_spoils(
     found = find_changes(
         normal_equations(sample, fits), fits.misfit, photos.drift.references.whites
     )
+    compressed = find_compression(capture, ~is_white_or_black(capture.plan))
     if not found:
-        return [*find_compression(sample, fits), *single.probable]
+        return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.
-    response = [*find_compression(sample, fits), *find_clipped_black(sample)]
+    response = [*compressed, *find_clipped_black(sample)]
     if not response and (encoding := name_encoding(sample)):
         response = [NotLinear(encoding)]
     if response:

@@ -1,4 +1,4 @@
-"""What spoils a capture as a whole: motion, focus, flicker, a response that is not linear, JPEG.
+"""What spoils a capture as a whole: motion, focus, flicker, a response that is not linear.
 
 How much of the photos' misfits each of them explains is read off the normal equations of
 `nearfar.workflow.diagnosis.misfit`, in misfits summed over photos: 1 is a photo's noise.
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats, Integers
 from nearfar.faults.of_photos import (
     BlackClipped,
-    Compressed,
     ExposureChanged,
     LampFlickers,
     Moved,
@@ -34,7 +33,6 @@ from nearfar.workflow.diagnosis.misfit import (
     PROJECTOR_DOWN,
     PROJECTOR_FOCUS,
     NormalEquations,
-    PhotoFits,
 )
 from nearfar.workflow.diagnosis.sample import CameraSample
 
@@ -62,13 +60,6 @@ DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
 NAMED_SHARE = 0.2
 # Share of camera pixels at which all photos of black read the lowest level.
 CLIPPED_SHARE = 0.2
-# Squared differences of neighbours across borders of JPEG's blocks, over those within: over their
-# mean, and over the largest.
-BLOCK_RATIO = 1.15
-CLEAR_RATIO = 1.07
-# Borders of blocks down, and across, from which they are told.
-FEWEST_BORDERS = 3
-BLOCK = 8
 
 
 class Step(NamedTuple):
@@ -254,29 +245,6 @@ def find_clipped_black(sample: CameraSample) -> list[Spoilt]:
     lowest = float(sample.photos.min())
     share = float(np.mean((sample.photos[blacks] <= lowest).all(axis=0)))
     return [BlackClipped(share)] if share > CLIPPED_SHARE else []
-
-
-def find_compression(sample: CameraSample, fits: PhotoFits) -> list[Spoilt]:
-    """Find the blocks of JPEG in what photos differ from their relit pictures.
-
-    Neighbours differ more across the border of two blocks than within one.
-    """
-    difference = fits.photos - fits.relit
-    for axis, lines in ((1, sample.rows), (2, sample.columns)):
-        by_place = np.zeros(BLOCK)
-        power = np.diff(difference, axis=axis) ** 2
-        # The median, because edges of the scene outweigh all else in a mean.
-        each = np.median(power, axis=tuple(i for i in range(4) if i != axis))
-        neighbours = np.diff(lines) == 1
-        for place in range(BLOCK):
-            chosen = each[neighbours & (lines[1:] % BLOCK == place)]
-            if len(chosen) < FEWEST_BORDERS:
-                return []
-            by_place[place] = float(np.median(chosen))
-        border, within = by_place[0], by_place[1:]
-        if border <= max(BLOCK_RATIO * within.mean(), CLEAR_RATIO * within.max()):
-            return []
-    return [Compressed()]
 
 
 def name_encoding(sample: CameraSample) -> str:

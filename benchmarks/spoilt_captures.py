@@ -23,7 +23,7 @@ from spoils import SPOILS, Photos, Shot, shoot
 PICTURES = 3
 COST = 3.0
 SCENES = ("cornell", "cornell-aside", "shelf", "alcove", "wedge", "corner")
-GOOD = ((24, 60), (32, 90), (40, 117), (32, 160))
+GOOD = ((24, 60), (28, 70), (32, 90), (40, 117), (32, 160))
 SEEDS = (0, 1)
 
 

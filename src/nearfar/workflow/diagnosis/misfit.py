@@ -29,6 +29,9 @@ from nearfar.workflow.diagnosis.sample import PATCH, CameraSample
 # Error of the model that counts as noise, as a share of the camera pixel's white and of the mean's.
 MODEL_ERROR = 0.002
 MODEL_ERROR_OF_MEAN = 0.0005
+# Smallest change of exposure, and of ambient light as a share of white, that is one: what the model
+# does not hold of a scene may look like less than this.
+SMALLEST_CHANGE = 0.01
 # The picture is divided into as many regions down and across.
 REGIONS_A_SIDE = 3
 
@@ -167,7 +170,7 @@ def _effects(
     relit, pattern = fits.relit[number], plan.patterns[number]
     lit = relit - fits.black
     effects = np.zeros((CAUSES, *relit.shape), dtype=np.float32)
-    effects[GAIN], effects[OFFSET] = lit, 1.0
+    effects[GAIN], effects[OFFSET] = lit, mean_white(fits)
     effects[DOWN], effects[ACROSS] = _derivatives(relit)
     effects[CAMERA_FOCUS] = _derivatives(effects[DOWN])[0] + _derivatives(effects[ACROSS])[1]
     # A bend that leaves black and half of white as they are: the gain is not of interest.
@@ -220,6 +223,11 @@ def _derivatives(picture: Floats) -> tuple[Floats, Floats]:
             )
         )
     return found[0], found[1]
+
+
+def mean_white(fits: PhotoFits) -> float:
+    """Return the unit of ambient light: the mean of white."""
+    return max(float(fits.white.mean()), 1e-12)
 
 
 def _regions(sample: CameraSample) -> Integers:

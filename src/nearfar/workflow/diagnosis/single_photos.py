@@ -28,7 +28,14 @@ from nearfar.faults.of_photos import (
 )
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, Sinusoid
-from nearfar.workflow.diagnosis.misfit import PhotoFits, fit_photos, is_check, is_white_or_black
+from nearfar.workflow.diagnosis.misfit import (
+    SMALLEST_CHANGE,
+    PhotoFits,
+    fit_photos,
+    is_check,
+    is_white_or_black,
+    mean_white,
+)
 from nearfar.workflow.diagnosis.sample import CameraSample
 
 # A photo is suspect above this misfit, in multiples of the usual one, which is at least 1.
@@ -52,8 +59,6 @@ UNEXPLAINED_RATIO = 40.0
 TORN_REACH = 3
 # Sweeps of the estimate.
 SWEEPS = 2
-# Smallest change of exposure, and of ambient light as a share of white, that is one.
-SMALLEST_CHANGE = 0.005
 
 TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
     ("rotated by 180 degrees", lambda picture: picture[::-1, ::-1]),
@@ -296,8 +301,7 @@ def _exposure(fits: PhotoFits, number: int, weight: Floats) -> Explanation:
     solved = np.linalg.lstsq(weighted @ effects.T, weighted @ difference.ravel(), rcond=None)[0]
     rest = difference.ravel() - solved @ effects
     misfit = float((weight.ravel() * rest**2).mean())
-    white = max(float(fits.white.mean()), 1e-12)
-    gain, offset = float(solved[0]), float(solved[1]) / white
+    gain, offset = float(solved[0]), float(solved[1]) / mean_white(fits)
     if max(abs(gain), abs(offset)) < SMALLEST_CHANGE:
         misfit = np.inf
     return Explanation("exposure", misfit, gain=gain, offset=offset)

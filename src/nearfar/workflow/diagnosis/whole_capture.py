@@ -32,6 +32,7 @@ from nearfar.workflow.diagnosis.misfit import (
     PROJECTOR_ACROSS,
     PROJECTOR_DOWN,
     PROJECTOR_FOCUS,
+    SMALLEST_CHANGE,
     NormalEquations,
 )
 from nearfar.workflow.diagnosis.sample import CameraSample
@@ -175,7 +176,8 @@ def find_changes_of_light(equations: NormalEquations) -> tuple[float, Spoilt] | 
     effects = np.array([_solved(m, v) for m, v in zip(matrix, vector, strict=True)])
     explained = np.einsum("np,np->n", vector, effects) / equations.values
     total = float(explained.sum())
-    changed = np.flatnonzero(explained > LEAST_EXPLAINED)
+    is_change = np.abs(effects).max(axis=1) > SMALLEST_CHANGE
+    changed = np.flatnonzero((explained > LEAST_EXPLAINED) & is_change)
     if total > FLICKER and np.mean(explained > FLICKER / 40) > FLICKER_SHARE:
         return total, LampFlickers(float(effects[:, 0].std()))
     if not len(changed):

@@ -43,6 +43,8 @@ LEAST_EXPLAINED = 1.0
 LEAST_SHARE = 0.05
 # A change at one moment lies at least so many photos from both ends.
 FROM_THE_ENDS = 4
+# Of what a size of its own in each photo explains, one change has to explain at least this share.
+LEAST_OF_EFFECTS = 0.25
 # And of the photos of white alone, where it is camera or scene that moved.
 LEAST_OF_WHITE = 0.3
 # A bend of the response has to explain at least this.
@@ -173,7 +175,7 @@ def find_changes_of_light(equations: NormalEquations) -> tuple[float, Spoilt] | 
     causes = [GAIN, OFFSET]
     matrix = equations.matrix[:, 0][:, causes][:, :, causes]
     vector = equations.vector[:, 0][:, causes]
-    effects = np.array([_solved(m, v) for m, v in zip(matrix, vector, strict=True)])
+    effects = _solved(matrix, vector)
     explained = np.einsum("np,np->n", vector, effects) / equations.values
     total = float(explained.sum())
     is_change = np.abs(effects).max(axis=1) > SMALLEST_CHANGE
@@ -215,16 +217,26 @@ def _step(
 def _best_step(
     matrix: NDArray[np.float64], vector: NDArray[np.float64], candidates: Integers
 ) -> Step:
-    """Return the change that explains most, before one of some photos."""
+    """Return the change that explains most, before one of some photos.
+
+    What an effect that never changes explains is no change: estimates that a prior pulls towards 0
+    look out of focus in all photos. Nor is there one change where effects go up and down.
+    """
+    effects = float(np.sum(_solved(matrix, vector) * vector))
     matrix, vector = matrix.cumsum(axis=0), vector.cumsum(axis=0)
-    best = Step(-1.0, int(candidates[0]), np.zeros(vector.shape[1]))
-    for photo in candidates.tolist():
-        before = _solved(matrix[photo - 1], vector[photo - 1])
-        after = _solved(matrix[-1] - matrix[photo - 1], vector[-1] - vector[photo - 1])
-        explained = float(before @ vector[photo - 1] + after @ (vector[-1] - vector[photo - 1]))
-        if explained > best.explained:
-            best = Step(explained, photo, after - before)
-    return best
+    unchanged = float(_solved(matrix[-1], vector[-1]) @ vector[-1])
+    before = vector[candidates - 1]
+    after = vector[-1] - before
+    of_before = _solved(matrix[candidates - 1], before)
+    of_after = _solved(matrix[-1] - matrix[candidates - 1], after)
+    explained = np.sum(of_before * before + of_after * after, axis=1)
+    best = int(np.argmax(explained))
+    gained = float(explained[best]) - unchanged
+    return Step(
+        gained if gained > LEAST_OF_EFFECTS * effects else 0.0,
+        int(candidates[best]),
+        of_after[best] - of_before[best],
+    )
 
 
 def _explained(
@@ -235,10 +247,11 @@ def _explained(
 
 
 def _solved(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve normal equations; causes without any effect come out as 0."""
-    scale = np.sqrt(np.maximum(np.diagonal(matrix), 1e-300))
-    scaled = matrix / np.outer(scale, scale)
-    return np.asarray(np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ (vector / scale) / scale)
+    """Solve normal equations, (..., n, n) and (..., n); causes without effect come out as 0."""
+    scale = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), 1e-300))
+    scaled = matrix / (scale[..., :, None] * scale[..., None, :])
+    inverse = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True)
+    return np.asarray(np.einsum("...ij,...j->...i", inverse, vector / scale) / scale)
 
 
 def find_clipped_black(sample: CameraSample) -> list[Spoilt]:

@@ -1,0 +1,75 @@
+"""Changes of a whole capture, by the normal equations of its photos."""
+
+import numpy as np
+import pytest
+
+from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved
+from nearfar.workflow.diagnosis.misfit import (
+    CAUSES,
+    DOWN,
+    GAIN,
+    PROJECTOR_DOWN,
+    PROJECTOR_FOCUS,
+    REGIONS_A_SIDE,
+    NormalEquations,
+)
+from nearfar.workflow.diagnosis.whole_capture import find_changes
+
+PHOTOS = 100
+WHITES = np.arange(0, PHOTOS, 11)
+VALUES = 1000
+# Weighted squares of a unit of an effect in one region of a photo.
+INFORMATION = 500.0
+
+
+def found(cause, sizes, *, regions=slice(None), information=INFORMATION):
+    """Return what is found where photos differ by an effect of these sizes, and nothing else."""
+    every = REGIONS_A_SIDE**2
+    effects = np.zeros((PHOTOS, every, CAUSES))
+    effects[:, regions, cause] = np.reshape(sizes, (PHOTOS, 1))
+    matrix = np.broadcast_to(information * np.eye(CAUSES), (PHOTOS, every, CAUSES, CAUSES))
+    vector = information * effects
+    misfit = 1 + np.einsum("nrc,nrc->n", effects, vector) / VALUES
+    return find_changes(NormalEquations(matrix, vector, VALUES), misfit, WHITES)
+
+
+def step(photo, size=1.0):
+    return np.where(np.arange(PHOTOS) < photo, -size / 2, size / 2)
+
+
+@pytest.mark.parametrize("cause", [PROJECTOR_DOWN, PROJECTOR_FOCUS])
+@pytest.mark.parametrize("photo", [20, 47, 80])
+def test_a_projector_that_changes_once_is_found_with_its_moment(cause, photo):
+    assert found(cause, step(photo)) == [Moved("projector", photo, None)]
+
+
+@pytest.mark.parametrize("cause", [PROJECTOR_DOWN, PROJECTOR_FOCUS])
+def test_an_effect_of_all_photos_is_no_change(cause):
+    # As where a prior pulls what is hardly measured towards 0: all patterns look out of focus.
+    assert found(cause, np.ones(PHOTOS)) == []
+
+
+@pytest.mark.parametrize("cause", [PROJECTOR_DOWN, PROJECTOR_FOCUS])
+def test_an_effect_of_a_few_photos_is_no_change(cause):
+    assert found(cause, 5.0 * np.isin(np.arange(PHOTOS), range(60, 65))) == []
+
+
+def test_a_camera_moves_everywhere_and_a_part_of_the_scene_does_not():
+    (camera,) = found(DOWN, step(44, 0.5))
+    (scene,) = found(DOWN, step(44, 0.5), regions=slice(3))
+    for moved, what in ((camera, "camera"), (scene, "scene")):
+        assert moved.what == what
+        assert 33 < moved.photo <= 44
+        assert moved.pixels == pytest.approx(0.5)
+
+
+def test_light_below_one_percent_is_no_change():
+    few = np.isin(np.arange(PHOTOS), [5, 50])
+    (fault,) = found(GAIN, np.where(few, 0.02, 0.0), information=1e7)
+    assert fault == ExposureChanged((5, 50), pytest.approx(0.02), 0.0)
+    assert found(GAIN, np.where(few, 0.009, 0.0), information=1e7) == []
+
+
+def test_light_that_changes_all_the_time_flickers():
+    (fault,) = found(GAIN, np.random.default_rng(0).standard_normal(PHOTOS))
+    assert isinstance(fault, LampFlickers)

@@ -44,7 +44,7 @@ LEAST_SHARE = 0.05
 # A change at one moment lies at least so many photos from both ends.
 FROM_THE_ENDS = 4
 # Of what a size of its own in each photo explains, one change has to explain at least this share.
-LEAST_OF_EFFECTS = 0.25
+LEAST_OF_EACH = 0.3
 # And of the photos of white alone, where it is camera or scene that moved.
 LEAST_OF_WHITE = 0.3
 # A bend of the response has to explain at least this.
@@ -201,7 +201,8 @@ def _step(
     """Return the best change of some causes between two photos.
 
     The photos of white, where they tell of the causes, tell best between which two of them it was:
-    the transport does not bend to them.
+    the transport does not bend to them. Where they do not tell, there is no such change if effects
+    of a size of its own in each photo explain far more.
     """
     matrix = equations.matrix[:, region][:, causes][:, :, causes]
     vector = equations.vector[:, region][:, causes]
@@ -211,6 +212,9 @@ def _step(
         place = _best_step(matrix[whites], vector[whites], np.arange(1, len(whites))).photo
         candidates = np.arange(whites[place - 1] + 1, whites[place] + 1)
     best = _best_step(matrix, vector, candidates)
+    in_each = float(np.sum(_solved(matrix, vector) * vector))
+    if whites is None and best.explained < LEAST_OF_EACH * in_each:
+        return best._replace(explained=0.0)
     return best._replace(explained=best.explained / equations.values)
 
 
@@ -220,9 +224,8 @@ def _best_step(
     """Return the change that explains most, before one of some photos.
 
     What an effect that never changes explains is no change: estimates that a prior pulls towards 0
-    look out of focus in all photos. Nor is there one change where effects go up and down.
+    look out of focus in all photos.
     """
-    effects = float(np.sum(_solved(matrix, vector) * vector))
     matrix, vector = matrix.cumsum(axis=0), vector.cumsum(axis=0)
     unchanged = float(_solved(matrix[-1], vector[-1]) @ vector[-1])
     before = vector[candidates - 1]
@@ -231,9 +234,8 @@ def _best_step(
     of_after = _solved(matrix[-1] - matrix[candidates - 1], after)
     explained = np.sum(of_before * before + of_after * after, axis=1)
     best = int(np.argmax(explained))
-    gained = float(explained[best]) - unchanged
     return Step(
-        gained if gained > LEAST_OF_EFFECTS * effects else 0.0,
+        float(explained[best]) - unchanged,
         int(candidates[best]),
         of_after[best] - of_before[best],
     )

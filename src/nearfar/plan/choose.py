@@ -35,7 +35,7 @@ from nearfar.illumination.frequencies import (
 )
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan.checks import check_pairs, check_patterns, spread_checks
-from nearfar.plan.model import LARGEST_SIDE, Plan
+from nearfar.plan.model import LARGEST_SIDE, Plan, largest_window
 from nearfar.plan.paper import sinusoids
 from nearfar.plan.patterns import Purpose
 from nearfar.plan.references import FEWEST, with_references
@@ -152,16 +152,17 @@ def choose_plan(
             f"{photos} photos are too few to settle correspondence and light: plan with "
             f"`photos={FEWEST_PHOTOS}` or more."
         )
-    if min(projector) < SMALLEST_SIDE or max(projector) > LARGEST_SIDE:
+    sides = [side for side in projector if side > 1] or [1]
+    if min(sides) < SMALLEST_SIDE or max(sides) > LARGEST_SIDE:
         raise PlanError(
             f"a projector of {projector} is no pattern grid to choose frequencies on: its sides "
-            f"must be from {SMALLEST_SIDE} to {LARGEST_SIDE} pixels."
+            f"must be from {SMALLEST_SIDE} to {LARGEST_SIDE} pixels, or one of them 1."
         )
     window = default_window(projector) if window is None else window
-    if not 1 <= window <= min(projector):
+    if not 1 <= window <= largest_window(projector):
         raise PlanError(
             f"W = {window} does not fit a projector of {projector}: choose `window` between 1 and "
-            f"{min(projector)}."
+            f"{largest_window(projector)}."
         )
     checks = check_pairs(photos) if checks is None else as_count(checks, "checks", 0)
     own = photos - 2 * checks
@@ -176,8 +177,10 @@ def choose_plan(
     band = Size(*(min(FAR_BAND_SIDE, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))
 
+    finest = finest_pattern(projector)
+
     def purpose(frequency: Frequency) -> Purpose:
-        if frequency == CHECKERBOARD:
+        if frequency == finest:
             return "direct"
         return "far" if frequency in low or -frequency in low else "near"
 
@@ -198,16 +201,28 @@ def choose_plan(
         offset="reference",
         correspondence="phase",
         patterns=with_references(
-            spread_checks(patterns, check_patterns(checks)), choice.references, choice.references
+            spread_checks(patterns, check_patterns(checks, projector)),
+            choice.references,
+            choice.references,
         ),
     )
     return plan, choice.expected
 
 
 def default_window(projector: Size) -> int:
-    """W where nothing is known: a sixth of the shorter side, odd, between 5 and 25."""
-    side = min(projector)
+    """W where nothing is known: a sixth of the shorter side, odd, between 5 and 25.
+
+    On a projector of one row or column it is a sixth of the longer side.
+    """
+    side = largest_window(projector)
     return int(min(2 * (min(25, max(5, round(side / 6))) // 2) + 1, side))
+
+
+def finest_pattern(projector: Size) -> Frequency:
+    """Return the highest frequency: the checkerboard, or alternate pixels of one row or column."""
+    return wrap(
+        *(k if side > 1 else DC.fy for k, side in zip(CHECKERBOARD, projector, strict=True))
+    )
 
 
 def candidates(projector: Size, window: int) -> list[Frequency]:
@@ -218,9 +233,10 @@ def candidates(projector: Size, window: int) -> list[Frequency]:
         wrap(*(_on_grid(part, side) for part, side in zip(k, projector, strict=True)))
         for k in grid(Size(steps, steps), Size(steps, steps))
     ]
-    halves = [CHECKERBOARD, wrap(CHECKERBOARD.fy, DC.fx), wrap(DC.fy, CHECKERBOARD.fx)]
+    finest = finest_pattern(projector)
+    halves = [finest, wrap(finest.fy, DC.fx), wrap(DC.fy, finest.fx)]
     even = all(side % 2 == 0 for side in projector)
-    listed = far_frequencies(low, projector) + rounded + (halves if even else [CHECKERBOARD])
+    listed = far_frequencies(low, projector) + rounded + (halves if even else [finest])
     return [k for k in representatives(listed) if k != DC]
 
 
@@ -317,7 +333,7 @@ def _covariances(
     cosines, sines = np.cos(angle), np.sin(angle)
     paired = np.array([not k.is_own_negative for k in frequencies])
     for prior_component, scale in typical.prior_components:
-        covariance = near_covariance(prior_component, window)
+        covariance = near_covariance(prior_component, window, projector)
         far = np.diag(far_variance(basis, prior_component)[~basis.is_sine])
         direct = np.full_like(far, TYPICAL_DIRECT_DEVIATION**2)
         squared = scale**2
@@ -396,8 +412,9 @@ def choose_frequencies(
         for place in range(len(listed)):
             take(place)
     else:
-        take(listed.index(CHECKERBOARD))
-        expected_errors.condition_on(listed.index(CHECKERBOARD), noise)
+        finest = listed.index(finest_pattern(projector))
+        take(finest)
+        expected_errors.condition_on(finest, noise)
     while left > 0:
         relative = expected_errors.gains(noise) / expected_errors.errors()[..., None]
         per_photo = typical.weights @ np.einsum("l,slk->sk", LIGHT_WEIGHTS, relative) / cost

@@ -37,7 +37,9 @@ from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfa
 def test_json_has_these_keys_and_stands_alone(options, photos, total, savings, quiet):
     ran = check_done(run_nearfar("plan", "--projector", *options, "--json", *quiet))
     found = json.loads(ran.out)
-    assert list(found) == ["photos", "transport_photos", "total_photos", "brute_force", "savings"]
+    keys = ["photos", "transport_photos", "total_photos", "brute_force", "savings"]
+    assert list(found)[: len(keys)] == keys
+    assert found["expected_dB"] is None
     purposes = ["direct", "near", "far", "reference", "correspondence", "check"]
     assert list(found["photos"]) == purposes
     assert found["transport_photos"] == photos
@@ -48,7 +50,8 @@ def test_json_has_these_keys_and_stands_alone(options, photos, total, savings, q
 
 def test_json_stands_alone_beside_a_file(tmp_path: Path):
     ran = check_done(run_nearfar(*PLAN, "--json", "-o", tmp_path / "plan.json"))
-    assert json.loads(ran.out) == read_plan(tmp_path / "plan.json").summary()
+    summary = read_plan(tmp_path / "plan.json").summary()
+    assert json.loads(ran.out) == {**summary, "expected_dB": None}
 
 
 def test_quiet_says_nothing(tmp_path: Path):
@@ -116,11 +119,17 @@ def test_pictures_without_a_plan_are_not_an_export(finished: Job, tmp_path: Path
 def test_a_number_of_photos_is_the_whole_command(tmp_path: Path):
     plan = tmp_path / "plan.json"
     ran = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "-o", plan))
-    assert "expected" in ran.out
     chosen = read_plan(plan)
     assert 39 <= len(chosen.patterns) <= 40
-    ran = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "--json"))
-    assert json.loads(ran.out) == chosen.summary()
+    as_json = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "--json"))
+    found = json.loads(as_json.out)
+    assert {name: found[name] for name in chosen.summary()} == chosen.summary()
+    expected = choose_plan((16, 20), 40)[1]
+    for light, value in expected._asdict().items():
+        low, high = found["expected_dB"][light]
+        assert low < value < high
+        assert f"{low:.0f} to {high:.0f} dB under" in ran.out
+    assert "scenes of direct, near-range and far-range light" in ran.out
 
 
 @pytest.mark.parametrize(

@@ -89,8 +89,9 @@ def plan(
     """
     from nearfar.plan import choose_plan, paper_plan
     from nearfar.plan.choose import NOISE
+    from nearfar.plan.expect import expected_range
     from nearfar.priors.fitted import TYPICAL_SCENES
-    from nearfar.report.plan import describe_plan
+    from nearfar.report.plan import describe_expected, describe_plan
 
     expected = None
     if photos is None and (look is not None or no_check):
@@ -127,18 +128,13 @@ def plan(
     if output is not None:
         with new_output(output, force=force) as partial:
             partial.write_text(made.to_json(), encoding="utf-8")
+    spread = expected and expected_range(expected, is_looked_at=look is not None)
     if as_json:
-        print(json.dumps(made.summary()))
+        print(json.dumps({**made.summary(), "expected_dB": spread and spread._asdict()}))
     else:
         say(describe_plan(made), quiet=quiet)
-        if expected is not None:
-            like = "this scene" if look is not None else "scenes like the simulated ones"
-            say(
-                f"expected of relighting {like}, before neighbours help: "
-                f"{expected.pictures:.0f} dB under pictures, {expected.random:.0f} dB under a "
-                f"random light",
-                quiet=quiet,
-            )
+        if spread is not None:
+            say(describe_expected(spread, is_looked_at=look is not None), quiet=quiet)
         if output is not None:
             say(f"plan written to {output}", quiet=quiet)
 

@@ -1,6 +1,7 @@
 """Description of a plan."""
 
 from nearfar.plan import Plan
+from nearfar.plan.expect import ExpectedRange
 
 
 def describe_plan(plan: Plan) -> str:
@@ -23,6 +24,27 @@ def describe_plan(plan: Plan) -> str:
             f"{_against(plan)}; counting the {plan.transport_photos} of transport alone, "
             f"{plan.savings:.2f} times fewer",
         ]
+    )
+
+
+def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
+    """Return what relighting is expected to reach, and for which scenes, in a sentence.
+
+    Parameters
+    ----------
+    expected : ExpectedRange
+    is_looked_at : bool
+        Whether it follows from a first estimate of the scene, not from typical scenes.
+    """
+    ranges = " and ".join(
+        f"{low:.0f} to {high:.0f} dB under {light}"
+        for (low, high), light in zip(expected, ("pictures", "a random light"), strict=True)
+    )
+    if is_looked_at:
+        return f"expected of relighting this scene: {ranges}"
+    return (
+        f"expected of relighting scenes of direct, near-range and far-range light: {ranges}; "
+        f"others, such as mirrors, glass and hair, come out worse, by 20 dB and more"
     )
 
 

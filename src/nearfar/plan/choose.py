@@ -35,6 +35,7 @@ from nearfar.plan.expect import (
     Expected,
     ExpectedErrors,
     errors_of_all_measured,
+    errors_of_none_measured,
     expected_of,
 )
 from nearfar.plan.model import LARGEST_SIDE, Plan, largest_window
@@ -90,6 +91,7 @@ def choose_plan(
     typical: TypicalScenes | None = None,
     noise: float = NOISE,
     checks: int | None = None,
+    every_frequency: bool = False,
     progress: Report | OldReport | None = None,
 ) -> tuple[Plan, Expected]:
     """Choose a plan of at most `photos` photos, whose own phase gives correspondence.
@@ -108,6 +110,10 @@ def choose_plan(
     checks : int, optional
         Check patterns, pictures and half-screens that no estimate sees; each is photographed with
         its inverse. By default about 4 % of the photos, and at least one pattern.
+    every_frequency : bool
+        Choose among all frequencies of the projector's DFT, the lowest first, as is best for scenes
+        that are not direct, near-range and far-range light: `projector.pixels` + 5 photos show all
+        of them.
     progress : callable, optional
         Called with what is being done and the share of it that is done, 0 to 1.
 
@@ -152,7 +158,13 @@ def choose_plan(
             f"W = {window} does not fit a projector of {projector}: choose `window` between 1 and "
             f"{largest_window(projector)}."
         )
-    checks = check_pairs(photos) if checks is None else as_count(checks, "checks", 0)
+    if checks is not None:
+        checks = as_count(checks, "checks", 0)
+    else:
+        checks = check_pairs(photos)
+        left_by_all = photos - photos_of_every_frequency(projector)
+        if every_frequency and left_by_all >= 2:
+            checks = min(checks, left_by_all // 2)
     own = photos - 2 * checks
     if own < FEWEST_PHOTOS - 2:
         raise PlanError(
@@ -160,7 +172,13 @@ def choose_plan(
             f"with `photos={FEWEST_PHOTOS + 2 * checks}` or more."
         )
     choice = choose_frequencies(
-        projector, own, window, typical=typical or TYPICAL_SCENES, noise=noise, progress=report
+        projector,
+        own,
+        window,
+        typical=typical or TYPICAL_SCENES,
+        noise=noise,
+        every_frequency=every_frequency,
+        progress=report,
     )
     band = Size(*(min(FAR_BAND_SIDE, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))
@@ -195,6 +213,11 @@ def choose_plan(
         ),
     )
     return plan, choice.expected
+
+
+def photos_of_every_frequency(projector: Size) -> int:
+    """Return how many photos show every frequency of a projector's DFT, without check photos."""
+    return projector.pixels - 1 + 2 * FEWEST
 
 
 def default_window(projector: Size) -> int:
@@ -246,6 +269,7 @@ def choose_frequencies(
     *,
     typical: TypicalScenes = TYPICAL_SCENES,
     noise: float = NOISE,
+    every_frequency: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> FrequencyChoice:
     """Choose what to show with a given number of photos.
@@ -261,6 +285,8 @@ def choose_frequencies(
         What to plan for.
     noise : float
         Standard deviation of a response, as a share of white.
+    every_frequency : bool
+        Show all frequencies of the DFT, the lowest first, as many as there are photos for.
     progress : callable, optional
         Called with the number of photos chosen so far.
 
@@ -269,15 +295,20 @@ def choose_frequencies(
     FrequencyChoice
     """
     references = max(FEWEST, photos // (REFERENCE_INTERVAL + 2))
+    half = max(FEWEST, references // 2)
     # With as many photos as unknowns, nothing is left to what scenes are expected to be. For that,
-    # half of the references are given up.
+    # half of the references are given up, or all but the fewest where no scene is expected.
     unknowns = projector.pixels - 1
-    is_complete = photos - 2 * max(FEWEST, references // 2) >= unknowns
+    is_complete = photos - 2 * (FEWEST if every_frequency else half) >= unknowns
     errors: ExpectedErrors
     if is_complete:
         references = min(references, (photos - unknowns) // 2)
         listed = _lowest_first(projector)
         errors = errors_of_all_measured(listed, projector, window, typical, noise)
+    elif every_frequency:
+        references = half
+        listed = _lowest_first(projector)
+        errors = errors_of_none_measured(listed, projector, window, typical)
     else:
         listed = candidates(projector, window)
         errors = ErrorsTogether(listed, projector, window, typical)
@@ -290,9 +321,12 @@ def choose_frequencies(
         chosen[listed[place]] = chosen.get(listed[place], 0) + 1
         left -= int(cost[place])
 
-    if is_complete:
+    if is_complete or every_frequency:
         for place in range(len(listed)):
-            take(place)
+            if cost[place] <= left:
+                take(place)
+                if not is_complete:
+                    errors.condition_on(place, noise)
     else:
         finest = listed.index(finest_pattern(projector))
         take(finest)

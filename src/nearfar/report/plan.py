@@ -1,7 +1,9 @@
 """Description of a plan."""
 
 from nearfar.plan import Plan
+from nearfar.plan.choose import photos_of_every_frequency
 from nearfar.plan.expect import ExpectedRange
+from nearfar.plan.look import Look
 
 
 def describe_plan(plan: Plan) -> str:
@@ -45,6 +47,41 @@ def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
     return (
         f"expected of relighting scenes of direct, near-range and far-range light: {ranges}; "
         f"others, such as mirrors, glass and hair, come out worse, by 20 dB and more"
+    )
+
+
+def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
+    """Return what a plan takes from a first estimate of the scene, and by what it was decided.
+
+    Parameters
+    ----------
+    look : Look
+    plan : Plan
+    photos_for_window : int, optional
+        Photos that leave as little unknown as a window of the look's size, if the plan's is larger.
+    """
+    if not look.model_holds:
+        needed = photos_of_every_frequency(plan.projector)
+        shown = (
+            "all frequencies are shown"
+            if plan.transport_photos >= plan.projector.pixels
+            else f"the lowest frequencies are shown; {needed} photos and the check photos show all"
+        )
+        return (
+            f"the scene is not direct, near-range and far-range light alone: by its light, "
+            f"{look.free_share:.0%} of the look's camera pixels fit no window and no band. Planned "
+            f"without them: {shown}"
+        )
+    if look.reach is None:
+        return f"the look shows hardly any near-range light: planned with W = {plan.window}"
+    more = " or more" if look.reach >= look.window else ""
+    falls = f"near-range light falls by a factor e in {look.reach:.1f}{more} projector pixels"
+    if photos_for_window is None:
+        return f"{falls} in the look: planned with W = {plan.window}"
+    return (
+        f"{falls}, and reaches further than the look's W = {look.window}: planned with W = "
+        f"{plan.window}, for which about {photos_for_window} photos leave as little unknown as "
+        f"{len(plan.patterns)} for W = {look.window}"
     )
 
 

@@ -105,6 +105,11 @@ def test_every_frequency_is_shown_as_soon_as_there_are_photos_for_it(checks):
         assert len(plan.patterns) <= count
 
 
+def test_more_frequencies_than_can_be_listed_are_refused():
+    with pytest.raises(PlanError, match="too many frequencies"):
+        choose_plan(Size(1080, 1920), 200, every_frequency=True)
+
+
 def test_below_that_the_lowest_frequencies_of_all_are_shown():
     projector = Size(12, 12)
     plan, expected = choose_plan(projector, 80, every_frequency=True)

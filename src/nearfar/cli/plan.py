@@ -173,17 +173,14 @@ def _choose(
 ) -> _Chosen:
     """Choose a plan, for the scene of a look if there is one."""
     from nearfar.plan import choose_plan
-    from nearfar.plan.choose import NOISE
+    from nearfar.plan.choose import MOST_LISTED, NOISE
     from nearfar.plan.expect import expected_range
     from nearfar.plan.look import photos_for_window
     from nearfar.priors.fitted import TYPICAL_SCENES
 
     seen = None if look is None else _looked_at(look, projector)
-    needed = None
     if window is None and seen is not None:
         window = seen.wanted_window if seen.model_holds else seen.window
-        if window > seen.window:
-            needed = photos_for_window(seen, projector, photos)
     plan, expected = choose_plan(
         projector,
         photos,
@@ -191,9 +188,14 @@ def _choose(
         typical=TYPICAL_SCENES if seen is None else seen.typical,
         noise=NOISE if seen is None else seen.noise,
         checks=None if checks else 0,
-        every_frequency=seen is not None and not seen.model_holds,
+        every_frequency=(
+            seen is not None and not seen.model_holds and projector.pixels <= MOST_LISTED
+        ),
         progress=progress,
     )
+    needed = None
+    if seen is not None and seen.model_holds and plan.window > seen.window:
+        needed = photos_for_window(seen, projector, photos)
     return _Chosen(plan, expected_range(expected, is_looked_at=seen is not None), seen, needed)
 
 

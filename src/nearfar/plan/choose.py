@@ -56,6 +56,8 @@ FEWEST_PHOTOS = 24
 # f is kept at the measured ones of as many DFT frequencies on each side.
 FAR_BAND_SIDE = 13
 SMALLEST_SIDE = 8
+# Pixels of the largest pattern grid all of whose frequencies are listed: more take minutes.
+MOST_LISTED = 2**17
 # Other photos from one white and black to the next. Fewer references leave more for frequencies
 # but cost white light; at 117 photos of the box, 10 instead of 16 gain 0.6 dB under pictures and
 # lose 0.7 dB under white.
@@ -151,6 +153,11 @@ def choose_plan(
         raise PlanError(
             f"a projector of {projector} is no pattern grid to choose frequencies on: its sides "
             f"must be from {SMALLEST_SIDE} to {LARGEST_SIDE} pixels, or one of them 1."
+        )
+    if every_frequency and projector.pixels > MOST_LISTED:
+        raise PlanError(
+            f"a projector of {projector} has too many frequencies to list them all: plan for a "
+            f"pattern grid of at most {MOST_LISTED} pixels."
         )
     window = default_window(projector) if window is None else window
     if not 1 <= window <= largest_window(projector):

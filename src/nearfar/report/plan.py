@@ -1,7 +1,7 @@
 """Description of a plan."""
 
 from nearfar.plan import Plan
-from nearfar.plan.choose import photos_of_every_frequency
+from nearfar.plan.choose import MOST_LISTED, photos_of_every_frequency
 from nearfar.plan.expect import ExpectedRange
 from nearfar.plan.look import Look
 
@@ -61,16 +61,18 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
         Photos that leave as little unknown as a window of the look's size, if the plan's is larger.
     """
     if not look.model_holds:
-        needed = photos_of_every_frequency(plan.projector)
-        shown = (
-            "all frequencies are shown"
-            if plan.transport_photos >= plan.projector.pixels
-            else f"the lowest frequencies are shown; {needed} photos and the check photos show all"
-        )
-        return (
+        found = (
             f"the scene is not direct, near-range and far-range light alone: by its light, "
-            f"{look.free_share:.0%} of the look's camera pixels fit no window and no band. Planned "
-            f"without them: {shown}"
+            f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
+        )
+        if plan.projector.pixels > MOST_LISTED:
+            return f"{found}. The projector has too many frequencies to do without them"
+        if plan.transport_photos >= plan.projector.pixels:
+            return f"{found}. Planned without them: all frequencies are shown"
+        needed = photos_of_every_frequency(plan.projector)
+        return (
+            f"{found}. Planned without them: the lowest frequencies are shown; {needed} photos and "
+            f"the check photos show all"
         )
     if look.reach is None:
         return f"the look shows hardly any near-range light: planned with W = {plan.window}"

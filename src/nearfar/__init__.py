@@ -98,9 +98,13 @@ True
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+# As in typing, which takes as long to import as all else that a command needs before it can say
+# that it was interrupted.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from nearfar.arrays import Size, parse_size
     from nearfar.capture import Capture, open_capture, write_capture
     from nearfar.correspondence import (
@@ -239,7 +243,7 @@ _OLD = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name == "__version__":
         return import_module("nearfar.release").version()
     if name in _OLD:

@@ -7,9 +7,11 @@ import imagecodecs
 import numpy as np
 import pytest
 
+from nearfar.arrays import Size
 from nearfar.plan import choose_plan, read_plan
 from nearfar.plan.choose import NOISE
 from nearfar.plan.typical import noise_of, typical_of
+from nearfar.scenes.hostile import hostile_transport
 from nearfar.transport.store import load_transport
 from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfar
 
@@ -37,7 +39,9 @@ from tests.cli.conftest import PLAN, Job, check_done, check_sentence, run_nearfa
 def test_json_has_these_keys_and_stands_alone(options, photos, total, savings, quiet):
     ran = check_done(run_nearfar("plan", "--projector", *options, "--json", *quiet))
     found = json.loads(ran.out)
-    assert list(found) == ["photos", "transport_photos", "total_photos", "brute_force", "savings"]
+    keys = ["photos", "transport_photos", "total_photos", "brute_force", "savings"]
+    assert list(found)[: len(keys)] == keys
+    assert found["expected_dB"] is None
     purposes = ["direct", "near", "far", "reference", "correspondence", "check"]
     assert list(found["photos"]) == purposes
     assert found["transport_photos"] == photos
@@ -48,7 +52,8 @@ def test_json_has_these_keys_and_stands_alone(options, photos, total, savings, q
 
 def test_json_stands_alone_beside_a_file(tmp_path: Path):
     ran = check_done(run_nearfar(*PLAN, "--json", "-o", tmp_path / "plan.json"))
-    assert json.loads(ran.out) == read_plan(tmp_path / "plan.json").summary()
+    summary = read_plan(tmp_path / "plan.json").summary()
+    assert json.loads(ran.out) == {**summary, "expected_dB": None, "look": None}
 
 
 def test_quiet_says_nothing(tmp_path: Path):
@@ -116,11 +121,17 @@ def test_pictures_without_a_plan_are_not_an_export(finished: Job, tmp_path: Path
 def test_a_number_of_photos_is_the_whole_command(tmp_path: Path):
     plan = tmp_path / "plan.json"
     ran = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "-o", plan))
-    assert "expected" in ran.out
     chosen = read_plan(plan)
     assert 39 <= len(chosen.patterns) <= 40
-    ran = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "--json"))
-    assert json.loads(ran.out) == chosen.summary()
+    as_json = check_done(run_nearfar("plan", "--projector", "16x20", "--photos", 40, "--json"))
+    found = json.loads(as_json.out)
+    assert {name: found[name] for name in chosen.summary()} == chosen.summary()
+    expected = choose_plan((16, 20), 40)[1]
+    for light, value in expected._asdict().items():
+        low, high = found["expected_dB"][light]
+        assert low < value < high
+        assert f"{low:.0f} to {high:.0f} dB under" in ran.out
+    assert "scenes of direct, near-range and far-range light" in ran.out
 
 
 @pytest.mark.parametrize(
@@ -155,11 +166,15 @@ def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
     ran = run_nearfar("plan", *wanted, "--look", look, "-o", chosen)
     assert "of relighting this scene" in check_done(ran).out
     seen = load_transport(look)
+    # Entries of that world's windows are as bright far from q as near it.
+    assert "reaches further than the look's W = 5: planned with W = 9" in ran.out
     by_noise = [
-        choose_plan(seen.projector, 60, typical=typical_of(seen), noise=noise)[0]
+        choose_plan(seen.projector, 60, window=9, typical=typical_of(seen), noise=noise)[0]
         for noise in (noise_of(seen), NOISE)
     ]
     assert read_plan(chosen) == by_noise[0] != by_noise[1]
+    own = ("--near", 5, "--look", look)
+    assert "planned with W = 5" in check_done(run_nearfar("plan", *wanted, *own)).out
     for arguments, said in (
         (("--projector", "16x24", "--photos", 60, "--look", look), "same pattern grid"),
         (("--projector", "16x20", "--photos", 60, "--look", finished.transport), "--method joint"),
@@ -167,3 +182,21 @@ def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
         check_sentence(run_nearfar("plan", *arguments), said)
     ran = run_nearfar("plan", "--projector", "16x20", "--near", 5, "--far", "3x3", "--look", look)
     assert ran.status == 2
+
+
+def test_a_look_at_what_is_not_direct_near_and_far_light_asks_for_every_frequency(tmp_path: Path):
+    scene = hostile_transport("permuted", Size(12, 12), Size(12, 12))
+    rig, plan, capture, look = (tmp_path / n for n in ("T.npy", "p.json", "c.zarr", "look.zarr"))
+    np.save(rig, scene.far[0].reshape(12, 12, 12, 12))
+    wanted = ("plan", "--projector", "12x12")
+    check_done(run_nearfar(*wanted, "--photos", 50, "-o", plan))
+    check_done(run_nearfar("acquire", plan, capture, "--rig", rig))
+    check_done(run_nearfar("reconstruct", capture, look))
+    for photos, said in ((150, "all frequencies are shown"), (100, "147 photos")):
+        ran = check_done(run_nearfar(*wanted, "--photos", photos, "--look", look))
+        assert "is not direct, near-range and far-range light alone" in ran.out
+        assert said in ran.out
+    ran = check_done(run_nearfar(*wanted, "--photos", 150, "--look", look, "--json"))
+    found = json.loads(ran.out)
+    assert found["look"]["model_holds"] is False
+    assert found["transport_photos"] >= 144

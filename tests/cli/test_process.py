@@ -172,7 +172,11 @@ main()
 @pytest.mark.parametrize(
     ("module", "stop"),
     [
-        # Before the command line is read, while it is, and in the command.
+        # Before signals are handled, before the command line is read, while it is, and in the
+        # command.
+        ("typing", signal.SIGINT),
+        ("nearfar.cli.stopping", signal.SIGINT),
+        ("contextlib", signal.SIGINT),
         ("typer", signal.SIGINT),
         ("nearfar.cli.plan", signal.SIGINT),
         ("nearfar.plan.choose", signal.SIGTERM),

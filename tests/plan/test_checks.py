@@ -60,7 +60,7 @@ def test_they_are_spread_and_part_no_cosine_from_its_sine(pairs):
         p for p in paper_plan(Size(16, 20), 5, Size(3, 3), correspondence="none").patterns
         if not p.inverse
     ]  # fmt: skip
-    checks = check_patterns(pairs)
+    checks = check_patterns(pairs, Size(16, 20))
     found = spread_checks(patterns, checks)
     assert [p for p in found if p.purpose != "check"] == patterns
     assert [p for p in found if p.purpose == "check"] == checks

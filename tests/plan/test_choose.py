@@ -7,14 +7,27 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.errors import InputError, PlanError
-from nearfar.illumination.frequencies import CHECKERBOARD, DC
+from nearfar.illumination.frequencies import (
+    CHECKERBOARD,
+    DC,
+    as_array,
+    grid,
+    representatives,
+)
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan import choose_plan, parse_plan
-from nearfar.plan.choose import FEWEST_PHOTOS, candidates, choose_frequencies, default_window
+from nearfar.plan.choose import (
+    FEWEST_PHOTOS,
+    candidates,
+    choose_frequencies,
+    default_window,
+    photos_of_every_frequency,
+)
+from nearfar.plan.look import look_at, photos_for_window
 from nearfar.plan.patterns import Sinusoid
 from nearfar.plan.typical import noise_of, typical_of
 from nearfar.priors.component import PriorComponent
-from nearfar.priors.fitted import LIT_COMPONENTS, PRIOR_SCALES, TYPICAL_SCENES
+from nearfar.priors.fitted import FREE, LIT_COMPONENTS, PRIOR_SCALES, TYPICAL_SCENES
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 
@@ -77,6 +90,34 @@ def test_with_as_many_photos_as_unknowns_every_frequency_is_shown(projector, mor
     assert np.linalg.matrix_rank(basis.patterns.astype(float)) == projector.pixels
     assert len(plan.patterns) <= photos
     assert expected.random > choose_plan(projector, projector.pixels)[1].random - 1.0
+
+
+@pytest.mark.parametrize("checks", [None, 0])
+def test_every_frequency_is_shown_as_soon_as_there_are_photos_for_it(checks):
+    projector = Size(9, 12)
+    photos = photos_of_every_frequency(projector) + (2 if checks is None else 0)
+    for count, whole in ((photos, True), (photos - 1, False)):
+        plan, _ = choose_plan(projector, count, checks=checks, every_frequency=True)
+        shown = {p.frequency for p in plan.patterns if isinstance(p, Sinusoid)}
+        basis = real_basis(list(shown), projector)
+        rank = np.linalg.matrix_rank(basis.patterns.astype(float))
+        assert (rank == projector.pixels) == whole
+        assert len(plan.patterns) <= count
+
+
+def test_more_frequencies_than_can_be_listed_are_refused():
+    with pytest.raises(PlanError, match="too many frequencies"):
+        choose_plan(Size(1080, 1920), 200, every_frequency=True)
+
+
+def test_below_that_the_lowest_frequencies_of_all_are_shown():
+    projector = Size(12, 12)
+    plan, expected = choose_plan(projector, 80, every_frequency=True)
+    shown = {p.frequency for p in plan.patterns if isinstance(p, Sinusoid)}
+    every = representatives(grid(projector, projector))
+    shown_cycles, cycles = (np.linalg.norm(as_array(some), axis=1) for some in (shown, every))
+    assert shown_cycles.max() <= np.sort(cycles)[len(shown)]
+    assert expected.pictures < choose_plan(projector, 160, every_frequency=True)[1].pictures
 
 
 def test_more_noise_asks_for_more_repeats():
@@ -155,9 +196,38 @@ def test_the_plan_follows_what_was_looked_at():
     assert highest(smooth, 0.002) < highest(rough, 0.02)
 
 
+def _with_near_light(look, reach):
+    side = np.abs(np.arange(5) - 2)
+    falling = np.exp(-np.maximum(side[:, None], side) / reach)
+    near = 0.02 * np.broadcast_to(falling, look.near.shape)
+    return replace(look, near=near.astype(np.float32))
+
+
+def test_near_range_light_that_reaches_beyond_the_window_asks_for_a_larger_one():
+    dark = _quick_look(PriorComponent(2.2, 16.0, 1.5), 0.006)
+    close, wide, flat = (_with_near_light(dark, reach) for reach in (0.8, 1.7, 1e9))
+    assert look_at(close).reach == pytest.approx(0.8, rel=0.01)
+    assert look_at(close).wanted_window == 5
+    seen = look_at(wide)
+    assert (seen.reach, seen.wanted_window) == (pytest.approx(1.7, rel=0.01), 9)
+    # A look tells little of what lies far beyond its own window.
+    assert (look_at(flat).reach, look_at(flat).wanted_window) == (5.0, 9)
+    assert (look_at(dark).reach, look_at(dark).wanted_window) == (None, 5)
+    # More entries are unknown, which more photos make up for.
+    assert 60 < photos_for_window(seen, Size(24, 24), 60) < 240
+
+
+def test_free_rows_say_that_the_model_does_not_hold():
+    bound = _quick_look(PriorComponent(2.2, 16.0, 1.5), 0.006)
+    free = _quick_look(PriorComponent(0.0, 64.0, FREE), 0.006)
+    assert look_at(bound).model_holds
+    assert look_at(free).free_share == 1.0
+    assert not look_at(free).model_holds
+
+
 def test_a_look_without_prior_components_is_refused():
     look = replace(_quick_look(LIT_COMPONENTS[0], 0.01), posterior=None)
-    for ask in (typical_of, noise_of):
+    for ask in (typical_of, noise_of, look_at):
         with pytest.raises(InputError, match="`method='joint'`"):
             ask(look)
 

@@ -22,7 +22,7 @@ def _basis():
 
 @pytest.mark.parametrize("component", EVERY)
 def test_covariances_are_positive_semidefinite(component):
-    covariance = near_covariance(component, WINDOW)
+    covariance = near_covariance(component, WINDOW, PROJECTOR)
     np.testing.assert_allclose(covariance, covariance.T)
     eigenvalues = np.linalg.eigvalsh(covariance)
     assert eigenvalues[0] >= -1e-9 * max(eigenvalues[-1], 1.0)
@@ -31,11 +31,21 @@ def test_covariances_are_positive_semidefinite(component):
 
 def test_near_range_light_at_q_has_the_prior_scale_and_falls_off():
     smooth = next(one for one in LIT_COMPONENTS if not (one.direct_spread or one.roughness))
-    variance = np.diag(near_covariance(smooth, WINDOW)).reshape(WINDOW, WINDOW)
+    variance = np.diag(near_covariance(smooth, WINDOW, PROJECTOR)).reshape(WINDOW, WINDOW)
     middle = WINDOW // 2
     assert variance[middle, middle] == pytest.approx(1.0)
     away = variance[middle, middle + 2]
     assert away == pytest.approx(np.exp(-2 * 2 / smooth.near_reach))
+
+
+def test_a_row_has_near_range_light_on_that_row_alone():
+    component = LIT_COMPONENTS[0]
+    on_row = near_covariance(component, WINDOW, Size(1, 15))
+    everywhere = near_covariance(component, WINDOW, PROJECTOR)
+    middle = np.arange(WINDOW) + WINDOW * (WINDOW // 2)
+    within = np.ix_(middle, middle)
+    np.testing.assert_array_equal(on_row[within], everywhere[within])
+    assert np.count_nonzero(on_row) == np.count_nonzero(on_row[within])
 
 
 def test_a_cosine_and_its_sine_share_the_spectral_density():
@@ -53,7 +63,7 @@ def test_eigenvectors_make_the_responses_independent(component):
     multiplicity = np.random.default_rng(0).integers(1, 5, basis.count).astype(np.float32)
     prior = response_prior(component, centred, multiplicity)
     patterns = centred.on_window.astype(np.float64)
-    signal = patterns @ near_covariance(component, WINDOW) @ patterns.T
+    signal = patterns @ near_covariance(component, WINDOW, PROJECTOR) @ patterns.T
     signal += np.diag(far_variance(basis, component))
     across = prior.eigenvectors.astype(np.float64)
     largest = float(prior.eigenvalues[0])

@@ -201,8 +201,8 @@ def test_a_projector_of_one_row_is_compared_by_what_fits():
     matrix = generator.uniform(size=(6, 16)).astype(np.float32) / 16
     row = ExactTransport(Size(1, 16), Size(2, 3), (), (), matrix[None], "a row")
     found = compare(row, [30], methods=["joint", "Hadamard", "brute force"])
-    assert {trial.method for trial in found.equal_photos} == {"Hadamard", "brute force"}
-    assert {failure.method for failure in found.failures} == {"joint"}
+    assert {trial.method for trial in found.equal_photos} == {"joint", "Hadamard", "brute force"}
+    assert not found.failures
     assert min(trial.pictures for trial in found.equal_photos) > 15
     assert default_budgets(row.projector)
 

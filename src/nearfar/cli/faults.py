@@ -13,9 +13,10 @@ from typing import Any, NoReturn
 import typer
 
 from nearfar.cli.flags import with_flags
+from nearfar.cli.interrupted import NOTHING_LEFT
 from nearfar.cli.printable import printable
 from nearfar.cli.saying import warn
-from nearfar.cli.stopping import NOTHING_LEFT, handled_by
+from nearfar.cli.stopping import handled_by
 from nearfar.errors import KeptInterrupt, NearfarError
 
 # Signals to stop that arrived while the command ran.

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
@@ -14,8 +14,11 @@ from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
+    from nearfar.plan import Plan
+    from nearfar.plan.expect import ExpectedRange
+    from nearfar.plan.look import Look
     from nearfar.plan.paper import Offset
-    from nearfar.priors.typical import TypicalScenes
+    from nearfar.progress import Report
 
 
 def plan(
@@ -87,12 +90,10 @@ def plan(
 
     The paper's: nearfar plan --projector 128x128 --near 19 --far 13x13 -o plan.json
     """
-    from nearfar.plan import choose_plan, paper_plan
-    from nearfar.plan.choose import NOISE
-    from nearfar.priors.fitted import TYPICAL_SCENES
+    from nearfar.plan import paper_plan
     from nearfar.report.plan import describe_plan
 
-    expected = None
+    chosen = None
     if photos is None and (look is not None or no_check):
         flag = "--no-check" if look is None else "--look"
         raise typer.BadParameter(f"{flag} goes with --photos N only")
@@ -102,17 +103,9 @@ def plan(
         check_output(output, force=force)
     if photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
-        typical, noise = (TYPICAL_SCENES, NOISE) if look is None else _looked_at(look, projector)
         with progress_bar("choosing patterns", quiet=quiet or as_json) as report:
-            made, expected = choose_plan(
-                projector,
-                photos,
-                window=near,
-                typical=typical,
-                noise=noise,
-                checks=0 if no_check else None,
-                progress=report,
-            )
+            chosen = _choose(projector, photos, near, look, checks=not no_check, progress=report)
+        made = chosen.plan
     elif near is None or far is None:
         raise typer.BadParameter("give --photos N, or --near W and --far HxW for the paper's plan")
     else:
@@ -128,24 +121,87 @@ def plan(
         with new_output(output, force=force) as partial:
             partial.write_text(made.to_json(), encoding="utf-8")
     if as_json:
-        print(json.dumps(made.summary()))
+        print(json.dumps({**made.summary(), **_numbers(chosen)}))
     else:
-        say(describe_plan(made), quiet=quiet)
-        if expected is not None:
-            like = "this scene" if look is not None else "scenes like the simulated ones"
-            say(
-                f"expected of relighting {like}, before neighbours help: "
-                f"{expected.pictures:.0f} dB under pictures, {expected.random:.0f} dB under a "
-                f"random light",
-                quiet=quiet,
-            )
-        if output is not None:
-            say(f"plan written to {output}", quiet=quiet)
+        said = [describe_plan(made), *(() if chosen is None else chosen.sentences())]
+        said += [] if output is None else [f"plan written to {output}"]
+        for line in said:
+            say(line, quiet=quiet)
 
 
-def _looked_at(look: Path, projector: Size) -> "tuple[TypicalScenes, float]":
-    """Read the mixture of prior components, and the noise, of a quick first estimate."""
-    from nearfar.plan.typical import noise_of, typical_of
+class _Chosen(NamedTuple):
+    """A plan that was chosen, what it is expected to reach, and what it takes from a look."""
+
+    plan: "Plan"
+    expected: "ExpectedRange"
+    look: "Look | None"
+    photos_for_window: int | None
+
+    def sentences(self) -> list[str]:
+        """Return what is said of the choice."""
+        from nearfar.report.plan import describe_expected, describe_look
+
+        found = []
+        if self.look is not None:
+            found.append(describe_look(self.look, self.plan, self.photos_for_window))
+        found.append(describe_expected(self.expected, is_looked_at=self.look is not None))
+        return found
+
+
+def _numbers(chosen: _Chosen | None) -> dict[str, Any]:
+    """Return what JSON says of the choice; nothing of a plan that was not chosen."""
+    if chosen is None:
+        return {"expected_dB": None, "look": None}
+    look = chosen.look and {
+        "window": chosen.plan.window,
+        "reach": chosen.look.reach,
+        "photos_for_window": chosen.photos_for_window,
+        "free_share": chosen.look.free_share,
+        "model_holds": chosen.look.model_holds,
+    }
+    return {"expected_dB": chosen.expected._asdict(), "look": look}
+
+
+def _choose(
+    projector: Size,
+    photos: int,
+    window: int | None,
+    look: Path | None,
+    *,
+    checks: bool,
+    progress: "Report",
+) -> _Chosen:
+    """Choose a plan, for the scene of a look if there is one."""
+    from nearfar.plan import choose_plan
+    from nearfar.plan.choose import MOST_LISTED, NOISE
+    from nearfar.plan.expect import expected_range
+    from nearfar.plan.look import photos_for_window
+    from nearfar.priors.fitted import TYPICAL_SCENES
+
+    seen = None if look is None else _looked_at(look, projector)
+    if window is None and seen is not None:
+        window = seen.wanted_window if seen.model_holds else seen.window
+    plan, expected = choose_plan(
+        projector,
+        photos,
+        window=window,
+        typical=TYPICAL_SCENES if seen is None else seen.typical,
+        noise=NOISE if seen is None else seen.noise,
+        checks=None if checks else 0,
+        every_frequency=(
+            seen is not None and not seen.model_holds and projector.pixels <= MOST_LISTED
+        ),
+        progress=progress,
+    )
+    needed = None
+    if seen is not None and seen.model_holds and plan.window > seen.window:
+        needed = photos_for_window(seen, projector, photos)
+    return _Chosen(plan, expected_range(expected, is_looked_at=seen is not None), seen, needed)
+
+
+def _looked_at(look: Path, projector: Size) -> "Look":
+    """Read what a quick first estimate shows."""
+    from nearfar.plan.look import look_at
     from nearfar.transport.store import load_transport
 
     seen = load_transport(look)
@@ -155,7 +211,7 @@ def _looked_at(look: Path, projector: Size) -> "tuple[TypicalScenes, float]":
             f"same pattern grid."
         )
     try:
-        return typical_of(seen), noise_of(seen)
+        return look_at(seen)
     except InputError as error:
         raise InputError(f"{look}: {error}") from None
 

@@ -4,14 +4,14 @@ Loading what a command needs takes a good part of its time. Until then it has be
 what is loaded, or reads the command line, has words of its own for an interrupt, or none.
 """
 
-import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from nearfar.cli.interrupted import end
+
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-NOTHING_LEFT = "interrupted: nothing half-written was left behind."
 
 
 @contextmanager
@@ -36,5 +36,4 @@ def handled_by(handle: Callable[[int, FrameType | None], object]) -> Iterator[No
 
 
 def _end(number: int, _frame: FrameType | None) -> None:
-    os.write(2, f"nearfar: {NOTHING_LEFT}\n".encode())
-    os._exit(128 + number)
+    end(number)

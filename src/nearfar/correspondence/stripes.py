@@ -8,7 +8,7 @@ Index convention: c runs over camera pixels, s over the stripes of one axis.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import PHOTOS_AT_ONCE, Photos, size_of_rows
 from nearfar.plan import Plan, Stripe
 
+StripeKind = Literal["black row", "black column"]
+# In the order of the axes, y before x.
+KINDS: tuple[StripeKind, StripeKind] = ("black row", "black column")
 # Distance of the pixels, on both sides, that a peak is compared with.
 BACKGROUND_REACH = 2
 # Stripes away from the peak that are needed to estimate its noise.
@@ -45,18 +48,22 @@ class _Axis(NamedTuple):
 
 
 def stripes(projector: Size) -> tuple[Stripe, ...]:
-    """Return a black stripe on each row, then on each column: Py + Px patterns (section 5.1)."""
-    return (
-        *(Stripe(kind="black row", index=y) for y in range(projector.height)),
-        *(Stripe(kind="black column", index=x) for x in range(projector.width)),
+    """Return a black stripe on each row, then on each column: Py + Px patterns (section 5.1).
+
+    A single row, or column, has none: it would be all black.
+    """
+    return tuple(
+        Stripe(kind=kind, index=index)
+        for kind, side in _sides(projector).items()
+        for index in range(side)
     )
 
 
 def has_stripes(plan: Plan) -> bool:
     """Return whether a plan holds a stripe on every row and every column."""
-    return all(
-        _numbers(plan, kind).keys() == set(range(side))
-        for kind, side in zip(("black row", "black column"), plan.projector, strict=True)
+    sides = _sides(plan.projector)
+    return bool(sides) and all(
+        set(range(side)) <= _numbers(plan, kind).keys() for kind, side in sides.items()
     )
 
 
@@ -91,13 +98,19 @@ def correspond_by_stripes(
         )
     rows = slice(0, photos.camera.height) if rows is None else rows
     camera = size_of_rows(photos, rows)
-    down = _axis(photos, "black row", rows, progress)
-    across = _axis(photos, "black column", rows, progress, plan.projector.height)
-
+    found: dict[StripeKind, _Axis] = {}
+    read = 0
     false_alarm: Floats = np.zeros(camera.pixels)
-    for axis, length in ((down, plan.projector.height), (across, plan.projector.width)):
-        false_alarm = false_alarm + length * normal_cdf(-axis.deviations)
+    for kind, side in _sides(plan.projector).items():
+        found[kind] = _axis(photos, kind, rows, progress, read)
+        read += side
+        false_alarm = false_alarm + side * normal_cdf(-found[kind].deviations)
     confidence = 1.0 - np.minimum(1.0, false_alarm)
+    # Across a single row there is nothing to find: its place is 0.
+    along = next(iter(found.values()))
+    down, across = (
+        found.get(kind, along._replace(place=np.zeros(camera.pixels))) for kind in KINDS
+    )
     strong, weak = (
         np.maximum(down.strength, across.strength),
         np.minimum(down.strength, across.strength),
@@ -113,6 +126,11 @@ def correspond_by_stripes(
         q.reshape(*camera, 2).astype(np.float32),
         np.asarray(confidence, dtype=np.float32).reshape(camera),
     )
+
+
+def _sides(projector: Size) -> dict[StripeKind, int]:
+    """Return the kinds of stripes that a projector has, and their numbers."""
+    return {kind: side for kind, side in zip(KINDS, projector, strict=True) if side > 1}
 
 
 def _axis(

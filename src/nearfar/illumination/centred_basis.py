@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats
+from nearfar.arrays import Complexes, Floats, Size
 from nearfar.illumination.real_basis import RealBasis
 
 
@@ -25,6 +25,15 @@ def window_offsets(window: int) -> NDArray[np.int64]:
     side = np.arange(window) - window // 2
     y, x = np.meshgrid(side, side, indexing="ij")
     return np.stack([y.ravel(), x.ravel()], axis=1)
+
+
+def reachable(window: int, projector: Size) -> NDArray[np.bool_]:
+    """Return which offsets of a window lead from some projector pixel to another, shape (W^2,).
+
+    On a projector of one row, those of the window's middle row alone.
+    """
+    found: NDArray[np.bool_] = np.all(np.abs(window_offsets(window)) < projector, axis=1)
+    return found
 
 
 # Offsets from the rounded q that the 2 x 2 footprint of direct light can touch.

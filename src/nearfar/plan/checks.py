@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from nearfar.arrays import Size
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.plan.model import Plan
@@ -43,15 +44,17 @@ def check_pairs(photos: int) -> int:
     return max(1, round(CHECK_SHARE * photos / 2))
 
 
-def check_patterns(pairs: int) -> list[Pattern]:
+def check_patterns(pairs: int, projector: Size) -> list[Pattern]:
     """Return check patterns, each followed by its inverse: pictures, and half-screens among them.
 
-    Every second pattern is a half-screen as long as there are some.
+    Every second pattern is a half-screen as long as there are some. A single row or column has no
+    halves across.
     """
-    halves: list[Pattern] = [
-        HalfScreen(kind="left half-screen"),
-        HalfScreen(kind="top half-screen"),
-    ]
+    halves: list[Pattern] = []
+    if projector.width > 1:
+        halves.append(HalfScreen(kind="left half-screen"))
+    if projector.height > 1:
+        halves.append(HalfScreen(kind="top half-screen"))
     chosen: list[Pattern] = []
     seed = FIRST_PICTURE_SEED
     for number in range(pairs):

@@ -66,7 +66,7 @@ class Plan(Frozen):
     projector : Size
         Pattern grid.
     window : int
-        W of the near-range window.
+        W of the near-range window, W x W; 1 x W on a projector of one row, W x 1 of one column.
     far, dropped : Size
         Far band, and the block of lowest near frequencies that are not shot.
     offset : {"inverse", "reference", "none"}
@@ -130,11 +130,12 @@ class Plan(Frozen):
     @model_validator(mode="after")
     def _is_a_plan_for_the_projector(self) -> "Plan":
         # Before anybody works with them for minutes.
+        widest = self.projector if min(self.projector) > 1 else _square(max(self.projector))
         for name, size, largest in (
             ("projector", self.projector, Size(LARGEST_SIDE, LARGEST_SIDE)),
-            ("window", Size(self.window, self.window), self.projector),
+            ("window", _square(self.window), widest),
             ("far", self.far, self.projector),
-            ("dropped", self.dropped, Size(self.window, self.window)),
+            ("dropped", self.dropped, _square(self.window)),
         ):
             if size.height > largest.height or size.width > largest.width:
                 raise ValueError(f"its {name} of {size} is larger than {largest}")
@@ -227,6 +228,18 @@ class Plan(Frozen):
         lines = ",\n".join(f"    {json.dumps(pattern)}" for pattern in data.pop("patterns"))
         head = ",\n".join(f"  {json.dumps(key)}: {json.dumps(data[key])}" for key in data)
         return f'{{\n{head},\n  "patterns": [\n{lines}\n  ]\n}}\n'
+
+
+def largest_window(projector: Size) -> int:
+    """Return the largest W: the shorter side, or the longer one where the other is one pixel.
+
+    On a projector of one row, a window is the part of its middle row that lies on the projector.
+    """
+    return min(projector) if min(projector) > 1 else max(projector)
+
+
+def _square(side: int) -> Size:
+    return Size(side, side)
 
 
 _OWN_KINDS = frozenset[str]().union(*map(kinds_of, OWN_PATTERNS))

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats
-from nearfar.illumination.centred_basis import window_offsets
+from nearfar.arrays import Floats, Size
+from nearfar.illumination.centred_basis import reachable, window_offsets
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.priors.component import PriorComponent
 
@@ -64,10 +64,13 @@ def smooth_covariance(length: float, entries: int) -> Floats:
     return np.asarray(np.exp(-((side[:, None] - side) ** 2) / (2 * length**2)))
 
 
-def near_covariance_factors(prior_component: PriorComponent, window: int) -> NearCovariance:
+def near_covariance_factors(
+    prior_component: PriorComponent, window: int, projector: Size
+) -> NearCovariance:
     """Return the factors of the covariance C of window entries at unit prior scale.
 
-    All are 0 where the component has no near-range light.
+    All are 0 where the component has no near-range light. The deviation is 0 at entries that lie on
+    the projector for no q: on one of a single row, those above and below q.
     """
     offsets = window_offsets(window).astype(np.float64)
     smooth = smooth_covariance(CORRELATION_LENGTH, window)
@@ -77,11 +80,12 @@ def near_covariance_factors(prior_component: PriorComponent, window: int) -> Nea
     deviation = np.exp(-np.hypot(offsets[:, 0], offsets[:, 1]) / prior_component.near_reach)
     around = np.abs(offsets).max(axis=1) <= 1
     spread = (prior_component.direct_spread / deviation) ** 2 * around
+    deviation = deviation * reachable(window, projector)
     return NearCovariance(deviation, smooth, spread + prior_component.roughness**2)
 
 
-def near_covariance(prior_component: PriorComponent, window: int) -> Floats:
+def near_covariance(prior_component: PriorComponent, window: int, projector: Size) -> Floats:
     """Return the covariance C of window entries at unit prior scale, (W^2, W^2), float64."""
-    deviation, smooth, independent = near_covariance_factors(prior_component, window)
+    deviation, smooth, independent = near_covariance_factors(prior_component, window, projector)
     middle = np.kron(smooth, smooth) + np.diag(independent)
     return np.asarray(deviation[:, None] * middle * deviation)

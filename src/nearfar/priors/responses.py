@@ -136,7 +136,8 @@ def response_prior(
     """
     patterns = centred.on_window.astype(np.float64)
     window = round(np.sqrt(patterns.shape[1]))
-    covariance = near_covariance(prior_component, window)
+    projector = centred.basis.projector
+    covariance = near_covariance(prior_component, window, projector)
     seen = patterns @ covariance
     variance = far_variance(centred.basis, prior_component)
     eigenvalues, eigenvectors = _eigenbasis(seen @ patterns.T + np.diag(variance), multiplicity)
@@ -154,7 +155,7 @@ def response_prior(
         variance_ratios=VARIANCE_RATIOS,
         spike_information=(precision @ of_window**2).astype(np.float32),
         noise_gain=shrinkage**2 @ np.sum(to_near**2, axis=1) / to_near.shape[1],
-        factors=near_covariance_factors(prior_component, window),
+        factors=near_covariance_factors(prior_component, window, projector),
         covariance=covariance,
         far_variance=variance,
     )

@@ -1,6 +1,9 @@
 """Description of a plan."""
 
 from nearfar.plan import Plan
+from nearfar.plan.choose import MOST_LISTED, photos_of_every_frequency
+from nearfar.plan.expect import ExpectedRange
+from nearfar.plan.look import Look
 
 
 def describe_plan(plan: Plan) -> str:
@@ -23,6 +26,64 @@ def describe_plan(plan: Plan) -> str:
             f"{_against(plan)}; counting the {plan.transport_photos} of transport alone, "
             f"{plan.savings:.2f} times fewer",
         ]
+    )
+
+
+def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
+    """Return what relighting is expected to reach, and for which scenes, in a sentence.
+
+    Parameters
+    ----------
+    expected : ExpectedRange
+    is_looked_at : bool
+        Whether it follows from a first estimate of the scene, not from typical scenes.
+    """
+    ranges = " and ".join(
+        f"{low:.0f} to {high:.0f} dB under {light}"
+        for (low, high), light in zip(expected, ("pictures", "a random light"), strict=True)
+    )
+    if is_looked_at:
+        return f"expected of relighting this scene: {ranges}"
+    return (
+        f"expected of relighting scenes of direct, near-range and far-range light: {ranges}; "
+        f"others, such as mirrors, glass and hair, come out worse, by 20 dB and more"
+    )
+
+
+def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
+    """Return what a plan takes from a first estimate of the scene, and by what it was decided.
+
+    Parameters
+    ----------
+    look : Look
+    plan : Plan
+    photos_for_window : int, optional
+        Photos that leave as little unknown as a window of the look's size, if the plan's is larger.
+    """
+    if not look.model_holds:
+        found = (
+            f"the scene is not direct, near-range and far-range light alone: by its light, "
+            f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
+        )
+        if plan.projector.pixels > MOST_LISTED:
+            return f"{found}. The projector has too many frequencies to do without them"
+        if plan.transport_photos >= plan.projector.pixels:
+            return f"{found}. Planned without them: all frequencies are shown"
+        needed = photos_of_every_frequency(plan.projector)
+        return (
+            f"{found}. Planned without them: the lowest frequencies are shown; {needed} photos and "
+            f"the check photos show all"
+        )
+    if look.reach is None:
+        return f"the look shows hardly any near-range light: planned with W = {plan.window}"
+    more = " or more" if look.reach >= look.window else ""
+    falls = f"near-range light falls by a factor e in {look.reach:.1f}{more} projector pixels"
+    if photos_for_window is None:
+        return f"{falls} in the look: planned with W = {plan.window}"
+    return (
+        f"{falls}, and reaches further than the look's W = {look.window}: planned with W = "
+        f"{plan.window}, for which about {photos_for_window} photos leave as little unknown as "
+        f"{len(plan.patterns)} for W = {look.window}"
     )
 
 

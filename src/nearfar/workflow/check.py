@@ -22,6 +22,7 @@ from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band, default_dropped
 from nearfar.illumination.pictures import standard_lights
 from nearfar.plan import paper_plan
+from nearfar.plan.model import largest_window
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.transport.exact import ExactTransport
@@ -203,11 +204,6 @@ def dropped_of(projector: Size, window: int, far: Size, dropped: Size | None) ->
         return plan.dropped
     # No plan fits a projector of one row or column: its windows run all along it.
     return default_dropped(window, far, projector) if dropped is None else dropped
-
-
-def largest_window(projector: Size) -> int:
-    """Return the largest W that is checked: a projector of one row has windows all along it."""
-    return min(projector) if min(projector) > 1 else max(projector)
 
 
 class _Totals:

@@ -21,6 +21,7 @@ from nearfar.illumination.frequencies import default_dropped
 from nearfar.parallel import single_threaded_products
 from nearfar.photometry.measure import measure as measure_photos
 from nearfar.photometry.measurements import Measurements
+from nearfar.plan.model import largest_window
 from nearfar.progress import Report, counting, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.workflow.reconstruction.sources import brightest_white, photos_without_drift
@@ -167,7 +168,11 @@ def estimate_transport(
     require_instance(correspondence, Correspondence, "correspondence", "nearfar.correspond")
     report, far = progress or ignore_progress, as_size(far, "far")
     window, projector = as_count(window, "window", 1), measurements.projector
-    if window > min(projector) or far.height > projector.height or far.width > projector.width:
+    if (
+        window > largest_window(projector)
+        or far.height > projector.height
+        or far.width > projector.width
+    ):
         raise InputError(
             f"W = {window} and a far band of {far} do not fit a projector of {projector}: choose "
             f"smaller ones."

@@ -55,7 +55,7 @@ def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=Non
 def drawn_rows(count, centres, scale, seed=0):
     """Draw rows of COMPONENT about chosen q, (C, 1, P), with direct light of 0.5; and windows."""
     generator = np.random.default_rng(seed)
-    covariance = near_covariance(COMPONENT, WINDOW)
+    covariance = near_covariance(COMPONENT, WINDOW, PROJECTOR)
     windows = scale * generator.multivariate_normal(
         np.zeros(WINDOW**2), covariance, count, method="eigh"
     )
@@ -106,7 +106,7 @@ def solved(batch, prior, scale, centred, *, by=None):
 def dense(measurements, batch, centred, scale, component=COMPONENT):
     """Posterior mean of (o, d, n, f) and the log evidence by plain linear algebra."""
     results = []
-    window = near_covariance(component, WINDOW)
+    window = near_covariance(component, WINDOW, PROJECTOR)
     variance = far_variance(centred.basis, component)
     for c in range(len(batch.white)):
         white, noise = float(batch.white[c, 0]), float(batch.noise[c, 0])

@@ -93,7 +93,7 @@ def _dense(transport, c, ask):
     prior[1, 1] = LIGHT**2 - (SHARE * OFFSET) ** 2
     prior[2, 2] = _prior_variance()[1]
     end = 3 + WINDOW**2
-    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW)
+    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR)
     prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
     noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
@@ -257,7 +257,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     s = SCALE * WHITE
     prior = np.zeros((responses.shape[1], responses.shape[1]))
     prior[:3, :3] = np.diag(_prior_variance()[:3])
-    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW)
+    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR)
     prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
     noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)

@@ -95,7 +95,10 @@ def test_clipped_windows_of_every_component_are_those_of_dense_algebra(component
     batch = batch_of(measurements, centres, centred)
     found = solved(batch, prior, np.full(len(centres), 0.05), centred, by=solve_clipped)
     spread = np.diag(1.0 / multiplicity[centred.response_indices])
-    window, power = near_covariance(component, WINDOW), far_variance(centred.basis, component)
+    window, power = (
+        near_covariance(component, WINDOW, PROJECTOR),
+        far_variance(centred.basis, component),
+    )
     for c in range(len(centres)):
         clipped = centred.on_window * batch.inside[c]
         squared = (0.05 * float(batch.white[c, 0])) ** 2

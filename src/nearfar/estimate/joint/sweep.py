@@ -28,7 +28,7 @@ from nearfar.estimate.joint.spikes import (
     likeliest_spike,
     with_spike,
 )
-from nearfar.illumination.centred_basis import CentredBasis
+from nearfar.illumination.centred_basis import CentredBasis, reachable
 from nearfar.parallel import side_by_side
 from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.priors.responses import ResponsePrior
@@ -76,7 +76,9 @@ def sweep_once(
     start = None
     if before is not None:
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
-    clipped = pixels.lit & ~xp.all(near.inside(pixels.centres, problem.window, projector), axis=1)
+    never_inside = beside(~reachable(problem.window, projector), pixels.responses)
+    inside = near.inside(pixels.centres, problem.window, projector)
+    clipped = pixels.lit & ~xp.all(inside | never_inside, axis=1)
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]

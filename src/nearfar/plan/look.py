@@ -1,0 +1,139 @@
+"""What a first estimate of a scene shows: what to plan for when it is measured again."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Size
+from nearfar.plan.choose import choose_frequencies
+from nearfar.plan.model import largest_window
+from nearfar.plan.typical import noise_of, typical_of
+from nearfar.priors.fitted import FREE
+from nearfar.priors.typical import TypicalScenes
+
+if TYPE_CHECKING:
+    # A plan needs none of what a transport computes with.
+    from nearfar.transport.model import Transport
+
+# W over the distance in which near-range light falls by a factor e: it leaves a fourth of a falling
+# exponential outside.
+WINDOW_OVER_REACH = 5.4
+# As large as the window that is chosen without a look, on the largest projectors.
+LARGEST_WINDOW = 25
+# Near-range light of less than this share of all light tells no reach.
+LEAST_NEAR_SHARE = 0.01
+# Share of the squared light that is of camera pixels with free rows, above which the model does not
+# hold. In looks of 30 to 80 photos it was at most 0.08 on the built-in scenes, and 0.15 to 0.85 on
+# caustics, glass, hair, dense and permuted rows.
+LARGEST_FREE_SHARE = 0.12
+
+
+class Look(NamedTuple):
+    """What a first estimate of a scene shows.
+
+    Attributes
+    ----------
+    typical : TypicalScenes
+        The mixture of prior components that it found.
+    noise : float
+        Standard deviation of the response to a sinusoid, as a share of white.
+    window : int
+        W of the estimate.
+    reach : float or None
+        Projector pixels in which near-range light falls by a factor e, at most the look's W; None
+        if there is hardly any.
+    wanted_window : int
+        W that holds near-range light of this reach; not below that of the estimate.
+    free_share : float
+        Share of the squared light that is of camera pixels whose rows no model describes.
+    """
+
+    typical: TypicalScenes
+    noise: float
+    window: int
+    reach: float | None
+    wanted_window: int
+    free_share: float
+
+    @property
+    def model_holds(self) -> bool:
+        """Whether the scene is direct, near-range and far-range light."""
+        return self.free_share <= LARGEST_FREE_SHARE
+
+
+def look_at(transport: "Transport") -> Look:
+    """Return what a first estimate shows.
+
+    Parameters
+    ----------
+    transport : Transport
+        From few photos, estimated jointly.
+
+    Raises
+    ------
+    InputError
+        If it was not estimated jointly.
+    """
+    typical = typical_of(transport)
+    free = [component.far_decay >= FREE for component, _ in typical.prior_components]
+    reach = _reach(transport)
+    wanted = 0 if reach is None else 2 * round((WINDOW_OVER_REACH * reach - 1) / 2) + 1
+    # All odd; a look tells little of what lies far beyond its own window.
+    last = largest_window(transport.projector)
+    largest = min(LARGEST_WINDOW, last - 1 + last % 2, 2 * transport.window - 1)
+    return Look(
+        typical=typical,
+        noise=noise_of(transport),
+        window=transport.window,
+        reach=reach,
+        wanted_window=max(transport.window, min(wanted, largest)),
+        free_share=float(typical.shares[0] @ free),
+    )
+
+
+def photos_for_window(look: Look, projector: Size, photos: int) -> int:
+    """Return how many photos leave as little unknown with the wanted window as with the look's own.
+
+    Parameters
+    ----------
+    look : Look
+    projector : Size
+    photos : int
+        With the look's own window.
+
+    Returns
+    -------
+    int
+        By the expected SNR_b under pictures, which is taken to grow evenly with the logarithm of
+        the photos.
+    """
+
+    def expected(photos: int, window: int) -> float:
+        choice = choose_frequencies(
+            projector, photos, window, typical=look.typical, noise=look.noise
+        )
+        return choice.expected.pictures
+
+    before = expected(photos, look.window)
+    now, twice = (expected(count, look.wanted_window) for count in (photos, 2 * photos))
+    doublings = max(before - now, 0.0) / max(twice - now, 1e-3)
+    return round(photos * 2 ** min(doublings, 4.0))
+
+
+def _reach(transport: "Transport") -> float | None:
+    """Return the distance in which the mean window falls by a factor e; None if it tells none.
+
+    Next to q near-range light is hard to tell from direct light, so that it is left out.
+    """
+    side = np.abs(np.arange(transport.window) - transport.window // 2)
+    distance = np.maximum(side[:, None], side)
+    window = transport.near.astype(np.float64).mean(axis=(0, 1, 2))
+    # Beyond a projector of a single row entries are 0.
+    entries = [window[(distance == r) & (window != 0)] for r in range(1, transport.window // 2 + 1)]
+    light = np.array([float(np.mean(entry)) for entry in entries if entry.size])
+    white = 0.0 if transport.posterior is None else float(transport.posterior.white.mean())
+    if len(light) < 2 or window.sum() < LEAST_NEAR_SHARE * white or light[0] <= 0:
+        return None
+    bright = np.maximum(light, 1e-3 * light[0])
+    slope = np.polyfit(np.arange(len(light)), np.log(bright), 1, w=np.sqrt(bright))[0]
+    return float(1.0 / max(-slope, 1.0 / transport.window))

@@ -33,7 +33,7 @@ MOST_TOGETHER = 1024
 PICTURE_SQUARED_MEAN, PICTURE_VARIANCE = 0.25, 0.06
 # What relighting reached less what was expected of the typical scenes, dB, from the lowest to the
 # highest: all six built-in scenes at two sizes and four or five budgets each, with a margin of half
-# a decibel (docs/decisions/0040). Where a first estimate of the scene was planned for, the same.
+# a decibel (docs/decisions/0041). Where a first estimate of the scene was planned for, the same.
 OFF_PICTURES, OFF_RANDOM = (-6.0, 2.0), (-4.0, 6.5)
 OFF_PICTURES_LOOKED_AT, OFF_RANDOM_LOOKED_AT = (-4.0, 3.0), (-4.0, 6.0)
 

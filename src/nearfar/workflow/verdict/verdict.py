@@ -16,6 +16,7 @@ from nearfar.transport.store import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
+from nearfar.workflow.verdict.widening import widening_of
 
 Cause = (
     of_photos.Cause | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "unchecked"]
@@ -88,6 +89,7 @@ class Verdict:
             _finite(checked.snr),
             _finite(checked.expected_snr),
             _finite(checked.error_ratio),
+            widening_of(checked),
         )
 
     @property

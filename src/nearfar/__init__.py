@@ -56,6 +56,7 @@ Lights to relight under
     random_pattern         an independent value at every pixel
 
 Judge
+    judge_transport        judge a transport by the photos that its estimate never saw
     ExactTransport         the transport of a scene, known without a model
     save_exact             write an exact transport
     load_exact             read an exact transport
@@ -131,6 +132,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct, reconstruct_to_file
     from nearfar.workflow.steps import correspond, estimate_transport, measure
+    from nearfar.workflow.verdict.keeping import judge_transport
 
     __version__: str
 
@@ -169,6 +171,7 @@ _HOMES = {
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
     "random_pattern": "nearfar.illumination.pictures",
+    "judge_transport": "nearfar.workflow.verdict.keeping",
     "ExactTransport": "nearfar.transport.exact",
     "save_exact": "nearfar.transport.exact_store",
     "load_exact": "nearfar.transport.exact_store",
@@ -215,6 +218,7 @@ __all__ = [  # noqa: RUF022
     "natural_picture",
     "penguin",
     "random_pattern",
+    "judge_transport",
     "ExactTransport",
     "save_exact",
     "load_exact",

@@ -28,9 +28,14 @@ from nearfar.transport.store import (
     load_transport,
     open_transport,
     save_transport,
+    write_verdict,
 )
+from nearfar.transport.verdict import KeptVerdict, Reason, verdict_to_json
 from tests.metadata import change_attributes, change_metadata
 from tests.transport.test_operators import CAMERA, PROJECTOR, _exact, _transport
+
+DOUBTS = KeptVerdict("doubtful", (Reason("moved", "it moved."),), 31.5, 35.0, 2.2, 1.5)
+VERDICT = verdict_to_json(DOUBTS)
 
 
 @pytest.fixture
@@ -198,6 +203,40 @@ def test_nothing_is_overwritten_without_force(stored, generator):
     np.testing.assert_allclose(load_transport(stored).near, 2 * before.near)
 
 
+@pytest.mark.parametrize("verdict", [DOUBTS, KeptVerdict("good")])
+def test_a_verdict_is_kept_with_the_transport(stored, tmp_path, verdict):
+    assert open_transport(stored).verdict is None
+    assert load_transport(stored).verdict is None
+    write_verdict(stored, KeptVerdict("wrong"))
+    before = sorted(path.name for path in stored.rglob("*"))
+    write_verdict(stored, verdict)
+    assert sorted(path.name for path in stored.rglob("*")) == before
+    kept = load_transport(stored)
+    assert kept.verdict == open_transport(stored).verdict == verdict
+    assert open_transport(stored).thinned(2).verdict == verdict
+    save_transport(kept, tmp_path / "copy.zarr")
+    assert load_transport(tmp_path / "copy.zarr").verdict == verdict
+    # Another transport is not what was judged.
+    assert kept.with_gains(near=2.0).verdict is None
+    assert (2 * kept).verdict is None
+
+
+def test_a_flipped_bit_of_a_verdict_is_seen(stored):
+    write_verdict(stored, DOUBTS)
+    metadata = stored / "zarr.json"
+    metadata.write_bytes(metadata.read_bytes().replace(b"doubtful", b"good"))
+    with pytest.raises(UnreadableFileError, match="checksum"):
+        open_transport(stored)
+
+
+def test_a_verdict_in_words():
+    assert str(DOUBTS) == (
+        "doubtful: It moved. Relit pictures are off by 2.7 % (held-out SNR_b 31.5 dB, 35.0 dB "
+        "expected); error bars are made 1.5 times as wide, to hold."
+    )
+    assert str(KeptVerdict("good")) == "good:"
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -212,6 +251,17 @@ def test_nothing_is_overwritten_without_force(stored, generator):
         ({"far_frequencies": [["1/7"]]}, "does not describe a transport"),
         ({"far_frequencies": [["0", "0"]]}, "its far has shape"),
         ({"provenance": 3}, "does not describe a transport"),
+        ({"verdict": "good"}, "does not describe a transport"),
+        ({"verdict": {}}, "does not describe a transport"),
+        ({"verdict": VERDICT | {"grade": "perfect"}}, "'perfect' is no grade"),
+        ({"verdict": VERDICT | {"reasons": 3}}, "does not describe a transport"),
+        ({"verdict": VERDICT | {"reasons": ["moved"]}}, "does not describe a transport"),
+        ({"verdict": VERDICT | {"reasons": [{"cause": 1, "sentence": ""}]}}, "is no text"),
+        ({"verdict": VERDICT | {"held_out_dB": float("nan")}}, "no number from -1000"),
+        ({"verdict": VERDICT | {"expected_dB": "x"}}, "no number from -1000"),
+        ({"verdict": VERDICT | {"error_ratio": -1.0}}, "no number from 0"),
+        ({"verdict": VERDICT | {"widening": 0.5}}, "no number from 1"),
+        ({"verdict": VERDICT | {"widening": 10**400}}, "does not describe a transport"),
     ],
 )
 def test_damaged_attributes_get_a_sentence(stored, changes, message):

@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +11,13 @@ import pytest
 from nearfar.files import from_srgb, read_light, to_srgb
 from nearfar.files.codecs import decode_png, encode_png
 from nearfar.illumination.pictures import natural_picture
+from nearfar.transport.store import save_transport
+from nearfar.transport.verdict import KeptVerdict, Reason
 from nearfar.viewer import interactive
+from nearfar.viewer.interactive import InteractiveTransport
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, slide, tone
+from tests.viewer.conftest import served_view
 from tests.waiting import LONGEST_WAIT
 
 pytestmark = pytest.mark.slow
@@ -53,6 +58,37 @@ def test_a_dropped_picture_comes_back(open_page, address):
     page.reload()
     settled(page)
     np.testing.assert_array_equal(seen(page), before)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "leads", "follows"),
+    [
+        (None, "Not judged. Nothing is known", "nearfar info"),
+        (KeptVerdict("good", (), 41.0, 42.0), "Good. Relit pictures are off by 0.89 %", "nothing"),
+        (
+            KeptVerdict("wrong", (Reason("order", "<b>photo 3</b> is rotated."),), 9.0),
+            "Wrong. Relit pictures are off by 35 %",
+            "<b>photo 3</b> is rotated.",
+        ),
+        (
+            KeptVerdict("doubtful", (Reason("unchecked", "nothing was checked."),)),
+            "Doubtful. Nothing was checked.",
+            "Look at what follows",
+        ),
+    ],
+)
+def test_the_page_leads_with_the_verdict(open_page, transport, tmp_path, verdict, leads, follows):
+    save_transport(replace(transport, verdict=verdict), tmp_path / "t.zarr")
+    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
+        page = open_page(address)
+        assert page.inner_text("#verdict").startswith(leads)
+        assert not page.is_visible("#meaning")
+        # By the keyboard, and without starting what the space plays.
+        page.focus("#verdict summary")
+        page.keyboard.press("Space")
+        page.wait_for_selector("#meaning", state="visible")
+        assert follows in page.inner_text("#verdict")
+        assert page.inner_text("#play") == "play"
 
 
 @pytest.mark.parametrize(

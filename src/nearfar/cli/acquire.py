@@ -183,10 +183,9 @@ def _finish(
     quiet: bool,
 ) -> None:
     """Make and write the transport, most of whose work was done while photos were taken."""
-    from nearfar.transport.store import open_transport
     from nearfar.workflow.reconstruction.executors import SerialExecutor, execute
     from nearfar.workflow.reconstruction.sinks import new_file
-    from nearfar.workflow.verdict.verdict import judge_reconstruction
+    from nearfar.workflow.verdict.keeping import judge_transport
 
     start = time.monotonic()
     work = estimate.finish(taken)
@@ -194,7 +193,7 @@ def _finish(
         summary = execute(work, SerialExecutor(), sink, report)
     say_reconstructed(summary, taken, transport, quiet=quiet)
     say(f"{time.monotonic() - start:.1f} s after the last photo", quiet=quiet)
-    say(str(judge_reconstruction(open_transport(transport), taken, report)), quiet=quiet)
+    say(str(judge_transport(transport, taken, progress=report)), quiet=quiet)
 
 
 def _say_time(photos: int, seconds: float, *, quiet: bool) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
-from nearfar.cli.saying import say
+from nearfar.cli.saying import say, warn_if_wrong
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
@@ -35,6 +35,7 @@ def convert(
     check_output(output, force=force)
     with progress_bar("converting", quiet=quiet):
         opened = load_transport(transport)
+        warn_if_wrong(transport, opened.verdict)
         array = opened.correspondence if correspondence else dense_array(opened)
         write_array(output, array, force=force)
     what = "correspondence" if correspondence else "dense transport"

@@ -15,7 +15,7 @@ from nearfar.cli.options import (
     check_report_page,
     require_reconstructed,
 )
-from nearfar.cli.saying import say, warn
+from nearfar.cli.saying import say, warn, warn_if_wrong
 from nearfar.progress import progress_bar
 
 
@@ -71,6 +71,7 @@ def evaluate(
     with progress_bar("evaluating", quiet=quiet) as told:
         require_reconstructed(transport)
         opened = load_transport(transport)
+        warn_if_wrong(transport, opened.verdict)
         if truth is not None:
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
             rows = row_snr(opened, known, progress=told)

@@ -89,11 +89,10 @@ def reconstruct(
     from nearfar.capture import open_capture
     from nearfar.correspondence import read_correspondence
     from nearfar.files import check_resumable
-    from nearfar.transport.store import open_transport
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
     from nearfar.workflow.reconstruction.sinks import RESUMABLE_TRANSPORT
-    from nearfar.workflow.verdict.verdict import judge_reconstruction
+    from nearfar.workflow.verdict.keeping import judge_transport
 
     if device == "cuda" and scheduler is not None:
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
@@ -120,7 +119,7 @@ def reconstruct(
             force=force,
             progress=progress,
         )
-        verdict = judge_reconstruction(open_transport(output), opened, progress)
+        verdict = judge_transport(output, opened, progress=progress)
     say_reconstructed(summary, opened, output, quiet=quiet)
     if report is not None:
         _write_report(report, output, opened, verdict, force=force)

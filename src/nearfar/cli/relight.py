@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
-from nearfar.cli.saying import say
+from nearfar.cli.saying import say, warn_if_wrong
 from nearfar.progress import progress_bar
 
 COMPONENTS = ("direct", "near", "far")
@@ -71,6 +71,7 @@ def relight(
     with progress_bar("relighting", quiet=quiet):
         require_reconstructed(transport)
         opened = open_transport(transport)
+        warn_if_wrong(transport, opened.verdict)
         projected = read_light(light, opened.projector, srgb=srgb)
         projected = as_channels_see(projected, opened.channels, opened.provenance)
         make = error_bars_of_stored if error_bars else relight_stored

@@ -13,6 +13,7 @@ BYTES_TO_ANNOUNCE = 10**9
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
+    from nearfar.transport.verdict import KeptVerdict
     from nearfar.workflow.reconstruction.summary import Summary
 
 
@@ -25,6 +26,12 @@ def say(text: str, *, quiet: bool = False) -> None:
 def warn(text: str) -> None:
     """Print a warning on stderr, with options for the Python in it; see `nearfar.cli.flags`."""
     print(f"warning: {printable(with_flags(text))}", file=sys.stderr)
+
+
+def warn_if_wrong(path: Path, verdict: "KeptVerdict | None") -> None:
+    """Warn that the transport in a file is not to be relied on, if it was judged wrong."""
+    if verdict is not None and verdict.grade == "wrong":
+        warn(f"{path} is {verdict}")
 
 
 def say_memory(

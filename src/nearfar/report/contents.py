@@ -18,6 +18,7 @@ from nearfar.transport.exact_store import KIND as EXACT_KIND
 from nearfar.transport.exact_store import load_exact
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
+from nearfar.transport.verdict import NOT_JUDGED
 
 
 def describe(path: Path) -> str:
@@ -134,6 +135,7 @@ def _describe_transport(path: Path) -> str:
     shares = ", ".join(f"{name} {value / total:.1%}" for name, value in sums.items() if total)
     return "\n".join(
         [
+            NOT_JUDGED if transport.verdict is None else str(transport.verdict),
             f"{TRANSPORT_KIND}: projector {transport.projector}, camera {transport.camera}, "
             f"{_channels(transport.channels)}, W = {transport.window}, "
             f"{transport.far_basis.count} far coefficients",

@@ -31,6 +31,7 @@ from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictu
 from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
+from nearfar.transport.verdict import KeptVerdict
 
 # Camera pixels of a batch: their windows take some tens of megabytes at W = 19.
 BATCH_PIXELS = 8192
@@ -79,6 +80,9 @@ class Transport(NoArray):
         State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it.
     quality : Quality, optional
         Confidence in q and saturation of each camera pixel, where the photos show them.
+    verdict : KeptVerdict, optional
+        Whether it can be trusted, and why not, once it was judged: ``grade``, ``reasons``,
+        ``held_out_snr`` and more; see `nearfar.judge_transport`.
 
     Examples
     --------
@@ -107,6 +111,7 @@ class Transport(NoArray):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     posterior: Posterior | None = None
     quality: Quality | None = None
+    verdict: KeptVerdict | None = None
 
     @property
     def camera(self) -> Size:
@@ -162,6 +167,7 @@ class Transport(NoArray):
             ("camera", f"{self.camera}, {self.channels} channels"),
             ("window W, far coefficients", f"{self.window}, {self.far_basis.count}"),
             ("directly lit", f"{self.lit.mean():.1%} of the camera"),
+            ("verdict", self.verdict.grade if self.verdict is not None else "not judged"),
             ("error bars", "yes" if self.posterior is not None else "no"),
             ("method", str(self.provenance.get("method", "unknown"))),
         ]
@@ -230,7 +236,7 @@ class Transport(NoArray):
     def with_gains(
         self, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
     ) -> "Transport":
-        """Return the transport with its components scaled, without error bars.
+        """Return the transport with its components scaled, without error bars or a verdict.
 
         Parameters
         ----------
@@ -249,6 +255,7 @@ class Transport(NoArray):
         return replace(
             self,
             posterior=None,
+            verdict=None,
             direct=self.direct * np.float32(direct),
             near=self.near * np.float32(near),
             far=self.far * np.float32(far),

@@ -14,7 +14,14 @@ from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import UnreadableFileError
 from nearfar.files import new_output
-from nearfar.files.stores import add_array, add_to_store, open_array, open_store, read_selection
+from nearfar.files.stores import (
+    add_array,
+    add_to_store,
+    open_array,
+    open_durable_store,
+    open_store,
+    read_selection,
+)
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent
@@ -29,6 +36,7 @@ from nearfar.transport.rows import (
     stacked,
     thinned_blocks,
 )
+from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to_json
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
@@ -47,6 +55,9 @@ MAXIMUM_REASON = 200
 
 # Memory of a block of a transport that is read block by block.
 READ_BYTES = 2**28
+
+# Attribute of the verdict on a transport, which is not there where none was passed.
+VERDICT = "verdict"
 
 # An optional part of a transport is stored as a mapping in the attributes and as arrays named
 # PART_FIELD. The posterior and some of its fields have older names in the format.
@@ -157,6 +168,11 @@ def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
     group.attrs["provenance"] = json.loads(json.dumps(dict(provenance)))
 
 
+def write_verdict(folder: Path, verdict: KeptVerdict) -> None:
+    """Keep a verdict with a transport, in place of the one that it has, in one step."""
+    open_durable_store(folder).attrs[VERDICT] = verdict_to_json(verdict)
+
+
 def _attributes(transport: Transport) -> dict[str, Any]:
     """Return the metadata that all camera pixels share, as JSON types."""
     attributes = {
@@ -167,6 +183,8 @@ def _attributes(transport: Transport) -> dict[str, Any]:
         attributes[POSTERIOR] = _described(transport.posterior)
     if transport.quality is not None:
         attributes[QUALITY] = {}
+    if transport.verdict is not None:
+        attributes[VERDICT] = verdict_to_json(transport.verdict)
     return attributes
 
 
@@ -207,6 +225,8 @@ class StoredTransport:
     far_basis : RealBasis
     provenance : mapping
     channels : int
+    verdict : KeptVerdict or None
+        Whether it can be trusted; None if it was not judged.
     """
 
     path: Path
@@ -215,6 +235,7 @@ class StoredTransport:
     far_basis: RealBasis
     provenance: Mapping[str, Any]
     channels: int
+    verdict: KeptVerdict | None
     _arrays: Mapping[str, Any]
     _posterior: Mapping[str, Any] | None
 
@@ -250,6 +271,7 @@ class StoredTransport:
             provenance=self.provenance,
             posterior=posterior,
             quality=Quality(**quality_fields) if quality_fields else None,
+            verdict=self.verdict,
             **read,
         )
 
@@ -289,13 +311,15 @@ def open_transport(path: AnyPath) -> StoredTransport:
     path = Path(path)
     group = open_store(path, KIND, FORMAT_VERSION)
     arrays = {name: open_array(group, name) for name in FACTORS}
-    posterior = None
+    posterior = verdict = None
     try:
         projector = stored_size(group.attrs["projector"])
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
         if POSTERIOR in group.attrs:
             posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
+        if VERDICT in group.attrs:
+            verdict = verdict_from_json(_mapped(group.attrs[VERDICT]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UnreadableFileError(
             f"{path} is damaged: its zarr.json does not describe a transport "
@@ -336,7 +360,15 @@ def open_transport(path: AnyPath) -> StoredTransport:
                 f"reconstruct it again."
             )
     return StoredTransport(
-        path, basis.projector, Size(*each[:2]), basis, provenance, each[2], arrays, posterior
+        path,
+        basis.projector,
+        Size(*each[:2]),
+        basis,
+        provenance,
+        each[2],
+        verdict,
+        arrays,
+        posterior,
     )
 
 

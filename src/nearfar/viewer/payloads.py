@@ -19,11 +19,17 @@ from nearfar.viewer.transport_row import transport_row
 
 
 def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict[str, Any]:
-    """Return the sizes of a transport, its plan and the maps there are, for JSON."""
-    stored = transport.stored
+    """Return a transport's verdict and sizes, its plan and the maps there are, for JSON."""
+    stored, verdict = transport.stored, transport.stored.verdict
     plan = stored.provenance.get("plan")
     return {
         "name": transport.path.name,
+        "verdict": verdict
+        and {
+            "grade": verdict.grade,
+            "summary": verdict.summary,
+            "reasons": list(verdict.sentences),
+        },
         "nearfar": version(),
         "projector": list(stored.projector),
         "camera": list(stored.camera),

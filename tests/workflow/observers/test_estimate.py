@@ -108,13 +108,19 @@ def _made(estimate, capture):
     return ReconstructedTile(*sink.collected())
 
 
+def _timeless(provenance):
+    """Leave out when the photos were taken."""
+    photos = {name: value for name, value in provenance["photos"].items() if name != "taken"}
+    return {**provenance, "photos": photos}
+
+
 @pytest.mark.parametrize("plan", ["reference", "pairs", "pairs and stripes"])
 def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, afterwards, tmp_path, plan):
     part, estimate, _ = _follow(_plan(plan), rig, tmp_path / "c.zarr")
     expected, correspondence = afterwards(plan)
     assert 0 < estimate.chosen_by < len(_plan(plan).patterns)
     np.testing.assert_array_equal(part.correspondence.q, correspondence.q)
-    assert part.transport.provenance == expected.provenance
+    assert _timeless(part.transport.provenance) == _timeless(expected.provenance)
     lights = standard_lights(SIZE)
     found, best = (relighting_snr(t, scene, lights) for t in (part.transport, expected))
     assert min(found[name] - best[name] for name in lights) > -0.5

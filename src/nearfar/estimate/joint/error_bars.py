@@ -76,8 +76,9 @@ class ErrorBars:
     """Posterior standard deviations of a transport.
 
     They cover the photos' noise and what was never measured, for rows as the prior components of
-    `nearfar.priors` expect them and q as it was found. Those of components are of the model's
-    split (d at q, n in the window, f in the band), not of the physical one.
+    `nearfar.priors` expect them and q as it was found. Where held-out photos showed larger errors,
+    they are multiplied by the ``widening`` of the transport's verdict. Those of components are of
+    the model's split (d at q, n in the window, f in the band), not of the physical one.
 
     Parameters
     ----------
@@ -103,6 +104,7 @@ class ErrorBars:
             )
         self._transport = transport
         self._posterior: Posterior = transport.posterior
+        self._widening = transport.verdict.widening if transport.verdict is not None else 1.0
         basis = real_basis(self._posterior.frequencies, transport.projector)
         self._centred: CentredBasis = centred_basis(basis, window_offsets(transport.window))
         self._priors: dict[int, ResponsePrior] = {}
@@ -326,11 +328,11 @@ class ErrorBars:
 
     def _variance(self, batch: slice, functionals: _Functionals) -> Floats:
         """Return posterior variances, (n, channels), of each pixel's or of one pixel's many."""
-        state = self._state(batch)
+        state, widening = self._state(batch), self._widening**2
         if len(state.prior_component) == 1:
             (place,) = state.prior_component
             its = functionals._replace(truncated=functionals.truncated[place])
-            return _posterior_variance(self._prior(int(place)), state, its)
+            return widening * _posterior_variance(self._prior(int(place)), state, its)
         found = np.empty((len(functionals.white), self._transport.channels))
         for place in np.unique(state.prior_component):
             rows = np.flatnonzero(state.prior_component == place)
@@ -338,7 +340,7 @@ class ErrorBars:
                 (*(part[rows] for part in functionals[:-1]), functionals.truncated[place])
             )
             found[rows] = _posterior_variance(self._prior(int(place)), state.only(rows), theirs)
-        return found
+        return widening * found
 
     def _prior(self, place: int) -> ResponsePrior:
         if place not in self._priors:

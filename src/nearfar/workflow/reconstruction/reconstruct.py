@@ -94,7 +94,7 @@ def reconstruct_to_file(
 
     Until the last tile is written, the tiles lie in a folder with the output's name and
     ``.unfinished`` appended. Whatever stops the work, kill -9 included, the written tiles stay
-    there for `resume`.
+    there for `resume`. The transport has no verdict until `nearfar.judge_transport` passes one.
 
     Parameters
     ----------

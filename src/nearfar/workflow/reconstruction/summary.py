@@ -43,12 +43,24 @@ def provenance_of(
     capture: Capture, photos: Photos, options: ReconstructionOptions
 ) -> dict[str, Any]:
     """Return the provenance of a transport as JSON types: options, plan, photos, rig and drift."""
-    plan = capture.plan
     drift = photos.drift if isinstance(photos, PhotosWithoutDrift) else None
     return {
         "nearfar": version(),
         "method": options.method,
         "square": options.square,
+        **description_of(capture),
+        # Shares of the mean lamp and of white, as references show them.
+        "drift": drift and {"lamp": drift.lamp_range, "ambient": drift.ambient_range},
+    }
+
+
+def description_of(capture: Capture) -> dict[str, Any]:
+    """Return what the provenance of a transport holds of its capture, by which it is known again.
+
+    ``taken`` is when the last photo was taken, in seconds since the epoch.
+    """
+    plan = capture.plan
+    return {
         "plan": {
             "window": plan.window,
             "far": list(plan.far),
@@ -56,8 +68,10 @@ def provenance_of(
             "offset": plan.offset,
             "photos": len(plan.patterns),
         },
-        "photos": {"dtype": str(capture.photos.dtype), "full_scale": capture.full_scale},
+        "photos": {
+            "dtype": str(capture.photos.dtype),
+            "full_scale": capture.full_scale,
+            "taken": float(capture.times.max()),
+        },
         "rig": capture.rig,
-        # Shares of the mean lamp and of white, as references show them.
-        "drift": drift and {"lamp": drift.lamp_range, "ambient": drift.ambient_range},
     }

@@ -161,10 +161,14 @@ class Bars(NamedTuple):
 
 
 def bars_of(transport: Transport) -> Bars | None:
-    """Return the error bars of a transport; None if it was not estimated jointly."""
+    """Return the error bars of a transport; None if it was not estimated jointly.
+
+    A verdict that it has already does not widen them.
+    """
     posterior = transport.posterior
     if posterior is None:
         return None
+    transport = replace(transport, verdict=None)
     without_noise = replace(
         transport,
         noise=NOISE_FACTOR * transport.noise,

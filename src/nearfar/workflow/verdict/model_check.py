@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from nearfar.transport.verdict import Grade
 from nearfar.workflow.check import ModelCheck
 from nearfar.workflow.conditioning import Conditioning
-from nearfar.workflow.verdict.grades import Grade
 
 # The best that the model can do without noise, in dB, under pictures and in the median row: from
 # the first on, errors of relit pictures are hardly seen (2 %); below the second, they are plain

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
+
+import numpy as np
 
 from nearfar.capture import Capture
 from nearfar.faults import of_photos
@@ -11,9 +13,10 @@ from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, S
 from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
+from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
-from nearfar.workflow.verdict.grades import Grade
 from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
+from nearfar.workflow.verdict.widening import widening_of
 
 Cause = (
     of_photos.Cause | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "unchecked"]
@@ -57,20 +60,6 @@ SENTENCES: Mapping[Cause, str] = {
 }
 
 
-class Reason(NamedTuple):
-    """Why a transport is not good.
-
-    Attributes
-    ----------
-    cause : str
-    sentence : str
-        What is wrong, with the photos that it concerns, and what to do.
-    """
-
-    cause: Cause
-    sentence: str
-
-
 @dataclass(frozen=True)
 class Verdict:
     """What check photos, and faults of the others, say of a transport.
@@ -89,31 +78,43 @@ class Verdict:
     reasons: tuple[Reason, ...]
 
     @property
-    def causes(self) -> tuple[Cause, ...]:
+    def kept(self) -> KeptVerdict:
+        """What is kept of it with the transport."""
+        checked = self.held_out
+        if checked is None:
+            return KeptVerdict(self.grade, self.reasons)
+        return KeptVerdict(
+            self.grade,
+            self.reasons,
+            _finite(checked.snr),
+            _finite(checked.expected_snr),
+            _finite(checked.error_ratio),
+            widening_of(checked),
+        )
+
+    @property
+    def causes(self) -> tuple[str, ...]:
         """Causes of the reasons, each once."""
-        return tuple(dict.fromkeys(reason.cause for reason in self.reasons))
+        return self.kept.causes
 
     def as_json(self) -> dict[str, Any]:
         """Return the verdict as a mapping of JSON types, for ``nearfar reconstruct --json``."""
-        held_out = self.held_out
+        kept = self.kept
         return {
             "verdict": self.grade,
-            "held_out_dB": None if held_out is None else held_out.snr,
-            "expected_dB": None if held_out is None else held_out.expected_snr,
-            "causes": list(self.causes),
+            "held_out_dB": kept.held_out_snr,
+            "expected_dB": kept.expected_snr,
+            "causes": list(kept.causes),
             "reasons": [reason.sentence for reason in self.reasons],
         }
 
     def __str__(self) -> str:
-        sentences = [reason.sentence for reason in self.reasons]
-        if self.held_out is not None:
-            snr, expected = self.held_out.snr, self.held_out.expected_snr
-            beside = "" if expected is None else f", {expected:.1f} dB expected"
-            sentences.append(
-                f"relit pictures are off by {100 * 10 ** (-snr / 20):.2g} % (held-out SNR_b "
-                f"{snr:.1f} dB{beside})."
-            )
-        return f"{self.grade}: {' '.join(each[:1].upper() + each[1:] for each in sentences)}"
+        return str(self.kept)
+
+
+def _finite(number: float | None) -> float | None:
+    """Return a number; None in place of one that is not finite, as where no pixel is usable."""
+    return float(number) if number is not None and np.isfinite(number) else None
 
 
 def judge_reconstruction(

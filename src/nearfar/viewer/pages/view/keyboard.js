@@ -41,7 +41,7 @@ export function bindKeyboard({ scene, store, inspector, playback }) {
     const kind = all('[data-kind]')[Number(event.key) - 1], solo = SOLOS[event.key];
     if (kind) store.update({ kind: kind.dataset.kind });
     else if (solo !== undefined) store.update({ solo });
-    else if (event.key === ' ' && focused.tagName !== 'BUTTON') {
+    else if (event.key === ' ' && !['BUTTON', 'SUMMARY'].includes(focused.tagName)) {
       event.preventDefault();
       playback.toggle();
     }

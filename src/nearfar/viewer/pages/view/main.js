@@ -15,6 +15,7 @@ import { request } from './protocol.js';
 import { bindSaving } from './saving.js';
 import { ScenePictures } from './scene-pictures.js';
 import { Store, changesLight, initialState } from './state.js';
+import { showVerdict } from './verdict.js';
 
 async function open() {
   const scene = await (await request('scene')).json();
@@ -44,6 +45,7 @@ async function open() {
   }
 
   describe(scene);
+  showVerdict(scene);
   bind(page, show);
   lightCanvas.draw();
   show();

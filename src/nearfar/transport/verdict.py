@@ -1,0 +1,138 @@
+"""The verdict that is kept with a transport: whether it can be trusted, and why not."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, get_args
+
+Grade = Literal["good", "doubtful", "wrong"]
+
+# Of a transport without a verdict.
+NOT_JUDGED = (
+    "not judged: nothing is known of how far it can be trusted. Give the capture that it was "
+    "reconstructed from as `capture` to judge it."
+)
+# What is beyond these in a file is no result of ours.
+LARGEST_DECIBELS = 1000.0
+LARGEST_RATIO = sys.float_info.max
+# Error bars so far off mean nothing, however wide they are made.
+LARGEST_WIDENING = 1e6
+
+
+class Reason(NamedTuple):
+    """Why a transport is not good.
+
+    Attributes
+    ----------
+    cause : str
+    sentence : str
+        What is wrong, with the photos that it concerns, and what to do.
+    """
+
+    cause: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class KeptVerdict:
+    """What check photos, and faults of the others, said of a transport.
+
+    Attributes
+    ----------
+    grade : {"good", "doubtful", "wrong"}
+    reasons : tuple of Reason
+        Why the transport is not good, the most probable first.
+    held_out_snr : float or None
+        Held-out SNR_b, dB; None if nothing was checked.
+    expected_snr : float or None
+        The SNR_b that the error bars expected before they were widened, dB; None if nothing was
+        checked, or without error bars.
+    error_ratio : float or None
+        Power of the errors over that which the error bars expected; None as `expected_snr`.
+    widening : float
+        What all standard deviations are multiplied by for the error bars to hold, at least 1.
+    """
+
+    grade: Grade
+    reasons: tuple[Reason, ...] = ()
+    held_out_snr: float | None = None
+    expected_snr: float | None = None
+    error_ratio: float | None = None
+    widening: float = 1.0
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Causes of the reasons, each once."""
+        return tuple(dict.fromkeys(reason.cause for reason in self.reasons))
+
+    @property
+    def summary(self) -> str:
+        """What held-out photos say of relit pictures, a sentence; empty if nothing was checked."""
+        if self.held_out_snr is None:
+            return ""
+        beside = "" if self.expected_snr is None else f", {self.expected_snr:.1f} dB expected"
+        widened = ""
+        if self.widening > 1:
+            widened = f"; error bars are made {self.widening:.2g} times as wide, to hold"
+        return (
+            f"Relit pictures are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % (held-out "
+            f"SNR_b {self.held_out_snr:.1f} dB{beside}){widened}."
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What is wrong and what to do, for each reason; each begins with a capital."""
+        return tuple(each.sentence[:1].upper() + each.sentence[1:] for each in self.reasons)
+
+    def __str__(self) -> str:
+        return " ".join([f"{self.grade}:", *self.sentences, self.summary]).rstrip()
+
+
+def verdict_to_json(verdict: KeptVerdict) -> dict[str, Any]:
+    """Return a verdict as a transport's file holds it, of JSON types."""
+    return {
+        "grade": verdict.grade,
+        "reasons": [reason._asdict() for reason in verdict.reasons],
+        "held_out_dB": verdict.held_out_snr,
+        "expected_dB": verdict.expected_snr,
+        "error_ratio": verdict.error_ratio,
+        "widening": verdict.widening,
+    }
+
+
+def verdict_from_json(kept: Mapping[str, Any]) -> KeptVerdict:
+    """Read a verdict from a transport's file.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If it is no verdict.
+    """
+    grade = kept["grade"]
+    if grade not in get_args(Grade):
+        raise ValueError(f"{grade!r} is no grade")
+    reasons = tuple(
+        Reason(_text(each["cause"]), _text(each["sentence"])) for each in kept["reasons"]
+    )
+    held_out, expected, ratio = (
+        None if kept[name] is None else _number(kept[name], least, largest)
+        for name, least, largest in (
+            ("held_out_dB", -LARGEST_DECIBELS, LARGEST_DECIBELS),
+            ("expected_dB", -LARGEST_DECIBELS, LARGEST_DECIBELS),
+            ("error_ratio", 0.0, LARGEST_RATIO),
+        )
+    )
+    widening = _number(kept["widening"], 1.0, LARGEST_WIDENING)
+    return KeptVerdict(grade, reasons, held_out, expected, ratio, widening)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no text")
+    return value
+
+
+def _number(value: Any, least: float, largest: float) -> float:
+    if isinstance(value, str) or not least <= float(value) <= largest:
+        raise ValueError(f"{value!r} is no number from {least:g} to {largest:g}")
+    return float(value)

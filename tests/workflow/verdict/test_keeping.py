@@ -1,0 +1,92 @@
+"""A stored transport is judged by its capture, and keeps the verdict."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.capture import open_capture
+from nearfar.errors import InputError, MissingFileError
+from nearfar.plan import choose_plan
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.transport.store import load_transport, open_transport, write_verdict
+from nearfar.transport.verdict import KeptVerdict
+from nearfar.workflow.acquire import acquire
+from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+from nearfar.workflow.verdict.keeping import judge_transport
+from tests.cli.conftest import check_done, check_sentence, run_nearfar
+from tests.metadata import change_attributes
+from tests.worlds import model_transport
+
+PROJECTOR = Size(12, 14)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Photograph a small world twice, and reconstruct it once; nobody writes here."""
+    folder = tmp_path_factory.mktemp("made")
+    world = model_transport(PROJECTOR, Size(9, 8), window=5, far=Size(3, 3))
+    plan, _ = choose_plan(PROJECTOR, 60)
+    rig = SimulatedRig(world, "test", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    for name in ("capture.zarr", "again.zarr"):
+        acquire(plan, folder / name, rig)
+    reconstruct_to_file(open_capture(folder / "capture.zarr"), folder / "t.zarr")
+    return folder
+
+
+@pytest.fixture
+def stored(made, tmp_path):
+    return shutil.copytree(made / "t.zarr", tmp_path / "t.zarr")
+
+
+def test_what_is_judged_is_kept(made, stored):
+    light = np.ones(PROJECTOR)
+    before = load_transport(stored)
+    write_verdict(stored, KeptVerdict("wrong", widening=10.0))
+    verdict = judge_transport(stored, open_capture(made / "capture.zarr"))
+    kept = load_transport(stored)
+    assert kept.verdict == verdict.kept
+    assert kept.verdict.held_out_snr == verdict.held_out.snr
+    np.testing.assert_array_equal(kept @ light, before @ light)
+    # It is compared with the error bars that followed from the photos, and not with wider ones.
+    assert kept.verdict.error_ratio > 0.2
+    assert kept.verdict.widening == 1.0
+
+
+def test_info_judges_and_leads_with_the_verdict(made, stored):
+    # As transports of before, which do not know when their photos were taken.
+    provenance = dict(open_transport(stored).provenance)
+    provenance["photos"] = {
+        name: value for name, value in provenance["photos"].items() if name != "taken"
+    }
+    change_attributes(stored, provenance=provenance)
+    said = check_done(run_nearfar("info", stored)).out
+    assert said.startswith("not judged: ")
+    assert "--capture" in said
+    said = check_done(run_nearfar("info", stored, "--capture", made / "capture.zarr")).out
+    assert said.splitlines()[0] == str(open_transport(stored).verdict)
+    assert check_done(run_nearfar("info", stored)).out == said
+
+
+def test_another_capture_is_refused(made, stored):
+    with pytest.raises(InputError, match=r"was not reconstructed from .*photos"):
+        judge_transport(stored, open_capture(made / "again.zarr"))
+    assert load_transport(stored).verdict is None
+    for other in (stored, made / "none.zarr"):
+        check_sentence(run_nearfar("info", stored, "--capture", other), other)
+    for other in (made / "capture.zarr", made / "none.zarr"):
+        check_sentence(run_nearfar("info", other, "--capture", made / "capture.zarr"), other)
+
+
+def test_what_cannot_be_judged_gets_a_sentence(made, stored, tmp_path):
+    capture = open_capture(made / "capture.zarr")
+    with pytest.raises(InputError, match=r"nearfar\.open_capture returns"):
+        judge_transport(stored, made / "capture.zarr")
+    with pytest.raises(MissingFileError, match="is not there"):
+        judge_transport(tmp_path / "none.zarr", capture)
+    change_attributes(stored, provenance={})
+    with pytest.raises(InputError, match="does not say how it was made"):
+        judge_transport(stored, capture)

@@ -87,7 +87,7 @@ def test_a_dslr_is_set_released_and_its_photo_brought_over(tmp_path):
 @pytest.mark.parametrize(
     ("choice", "seconds"),
     [
-        ("1/250", 1 / 250), ("0.0041s", 0.004), ("2.5", 2.5), ("10/25", 0.4), ("30", 30.0),
+        ("1/250", 1 / 250), ("0.0040s", 0.004), ("2.5", 2.5), ("10/25", 0.4), ("30", 30.0),
         ("Bulb", None), ("Auto", None), ("0", None), ("1/0", None), ("", None),
     ],
 )  # fmt: skip

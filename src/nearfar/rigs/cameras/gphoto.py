@@ -225,7 +225,7 @@ class GphotoCamera(Camera):
 
 
 def seconds_of(choice: str) -> float | None:
-    """Read an exposure as cameras write it: 1/250, 0.0041s, 2.5, 10/25; None if it is none."""
+    """Read an exposure as cameras write it: 1/250, 0.0040s, 2.5, 10/25; None if it is none."""
     match = EXPOSURE_CHOICE.match(choice.strip())
     if match is None:
         return None

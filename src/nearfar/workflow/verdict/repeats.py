@@ -58,8 +58,8 @@ class Repeats:
                 f"of white."
             )
         return (
-            f"{said}; the light changed by {self.lamp:.2%}; pairs sum to {self.excess:+.2%} of "
-            f"white more than white and black, 0 if the response is linear."
+            f"{said}; the light changed by {self.lamp:.2%}; what pairs sum to differs from white "
+            f"and black by {self.excess:+.2%} of white, by nothing if the response is linear."
         )
 
 

@@ -81,8 +81,14 @@ class Shot:
 
 def shoot(scene: str, projector: Size, photos: int, seed: int = 0) -> Shot:
     """Take a good capture of a built-in scene."""
-    truth = cached_scene(scene, projector)
     plan, _ = choose_plan(projector, photos)
+    return shoot_plan(scene, plan, seed)
+
+
+def shoot_plan(scene: str, plan: Plan, seed: int = 0) -> Shot:
+    """Take a good capture of a built-in scene with a plan."""
+    projector = plan.projector
+    truth = cached_scene(scene, projector)
     brightest = float((truth @ np.ones(projector)).max())
     rig = SimulatedRig(truth, scene, SimulatedProjector(), SimulatedCamera(), 0.9 / brightest, seed)
     taken = np.stack(list(rig.shoot([plan.draw(i) for i in range(len(plan.patterns))])))

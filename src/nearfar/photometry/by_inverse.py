@@ -22,7 +22,7 @@ from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import ahead
 from nearfar.photometry.measurements import Measurements
-from nearfar.photometry.noise import NoiseModel, fit_noise
+from nearfar.photometry.noise import NoiseModel, fit_noise, variance_by_channel
 from nearfar.photometry.photos import (
     PHOTOS_AT_ONCE,
     Photos,
@@ -144,7 +144,7 @@ def measure_pairs(
     ]
 
     def variance(photo: Floats) -> Floats:
-        return np.stack([m.variance(photo[:, i]) for i, m in enumerate(models)], axis=1)
+        return variance_by_channel(models, photo)
 
     excess = _excess_of_sums(pair_mean, white, black)
     # Where projector or camera is not linear, the sums are no reference for white.

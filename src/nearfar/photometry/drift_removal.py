@@ -12,7 +12,7 @@ import numpy as np
 from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
 from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, follow_drift
-from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few
+from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few, variance_by_channel
 from nearfar.photometry.photos import PHOTOS_AT_ONCE, Photos, Wave, find_waves, in_batches
 from nearfar.plan import Plan
 
@@ -58,8 +58,7 @@ class PhotosWithoutDrift:
 
     def variance(self, photo: Floats) -> Floats:
         """Variance of one photo that reads `photo`, (C, channels)."""
-        variances = [model.variance(photo[:, i]) for i, model in enumerate(self.noise)]
-        return np.stack(variances, axis=1)
+        return variance_by_channel(self.noise, photo)
 
 
 def remove_drift(

@@ -1,6 +1,6 @@
 """The camera's noise, estimated from the photos themselves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +76,11 @@ def fit_noise(
     if gain < 0:
         return NoiseModel(0.0, float(np.median(binned)) / photos, least)
     return NoiseModel(float(gain), max(float(offset) / photos, -float(gain) * dark), least)
+
+
+def variance_by_channel(models: Sequence[NoiseModel], photo: Floats) -> Floats:
+    """Return the variance of a photo, (C, channels), by the model of each channel."""
+    return np.stack([model.variance(photo[:, i]) for i, model in enumerate(models)], axis=1)
 
 
 def mean_of_few(variances: Floats) -> float:

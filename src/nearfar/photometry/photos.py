@@ -48,6 +48,14 @@ class Photos(Protocol):
         ...
 
 
+class PhotosWithNoise(Photos, Protocol):
+    """Photos with a model of their noise."""
+
+    def variance(self, photo: Floats) -> Floats:
+        """Variance of one photo that reads `photo`, (C, channels)."""
+        ...
+
+
 def size_of_rows(photos: Photos, rows: slice) -> Size:
     """Return the size of some rows of the camera."""
     return Size(len(range(*rows.indices(photos.camera.height))), photos.camera.width)

@@ -122,9 +122,9 @@ def _held_out(verdict: Verdict) -> str:
             written(light.expected_snr),
             written(light.photo_snr),
         ]
-        for light in verdict.held_out.lights
+        for light in (*verdict.held_out.lights, *verdict.held_out.fine)
     ]
-    head = ["pattern, with its inverse", "held-out SNR_b", "expected", "one photo over its noise"]
+    head = ["light", "held-out SNR_b", "expected", "one photo over its noise"]
     return f"""<h2>Checked</h2>
 <p>The transport was relit under patterns from whose photos nothing was estimated, and compared with
 these photos; all in dB. Where it is much worse than expected, the scene or the photos break an

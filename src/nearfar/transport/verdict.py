@@ -51,6 +51,10 @@ class KeptVerdict:
         Power of the errors over that which the error bars expected; None as `expected_snr`.
     widening : float
         What all standard deviations are multiplied by for the error bars to hold, at least 1.
+    checked_by : str
+        The lights that the estimate never saw, in words.
+    is_least : bool
+        Whether the true SNR_b may be higher: noise hides all errors.
     """
 
     grade: Grade
@@ -59,6 +63,8 @@ class KeptVerdict:
     expected_snr: float | None = None
     error_ratio: float | None = None
     widening: float = 1.0
+    checked_by: str = "pictures"
+    is_least: bool = False
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -67,16 +73,17 @@ class KeptVerdict:
 
     @property
     def summary(self) -> str:
-        """What held-out photos say of relit pictures, a sentence; empty if nothing was checked."""
+        """What held-out photos say of what is relit, a sentence; empty if nothing was checked."""
         if self.held_out_snr is None:
             return ""
         beside = "" if self.expected_snr is None else f", {self.expected_snr:.1f} dB expected"
         widened = ""
         if self.widening > 1:
             widened = f"; error bars are made {self.widening:.2g} times as wide, to hold"
+        least = "at least " if self.is_least else ""
         return (
-            f"Relit pictures are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % (held-out "
-            f"SNR_b {self.held_out_snr:.1f} dB{beside}){widened}."
+            f"Relit {self.checked_by} are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % "
+            f"(held-out SNR_b {least}{self.held_out_snr:.1f} dB{beside}){widened}."
         )
 
     @property
@@ -97,6 +104,8 @@ def verdict_to_json(verdict: KeptVerdict) -> dict[str, Any]:
         "expected_dB": verdict.expected_snr,
         "error_ratio": verdict.error_ratio,
         "widening": verdict.widening,
+        "checked_by": verdict.checked_by,
+        "is_least": verdict.is_least,
     }
 
 
@@ -123,7 +132,16 @@ def verdict_from_json(kept: Mapping[str, Any]) -> KeptVerdict:
         )
     )
     widening = _number(kept["widening"], 1.0, LARGEST_WIDENING)
-    return KeptVerdict(grade, reasons, held_out, expected, ratio, widening)
+    return KeptVerdict(
+        grade,
+        reasons,
+        held_out,
+        expected,
+        ratio,
+        widening,
+        _text(kept["checked_by"]),
+        kept["is_least"] is True,
+    )
 
 
 def _text(value: Any) -> str:

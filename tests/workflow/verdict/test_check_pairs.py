@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nearfar.workflow.verdict.check_pairs import compare_pair
+from nearfar.workflow.verdict.check_pairs import compare_pair, over_both
 
 VALUES = 40_000
 
@@ -77,6 +77,6 @@ def test_parts_of_a_camera_count_as_the_whole():
             error_of_white=1e-4,
         )
 
-    whole, joined = of(slice(None)), of(slice(0, 999)) + of(slice(999, None))
+    whole, joined = of(slice(None)), over_both(of(slice(0, 999)), of(slice(999, None)))
     assert joined.values == whole.values == VALUES
     assert vars(joined) == pytest.approx(vars(whole))

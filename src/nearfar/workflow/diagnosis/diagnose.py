@@ -4,13 +4,16 @@ import numpy as np
 
 from nearfar.capture import Capture
 from nearfar.errors import InputError
+from nearfar.estimate.joint import estimate_jointly
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
+from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.compression import find_compression
+from nearfar.workflow.diagnosis.inverse_pairs import find_motion_by_pairs
 from nearfar.workflow.diagnosis.misfit import fit_photos, is_white_or_black, normal_equations
 from nearfar.workflow.diagnosis.sample import sample_camera
-from nearfar.workflow.diagnosis.single_photos import find_spoilt_photos
+from nearfar.workflow.diagnosis.single_photos import SWEEPS, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
     find_changes,
     find_clipped_black,
@@ -43,27 +46,36 @@ def find_what_spoils(
     Returns
     -------
     list of Spoilt
-        The worst first; empty if all is well, or if the photos cannot tell: those of a plan of
-        inverse pairs, and a transport that was not estimated jointly.
+        The worst first; empty if all is well, or if the photos cannot tell: those by reference of
+        a square T. Inverse pairs tell of motion and JPEG alone.
 
     Raises
     ------
     UnreadableFileError
         If the transport or the capture is damaged.
     """
-    if capture.plan.offset != "reference" or transport.provenance["square"]:
-        return []
-    if transport.provenance["method"] != "joint":
+    plan = capture.plan
+    by_pairs = plan.offset == "inverse"
+    if transport.provenance["square"] and not by_pairs:
         return []
     step = "comparing photos"
     sample = sample_camera(capture, lambda share: progress(step, share / 2))
+    compressed = find_compression(capture, ~is_white_or_black(plan))
+    if by_pairs:
+        moved = find_motion_by_pairs(sample)
+        progress(step, 1.0)
+        return [*compressed, *moved]
     try:
-        photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
+        photos = sample.without_drift(np.arange(len(plan.patterns)))
     except InputError:
         # Nothing but saturated camera pixels were sampled.
         return []
     sampled = sample.of_transport(transport)
-    fits = fit_photos(capture.plan, photos, sampled)
+    if transport.provenance["method"] != "joint":
+        # Other estimates differ from the photos by far more than noise.
+        q = sampled.correspondence
+        sampled = estimate_jointly(measure(photos), q, plan.window, plan.far, sweeps=SWEEPS)
+    fits = fit_photos(plan, photos, sampled)
     progress(step, 3 / 4)
     single = find_spoilt_photos(sample, fits, sampled.correspondence, suspected=suspected)
     progress(step, 1.0)
@@ -72,7 +84,6 @@ def find_what_spoils(
     found = find_changes(
         normal_equations(sample, fits), fits.misfit, photos.drift.references.whites
     )
-    compressed = find_compression(capture, ~is_white_or_black(capture.plan))
     if not found:
         return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.

@@ -51,13 +51,11 @@ CAUSES = 9
 
 
 @dataclass(frozen=True, eq=False)
-class PhotoFits:
-    """Photos of a sample beside relit pictures.
+class Fits:
+    """Photos of a sample beside what they should be.
 
     Attributes
     ----------
-    without_drift : PhotosWithoutDrift
-        The photos of the sample.
     photos, relit, variance : ndarray, shape (photos, rows, columns, channels)
         Without drift; relit pictures with the light of black; variance of their difference.
     black : ndarray, shape (rows, columns, channels)
@@ -65,7 +63,6 @@ class PhotoFits:
         Relit under white, without black.
     """
 
-    without_drift: PhotosWithoutDrift
     photos: Floats
     relit: Floats
     variance: Floats
@@ -78,10 +75,24 @@ class PhotoFits:
         return np.asarray(((self.photos - self.relit) ** 2 / self.variance).mean(axis=(1, 2, 3)))
 
 
+@dataclass(frozen=True, eq=False)
+class PhotoFits(Fits):
+    """Photos of a sample beside relit pictures.
+
+    Attributes
+    ----------
+    without_drift : PhotosWithoutDrift
+        The photos of the sample.
+    """
+
+    without_drift: PhotosWithoutDrift
+
+
 def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> PhotoFits:
     """Relight a sample under every pattern of its plan.
 
-    What is saturated under white counts for nothing.
+    What is saturated under white counts for nothing. Nor do stripes and Gray code: no response is
+    estimated from them, so that they differ from their relit pictures by more than noise.
 
     Parameters
     ----------
@@ -100,16 +111,28 @@ def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> 
     white = np.asarray(
         transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
     ).reshape(size)
-    model = (MODEL_ERROR * white) ** 2 + (MODEL_ERROR_OF_MEAN * white.mean()) ** 2
     variance = np.stack(
         [
             photos.variance(np.maximum(a, b).reshape(-1, size[2])).reshape(size)
             for a, b in zip(taken, relit, strict=True)
         ]
     )
-    variance += model
+    variance += model_variance(white)
     variance[:, ~photos.drift.unsaturated] = np.inf
-    return PhotoFits(photos, taken, relit, variance.astype(np.float32), transport.black, white)
+    variance[is_for_correspondence(plan)] = np.inf
+    return PhotoFits(
+        photos=taken,
+        relit=relit,
+        variance=variance.astype(np.float32),
+        black=transport.black,
+        white=white,
+        without_drift=photos,
+    )
+
+
+def model_variance(white: Floats) -> Floats:
+    """Return the error of the model that counts as noise, given a picture under white."""
+    return np.asarray((MODEL_ERROR * white) ** 2 + (MODEL_ERROR_OF_MEAN * white.mean()) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +161,7 @@ class NormalEquations:
         )
 
 
-def normal_equations(sample: CameraSample, fits: PhotoFits) -> NormalEquations:
+def normal_equations(sample: CameraSample, fits: Fits) -> NormalEquations:
     """Return the normal equations of all photos of a sample."""
     plan = sample.plan
     region = _regions(sample)
@@ -164,7 +187,7 @@ def normal_equations(sample: CameraSample, fits: PhotoFits) -> NormalEquations:
 
 
 def _effects(
-    fits: PhotoFits, plan: Plan, number: int, partner: int | None, scale: float
+    fits: Fits, plan: Plan, number: int, partner: int | None, scale: float
 ) -> NDArray[np.float32]:
     """Return the derivatives of a photo by the causes, (causes, rows, columns, channels)."""
     relit, pattern = fits.relit[number], plan.patterns[number]
@@ -225,7 +248,7 @@ def _derivatives(picture: Floats) -> tuple[Floats, Floats]:
     return found[0], found[1]
 
 
-def mean_white(fits: PhotoFits) -> float:
+def mean_white(fits: Fits) -> float:
     """Return the unit of ambient light: the mean of white."""
     return max(float(fits.white.mean()), 1e-12)
 
@@ -239,9 +262,15 @@ def _regions(sample: CameraSample) -> Integers:
     return np.add.outer(REGIONS_A_SIDE * down, across)
 
 
-def is_check(plan: Plan) -> Booleans:
-    """Return which photos of a plan are check photos, (photos,)."""
-    return np.array([pattern.purpose == "check" for pattern in plan.patterns])
+def is_held_out(plan: Plan) -> Booleans:
+    """Return from which photos of a plan no response is estimated, (photos,)."""
+    held_out = ("check", "correspondence")
+    return np.array([pattern.purpose in held_out for pattern in plan.patterns])
+
+
+def is_for_correspondence(plan: Plan) -> Booleans:
+    """Return which photos of a plan are of its correspondence method, (photos,)."""
+    return np.array([pattern.purpose == "correspondence" for pattern in plan.patterns])
 
 
 def is_white_or_black(plan: Plan) -> Booleans:

@@ -32,7 +32,8 @@ from nearfar.workflow.diagnosis.misfit import (
     SMALLEST_CHANGE,
     PhotoFits,
     fit_photos,
-    is_check,
+    is_for_correspondence,
+    is_held_out,
     is_white_or_black,
     mean_white,
 )
@@ -130,7 +131,7 @@ def find_spoilt_photos(
         tells of its frequency fits itself.
     """
     plan = sample.plan
-    fixed = is_white_or_black(plan)
+    fixed = is_white_or_black(plan) | is_for_correspondence(plan)
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
     if not suspected and not _suspects(fits.misfit, good & ~fixed):
@@ -182,7 +183,7 @@ def _explain_by_turns(
         if isinstance(pattern, Sinusoid) and good[number]:
             turns[number] = turn_of.setdefault(pattern.frequency, len(turn_of) % TURNS_OF_LEAVING)
     relit = fits.relit.copy()
-    measured = good & ~is_check(plan) & ~is_white_or_black(plan)
+    measured = good & ~is_held_out(plan) & ~is_white_or_black(plan)
     for turn in range(TURNS_OF_LEAVING):
         left_out = np.flatnonzero(measured & (turns == turn))
         without = _fit_without(sample, fits, good, left_out.tolist(), known)
@@ -210,7 +211,7 @@ def _fit_without(
 ) -> PhotoFits | None:
     """Return the fits of all photos to an estimate without some; None if too few remain."""
     plan = sample.plan
-    keep = good & ~is_check(plan)
+    keep = good & ~is_held_out(plan)
     keep[left_out] = False
     # A cosine is nothing without its sine.
     kept = {

@@ -8,6 +8,7 @@ Index convention: pictures are (..., channels), any camera pixels.
 """
 
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -56,18 +57,6 @@ class CheckPair:
     error_of_white: float
     share_of_pattern: float
 
-    def __add__(self, other: "CheckPair") -> "CheckPair":
-        """Return the pair of both sets of camera pixels."""
-        values = self.values + other.values
-        share = self.values / max(1, values)
-        mine, theirs = vars(self), vars(other)
-        means = {
-            name: share * mine[name] + (1 - share) * theirs[name]
-            for name in mine
-            if name != "values"
-        }
-        return CheckPair(values, **means)
-
     @property
     def photo_noise(self) -> float:
         """Mean variance of one photo's noise."""
@@ -89,6 +78,30 @@ class CheckPair:
     def excess_share(self) -> float:
         """What the pattern and its inverse show beyond white, as a share of white."""
         return self.excess / self.white if self.white > 0 else 0.0
+
+
+class Means(Protocol):
+    """A record of means over `values` values."""
+
+    @property
+    def values(self) -> int:
+        """Number of values."""
+        ...
+
+
+Record = TypeVar("Record", bound=Means)
+
+
+def over_both(one: Record, other: Record) -> Record:
+    """Return the record of the camera pixels of two records; what is None stays None."""
+    mine, theirs = vars(one), vars(other)
+    values = one.values + other.values
+    share = one.values / max(1, values)
+    means = {
+        name: None if mean is None else share * mean + (1 - share) * theirs[name]
+        for name, mean in mine.items()
+    }
+    return type(one)(**means | {"values": values})
 
 
 def compare_pair(

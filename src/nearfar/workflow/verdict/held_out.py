@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers, Size, blocks
+from nearfar.arrays import Booleans, Floats, Integers, Size, blocks
 from nearfar.capture import Capture
 from nearfar.estimate.joint import ErrorBars
 from nearfar.photometry.drift import find_references
@@ -18,7 +18,8 @@ from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.evaluate import decibels
 from nearfar.workflow.reconstruction.sources import photos_without_drift
-from nearfar.workflow.verdict.check_pairs import CheckPair, compare_pair
+from nearfar.workflow.verdict.check_pairs import CheckPair, compare_pair, over_both
+from nearfar.workflow.verdict.weighed_photos import WeighedPhotos
 
 # Camera pixels that are compared, about, in bands of this many rows.
 CAMERA_PIXELS = 2**17
@@ -39,8 +40,8 @@ class HeldOutLight:
         The pattern.
     is_binary : bool
         Whether it is white and black alone, whose photos do not tell whether the rig is linear.
-    pair : CheckPair
-        Its photo and its inverse's.
+    pair : CheckPair or WeighedPhotos
+        What its photo and its inverse's say; or the photos for correspondence that show it.
     expected_error : float or None
         Mean square of the error that the error bars expect; None without error bars.
     unmeasured_error : float or None
@@ -49,7 +50,7 @@ class HeldOutLight:
 
     description: str
     is_binary: bool
-    pair: CheckPair
+    pair: CheckPair | WeighedPhotos
     expected_error: float | None
     unmeasured_error: float | None
 
@@ -60,8 +61,13 @@ class HeldOutLight:
         return decibels(pair.signal, max(pair.error, pair.error_deviation))
 
     @property
+    def is_hidden(self) -> bool:
+        """Whether noise hides the error, so that it may be smaller than `snr` says."""
+        return self.pair.error < HIDDEN_DEVIATIONS * self.pair.error_deviation
+
+    @property
     def photo_snr(self) -> float:
-        """One photo over its noise, dB."""
+        """One photo, or the weighted sum of photos that shows the light, over its noise, dB."""
         return decibels(self.pair.signal, self.pair.photo_noise)
 
     @property
@@ -80,9 +86,15 @@ class HeldOut:
     ----------
     lights : tuple of HeldOutLight
         At least one.
+    fine : tuple of HeldOutLight
+        Lights of high frequencies, such as single rows, which count apart.
+    called : str
+        What the lights are, in words.
     """
 
     lights: tuple[HeldOutLight, ...]
+    fine: tuple[HeldOutLight, ...] = ()
+    called: str = "pictures"
 
     @property
     def snr(self) -> float:
@@ -95,13 +107,17 @@ class HeldOut:
         values = []
         for light in self.lights:
             kind = tuple(each for each in self.lights if each.is_binary == light.is_binary)
-            hidden = light.pair.error < HIDDEN_DEVIATIONS * light.pair.error_deviation
             ratio = HeldOut(kind).error_ratio
-            if hidden and ratio is not None and light.expected_snr is not None:
+            if light.is_hidden and ratio is not None and light.expected_snr is not None:
                 values.append(light.expected_snr - decibels(ratio, 1.0))
             else:
                 values.append(light.snr)
         return float(np.mean(values))
+
+    @property
+    def is_least(self) -> bool:
+        """Whether `snr` may be higher: noise hides all errors, and no error bars tell them."""
+        return self.expected_snr is None and all(light.is_hidden for light in self.lights)
 
     @property
     def lamp_excess(self) -> float:
@@ -217,7 +233,7 @@ def measure_held_out(
         block = transport.rows(rows)
         bars = bars_of(block)
         for number, light in enumerate(lights):
-            found[number] = _joined(found[number], compare_light(block, bars, photos, light, rows))
+            found[number] = joined(found[number], compare_light(block, bars, photos, light, rows))
         progress("check photos", rows.stop / transport.camera.height)
     return HeldOut(tuple(light for light in found if light is not None))
 
@@ -268,14 +284,9 @@ def compare_light(
     expected = unmeasured = None
     share_of_pattern = 1.0
     if bars is not None:
-
-        def mean_square(bars: ErrorBars, shown: Floats) -> float:
-            deviation = bars.picture(shown).reshape(size)[usable]
-            return float(np.mean(np.square(deviation, dtype=np.float64)))
-
-        of_white = mean_square(bars.of_all, np.ones_like(pattern))
-        expected, unmeasured = (mean_square(each, pattern) for each in bars)
-        of_inverse = mean_square(bars.of_all, 1 - pattern)
+        of_white = mean_square(bars.of_all, np.ones_like(pattern), usable)
+        expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
+        of_inverse = mean_square(bars.of_all, 1 - pattern, usable)
         share_of_pattern = 2 * expected / max(expected + of_inverse, 1e-300)
     pair = compare_pair(
         means[0] - black,
@@ -291,13 +302,26 @@ def compare_light(
     return HeldOutLight(light.pattern.description, is_binary, pair, expected, unmeasured)
 
 
+def mean_square(bars: ErrorBars, light: Floats, usable: Booleans) -> float:
+    """Return the expected square of the error under a light, mean over usable camera pixels.
+
+    Parameters
+    ----------
+    bars : ErrorBars
+    light : ndarray, shape (Py, Px)
+    usable : ndarray of bool, shape (C,)
+    """
+    deviation = bars.picture(light).reshape(len(usable), -1)[usable]
+    return float(np.mean(np.square(deviation, dtype=np.float64)))
+
+
 def _noise(photos: PhotosWithoutDrift, mean: Floats, numbers: Sequence[int] | Integers) -> float:
     """Return the mean variance of the mean of some photos of a pattern."""
     return float(photos.variance(mean).mean()) / len(numbers)
 
 
-def _joined(one: HeldOutLight | None, other: HeldOutLight) -> HeldOutLight:
-    """Return the comparison over the camera pixels of both."""
+def joined(one: HeldOutLight | None, other: HeldOutLight) -> HeldOutLight:
+    """Return the comparison under one light over the camera pixels of both."""
     if one is None or not one.pair.values:
         return other
     if not other.pair.values:
@@ -312,7 +336,7 @@ def _joined(one: HeldOutLight | None, other: HeldOutLight) -> HeldOutLight:
     return HeldOutLight(
         one.description,
         one.is_binary,
-        one.pair + other.pair,
+        over_both(one.pair, other.pair),
         mean(one.expected_error, other.expected_error),
         mean(one.unmeasured_error, other.unmeasured_error),
     )

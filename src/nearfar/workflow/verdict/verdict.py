@@ -15,7 +15,9 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
+from nearfar.workflow.verdict.by_correspondence import measure_by_correspondence
 from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
+from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
 
 Cause = (
@@ -27,6 +29,8 @@ LARGEST_EXCESS = 0.01
 # Power of the errors over what the error bars expect: above the first the transport is doubtful,
 # above the second it is wrong.
 DOUBTFUL_ERROR_RATIO = 2.0
+# The same of fine lights, which error bars expect less well.
+DOUBTFUL_FINE_ERROR_RATIO = 10.0
 WRONG_ERROR_RATIO = 20.0
 # Held-out SNR_b in dB above which no error, however unexpected, makes a transport doubtful.
 GOOD_DECIBELS = 40.0
@@ -37,6 +41,9 @@ WRONG_DECIBELS = 15.0
 # Above this, pictures and their inverses say surely that the response is not linear, unless the
 # half-screens show a quarter of it.
 SURE_EXCESS = 0.05
+
+# Without error bars, errors as many dB above the noise of a photo are not due to it.
+NOISE_DECIBELS = 6.0
 
 # Below this, error bars expect so much more error than there is that photos contradict each other.
 SMALLEST_ERROR_RATIO = 0.5
@@ -90,6 +97,8 @@ class Verdict:
             _finite(checked.expected_snr),
             _finite(checked.error_ratio),
             widening_of(checked),
+            checked.called,
+            checked.is_least,
         )
 
     @property
@@ -135,18 +144,28 @@ def judge_reconstruction(
         If the transport or the capture is damaged.
     """
     square = transport.provenance["square"]
-    held_out = None if square else measure_held_out(transport, capture, progress)
+    held_out = None
+    if not square:
+        held_out = measure_held_out(transport, capture, progress)
+        held_out = held_out or measure_by_correspondence(transport, capture, progress)
+    repeats = None
+    if held_out is None:
+        repeats = measure_repeats(capture, transport.provenance, progress)
     return judge(
         held_out,
         find_faults(capture, transport.provenance),
         find_what_spoils(
             transport, capture, progress, suspected=held_out is not None and _contradicts(held_out)
         ),
+        repeats,
     )
 
 
 def judge(
-    held_out: HeldOut | None, faults: Sequence[Fault], spoilt: Sequence[Spoilt] = ()
+    held_out: HeldOut | None,
+    faults: Sequence[Fault],
+    spoilt: Sequence[Spoilt] = (),
+    repeats: Repeats | None = None,
 ) -> Verdict:
     """Return the verdict on a transport.
 
@@ -158,6 +177,8 @@ def judge(
         Of the capture.
     spoilt : sequence of Spoilt
         What spoils its photos.
+    repeats : Repeats, optional
+        What is known where nothing was checked.
     """
     if held_out is not None and _bends(held_out):
         # What bends the response makes pictures of other brightness than expected, too.
@@ -175,21 +196,23 @@ def judge(
         ):
             add(cause)
     if held_out is None:
-        add("unchecked")
+        known = "" if repeats is None else f" Known is this: {repeats}"
+        reasons.append(Reason("unchecked", SENTENCES["unchecked"] + known))
         wrong = any(reason.cause in WRONG_PHOTOS for reason in reasons)
         return Verdict("wrong" if wrong else "doubtful", None, tuple(reasons))
     if not spoilt:
         if abs(held_out.nonlinear_excess) > LARGEST_EXCESS:
             add("not-linear")
-        elif abs(held_out.lamp_excess) > LARGEST_EXCESS:
+        elif abs(held_out.lamp_excess) > LARGEST_EXCESS and not reasons:
             add("lamp")
     ratio = held_out.error_ratio
-    surprises = ratio is not None and ratio > DOUBTFUL_ERROR_RATIO
-    if surprises and held_out.snr < GOOD_DECIBELS and not reasons:
+    surprises = _surprises(held_out, DOUBTFUL_ERROR_RATIO) or (
+        held_out.fine and _surprises(HeldOut(held_out.fine), DOUBTFUL_FINE_ERROR_RATIO)
+    )
+    if surprises and not reasons:
         add("model")
     if held_out.snr < DOUBTFUL_DECIBELS and not reasons:
-        few = (held_out.unmeasured_share or 0.0) > 1 / 2
-        add("too-few-photos" if few else "noise")
+        add(_what_limits(held_out))
     wrong = (
         held_out.snr < WRONG_DECIBELS
         or (ratio is not None and ratio > WRONG_ERROR_RATIO)
@@ -198,6 +221,20 @@ def judge(
     return Verdict(
         "wrong" if wrong else "doubtful" if reasons else "good", held_out, tuple(reasons)
     )
+
+
+def _surprises(held_out: HeldOut, most: float) -> bool:
+    """Return whether errors matter, and are larger than the error bars expect by so much."""
+    return (held_out.error_ratio or 0.0) > most and held_out.snr < GOOD_DECIBELS
+
+
+def _what_limits(held_out: HeldOut) -> Cause:
+    """Return why pictures are relit badly where nothing was found in the photos."""
+    share = held_out.unmeasured_share
+    if share is not None:
+        return "too-few-photos" if share > 1 / 2 else "noise"
+    photos = float(np.mean([light.photo_snr for light in held_out.lights]))
+    return "model" if photos > held_out.snr + NOISE_DECIBELS else "noise"
 
 
 def _bends(held_out: HeldOut) -> bool:

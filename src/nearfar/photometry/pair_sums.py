@@ -1,0 +1,130 @@
+"""What inverse pairs sum to: always white + black, so that they tell noise and drift of the light.
+
+Index convention: arrays are (C, channels) with C camera pixels row by row.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Size
+from nearfar.illumination.frequencies import DC
+from nearfar.photometry.by_inverse import Pair, find_pairs
+from nearfar.photometry.noise import NoiseModel, fit_noise, variance_by_channel
+from nearfar.photometry.photos import Photos, in_batches
+from nearfar.plan import Plan
+
+
+@dataclass(frozen=True, eq=False)
+class PhotosOfPairs:
+    """Photos of inverse pairs with a model of their noise; read as any others.
+
+    Attributes
+    ----------
+    photos : Photos
+        As they were taken.
+    noise : tuple of NoiseModel
+        One for each channel.
+    light : ndarray, shape (pairs,)
+        What each pair sums to, mean over the camera, as a share of the mean of all pairs.
+    scatter : float
+        Variance of what pairs sum to, over that which the noise expects.
+    """
+
+    photos: Photos
+    noise: tuple[NoiseModel, ...]
+    light: Floats
+    scatter: float
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that was shot."""
+        return self.photos.plan
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        return self.photos.camera
+
+    @property
+    def channels(self) -> int:
+        """Channels of the photos."""
+        return self.photos.channels
+
+    def read(self, indices: Sequence[int], rows: slice) -> Floats:
+        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
+        return self.photos.read(indices, rows)
+
+    def variance(self, photo: Floats) -> Floats:
+        """Variance of one photo that reads `photo`, (C, channels)."""
+        return variance_by_channel(self.noise, photo)
+
+
+def sum_pairs(
+    photos: Photos, bands: Sequence[slice], progress: Callable[[float], None] | None = None
+) -> PhotosOfPairs:
+    """Estimate noise and drift of a capture of inverse pairs from what the pairs sum to.
+
+    Parameters
+    ----------
+    photos : Photos
+        A capture of a plan with offset inverse.
+    bands : sequence of slice
+        Rows of the camera to look at.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    InputError
+        If a pattern has no inverse.
+    """
+    pairs = find_pairs(photos.plan)
+    report = progress or (lambda _share: None)
+    light = np.zeros(len(pairs))
+    for done, rows in enumerate(bands, 1):
+        light += [both.sum() for both in _sums(photos, pairs, rows)]
+        report(done / len(bands) / 2)
+    # A pair without any light, such as of a projector that is off, divides nothing.
+    light = np.where(light > 0, light / max(float(light.mean()), 1e-300), 1.0)
+    black = [pair.inverse for pair in pairs if pair.frequency == DC]
+    means, variances, dark = [], [], []
+    for done, rows in enumerate(bands, 1):
+        mean, variance = _moments(photos, pairs, rows, light)
+        means.append(mean)
+        variances.append(variance)
+        dark += [photos.read([number], rows).reshape(-1, photos.channels) for number in black]
+        report((1 + done / len(bands)) / 2)
+    mean, variance = np.concatenate(means), np.concatenate(variances)
+    levels = np.median(np.concatenate(dark), axis=0) if dark else np.zeros(photos.channels)
+    noise = tuple(
+        fit_noise(mean[:, i], variance[:, i], float(levels[i])) for i in range(photos.channels)
+    )
+    expected = 2 * float(variance_by_channel(noise, mean / 2).mean())
+    return PhotosOfPairs(photos, noise, light, float(variance.mean()) / expected)
+
+
+def _sums(photos: Photos, pairs: Sequence[Pair], rows: slice) -> Iterator[NDArray[np.float64]]:
+    """Yield what each pair sums to, (C, channels)."""
+    # Batches hold an even number of photos, and so whole pairs.
+    numbers = [number for pair in pairs for number in (pair.photo, pair.inverse)]
+    for _, read in in_batches(photos, numbers, rows):
+        yield from read[::2].astype(np.float64) + read[1::2]
+
+
+def _moments(
+    photos: Photos, pairs: Sequence[Pair], rows: slice, light: Floats
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean and variance of the pairs' sums under the mean of the light, (C, channels)."""
+    total = squares = first = np.zeros(())
+    for number, (both, gain) in enumerate(zip(_sums(photos, pairs, rows), light, strict=True)):
+        steady = both / gain
+        first = steady if number == 0 else first
+        # Differences from the first are small: their sums lose no digits.
+        off = steady - first
+        total, squares = total + off, squares + off**2
+    count = len(pairs)
+    variance = np.maximum(squares - total**2 / count, 0.0) / max(count - 1, 1)
+    return first + total / count, variance

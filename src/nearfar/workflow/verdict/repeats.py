@@ -1,0 +1,134 @@
+"""What photos of one and the same light tell of a capture that nothing was checked of.
+
+A plan by reference shows white and black again and again. Every inverse pair sums to white and
+black, so that pairs also tell whether the response is linear.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nearfar.capture import Capture
+from nearfar.photometry.by_inverse import find_pairs
+from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.photometry.pair_sums import PhotosOfPairs, sum_pairs
+from nearfar.photometry.photos import mean_photo
+from nearfar.plan import Plan, Sinusoid
+from nearfar.plan.checks import is_reference
+from nearfar.progress import Report, ignore_progress
+from nearfar.workflow.evaluate import decibels
+from nearfar.workflow.reconstruction.sources import photos_without_drift
+from nearfar.workflow.verdict.held_out import bands
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Noise, drift and linearity of a capture.
+
+    Attributes
+    ----------
+    white_snr : float
+        One photo of white over its noise, dB.
+    scatter : float
+        Variance of what should be the same, over that which the model of shot and read noise
+        expects.
+    lamp, ambient : float
+        Largest less smallest lamp, and ambient light, as shares of white; of pairs, which do not
+        tell them apart, both together as the lamp.
+    excess : float or None
+        What inverse pairs show beyond white and black, as a share of white; None without pairs.
+    """
+
+    white_snr: float
+    scatter: float
+    lamp: float
+    ambient: float
+    excess: float | None
+
+    def __str__(self) -> str:
+        said = (
+            f"one photo of white is {self.white_snr:.1f} dB over its noise; what was shown again "
+            f"scatters {self.scatter:.2g} times as much as shot and read noise do"
+        )
+        if self.excess is None:
+            return (
+                f"{said}; the lamp changed by {self.lamp:.2%}, ambient light by {self.ambient:.2%} "
+                f"of white."
+            )
+        return (
+            f"{said}; the light changed by {self.lamp:.2%}; what pairs sum to differs from white "
+            f"and black by {self.excess:+.2%} of white, by nothing if the response is linear."
+        )
+
+
+def measure_repeats(
+    capture: Capture, provenance: Mapping[str, Any], progress: Report = ignore_progress
+) -> Repeats:
+    """Measure what photos of one and the same light tell of a capture.
+
+    Of a large camera, evenly spaced rows are looked at.
+
+    Parameters
+    ----------
+    capture : Capture
+    provenance : mapping
+        Of the transport that was reconstructed from it.
+    progress : callable
+        Called with the step and the share of it that is done.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the capture is damaged.
+    """
+    photos = photos_with_noise(capture, progress)
+    shown = [_numbers(capture.plan, inverse=inverse) for inverse in (False, True)]
+    signal = noise = scattered = expected = 0.0
+    for rows in bands(photos.camera):
+        white, black = (mean_photo(photos, numbers, rows) for numbers in shown)
+        signal += float(np.sum((white - black) ** 2))
+        noise += float(np.sum(photos.variance(white)))
+        for numbers, mean in zip(shown, (white, black), strict=True):
+            for number in numbers if len(numbers) > 1 else []:
+                photo = photos.read([number], rows).reshape(mean.shape)
+                scattered += float(np.sum((photo - mean) ** 2)) * len(numbers) / (len(numbers) - 1)
+                expected += float(np.sum(photos.variance(mean)))
+    white_snr = decibels(signal, noise)
+    if isinstance(photos, PhotosOfPairs):
+        # White and the checkerboard sum to more than others where the response bends.
+        lamp = float(
+            np.ptp(
+                [
+                    light
+                    for pair, light in zip(find_pairs(photos.plan), photos.light, strict=True)
+                    if not pair.frequency.is_own_negative
+                ]
+                or [1.0]
+            )
+        )
+        return Repeats(white_snr, photos.scatter, lamp, 0.0, float(provenance["excess_of_sums"]))
+    drift = photos.drift
+    return Repeats(
+        white_snr, scattered / max(expected, 1e-300), drift.lamp_range, drift.ambient_range, None
+    )
+
+
+def photos_with_noise(
+    capture: Capture, progress: Report = ignore_progress
+) -> PhotosWithoutDrift | PhotosOfPairs:
+    """Return the photos of a capture with a model of their noise, by reference without drift."""
+    photos = photos_without_drift(capture, progress)
+    if isinstance(photos, PhotosWithoutDrift):
+        return photos
+    return sum_pairs(photos, bands(capture.camera), lambda share: progress("inverse pairs", share))
+
+
+def _numbers(plan: Plan, *, inverse: bool) -> list[int]:
+    """Return the numbers of the photos of white, or of black."""
+    return [
+        number
+        for number, pattern in enumerate(plan.patterns)
+        if is_reference(pattern) and isinstance(pattern, Sinusoid) and pattern.inverse == inverse
+    ]

@@ -75,8 +75,10 @@ class PhotoFits:
         return np.asarray(((self.photos - self.relit) ** 2 / self.variance).mean(axis=(1, 2, 3)))
 
 
-def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> PhotoFits:
-    """Relight a sample under every pattern of its plan.
+def fit_photos(
+    plan: Plan, photos: PhotosWithoutDrift, transport: Transport, start: int = 0
+) -> PhotoFits:
+    """Relight a sample, or some rows of a camera, under every pattern of a plan.
 
     What is saturated under white counts for nothing.
 
@@ -84,16 +86,19 @@ def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> 
     ----------
     plan : Plan
     photos : PhotosWithoutDrift
-        All photos of the sample.
+        All photos.
     transport : Transport
-        Of the sample's camera pixels.
+        Of the sample's camera pixels, or of the rows.
+    start : int
+        First of the rows.
     """
+    rows = slice(start, start + transport.camera.height)
     size = (*transport.camera, transport.channels)
     numbers = range(len(plan.patterns))
     lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
     relit = transport.pictures(lights)
     relit += transport.black
-    taken = photos.read(numbers, slice(0, transport.camera.height))
+    taken = photos.read(numbers, rows)
     white = np.asarray(
         transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
     ).reshape(size)
@@ -105,7 +110,7 @@ def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> 
         ]
     )
     variance += model
-    variance[:, ~photos.drift.unsaturated] = np.inf
+    variance[:, ~photos.drift.unsaturated[rows]] = np.inf
     return PhotoFits(photos, taken, relit, variance.astype(np.float32), transport.black, white)
 
 

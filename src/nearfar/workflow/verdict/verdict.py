@@ -1,7 +1,7 @@
 """The verdict on a transport: good, doubtful or wrong, and why."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 from nearfar.capture import Capture
@@ -12,6 +12,7 @@ from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSat
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
+from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
 from nearfar.workflow.verdict.grades import Grade
 from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
 
@@ -135,13 +136,31 @@ def judge_reconstruction(
     """
     square = transport.provenance["square"]
     held_out = None if square else measure_held_out(transport, capture, progress)
-    return judge(
+    verdict = judge(
         held_out,
         find_faults(capture, transport.provenance),
         find_what_spoils(
             transport, capture, progress, suspected=held_out is not None and _contradicts(held_out)
         ),
     )
+    if "model" not in verdict.causes:
+        return verdict
+    misfit = measure_misfit(transport, capture, progress)
+    return verdict if misfit is None else with_worst(verdict, misfit)
+
+
+def with_worst(verdict: Verdict, misfit: MisfitMaps) -> Verdict:
+    """Return a verdict whose reason that the model fails names where, if anything stands out."""
+    worst = describe_worst(misfit)
+    if not worst:
+        return verdict
+    reasons = tuple(
+        reason._replace(sentence=f"{reason.sentence.removesuffix('.')}; {worst}.")
+        if reason.cause == "model"
+        else reason
+        for reason in verdict.reasons
+    )
+    return replace(verdict, reasons=reasons)
 
 
 def judge(

@@ -16,7 +16,8 @@ SCALE = np.array(
     dtype=np.float64,
 )
 
-# Of saturated camera pixels: far from all of `SCALE` and from grey.
+# Of saturated camera pixels, as in the style of `nearfar.report.page`: far from all of `SCALE` and
+# from grey.
 MARK = (214, 40, 90)
 
 

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Booleans, Floats
 from nearfar.files import encode_png, to_srgb
 
 # From dark blue over teal to yellow, in even steps of lightness, so that it reads the same in grey.
@@ -15,6 +15,10 @@ SCALE = np.array(
     [[38, 20, 72], [52, 70, 140], [36, 120, 148], [50, 168, 130], [138, 205, 88], [248, 228, 60]],
     dtype=np.float64,
 )
+
+# Of saturated camera pixels, as in the style of `nearfar.report.page`: far from all of `SCALE` and
+# from grey.
+MARK = (214, 40, 90)
 
 
 def picture(image: Floats, description: str) -> str:
@@ -35,14 +39,21 @@ def embedded(pixels: NDArray[np.uint8], description: str) -> str:
     return f'<img alt="{escape(description)}" src="data:image/png;base64,{data}">'
 
 
-def false_colour(values: Floats, low: float, high: float) -> NDArray[np.uint8]:
-    """Map values from `low` to `high` to the colours of `SCALE`, uint8 (y, x, 3); NaN to grey."""
+def false_colour(
+    values: Floats, low: float, high: float, marked: Booleans | None = None
+) -> NDArray[np.uint8]:
+    """Map values from `low` to `high` to the colours of `SCALE`, uint8 (y, x, 3); NaN to grey.
+
+    What is `marked` gets the colour `MARK`, whatever its value.
+    """
     share = np.clip((np.nan_to_num(values, nan=low) - low) / max(high - low, 1e-12), 0, 1)
     position = share * (len(SCALE) - 1)
     below = np.minimum(position.astype(np.int64), len(SCALE) - 2)
     fraction = (position - below)[..., None]
     colours = SCALE[below] * (1 - fraction) + SCALE[below + 1] * fraction
     colours[~np.isfinite(values)] = 128
+    if marked is not None:
+        colours[marked] = MARK
     return np.asarray(np.rint(colours).astype(np.uint8))
 
 

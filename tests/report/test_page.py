@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from nearfar.files import encode_png
-from nearfar.markup import card, false_colour, numbers, picture
+from nearfar.markup import MARK, card, false_colour, numbers, picture
 from nearfar.report.comparison import comparison_page
-from nearfar.report.page import colour_map, facts, gallery, listed, page
+from nearfar.report.page import STYLE, colour_map, facts, gallery, listed, page
 from nearfar.workflow.compare import Comparison
 
 EVIL = "<img src=x onerror=alert(1)>\"'&"
@@ -58,6 +58,21 @@ def test_false_colour_is_ordered_and_marks_what_is_not_there():
     np.testing.assert_array_equal(colours[0, 3], (128, 128, 128))
     np.testing.assert_array_equal(colours[0, 4], colours[0, 0])
     np.testing.assert_array_equal(colours[0, 5], colours[0, 2])
+    saturated = np.array([[False, True, False, True, False, False]])
+    marked = false_colour(np.array([[0.0, 0.5, 1.0, np.nan, -5.0, 9.0]]), 0, 1, saturated)
+    assert {tuple(colour) for colour in marked[saturated].tolist()} == {MARK}
+    np.testing.assert_array_equal(marked[~saturated], colours[~saturated])
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_marked_pixels_are_explained_where_there_are_some(number):
+    saturated = np.arange(6).reshape(2, 3) < number
+    text = colour_map(
+        np.ones((2, 3)), 0, 1, "dB", "map", reading="Read <it> so.", saturated=saturated
+    )
+    assert ("saturated: not measured" in text) == (number > 0)
+    assert "--saturated: #{:02x}{:02x}{:02x};".format(*MARK) in STYLE
+    assert "<b>Map.</b> Read &lt;it&gt; so." in text
 
 
 @pytest.mark.parametrize("low", [3.0, 7.0])

@@ -1,5 +1,6 @@
 """Reports of reconstruct and evaluate, from the command line to what a browser would show."""
 
+import html
 import re
 import shutil
 
@@ -7,9 +8,9 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.files import write_picture
+from nearfar.files import read_picture, write_picture
 from nearfar.plan import choose_plan, paper_plan
-from nearfar.report.maps import maps_of
+from nearfar.report.maps import READINGS, maps_of
 from nearfar.report.reconstruction import MAXIMUM_DISPLAYED_PIXELS, reconstruction_page
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -17,7 +18,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.store import load_transport, open_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.verdict.verdict import judge_reconstruction
-from tests.cli.conftest import run_nearfar
+from tests.cli.conftest import check_done, run_nearfar
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA = Size(12, 16), Size(14, 18)
@@ -62,8 +63,18 @@ def test_a_report_tells_of_a_reconstruction(made):
         assert compute().title in text, name
     assert '<p class="verdict good"><b>good.</b> Relit pictures are off by' in text
     assert "<td>picture 101</td>" in text
-    # Lights and their parts, maps, and the histogram.
-    assert text.count("<img") == 10 + len(maps_of(transport)) + 1
+    # Lights and their parts, maps, the histogram, and what photos fit.
+    assert text.count("<img") == 10 + len(maps_of(transport)) + 3
+    # Each with how to read it; no camera pixel is saturated.
+    for reading in READINGS.values():
+        assert html.escape(reading) in text or reading == READINGS["noise"]
+    assert "saturated: not measured" not in text
+    # White is measured itself, and comes after pictures.
+    assert text.index("held-out SNR_b: pictures") < text.index("floodlit picture over its error")
+    assert text.index(">a picture<") < text.index(">white<")
+    assert "was measured by frequency-space decomposition [1], from 40 photos" in text
+    assert "whose photos no estimate used, the transport has a mean SNR_b of" in text
+    assert f"nearfar reconstruct {made}/capture.zarr" in text
     assert "white and black, to measure against" in text
     assert "nearfar" in text
     assert "<td>joint</td>" in text
@@ -96,6 +107,25 @@ def test_saturated_pixels_are_mapped_and_reported(world, tmp_path):
     expected = (capture.photos[white] >= capture.full_scale).any(axis=-1)
     np.testing.assert_array_equal(quality.saturated, expected)
     assert 0 < expected.mean() < 1
+    np.save(tmp_path / "light.npy", np.full(PROJECTOR, 0.5, dtype=np.float32))
+    for name in ("bars.npy", "bars.exr", "bars.png"):
+        bars = ("relight", tmp_path / "t.zarr", tmp_path / "light.npy", tmp_path / name)
+        check_done(run_nearfar(*bars, "--error-bars"))
+    found = np.load(tmp_path / "bars.npy")
+    np.testing.assert_array_equal(np.isposinf(found).all(axis=-1), expected)
+    assert not np.isnan(found).any()
+    assert (read_picture(tmp_path / "bars.png")[expected] == 255).all()
+    text = (tmp_path / "r.html").read_text()
+    maps = maps_of(load_transport(tmp_path / "t.zarr"))
+    # On all maps but their own, and on that of misfit.
+    assert text.count("saturated: not measured") == len(maps)
+    assert f"<b>{expected.mean():.1%}</b>" in text
+    for name in ("column", "picture-error", "direct-error", "far-share"):
+        found = maps[name]()
+        np.testing.assert_array_equal(found.saturated, expected)
+        assert np.isnan(found.values[expected]).all()
+        assert np.isfinite(found.values[~expected]).any()
+        assert found.low < found.high
 
 
 def test_a_report_is_not_overwritten_and_refused_before_any_work(made, tmp_path):
@@ -173,6 +203,9 @@ def test_an_evaluation_by_truth(made, world, tmp_path):
     text = (tmp_path / "e.html").read_text()
     stands_alone(text)
     assert "SNR_t of every camera pixel" in text
+    assert ran.out.index("snr_b_pictures") < ran.out.index("white")
+    assert re.search(r"<td>random</td>.*<td>white</td>", text)
+    assert "by frequency-space decomposition [1]" in text
     found = float(re.search(r"white +(\d+\.\d+) dB", ran.out).group(1))
     assert f"<td>{found:.1f} dB</td>" in text
 

@@ -1,5 +1,7 @@
 """Drawings of a transport."""
 
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from matplotlib.axes import Axes
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
+from nearfar.transport.quality import Quality
 from tests.worlds import model_transport
 
 
@@ -92,3 +95,29 @@ def test_other_bad_input(transport):
         transport.plot.correspondence("z")
     with pytest.raises(InputError, match="give three"):
         transport.plot.components(np.ones(transport.projector), ax=[])
+
+
+class KnownErrors:
+    """Error bars that are infinite at every camera pixel."""
+
+    def along(self, pixel, line):
+        return tuple(np.full((1, 12), np.inf, dtype=np.float32) for _ in range(3))
+
+
+def test_saturated_camera_pixels_are_marked_and_their_errors_said_to_be_unknown():
+    transport = model_transport(Size(9, 12), Size(7, 8), window=3, far=Size(3, 3))
+    saturated = np.zeros((7, 8), dtype=bool)
+    saturated[6, 7] = True
+    transport = replace(transport, quality=Quality(np.ones((7, 8), np.float32), saturated))
+    ax = transport.plot.correspondence("x")
+    drawn, marks = (image.get_array() for image in ax.images)
+    np.testing.assert_array_equal(np.ma.getmaskarray(drawn) | np.isnan(drawn), saturated)
+    np.testing.assert_array_equal(marks[..., 3] > 0, saturated)
+    # The rightmost column is the saturated one's and others', but nothing beyond is in the scale.
+    assert ax.images[0].get_clim()[1] == np.max(transport.correspondence[~saturated][:, 1])
+    unknown = transport.plot.row(6, 7, errors=KnownErrors())
+    assert "errors unknown" in unknown.get_title()
+    assert unknown.patches
+    known = transport.plot.row(6, 6)
+    assert "unknown" not in known.get_title()
+    assert not known.patches

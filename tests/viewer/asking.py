@@ -13,7 +13,7 @@ from nearfar.arrays import Size
 from tests.waiting import LONGEST_WAIT
 
 PROJECTOR, CAMERA = Size(20, 24), Size(30, 42)
-TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2"}
+TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2", "uint8": "u1"}
 
 
 def unpack(data):

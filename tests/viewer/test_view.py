@@ -22,6 +22,7 @@ from nearfar.errors import InputError, MissingFileError
 from nearfar.estimate.joint import ErrorBars
 from nearfar.files import read_light, read_picture, write_picture
 from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
+from nearfar.markup import MARK
 from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
 from nearfar.viewer import application, interactive
@@ -187,7 +188,9 @@ def test_every_map_is_there(address, transport):
     assert set(names) >= {"row", "column", "confidence", "error", "near-share", "saturated"}
     found = {}
     for name in names:
-        header, (found[name],) = unpack(ask(address, f"/map/{name}"))
+        header, (found[name], saturated) = unpack(ask(address, f"/map/{name}"))
+        assert saturated.shape == CAMERA
+        assert not saturated.any()
         assert found[name].shape == CAMERA
         assert header["low"] < header["high"]
         assert header["title"]
@@ -199,6 +202,28 @@ def test_every_map_is_there(address, transport):
     bars = ErrorBars(transport).picture(np.ones(PROJECTOR, np.float32))
     ratio = 10 * np.log10((white**2).mean(axis=-1) / (bars**2).mean(axis=-1))
     np.testing.assert_allclose(found["error"], ratio, atol=1e-3)
+
+
+def test_saturated_camera_pixels_are_marked_and_their_errors_unknown(tmp_path, transport):
+    saturated = np.zeros(CAMERA, dtype=bool)
+    saturated[1, 2] = True
+    quality = replace(transport.quality, saturated=saturated)
+    save_transport(replace(transport, quality=quality), tmp_path / "t.zarr")
+    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
+        assert json.loads(ask(address, "/scene"))["mark"] == list(MARK)
+        for name in ("column", "confidence", "error", "far-share"):
+            header, (values, marks) = unpack(ask(address, f"/map/{name}"))
+            np.testing.assert_array_equal(marks, saturated)
+            assert np.isnan(values[1, 2])
+            assert header["high"] >= header["low"]
+        header, (_, _, near_error, far_error, _) = unpack(ask(address, "/row?y=1&x=2"))
+        assert header["saturated"]
+        assert header["no_errors"] == "they are unknown"
+        assert np.isinf(near_error).all()
+        assert np.isinf(far_error).all()
+        header, (_, _, near_error, far_error, _) = unpack(ask(address, "/row?y=1&x=3"))
+        assert not header["no_errors"]
+        assert np.isfinite([near_error, far_error]).all()
 
 
 def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from nearfar.arrays import Size
+from nearfar.cli.command_line import command_line
 from nearfar.cli.options import (
     AsJson,
     DenseCamera,
@@ -70,9 +71,8 @@ def check(
         found = check_model(world, near, far, sample=sample, progress=told)
         condition = condition_near(world.projector, near, dropped)
         if page is not None:
-            write_page(
-                page, check_page(transport.name, found, condition, world.camera), force=force
-            )
+            text = check_page(transport.name, found, condition, world.camera, command_line())
+            write_page(page, text, force=force)
     numbers = numbers_of(found, condition)
     if as_json:
         print(json.dumps(numbers, allow_nan=False))

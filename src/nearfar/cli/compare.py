@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import Size
+from nearfar.cli.command_line import command_line
 from nearfar.cli.options import (
     AsJson,
     Force,
@@ -167,9 +168,9 @@ class _Outputs:
         from nearfar.report.page import write_page
 
         if self.folder is not None:
-            write_comparison(self.folder, found, force=self.force)
+            write_comparison(self.folder, found, force=self.force, command=command_line())
         if self.page is not None:
-            write_page(self.page, standalone_page(found), force=self.force)
+            write_page(self.page, standalone_page(found, command_line()), force=self.force)
         for sentence in describe_failures(found):
             warn(sentence)
         if self.as_json:

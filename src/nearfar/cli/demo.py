@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from nearfar.cli.command_line import command_line
 from nearfar.cli.options import Force, Quiet
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
@@ -26,10 +27,10 @@ def demo(
 
     check_output(output, force=force, replaceable=is_demo)
     with progress_bar("demo", quiet=quiet) as report:
-        found = run_demo(output, force=force, progress=report)
+        found = run_demo(output, force=force, progress=report, command=command_line())
     say(
-        f"SNR_b {found['snr_b']['white']:.1f} dB under white, {found['snr_b_pictures']:.1f} dB "
-        f"under pictures (mean of five); SNR_t {found['snr_t']['p50']:.1f} dB (median)\n"
-        f"open {output / 'report.html'}",
+        f"SNR_b {found['snr_b_pictures']:.1f} dB under pictures (mean of five), "
+        f"{found['snr_b']['white']:.1f} dB under white; SNR_t {found['snr_t']['p50']:.1f} dB "
+        f"(median)\nopen {output / 'report.html'}",
         quiet=quiet,
     )

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from nearfar.cli.command_line import command_line
 from nearfar.cli.options import (
     AsJson,
     Force,
@@ -87,7 +88,9 @@ def evaluate(
 
             if truth is not None:
                 pairs = beside_truth(opened, known)
-            text = evaluation_page(opened, str(truth or photos), found, pairs, rows, faults)
+            text = evaluation_page(
+                opened, str(truth or photos), found, pairs, rows, faults, command=command_line()
+            )
             write_page(report, text, force=force)
     for fault in faults:
         warn(fault)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from nearfar.cli.command_line import command_line
 from nearfar.cli.options import Force, Quiet
 from nearfar.cli.saying import say, warn
 from nearfar.progress import progress_bar
@@ -31,5 +32,5 @@ def figures(
     names = check_names(only or [])
     check_output(output, force=force, replaceable=is_figures)
     with progress_bar("figures", quiet=quiet) as report:
-        make_figures(output, names, force=force, progress=report, note=warn)
+        make_figures(output, names, force=force, progress=report, note=warn, command=command_line())
     say(f"{', '.join(names)} drawn; open {output / INDEX}", quiet=quiet)

@@ -8,6 +8,7 @@ import typer
 
 from nearfar.arrays import parse_bytes
 from nearfar.cli.choices import choice
+from nearfar.cli.command_line import command_line
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import (
     AsJson,
@@ -122,7 +123,9 @@ def reconstruct(
         verdict = judge_transport(output, opened, progress=progress)
     say_reconstructed(summary, opened, output, quiet=quiet)
     if report is not None:
-        _write_report(report, output, opened, verdict, force=force)
+        _write_report(
+            report, output, opened, verdict, given=given is not None, force=force, quiet=quiet
+        )
         say(f"report written to {report}", quiet=quiet)
     if as_json:
         print(json.dumps(verdict.as_json()))
@@ -130,11 +133,30 @@ def reconstruct(
 
 
 def _write_report(
-    report: Path, output: Path, capture: "Capture", verdict: "Verdict", *, force: bool
+    report: Path,
+    output: Path,
+    capture: "Capture",
+    verdict: "Verdict",
+    *,
+    given: bool,
+    force: bool,
+    quiet: bool,
 ) -> None:
     from nearfar.report.page import write_page
     from nearfar.report.reconstruction import reconstruction_page
     from nearfar.transport.store import open_transport
+    from nearfar.workflow.diagnosis.misfit_maps import measure_misfit
 
-    text = reconstruction_page(open_transport(output), capture, verdict, with_flags)
+    transport = open_transport(output)
+    with progress_bar("reporting", quiet=quiet) as progress:
+        misfit = measure_misfit(transport, capture, progress)
+    text = reconstruction_page(
+        transport,
+        capture,
+        verdict,
+        with_flags,
+        misfit=misfit,
+        correspondence_given=given,
+        command=command_line(),
+    )
     write_page(report, text, force=force)

@@ -49,7 +49,9 @@ def relight(
     error_bars: Annotated[
         bool,
         typer.Option(
-            "--error-bars", help="Write the picture's standard deviation instead of the picture."
+            "--error-bars",
+            help="Write the picture's standard deviation instead of the picture, infinite where "
+            "the camera is saturated.",
         ),
     ] = False,
     force: Force = False,
@@ -75,6 +77,7 @@ def relight(
         projected = read_light(light, opened.projector, srgb=srgb)
         projected = as_channels_see(projected, opened.channels, opened.provenance)
         make = error_bars_of_stored if error_bars else relight_stored
-        write_picture(output, make(opened, projected, gains), force=force)
+        picture = make(opened, projected, gains)
+        write_picture(output, picture, force=force, may_be_infinite=error_bars)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"
     say(f"{what} of {opened.camera} written to {output}", quiet=quiet)

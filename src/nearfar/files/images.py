@@ -219,7 +219,9 @@ def check_picture_ending(path: Path) -> None:
         )
 
 
-def write_picture(path: Path, image: NDArray[np.float32], *, force: bool = False) -> None:
+def write_picture(
+    path: Path, image: NDArray[np.float32], *, force: bool = False, may_be_infinite: bool = False
+) -> None:
     """Write an image by the ending of its name, whole or not at all.
 
     Parameters
@@ -231,11 +233,14 @@ def write_picture(path: Path, image: NDArray[np.float32], *, force: bool = False
         Linear light, shape (y, x) or (y, x, 3); for ``.npy`` any number of channels.
     force : bool
         Replace a file that is there.
+    may_be_infinite : bool
+        Whether values may be infinite, as standard deviations of what is not known are; white in a
+        ``.png``.
 
     Raises
     ------
     InputError
-        For another ending or shape, NaN or infinities.
+        For another ending or shape, NaN, or infinities that are not allowed.
     ExistingOutputError, MissingFileError, StorageError
         As `nearfar.files.output.new_output`.
     """
@@ -249,7 +254,8 @@ def write_picture(path: Path, image: NDArray[np.float32], *, force: bool = False
             f"the image for {path} has the shape {image.shape}: give (y, x) or (y, x, 3), or "
             f"choose a name that ends in .npy, which holds any number of channels."
         )
-    require_finite(image, f"the image for {path}")
+    known = np.where(np.isposinf(image), 0, image) if may_be_infinite else image
+    require_finite(known, f"the image for {path}")
     with new_output(path, force=force) as partial:
         partial.write_bytes(_encode(path.suffix.lower(), image))
 
@@ -260,7 +266,7 @@ def _encode(ending: str, image: NDArray[np.float32]) -> bytes:
     if ending == ".exr":
         return codecs.encode_exr(image)
     if ending == ".png":
-        return codecs.encode_png(np.rint(255.0 * to_srgb(image)).astype(np.uint8))
+        return codecs.encode_png(np.rint(255.0 * to_srgb(np.clip(image, 0, 1))).astype(np.uint8))
     return codecs.encode_tiff(image)
 
 

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from nearfar.files import new_output
 from nearfar.markup import numbers
 from nearfar.report.figures.style import new_figure, save, styled
-from nearfar.report.page import listed, page, plot
+from nearfar.report.methods import comparison_methods
+from nearfar.report.page import figure_caption, listed, page, plot
 from nearfar.workflow.compare import Comparison, Trial
 from nearfar.workflow.rivals import RIVALS
 
@@ -24,6 +25,11 @@ TITLE = "nearfar: methods compared"
 MINIMUM_PLOTTED_SNR = 10.0
 MINIMUM_TICK_RATIO = 1.25
 PLOT_SHOWS = "SNR against photos and exposure"
+READING = (
+    "Each line is a method; higher is better, and 20 dB are an error of 10 %, 40 dB of 1 %. On the "
+    "left every photo is exposed alike; on the right all photos together get the same light, so "
+    "that methods of many photos gain nothing by their number."
+)
 BEST = (
     "The best on pictures of each budget at which several methods were tried is marked, with the "
     "budget."
@@ -39,8 +45,20 @@ def is_comparison(folder: Path) -> bool:
     return not entries or TITLE in (folder / INDEX).read_text(encoding="utf-8", errors="replace")
 
 
-def write_comparison(output: Path, comparison: Comparison, *, force: bool = False) -> None:
+def write_comparison(
+    output: Path, comparison: Comparison, *, force: bool = False, command: str | None = None
+) -> None:
     """Write a folder: ``index.html``, ``comparison.pdf``, ``.png`` and ``.json``.
+
+    Parameters
+    ----------
+    output : Path
+        Folder to create.
+    comparison : Comparison
+    force : bool
+        Whether to replace the folder of an earlier comparison.
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
 
     Raises
     ------
@@ -54,7 +72,7 @@ def write_comparison(output: Path, comparison: Comparison, *, force: bool = Fals
         save(figure, partial, PLOT)
         text = json.dumps(comparison.numbers(), indent=1, allow_nan=False)
         (partial / DATA).write_text(text, encoding="utf-8")
-        (partial / INDEX).write_text(comparison_page(comparison), encoding="utf-8")
+        (partial / INDEX).write_text(comparison_page(comparison, command), encoding="utf-8")
 
 
 def draw(comparison: Comparison) -> Figure:
@@ -179,20 +197,24 @@ def _ordered(trials: Sequence[Trial]) -> list[Trial]:
 TABLE_HEAD = ["method", "photos", "exposure", "pictures", "white", "random", "best of"]
 
 
-def standalone_page(comparison: Comparison) -> str:
+def standalone_page(comparison: Comparison, command: str | None = None) -> str:
     """Return the page with the plot inside, which needs no other file."""
     with styled():
         figure = draw(comparison)
-    return _page(comparison, plot(figure, PLOT_SHOWS), "")
+    return _page(comparison, plot(figure, PLOT_SHOWS, READING), "", command)
 
 
-def comparison_page(comparison: Comparison) -> str:
+def comparison_page(comparison: Comparison, command: str | None = None) -> str:
     """Return the page beside whose file those of the plot and the data lie."""
-    sheet = f'<figure class="sheet"><img src="{PLOT}.png" alt="{PLOT_SHOWS}"></figure>'
-    return _page(comparison, sheet, f'<a href="{PLOT}.pdf">PDF</a>, <a href="{DATA}">data</a>.')
+    sheet = (
+        f'<figure class="sheet"><img src="{PLOT}.png" alt="{PLOT_SHOWS}">'
+        f"{figure_caption('', READING)}</figure>"
+    )
+    links = f'<a href="{PLOT}.pdf">PDF</a>, <a href="{DATA}">data</a>.'
+    return _page(comparison, sheet, links, command)
 
 
-def _page(comparison: Comparison, sheet: str, links: str) -> str:
+def _page(comparison: Comparison, sheet: str, links: str, command: str | None) -> str:
     caption = (
         "Every method sees the same scene, camera and noise, and finds correspondence itself where "
         "it needs it; photos count stripes, inverses, references and black. The paper's method "
@@ -222,4 +244,5 @@ def _page(comparison: Comparison, sheet: str, links: str) -> str:
         marked = [place for place, trial in enumerate(_ordered(trials)) if trial in best]
         table = numbers(TABLE_HEAD, table_rows(trials), marked)
         body += [f"<h2>{title}</h2>", f"<p>{text} {BEST}</p>", table]
-    return page(TITLE, "\n".join(body))
+    methods = comparison_methods(comparison)
+    return page(TITLE, "\n".join(body), methods=methods, command=command)

@@ -36,7 +36,11 @@ def is_demo(folder: Path) -> bool:
 
 
 def run_demo(
-    output: Path, *, force: bool = False, progress: Callable[[str, float], None] | None = None
+    output: Path,
+    *,
+    force: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+    command: str | None = None,
 ) -> dict[str, Any]:
     """Run all steps on the built-in Cornell scene and write a report.
 
@@ -49,6 +53,8 @@ def run_demo(
         Whether to replace the folder of an earlier demo.
     progress : callable, optional
         Called with the name of a step and the share of it that is done.
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
 
     Returns
     -------
@@ -90,6 +96,8 @@ def run_demo(
             "penguin": penguin(PROJECTOR),
             "leaves": natural_picture(PROJECTOR, 1, colour=True),
         }
-        text = demo_page(plan, transport, truth, correspondence, lights, judgement, rows, seconds)
+        text = demo_page(
+            plan, transport, truth, correspondence, lights, judgement, rows, seconds, command
+        )
         (partial / REPORT).write_text(text, encoding="utf-8")
     return judgement

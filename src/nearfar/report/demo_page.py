@@ -10,6 +10,9 @@ from nearfar.correspondence import Correspondence
 from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
 from nearfar.report.differences import difference_gain
+from nearfar.report.evaluation import FREQUENCIES_READING, ROWS_READING
+from nearfar.report.maps import READINGS
+from nearfar.report.methods import reconstruction_methods
 from nearfar.report.page import colour_map, facts, gallery, page
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
@@ -25,6 +28,7 @@ def demo_page(
     judgement: Mapping[str, Any],
     rows: Rows,
     seconds: Mapping[str, float],
+    command: str | None = None,
 ) -> str:
     """Return the report of a demo as one self-contained HTML page.
 
@@ -43,6 +47,8 @@ def demo_page(
     rows : Rows
     seconds : mapping of str to float
         Duration of each step, by name.
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
     """
     snr_b = judgement["snr_b"]
     photos, brute_force = len(plan.patterns), plan.projector.pixels
@@ -50,8 +56,8 @@ def demo_page(
         [
             (str(photos), "photos in all, those of white and black too"),
             (f"{brute_force / photos:.1f}×", f"fewer than {brute_force} by brute force"),
-            (f"{snr_b['white']:.1f} dB", "SNR_b under floodlight"),
             (f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of five pictures"),
+            (f"{snr_b['white']:.1f} dB", "SNR_b under floodlight, which was measured itself"),
             (f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"),
         ]
     )
@@ -98,9 +104,12 @@ window of {transport.window} × {transport.window} and the far band could do on 
 <h2>Where it is good, and where less</h2>
 <div class="maps">{_maps(transport, correspondence, rows)}</div>
 <p></p>
-<p>{times}. Made by nearfar after Reddy, Ramamoorthi and Curless, ECCV 2012.</p>
+<p>{times}.</p>
 """
-    return page("nearfar: light transport, taken apart", body)
+    checked = "Relit pictures were compared with those of the simulated scene, which are exact."
+    methods = reconstruction_methods(transport, plan, checked)
+    title = "nearfar: light transport, taken apart"
+    return page(title, body, methods=methods, command=command)
 
 
 def _row(
@@ -121,17 +130,17 @@ def _maps(transport: Transport, correspondence: Correspondence, rows: Rows) -> s
     height, width = transport.projector
     low, high = np.nanpercentile(rows.snr_b_of_frequency, [1, 99])
     low_t, high_t = np.nanpercentile(rows.snr_t, [1, 99])
-    return "".join(
-        [
-            colour_map(rows.snr_t, low_t, high_t, "dB", "SNR_t of every camera pixel"),
-            colour_map(
-                rows.snr_b_of_frequency,
-                low,
-                high,
-                "dB",
-                "SNR_b under every frequency (kx, ky), DC in the middle",
-            ),
-            colour_map(q[..., 1], 0, width - 1, "px", "Correspondence: projector column"),
-            colour_map(q[..., 0], 0, height - 1, "px", "Correspondence: projector row"),
-        ]
+    maps = (
+        (rows.snr_t, low_t, high_t, "dB", "SNR_t of every camera pixel", ROWS_READING),
+        (
+            rows.snr_b_of_frequency,
+            low,
+            high,
+            "dB",
+            "SNR_b under every frequency (kx, ky), DC in the middle",
+            FREQUENCIES_READING,
+        ),
+        (q[..., 1], 0, width - 1, "px", "Correspondence: projector column", READINGS["column"]),
+        (q[..., 0], 0, height - 1, "px", "Correspondence: projector row", READINGS["row"]),
     )
+    return "".join(colour_map(*values, reading=reading) for *values, reading in maps)

@@ -9,11 +9,21 @@ import numpy as np
 from nearfar.markup import numbers, picture
 from nearfar.report.differences import difference_gain
 from nearfar.report.figures.style import new_figure, styled
+from nearfar.report.methods import evaluation_methods
 from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
 from nearfar.report.reconstruction import exposure_of, visible
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import HIGHEST, Rows
-from nearfar.workflow.judge import Pair, describe_units
+from nearfar.workflow.judge import Pair, describe_units, white_last
+
+# How to read the maps.
+ROWS_READING = (
+    "Dark: the light of single projector pixels is wrong there, although pictures may relight well."
+)
+FREQUENCIES_READING = (
+    "How well stripes of each frequency relight: coarse ones in the middle, fine ones outside. "
+    "Measured frequencies may stand out as dots; the darker, the worse."
+)
 
 
 def evaluation_page(
@@ -23,6 +33,8 @@ def evaluation_page(
     pairs: Mapping[str, Pair],
     rows: Rows | None = None,
     faults: Sequence[str] = (),
+    *,
+    command: str | None = None,
 ) -> str:
     """Return the report of an evaluation as one self-contained HTML page.
 
@@ -39,6 +51,8 @@ def evaluation_page(
         SNR of each row; given if the true transport is known.
     faults : sequence of str
         What is wrong with what was compared, a sentence each.
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
     """
     snr_b: Mapping[str, float] = judgement["snr_b"]
     ceiling = judgement.get("ceiling", {}).get("snr_b", {})
@@ -54,11 +68,15 @@ def evaluation_page(
     head = ["light", "SNR_b", *(["ceiling of the model, no noise"] if ceiling else [])]
     table = [
         [name, f"{value:.1f} dB", *([f"{ceiling[name]:.1f} dB"] if ceiling else [])]
-        for name, value in snr_b.items()
+        for name, value in white_last(snr_b).items()
     ]
     exposure = exposure_of(transport)
     gain = difference_gain(exposure * (pair.relit - pair.known) for pair in pairs.values())
-    gallery_rows = [(name, _cells(name, pair, exposure, gain)) for name, pair in pairs.items()]
+    white_says = ""
+    if "white" in snr_b:
+        white_says = " White was photographed itself, so that it is no measure of relighting."
+    shown = white_last(pairs)
+    gallery_rows = [(name, _cells(name, pair, exposure, gain)) for name, pair in shown.items()]
     columns = ["light", "relit", "known", f"difference × {gain}"]
     body = f"""
 <h1>How close the transport comes</h1>
@@ -71,11 +89,13 @@ SNR_t the same of a camera pixel's row of the transport.</p>
 them.</p>
 {gallery(columns, gallery_rows)}
 <h2>Figures</h2>
+<p>20 dB are an error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %.{white_says}</p>
 {numbers(head, table)}
 {_components(judgement)}
-{_row_section(rows)}
+{_row_section(rows, transport)}
 """
-    return page("nearfar: evaluation", body)
+    methods = evaluation_methods(transport.provenance, len(snr_b), by_truth=rows is not None)
+    return page("nearfar: evaluation", body, methods=methods, command=command)
 
 
 def _cells(name: str, pair: Pair, exposure: float, gain: int) -> list[str]:
@@ -108,24 +128,36 @@ def _decibels(value: float) -> str:
     return f"{value:.1f} dB" if value > -HIGHEST else "the scene has none"
 
 
-def _row_section(rows: Rows | None) -> str:
+def _row_section(rows: Rows | None, transport: Transport) -> str:
     if rows is None:
         return ""
+    saturated = None if transport.quality is None else transport.quality.saturated
+    snr_t = rows.snr_t if saturated is None else np.where(saturated, np.nan, rows.snr_t)
     with styled():
         figure = new_figure(2.2)
         axes = figure.subplots()
-        axes.hist(rows.snr_t[np.isfinite(rows.snr_t)], bins=60, color="#1f4e9c")
+        axes.hist(snr_t[np.isfinite(snr_t)], bins=60, color="#1f4e9c")
         axes.set(xlabel="SNR_t, dB", ylabel="camera pixels")
-    maps = [
-        (rows.snr_t, "SNR_t of every camera pixel"),
-        (rows.snr_b_of_frequency, "SNR_b under every frequency, DC in the middle"),
-    ]
+    reading = (
+        "The further to the right, the better. A second hump at the left is of camera pixels "
+        "that the model does not hold, or that see little light; the maps show where they are."
+    )
+    maps = (
+        (snr_t, saturated, "SNR_t of every camera pixel", ROWS_READING),
+        (
+            rows.snr_b_of_frequency,
+            None,
+            "SNR_b under every frequency, DC in the middle",
+            FREQUENCIES_READING,
+        ),
+    )
     drawn = ""
-    for values, caption in maps:
+    for values, marked, caption, how in maps:
         known = values[np.isfinite(values)]
-        low, high = np.percentile(known, [1, 99]) if known.size else (0.0, 1.0)
-        drawn += colour_map(values, float(low), float(high), "dB", caption)
+        low, high = map(float, np.percentile(known, [1, 99]) if known.size else (0.0, 1.0))
+        drawn += colour_map(values, low, high, "dB", caption, reading=how, saturated=marked)
     return (
-        f"<h2>Every camera pixel, every frequency</h2>{plot(figure, 'histogram of SNR_t')}"
+        f"<h2>Every camera pixel, every frequency</h2>"
+        f"{plot(figure, 'histogram of SNR_t', reading)}"
         f'<div class="maps">{drawn}</div>'
     )

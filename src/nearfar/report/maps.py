@@ -1,5 +1,7 @@
 """Maps of a transport: a value for each camera pixel.
 
+Saturated camera pixels have no value, and so no say in the colour scale; they are marked.
+
 Index convention: maps are over camera pixels [y, x]; channels are averaged.
 """
 
@@ -8,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Booleans, Floats
 from nearfar.errors import InputError
 from nearfar.estimate.joint import ErrorBars
+from nearfar.illumination.pictures import natural_picture, white
 from nearfar.transport.model import Transport
 
 # Titles for readers, by name.
@@ -18,12 +21,35 @@ TITLES = {
     "column": "projector column of q",
     "row": "projector row of q",
     "confidence": "confidence in q",
+    "picture-error": "relit picture over its error",
     "error": "floodlit picture over its error",
     "direct-error": "direct light over its error",
     "noise": "floodlit picture over a measurement's noise",
     "near-share": "near-range share of the floodlit picture",
     "far-share": "far-range share of the floodlit picture",
     "saturated": "saturated under white",
+}
+# How to read each.
+READINGS = {
+    "column": "Which projector column lights the camera pixel directly. It should change smoothly, "
+    "with steps only where one surface hides another.",
+    "row": "The same for the projector's rows.",
+    "confidence": "1: the photos show one place on the projector. Low values are common on dark "
+    "surfaces and at edges; direct and near-range light are unsure there.",
+    "picture-error": "Signal over one standard deviation, under a natural picture: 20 dB is an "
+    "error of 10 %, 40 dB of 1 %. Dark patches relight worst.",
+    "error": "The same under white. White is photographed itself, many times, so it is surer than "
+    "any other light.",
+    "direct-error": "The same of the direct light alone. It is less sure than relit pictures where "
+    "direct and near-range light can hardly be told apart.",
+    "noise": "Light under white over the noise of one measurement: the camera's noise, not the "
+    "estimate's error. Only the joint estimate has error bars.",
+    "near-share": "How much of the light comes from projector pixels close by: high on skin, wax "
+    "and marble, low on opaque surfaces.",
+    "far-share": "How much of the light came by way of other surfaces: high in shadows and "
+    "creases.",
+    "saturated": "1: at full scale under white in one channel or more. What was estimated there "
+    "is wrong; expose less.",
 }
 
 
@@ -37,6 +63,10 @@ class Map(NamedTuple):
         Ends of the colour scale.
     values : ndarray, shape (y, x), float32
         NaN where a camera pixel has no value.
+    reading : str
+        How to read it, a sentence or two.
+    saturated : ndarray of bool, shape (y, x), optional
+        Camera pixels that have no value as they are saturated.
     """
 
     title: str
@@ -44,33 +74,66 @@ class Map(NamedTuple):
     low: float
     high: float
     values: Floats
+    reading: str = ""
+    saturated: Booleans | None = None
 
 
 def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
     """Return the maps that a transport has data for, by name, as functions that compute them."""
     height, width = transport.projector
     q = transport.correspondence
-    maps: dict[str, Callable[[], Map]] = {
-        "column": lambda: Map(TITLES["column"], "px", 0, max(1, width - 1), q[..., 1]),
-        "row": lambda: Map(TITLES["row"], "px", 0, max(1, height - 1), q[..., 0]),
-    }
     quality = transport.quality
+    saturated = None if quality is None else quality.saturated
+
+    def plain(name: str, unit: str, high: float, values: Floats) -> Map:
+        values = values.astype(np.float32)
+        if saturated is not None:
+            values[saturated] = np.nan
+        return Map(TITLES[name], unit, 0.0, high, values, READINGS[name], saturated)
+
+    def ratio(name: str, signal: Floats, error: Floats) -> Map:
+        found = plain(name, "dB", 1.0, _decibels(signal, error))
+        low, high = _range(found.values, 1, 99)
+        return found._replace(low=low, high=max(high, low + 1))
+
+    def share(name: str, component: int) -> Map:
+        found = plain(name, "%", 1.0, _share(transport, component))
+        return found._replace(high=float(np.clip(_range(found.values, 0, 99)[1], 1.0, 100.0)))
+
+    def relit(light: Floats) -> Floats:
+        return (transport @ light).reshape(*transport.camera, -1)
+
+    def over_error(name: str, light: Floats) -> Map:
+        error = ErrorBars(transport).picture(light).reshape(*transport.camera, -1)
+        return ratio(name, relit(light), error)
+
+    floodlight = white(transport.projector)
+    maps: dict[str, Callable[[], Map]] = {
+        "column": lambda: plain("column", "px", max(1, width - 1), q[..., 1]),
+        "row": lambda: plain("row", "px", max(1, height - 1), q[..., 0]),
+    }
     if quality is not None:
-        maps["confidence"] = lambda: Map(
-            TITLES["confidence"], "", 0, 1, quality.confidence.astype(np.float32)
-        )
+        maps["confidence"] = lambda: plain("confidence", "", 1.0, quality.confidence)
     if transport.posterior is not None:
-        maps["error"] = lambda: _ratio(TITLES["error"], _floodlit(transport), _error(transport))
-        maps["direct-error"] = lambda: _ratio(
-            TITLES["direct-error"], transport.direct, ErrorBars(transport).direct()
+        maps["picture-error"] = lambda: over_error(
+            "picture-error", natural_picture(transport.projector, 1)
+        )
+        maps["error"] = lambda: over_error("error", floodlight)
+        maps["direct-error"] = lambda: ratio(
+            "direct-error", transport.direct, ErrorBars(transport).direct()
         )
     else:
-        maps["noise"] = lambda: _ratio(TITLES["noise"], _floodlit(transport), transport.noise)
-    maps["near-share"] = lambda: _share(transport, 1, TITLES["near-share"])
-    maps["far-share"] = lambda: _share(transport, 2, TITLES["far-share"])
+        maps["noise"] = lambda: ratio("noise", relit(floodlight), transport.noise)
+    maps["near-share"] = lambda: share("near-share", 1)
+    maps["far-share"] = lambda: share("far-share", 2)
     if quality is not None:
         maps["saturated"] = lambda: Map(
-            TITLES["saturated"], "", 0, 1, quality.saturated.astype(np.float32)
+            TITLES["saturated"],
+            "",
+            0.0,
+            1.0,
+            quality.saturated.astype(np.float32),
+            READINGS["saturated"],
         )
     return maps
 
@@ -88,34 +151,28 @@ def map_named(maps: Mapping[str, Callable[[], Map]], name: str) -> Map:
     return maps[name]()
 
 
-def _floodlit(transport: Transport) -> Floats:
-    light = np.ones(transport.projector, dtype=np.float32)
-    return (transport @ light).reshape(*transport.camera, -1)
-
-
-def _error(transport: Transport) -> Floats:
-    light = np.ones(transport.projector, dtype=np.float32)
-    return ErrorBars(transport).picture(light).reshape(*transport.camera, -1)
-
-
-def _ratio(title: str, values: Floats, errors: Floats) -> Map:
-    """Return the map of the ratio of mean squares over channels, in dB."""
+def _decibels(values: Floats, errors: Floats) -> Floats:
+    """Return the ratio of mean squares over channels, in dB; NaN where there is none."""
     signal, error = (np.mean(part.astype(np.float64) ** 2, axis=-1) for part in (values, errors))
     with np.errstate(divide="ignore", invalid="ignore"):
-        decibels = (10 * np.log10(signal / error)).astype(np.float32)
+        decibels = 10 * np.log10(signal / error)
     decibels[~np.isfinite(decibels)] = np.nan
-    finite = decibels[np.isfinite(decibels)]
-    low, high = np.percentile(finite, [1, 99]) if finite.size else (0.0, 1.0)
-    return Map(title, "dB", float(low), float(max(high, low + 1)), decibels)
+    return np.asarray(decibels)
 
 
-def _share(transport: Transport, component: int, title: str) -> Map:
-    parts = transport.components(np.ones(transport.projector, dtype=np.float32))
+def _share(transport: Transport, component: int) -> Floats:
+    """Return the share of a component in the floodlit picture, in percent; NaN without light."""
+    parts = transport.components(white(transport.projector))
     sums = np.stack([part.reshape(*transport.camera, -1).sum(axis=-1) for part in parts])
     with np.errstate(divide="ignore", invalid="ignore"):
         total = sums.sum(axis=0)
-        share = (100 * sums[component] / total).astype(np.float32)
+        share = 100 * sums[component] / total
     share[(total <= 0) | ~np.isfinite(share)] = np.nan
-    finite = share[np.isfinite(share)]
-    high = float(np.percentile(finite, 99)) if finite.size else 1.0
-    return Map(title, "%", 0.0, float(np.clip(high, 1.0, 100.0)), share)
+    return np.asarray(share)
+
+
+def _range(values: Floats, low: float, high: float) -> tuple[float, float]:
+    """Return two percentiles of the values that there are; 0 and 1 if there are none."""
+    finite = values[np.isfinite(values)]
+    first, last = np.percentile(finite, [low, high]) if finite.size else (0.0, 1.0)
+    return float(first), float(last)

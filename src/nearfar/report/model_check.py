@@ -8,6 +8,7 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.markup import numbers
+from nearfar.report.methods import check_methods
 from nearfar.report.page import colour_map, facts, listed, page, verdict_box
 from nearfar.workflow.check import ModelCheck
 from nearfar.workflow.conditioning import Conditioning
@@ -106,7 +107,13 @@ def check_rows(check: Mapping[str, Any]) -> list[list[str]]:
     ]
 
 
-def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Size) -> str:
+def check_page(
+    name: str,
+    check: ModelCheck,
+    condition: Conditioning,
+    camera: Size,
+    command: str | None = None,
+) -> str:
     """Return a page on how well the model holds on a scene.
 
     Parameters
@@ -117,16 +124,27 @@ def check_page(name: str, check: ModelCheck, condition: Conditioning, camera: Si
         Its maps are drawn if it covers every camera pixel.
     condition : Conditioning
     camera : Size
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
     """
     verdict = judge_check(check)
     shares = facts([(f"{share:.1%}", f"{part} light") for part, share in check.floodlit.items()])
     maps = ""
     if check.camera_pixels == camera.pixels:
         captioned = (
-            (check.far_beyond_map, "far-range energy beyond k_far and outside the window"),
-            (check.checkerboard_map, "N + F over D at the checkerboard"),
+            (
+                check.far_beyond_map,
+                "far-range energy beyond k_far and outside the window",
+                "Bright: light that neither the window nor the far band holds, as at creases and "
+                "mirrors. A larger far band or W helps there.",
+            ),
+            (
+                check.checkerboard_map,
+                "N + F over D at the checkerboard",
+                "Bright: the paper's direct light is off by this share. Grey: no direct light.",
+            ),
         )
-        maps = "".join(_map(values.reshape(camera), caption) for values, caption in captioned)
+        maps = "".join(_map(values.reshape(camera), *texts) for values, *texts in captioned)
         maps = f'<h2>Where it does not</h2><div class="maps">{maps}</div>'
     body = f"""
 <h1>Where the model holds: {escape(name)}</h1>
@@ -140,11 +158,12 @@ over {check.camera_pixels} camera pixels.{SPLIT_BY_MODEL if check.is_split_by_mo
 {numbers(list(HEAD), check_rows(numbers_of(check, condition)))}
 {maps}
 <h2>Words</h2>
-{numbers(["word", "meaning"], [list(pair) for pair in WORDS])}
+<div class="words">{numbers(["word", "meaning"], [list(pair) for pair in WORDS])}</div>
 """
-    return page(f"nearfar: where the model holds on {name}", body)
+    title = f"nearfar: where the model holds on {name}"
+    return page(title, body, methods=check_methods(check), command=command)
 
 
-def _map(values: Any, caption: str) -> str:
+def _map(values: Any, caption: str, reading: str) -> str:
     high = float(np.nanpercentile(values, 99)) if np.isfinite(values).any() else 0.0
-    return colour_map(100 * values, 0.0, max(100 * high, 1.0), "%", caption)
+    return colour_map(100 * values, 0.0, max(100 * high, 1.0), "%", caption, reading=reading)

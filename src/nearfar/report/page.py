@@ -8,15 +8,16 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Booleans, Floats
 from nearfar.files import new_output
 from nearfar.markup import SCALE, embedded, false_colour
+from nearfar.report.about import Methods, about_page
 from nearfar.report.figures.style import DPI, styled
 
 # Colours of the light and the dark theme; data-theme on the root overrides the browser's choice.
 _LIGHT = """--ink: #1d2129; --soft: #5b6472; --line: #dfe3e8; --back: #f7f8fa; --card: #ffffff;
   --edge: #8a93a0; --mark: #1f6ec9; --bad: #b3261e; --near: #c2561a; --far: #2f855f;
-  color-scheme: light;"""
+  --saturated: #d6285a; color-scheme: light;"""
 _DARK = """--ink: #e8eaed; --soft: #a0a8b4; --line: #343a44; --back: #14171c; --card: #1d2128;
   --edge: #6b7482; --mark: #6aa9f5; --bad: #ff8a80; --near: #f0874a; --far: #58c496;
   color-scheme: dark;"""
@@ -25,6 +26,8 @@ _THEMES = (
     f"@media (prefers-color-scheme: dark) {{ :root:not([data-theme=light]) {{ {_DARK} }} }}\n"
     f":root[data-theme=dark] {{ {_DARK} }}\n"
 )
+
+SATURATED_KEY = '<figcaption class="mark">saturated: not measured</figcaption>'
 
 STYLE = (
     _THEMES
@@ -66,35 +69,88 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .broad .numbers { max-width: none; }
 .broad .numbers td:first-child { min-width: 14rem; }
 .maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }
+.beside { display: grid; grid-template-columns: repeat(auto-fit, minmax(280px, 1fr)); gap: 1.6rem;
+  align-items: start; }
 figure { margin: 0; }
+.words .numbers td { text-align: left; }
+.sheet { margin-bottom: 1.2rem; }
 .sheet img { image-rendering: auto; background: #ffffff; }
 figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
 .scale { display: flex; justify-content: space-between; font-size: .75rem; color: var(--soft); }
 .findings { max-width: 46rem; padding-left: 1.2rem; }
+.mark::before { content: ""; display: inline-block; width: .7em; height: .7em; border-radius: 2px;
+  margin-right: .4em; background: var(--saturated); }
+.references { max-width: 46rem; padding-left: 1.6rem; color: var(--soft); font-size: .9rem; }
+.about { display: grid; grid-template-columns: max-content 1fr; gap: .3rem 1rem; margin: .6rem 0 0;
+  max-width: 46rem; font-size: .9rem; }
+.about dt { color: var(--soft); }
+.about dd { margin: 0; overflow-wrap: anywhere; }
 .bar { height: 8px; border-radius: 4px; margin-top: .5rem; }
 """
 )
 
 
-def page(title: str, body: str) -> str:
-    """Return a whole HTML page."""
+def page(
+    title: str, body: str, *, methods: Methods | None = None, command: str | None = None
+) -> str:
+    """Return a whole HTML page, which ends with its methods, its date and what made it.
+
+    Parameters
+    ----------
+    title, body : str
+    methods : Methods, optional
+    command : str, optional
+        The command line that was typed.
+    """
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f"{body}\n</main>\n</body>\n</html>\n"
+        f"{body}\n{about_page(methods, command)}\n</main>\n</body>\n</html>\n"
     )
 
 
-def colour_map(values: Floats, low: float, high: float, unit: str, caption: str) -> str:
-    """Return a <figure> of values in false colour with its scale."""
+def colour_map(
+    values: Floats,
+    low: float,
+    high: float,
+    unit: str,
+    caption: str,
+    *,
+    reading: str = "",
+    saturated: Booleans | None = None,
+) -> str:
+    """Return a <figure> of values in false colour with its scale.
+
+    Parameters
+    ----------
+    values : ndarray, shape (y, x)
+        NaN where there is no value.
+    low, high : float
+        Ends of the colour scale.
+    unit, caption : str
+    reading : str
+        How to read it, a sentence or two.
+    saturated : ndarray of bool, shape (y, x), optional
+        Camera pixels that are marked as saturated.
+    """
     stops = ", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
+    digits = 0 if high - low >= 10 else 1
+    ends = "".join(f"<span>{value:.{digits}f} {escape(unit)}</span>" for value in (low, high))
+    marks = saturated is not None and bool(saturated.any())
     return (
-        f"<figure>{embedded(false_colour(values, low, high), caption)}"
+        f"<figure>{embedded(false_colour(values, low, high, saturated), caption)}"
         f'<div class="bar" style="background: linear-gradient(to right, {stops})"></div>'
-        f'<div class="scale"><span>{low:.0f} {unit}</span><span>{high:.0f} {unit}</span></div>'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
+        f'<div class="scale">{ends}</div>'
+        f"{figure_caption(caption, reading)}"
+        f"{SATURATED_KEY if marks else ''}</figure>"
     )
+
+
+def figure_caption(caption: str, reading: str) -> str:
+    """Return what a figure shows, and how to read it."""
+    first = f"<b>{escape(caption[:1].upper() + caption[1:])}.</b> " if caption else ""
+    return f"<figcaption>{first}{escape(reading)}</figcaption>" if caption or reading else ""
 
 
 def verdict_box(grade: str, text: str) -> str:
@@ -142,13 +198,13 @@ def write_page(path: Path, text: str, *, force: bool = False) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
-def plot(figure: Figure, description: str) -> str:
-    """Return an <img> of a figure."""
+def plot(figure: Figure, description: str, reading: str = "") -> str:
+    """Return a <figure> of a plot, with how to read it."""
     data = BytesIO()
     with styled():
         figure.savefig(data, format="png", dpi=DPI, metadata={"Software": None})
     encoded = base64.b64encode(data.getvalue()).decode("ascii")
     return (
         f'<figure class="sheet"><img alt="{escape(description)}" '
-        f'src="data:image/png;base64,{encoded}"></figure>'
+        f'src="data:image/png;base64,{encoded}">{figure_caption("", reading)}</figure>'
     )

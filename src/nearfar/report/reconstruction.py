@@ -15,14 +15,21 @@ from nearfar.illumination.pictures import natural_picture, white
 from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
 from nearfar.report.figures.style import new_figure, styled
-from nearfar.report.maps import Map, maps_of
+from nearfar.report.maps import TITLES, Map, maps_of
+from nearfar.report.methods import checked_by_photos, counted, reconstruction_methods
+from nearfar.report.misfit import misfit_section
 from nearfar.report.page import colour_map, facts, gallery, listed, page, plot, verdict_box
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
+from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps
 from nearfar.workflow.verdict.verdict import Verdict
 
 # Larger cameras are displayed at every second row and column, every third, and so on.
 MAXIMUM_DISPLAYED_PIXELS = 2**17
+HISTOGRAM_READING = (
+    "How many camera pixels are how sure. The further to the right, the better; a hump at the left "
+    "is of dark surfaces, which few photons reach. Saturated camera pixels are left out."
+)
 PURPOSES = {
     "direct": "direct light: the checkerboard",
     "near": "near-range light",
@@ -38,6 +45,10 @@ def reconstruction_page(
     capture: Capture,
     verdict: Verdict,
     reword: Callable[[str], str] = str,
+    *,
+    misfit: MisfitMaps | None = None,
+    correspondence_given: bool = False,
+    command: str | None = None,
 ) -> str:
     """Return the report of a transport as one self-contained HTML page.
 
@@ -50,6 +61,13 @@ def reconstruction_page(
         On the transport.
     reword : callable, optional
         Rewords a fault, such as for readers who use the command line.
+    misfit : MisfitMaps, optional
+        Where photos and relit pictures differ, as
+        `nearfar.workflow.diagnosis.misfit_maps.measure_misfit` returns it.
+    correspondence_given : bool
+        Whether q was given, and not found in the photos.
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
 
     Raises
     ------
@@ -60,13 +78,14 @@ def reconstruction_page(
     transport = stored.thinned(step)
     exposure = exposure_of(transport)
     maps = {name: compute() for name, compute in maps_of(transport).items()}
-    snr = maps.get("error", maps.get("noise"))
+    snr = maps.get("picture-error", maps.get("noise"))
     assert snr is not None
     finite = snr.values[np.isfinite(snr.values)]
     median = f"{np.median(finite):.1f} dB" if finite.size else "none"
     plan = capture.plan
     cards = facts(
         [
+            *_relit_pictures(verdict),
             (str(len(plan.patterns)), "photos"),
             (
                 f"{plan.projector.pixels / len(plan.patterns):.1f}×",
@@ -76,6 +95,7 @@ def reconstruction_page(
             (str(stored.projector), "projector pixels"),
             (f"{transport.lit.mean():.1%}", "of camera pixels see direct light"),
             (median, f"{snr.title}, median"),
+            *_saturated(transport),
         ]
     )
     faults = [*map(str, find_faults(capture, stored.provenance)), *capture.alarms]
@@ -90,21 +110,45 @@ def reconstruction_page(
 {f"<h2>What to look at</h2>{listed(faults)}" if faults else ""}
 <h2>Relit, and taken apart</h2>
 <p>Direct light comes from one projector pixel, near-range light from the window around it,
-far-range light from everywhere. {_exposure_note(exposure)}</p>
+far-range light from everywhere; together they are the relit picture. {_exposure_note(exposure)}</p>
 {gallery(["light", "direct", "near-range", "far-range", "relit"], _rows(transport, exposure))}
 <h2>Maps</h2>
-<p>Grey where there is no value: no direct light is seen there.</p>
+<p>Grey where there is no value, such as where no direct light is seen.</p>
 <div class="maps">{"".join(_map(each) for each in maps.values())}</div>
 <h2>How sure</h2>
 <p>{_explain(snr)}</p>
-{plot(_histogram(snr), "histogram of " + snr.title)}
+{plot(_histogram(snr), "histogram of " + snr.title, HISTOGRAM_READING)}
 {_held_out(verdict)}
+{misfit_section(misfit)}
 <h2>The plan</h2>
 {_plan_table(plan)}
 <h2>Where it comes from</h2>
 {numbers(["what", "value"], _provenance(stored, capture))}
 """
-    return page(f"nearfar: {stored.path.name}", body)
+    methods = reconstruction_methods(
+        stored,
+        plan,
+        checked_by_photos(verdict.held_out),
+        correspondence_given=correspondence_given,
+    )
+    return page(f"nearfar: {stored.path.name}", body, methods=methods, command=command)
+
+
+def _relit_pictures(verdict: Verdict) -> list[tuple[str, str]]:
+    """Return the cards of relit pictures, which lead."""
+    if verdict.held_out is None:
+        return []
+    expected = verdict.held_out.expected_snr
+    beside = "" if expected is None else f"; {expected:.1f} dB expected"
+    return [(f"{verdict.held_out.snr:.1f} dB", f"held-out SNR_b: pictures no estimate saw{beside}")]
+
+
+def _saturated(transport: Transport) -> list[tuple[str, str]]:
+    """Return the card of saturated camera pixels, if there are some."""
+    if transport.quality is None or not transport.quality.saturated.any():
+        return []
+    share = transport.quality.saturated.mean()
+    return [(f"{share:.1%}", "of camera pixels are saturated: marked, with unknown errors")]
 
 
 def _held_out(verdict: Verdict) -> str:
@@ -145,8 +189,8 @@ def _exposure_note(exposure: float) -> str:
 
 def _rows(transport: Transport, exposure: float) -> list[tuple[str, list[str]]]:
     lights = {
-        "white": white(transport.projector),
         "a picture": natural_picture(transport.projector, 1),
+        "white": white(transport.projector),
     }
     rows = []
     for name, light in lights.items():
@@ -167,18 +211,13 @@ def visible(image: Floats) -> Floats:
     return image[..., :3] if image.shape[2] > 3 else image.mean(axis=-1)
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, in the plural unless it is 1."""
-    return f"{number} {noun}{'s' * (number != 1)}"
-
-
 def _explain(snr: Map) -> str:
     """Describe the histogram in words."""
-    if snr.title.startswith("floodlit picture over its error"):
+    if snr.title == TITLES["picture-error"]:
         return (
-            "Signal over one standard deviation, under white, of every camera pixel: 20 dB is an "
-            "error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %. It is of relit pictures; how light is "
-            "split into direct, near and far is less sure."
+            "Signal over one standard deviation, under a natural picture, of every camera pixel: "
+            "20 dB is an error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %. It is of relit pictures; how "
+            "light is split into direct, near and far is less sure."
         )
     return (
         "Light under white over the noise of one measurement. Only the joint estimate has "
@@ -187,7 +226,15 @@ def _explain(snr: Map) -> str:
 
 
 def _map(each: Map) -> str:
-    return colour_map(each.values, each.low, each.high, each.unit, each.title)
+    return colour_map(
+        each.values,
+        each.low,
+        each.high,
+        each.unit,
+        each.title,
+        reading=each.reading,
+        saturated=each.saturated,
+    )
 
 
 def _histogram(each: Map) -> Figure:

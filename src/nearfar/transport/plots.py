@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Booleans, Floats
 from nearfar.checks import as_place
 from nearfar.errors import InputError
 from nearfar.files import to_srgb
+from nearfar.markup import MARK
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.transport.band import Banded, band_edge
 from nearfar.transport.posterior import deviation_of_mean
+from nearfar.transport.quality import Quality
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +30,10 @@ PARTS = ("direct", "near", "far")
 
 class Drawable(Apart, Banded, Protocol):
     """The attributes of `nearfar.Transport` that the drawings need."""
+
+    @property
+    def quality(self) -> Quality | None:
+        """Which camera pixels are saturated, where the photos show it."""
 
     def __matmul__(self, light: Floats) -> Floats: ...
 
@@ -95,12 +101,22 @@ class Plots:
         ]
 
     def correspondence(self, axis: str = "x", *, ax: "Axes | None" = None) -> "Axes":
-        """Draw q: the projector's column ("x") or row ("y") that lights each camera pixel."""
+        """Draw q: the projector's column ("x") or row ("y") that lights each camera pixel.
+
+        Saturated camera pixels are marked, and left out of the colour scale.
+        """
         if axis not in {"x", "y"}:
             raise InputError(f"{axis!r} is no axis of q: give 'x' or 'y'.")
         drawn = _axes(ax)
-        image = drawn.imshow(self._transport.correspondence[..., "yx".index(axis)], cmap="viridis")
+        saturated = self._saturated()
+        q = self._transport.correspondence[..., "yx".index(axis)]
+        image = drawn.imshow(np.where(saturated, np.nan, q), cmap="viridis")
         drawn.figure.colorbar(image, ax=drawn, label=f"q along {axis}, projector pixels")
+        if saturated.any():
+            marks = np.zeros((*saturated.shape, 4), dtype=np.uint8)
+            marks[saturated] = (*MARK, 255)
+            drawn.imshow(marks)
+            drawn.set_xlabel("red: saturated")
         return _bare(drawn, "correspondence")
 
     def row(
@@ -119,7 +135,8 @@ class Plots:
             Camera pixel.
         errors : ErrorBars, optional
             Adds a band of one standard deviation of the mean over channels, whose errors are taken
-            to be independent.
+            to be independent; over the whole plot at a saturated camera pixel, of which nothing is
+            known.
         ax : Axes, optional
         """
         transport, pixel = self._transport, self._pixel(y, x)
@@ -131,7 +148,7 @@ class Plots:
         for number, (name, values) in enumerate(zip(PARTS, rows, strict=True)):
             level = np.abs(values[0].mean(axis=0).reshape(height, width)[line])
             (drawn_line,) = drawn.semilogy(level, label=name)
-            if bars is not None:
+            if bars is not None and np.isfinite(bars[number]).all():
                 off = deviation_of_mean(bars[number])
                 low = np.maximum(level - off, 1e-12)
                 drawn.fill_between(
@@ -140,7 +157,11 @@ class Plots:
         drawn.set(xlabel=f"projector column, row {line}", ylabel="transport, photo units")
         most = max(float(np.abs(part).max()) for part in rows)
         drawn.set_ylim(bottom=most * 10.0**-LINE_DECADES if most > 0 else None)
-        drawn.set_title(f"camera pixel ({y}, {x})")
+        is_saturated = bool(self._saturated()[y, x])
+        if is_saturated and bars is not None:
+            drawn.axhspan(0, 1, transform=drawn.transAxes, alpha=0.15, color="grey")
+        says = ", saturated: errors unknown" if is_saturated else ""
+        drawn.set_title(f"camera pixel ({y}, {x}){says}")
         drawn.legend()
         return drawn
 
@@ -175,6 +196,12 @@ class Plots:
         picture = self._transport.column(y, x)
         picture = picture if picture.ndim == 2 else picture.mean(axis=-1)
         return _bare(_logarithm(_axes(ax), picture), f"lit by projector pixel ({y}, {x})")
+
+    def _saturated(self) -> Booleans:
+        quality = self._transport.quality
+        if quality is None:
+            return np.zeros(self._transport.camera, dtype=bool)
+        return quality.saturated
 
     def _pixel(self, y: int, x: int) -> slice:
         camera = self._transport.camera

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from nearfar.errors import InputError
 from nearfar.files import from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
-from nearfar.markup import SCALE
+from nearfar.markup import MARK, SCALE
 from nearfar.release import version
 from nearfar.report.maps import TITLES, Map, map_named
 from nearfar.viewer.decoding import decode_in_process
@@ -39,6 +39,7 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "plan": plan if isinstance(plan, dict) else None,
         "maps": [{"name": name, "title": TITLES[name]} for name in maps],
         "scale": SCALE.tolist(),
+        "mark": list(MARK),
     }
 
 
@@ -58,8 +59,10 @@ def pack_column(transport: InteractiveTransport, y: int, x: int) -> bytes:
 def pack_map(maps: Mapping[str, Callable[[], Map]], name: str) -> bytes:
     """Compute and pack a map; raises as `nearfar.report.maps.map_named`."""
     found = map_named(maps, name)
-    header = {name: getattr(found, name) for name in ("title", "unit", "low", "high")}
-    return pack(header, np.asarray(found.values, dtype=np.float32))
+    header = {name: getattr(found, name) for name in ("title", "unit", "low", "high", "reading")}
+    values = np.asarray(found.values, dtype=np.float32)
+    saturated = np.zeros(values.shape, bool) if found.saturated is None else found.saturated
+    return pack(header, values, saturated.astype(np.uint8))
 
 
 def encode_relit_exr(transport: InteractiveTransport, light: Light, gains: Gains) -> bytes:

@@ -30,7 +30,8 @@ class TransportRow(NamedTuple):
         D + N, and F.
     window_error, far_error : ndarray, shape (Px,), float32
         Standard deviations along the projector row of q (``line`` in the header), for errors that
-        are independent between channels; 0 if the transport has no posterior.
+        are independent between channels; 0 if the transport has no posterior, infinite if the
+        camera pixel is saturated.
     spectrum : ndarray, shape (Py, Px), float32
         Magnitude of the row's Fourier transform in dB, 0 for the largest, DC in the middle.
     """
@@ -64,17 +65,24 @@ def transport_row(transport: Transport, x: int) -> TransportRow:
         errors[0] = deviation_of_mean(np.hypot(d_error, n_error))
         errors[1] = deviation_of_mean(f_error)
     quality = transport.quality
+    saturated = None if quality is None else bool(quality.saturated[0, x])
     header: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
         "line": line,
         "window": transport.window,
-        "no_errors": "the joint estimate tells them" if transport.posterior is None else "",
+        "no_errors": _why_no_errors(transport, saturated=saturated),
         "confidence": None if quality is None else float(quality.confidence[0, x]),
-        "saturated": None if quality is None else bool(quality.saturated[0, x]),
+        "saturated": saturated,
         "floodlit": {"direct": float(d.sum()), "near": float(n.sum()), "far": float(f.sum())},
         **_bands(transport),
     }
     return TransportRow(header, window, far, errors[0], errors[1], _spectrum(window + far))
+
+
+def _why_no_errors(transport: Transport, *, saturated: bool | None) -> str:
+    if transport.posterior is None:
+        return "the joint estimate tells them"
+    return "they are unknown" if saturated else ""
 
 
 def _spectrum(row: Floats) -> Floats:

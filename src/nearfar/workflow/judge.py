@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,6 +31,9 @@ REMARKS = ("exposure", "exposure_is_fitted", "pixels_without_light", "pairs_with
 # A truth whose own best exposure is this many times the recorded one, or a part of it, is in
 # other units.
 LARGEST_RATIO_OF_EXPOSURES = 1.25
+
+
+Value = TypeVar("Value")
 
 
 class Pair(NamedTuple):
@@ -92,8 +95,8 @@ def judge_by_truth(
         "exposure": factor,
         "exposure_is_fitted": exposure.is_fitted,
         "pixels_without_light": int(np.isnan(rows.snr_t).sum()),
-        "snr_b": found,
         "snr_b_pictures": _mean_of_pictures(found),
+        "snr_b": white_last(found),
         "snr_b_frequency": percentiles(rows.snr_b_of_frequency),
         "snr_t": percentiles(rows.snr_t),
         "snr": {"T": components.pop("T")},
@@ -107,9 +110,17 @@ def judge_by_truth(
             "model": split_snr(transport, fitted),
             "floodlit": floodlit_snr(transport, truth, factor),
         }
-        numbers["ceiling"] = {"snr_b": ceiling, "snr_b_pictures": _mean_of_pictures(ceiling)}
+        numbers["ceiling"] = {
+            "snr_b_pictures": _mean_of_pictures(ceiling),
+            "snr_b": white_last(ceiling),
+        }
         report("model's truth", 1.0)
     return numbers
+
+
+def white_last(of_lights: Mapping[str, Value]) -> dict[str, Value]:
+    """Return what there is of each light, white at the end: it is measured, not relit."""
+    return dict(sorted(of_lights.items(), key=lambda item: item[0] == "white"))
 
 
 def describe_units(judgement: Mapping[str, Any]) -> list[str]:

@@ -27,6 +27,7 @@ from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
+from nearfar.transport.quality import Quality
 from nearfar.workflow.acquire import acquire_in_memory
 
 PROJECTOR = Size(12, 16)
@@ -276,6 +277,26 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     variance += s**2 * unseen.sum() / PROJECTOR.pixels**2
     found = ErrorBars(transport).picture(light)[0, 0]
     assert found == pytest.approx(np.sqrt(variance), rel=2e-3)
+
+
+def test_nothing_is_known_of_saturated_camera_pixels():
+    transport = _transport(np.array([[5.0, 7.0], [3.0, 4.0]]))
+    known, light = ErrorBars(transport), np.random.default_rng(0).random(PROJECTOR)
+    saturated = np.array([[False, True]])
+    quality = Quality(np.ones((1, 2), np.float32), saturated)
+    bars = ErrorBars(replace(transport, quality=quality))
+    for found, before in (
+        (bars.picture(light), known.picture(light)),
+        (bars.direct()[..., 0], known.direct()[..., 0]),
+    ):
+        np.testing.assert_array_equal(np.isinf(found), saturated)
+        np.testing.assert_array_equal(found[~saturated], before[~saturated])
+    for row, before in zip(bars.component_rows(slice(0, 2)), known.along(0, 4), strict=True):
+        assert np.isinf(row[1]).all()
+        np.testing.assert_array_equal(row[0].reshape(-1, *PROJECTOR)[:, 4], before)
+    # No NaN, also where there is no direct light.
+    dark = replace(_transport(np.array([[5.0, 7.0], [3.0, 4.0]]), lit=False), quality=quality)
+    assert np.isinf(ErrorBars(dark).direct()[0, 1]).all()
 
 
 def test_a_transport_without_posterior_says_so():

@@ -69,6 +69,7 @@ def test_a_second_run_measures_nothing_and_draws_the_same(
     drawn_once, small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     shutil.copytree(drawn_once.cache, tmp_path / "cache")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     make_figures(tmp_path / "two", ["2", "5"])
     assert small == []
     names = {path.name for path in (tmp_path / "two").iterdir()}

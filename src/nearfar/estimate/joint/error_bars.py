@@ -80,6 +80,10 @@ class ErrorBars:
     they are multiplied by the ``widening`` of the transport's verdict. Those of components are of
     the model's split (d at q, n in the window, f in the band), not of the physical one.
 
+    Where a camera pixel is saturated under white, nothing is known of its light: its standard
+    deviations are infinite. Means over a picture leave such pixels out,
+    ``sigma[numpy.isfinite(sigma)]``, and weights of 1 / sigma^2 are 0 there.
+
     Parameters
     ----------
     transport : Transport
@@ -112,6 +116,12 @@ class ErrorBars:
         self._centres = near.centre(transport.correspondence, transport.projector)
         kept = set(transport.far_basis.frequencies)
         self._is_held = np.array([basis.frequencies[i] in kept for i in basis.index])
+        quality = transport.quality
+        self._unknown = (
+            np.zeros(transport.camera.pixels, dtype=bool)
+            if quality is None
+            else quality.saturated.ravel()
+        )
 
     def picture(
         self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
@@ -127,7 +137,7 @@ class ErrorBars:
         Returns
         -------
         ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
-            Photo units.
+            Photo units; infinite at saturated camera pixels.
         """
         transport = self._transport
         lights = transport.lights(light)
@@ -142,22 +152,28 @@ class ErrorBars:
                     found[batch] = deviation
                 else:
                     found[batch, place] = deviation[:, place]
+        found[self._unknown] = np.inf
         return transport.picture(found)
 
     def direct(self) -> Floats:
-        """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light."""
+        """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light.
+
+        Infinite at saturated camera pixels.
+        """
         transport = self._transport
         found = np.empty((transport.camera.pixels, transport.channels), dtype=np.float32)
         for batch in blocks(len(found), BATCH_PIXELS):
             found[batch] = np.sqrt(self._variance(batch, self._of_direct(len(found[batch]))))
         found *= transport.lit.reshape(-1, 1)
+        found[self._unknown] = np.inf
         return found.reshape(*transport.camera, transport.channels)
 
     def component_rows(self, pixels: slice) -> Components:
         """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
 
         N and F are the model's: n in the window, f at the frequencies of the far band that the
-        transport holds. Some milliseconds for each thousand projector pixels and camera pixel.
+        transport holds. Infinite at saturated camera pixels. Some milliseconds for each thousand
+        projector pixels and camera pixel.
         """
         selected = range(*pixels.indices(self._transport.camera.pixels))
         shape = (0, self._transport.channels, self._transport.projector.pixels)
@@ -204,6 +220,8 @@ class ErrorBars:
         first, last = lines.start * width, lines.stop * width
         inside = near.inside(self._centres[one], transport.window, transport.projector)[0]
         d = np.zeros((transport.channels, last - first), dtype=np.float32)
+        if self._unknown[c]:
+            return Components(*(np.full_like(d, np.inf) for _ in Components._fields))
         n, f = np.zeros_like(d), np.empty_like(d)
         if transport.lit.ravel()[c]:
             deviation = np.sqrt(self._variance(one, self._of_direct(1)))[0]

@@ -12,6 +12,7 @@ from nearfar.report.figures import NAMES
 from nearfar.report.figures.sheets import SHEETS
 from nearfar.report.figures.style import save, styled
 from nearfar.report.figures.table import relighting_rows, table
+from nearfar.report.methods import figures_methods
 from nearfar.report.model_check import HEAD, check_rows
 from nearfar.report.page import page
 from nearfar.workflow.experiments.data import Data, kept, together, write_data
@@ -57,6 +58,7 @@ def make_figures(
     force: bool = False,
     progress: Report | None = None,
     note: Callable[[str], None] | None = None,
+    command: str | None = None,
 ) -> dict[str, Data]:
     """Draw figures into a folder.
 
@@ -72,6 +74,8 @@ def make_figures(
         Called with the name of a step and the share of it that is done.
     note : callable, optional
         Called with a sentence on why saved data are computed again.
+    command : str, optional
+        As `nearfar.report.page.page` takes it.
 
     Returns
     -------
@@ -101,7 +105,7 @@ def make_figures(
         for number, name in enumerate(drawn):
             _draw(partial, name, found[name])
             report("drawing", (number + 1) / len(drawn))
-        text = index_page(drawn, found, with_table="table" in chosen)
+        text = index_page(drawn, found, with_table="table" in chosen, command=command)
         (partial / INDEX).write_text(text, encoding="utf-8")
     return found
 
@@ -121,7 +125,9 @@ def _draw(folder: Path, name: str, data: Data) -> None:
     write_data(folder / f"figure-{name}.npz", f"figure {name}", sheet.data_of(data))
 
 
-def index_page(drawn: list[str], found: dict[str, Data], *, with_table: bool) -> str:
+def index_page(
+    drawn: list[str], found: dict[str, Data], *, with_table: bool, command: str | None = None
+) -> str:
     """Return the page that shows the figures and the tables."""
     body = [
         "<h1>The paper's figures, from data made here</h1>",
@@ -140,7 +146,7 @@ def index_page(drawn: list[str], found: dict[str, Data], *, with_table: bool) ->
         )
     if with_table:
         body += _tables(found)
-    return page(TITLE, "\n".join(body))
+    return page(TITLE, "\n".join(body), methods=figures_methods(), command=command)
 
 
 def _tables(found: dict[str, Data]) -> list[str]:

@@ -61,9 +61,9 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float) -> Figure:
-    """Return a figure of the page's width, `height` inches high."""
-    return Figure(figsize=(FIGURE_WIDTH, height))
+def new_figure(height: float, width: float = FIGURE_WIDTH) -> Figure:
+    """Return a figure of the page's width, or of another, `height` inches high."""
+    return Figure(figsize=(width, height))
 
 
 def bands(figure: Figure, heights: Sequence[float]) -> list[SubFigure]:

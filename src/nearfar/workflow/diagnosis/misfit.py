@@ -88,8 +88,10 @@ class PhotoFits(Fits):
     without_drift: PhotosWithoutDrift
 
 
-def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> PhotoFits:
-    """Relight a sample under every pattern of its plan.
+def fit_photos(
+    plan: Plan, photos: PhotosWithoutDrift, transport: Transport, start: int = 0
+) -> PhotoFits:
+    """Relight a sample, or some rows of a camera, under every pattern of a plan.
 
     What is saturated under white counts for nothing. Nor do stripes and Gray code: no response is
     estimated from them, so that they differ from their relit pictures by more than noise.
@@ -98,16 +100,19 @@ def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> 
     ----------
     plan : Plan
     photos : PhotosWithoutDrift
-        All photos of the sample.
+        All photos.
     transport : Transport
-        Of the sample's camera pixels.
+        Of the sample's camera pixels, or of the rows.
+    start : int
+        First of the rows.
     """
+    rows = slice(start, start + transport.camera.height)
     size = (*transport.camera, transport.channels)
     numbers = range(len(plan.patterns))
     lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
     relit = transport.pictures(lights)
     relit += transport.black
-    taken = photos.read(numbers, slice(0, transport.camera.height))
+    taken = photos.read(numbers, rows)
     white = np.asarray(
         transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
     ).reshape(size)
@@ -118,7 +123,7 @@ def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> 
         ]
     )
     variance += model_variance(white)
-    variance[:, ~photos.drift.unsaturated] = np.inf
+    variance[:, ~photos.drift.unsaturated[rows]] = np.inf
     variance[is_for_correspondence(plan)] = np.inf
     return PhotoFits(
         photos=taken,

@@ -1,7 +1,7 @@
 """The verdict on a transport: good, doubtful or wrong, and why."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
+from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
 from nearfar.workflow.verdict.by_correspondence import measure_by_correspondence
 from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
 from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
@@ -151,7 +152,7 @@ def judge_reconstruction(
     repeats = None
     if held_out is None:
         repeats = measure_repeats(capture, transport.provenance, progress)
-    return judge(
+    verdict = judge(
         held_out,
         find_faults(capture, transport.provenance),
         find_what_spoils(
@@ -159,6 +160,24 @@ def judge_reconstruction(
         ),
         repeats,
     )
+    if "model" not in verdict.causes:
+        return verdict
+    misfit = measure_misfit(transport, capture, progress)
+    return verdict if misfit is None else with_worst(verdict, misfit)
+
+
+def with_worst(verdict: Verdict, misfit: MisfitMaps) -> Verdict:
+    """Return a verdict whose reason that the model fails names where, if anything stands out."""
+    worst = describe_worst(misfit)
+    if not worst:
+        return verdict
+    reasons = tuple(
+        reason._replace(sentence=f"{reason.sentence.removesuffix('.')}; {worst}.")
+        if reason.cause == "model"
+        else reason
+        for reason in verdict.reasons
+    )
+    return replace(verdict, reasons=reasons)
 
 
 def judge(

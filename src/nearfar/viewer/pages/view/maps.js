@@ -1,7 +1,7 @@
 // Maps of the whole camera picture, in false colour.
 
 import { get, nearestPixel, positionOn, showingFaults } from './dom.js';
-import { drawMap, gradient } from './plots.js';
+import { drawMap, gradient, markPixels } from './plots.js';
 import { requestMessage } from './protocol.js';
 
 export class Maps {
@@ -24,21 +24,24 @@ export class Maps {
     for (const id of ['map-low', 'map-high', 'map-caption', 'map-value']) get(id).textContent = '';
     if (!name) return;
     get('map-caption').textContent = 'computing';
-    const { header, arrays: [values] } = await requestMessage(`map/${name}`)
+    const { header, arrays: [values, saturated] } = await requestMessage(`map/${name}`)
       .catch(error => { get('map-caption').textContent = ''; throw error; });
     if (this.#store.state.map !== name) return;
-    this.#map = { ...values, unit: header.unit };
+    this.#map = { ...values, saturated: saturated.data, unit: header.unit };
     drawMap(get('map'), values.data, values.shape, header.low, header.high, this.#scene.scale);
+    const anySaturated = markPixels(get('map'), saturated.data, this.#scene.mark);
     const unit = header.unit && ' ' + header.unit;
     get('map-low').textContent = +header.low.toPrecision(3) + unit;
     get('map-high').textContent = +header.high.toPrecision(3) + unit;
-    get('map-caption').textContent = header.title + '; grey where there is none';
+    get('map-caption').textContent = header.title + '; grey where there is none' +
+      (anySaturated ? ', red where saturated' : '') + '. ' + header.reading;
   });
 
   #showValue(event) {
     if (!this.#map) return;
-    const { shape, data, unit } = this.#map, [y, x] = nearestPixel(positionOn(event, shape), shape);
-    const value = data[y * shape[1] + x];
-    get('map-value').textContent = Number.isFinite(value) ? +value.toPrecision(4) + ' ' + unit : 'none';
+    const { shape, data, saturated, unit } = this.#map, [y, x] = nearestPixel(positionOn(event, shape), shape);
+    const place = y * shape[1] + x, value = data[place];
+    get('map-value').textContent = Number.isFinite(value) ? +value.toPrecision(4) + ' ' + unit
+      : saturated[place] ? 'saturated' : 'none';
   }
 }

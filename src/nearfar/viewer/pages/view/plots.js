@@ -22,6 +22,16 @@ export function drawMap(canvas, values, [height, width], low, high, scale) {
   pen.putImageData(image, 0, 0);
 }
 
+// Paints over the marked pixels of a map, and tells whether there are any.
+export function markPixels(canvas, marks, colour) {
+  if (!marks.some(Boolean)) return false;
+  const pen = canvas.getContext('2d', { willReadFrequently: true });
+  const image = pen.getImageData(0, 0, canvas.width, canvas.height);
+  marks.forEach((mark, i) => mark && image.data.set([...colour, 255], 4 * i));
+  pen.putImageData(image, 0, 0);
+  return true;
+}
+
 // Smaller values count as zero.
 const FLOOR = 1e-12;
 
@@ -73,7 +83,8 @@ export function drawSpectrum(canvas, values, [height, width], { measured, k_near
   }
 }
 
-// Lines over the same pixels on a log scale, each with a band of one standard deviation.
+// Lines over the same pixels on a log scale, each with a band of one standard deviation, which is the
+// whole plot where the deviation is infinite.
 export function drawProfile(canvas, lines, label) {
   const ratio = devicePixelRatio || 1, w = canvas.clientWidth || 600, h = 170;
   Object.assign(canvas, { width: w * ratio, height: h * ratio });
@@ -83,7 +94,8 @@ export function drawProfile(canvas, lines, label) {
   let high = Math.log10(FLOOR);
   for (const { values } of lines) for (const v of values) high = Math.max(high, Math.log10(Math.abs(v) + FLOOR));
   const top = Math.ceil(high), low = top - 6, left = 38, bottom = h - 20;
-  const y = v => bottom - (Math.max(low, Math.log10(Math.max(v, FLOOR))) - low) / (top - low) * (bottom - 6);
+  const within = v => Math.min(top, Math.max(low, Math.log10(Math.max(v, FLOOR))));
+  const y = v => bottom - (within(v) - low) / (top - low) * (bottom - 6);
   pen.font = '11px system-ui';
   pen.fillStyle = css('--soft');
   pen.strokeStyle = css('--line');

@@ -1,0 +1,212 @@
+"""Paragraphs of methods, ready to cite: what was done, with the numbers of this very run."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from nearfar.arrays import Size
+from nearfar.plan import Plan
+from nearfar.release import version
+from nearfar.report.about import PAPER, Methods, software_reference
+from nearfar.transport.model import Transport
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.check import ModelCheck
+from nearfar.workflow.compare import Comparison
+from nearfar.workflow.rivals import RIVALS
+from nearfar.workflow.verdict.held_out import HeldOut
+
+PEERS = (
+    "Peers, P., Mahajan, D.K., Lamond, B., Ghosh, A., Matusik, W., Ramamoorthi, R., Debevec, P.: "
+    "Compressive Light Transport Sensing. ACM Transactions on Graphics 28(1), 2009."
+)
+SCHECHNER = (
+    "Schechner, Y.Y., Nayar, S.K., Belhumeur, P.N.: A Theory of Multiplexed Illumination. IEEE "
+    "International Conference on Computer Vision (ICCV), 2003."
+)
+# What the methods of `nearfar compare` go back to, beside the paper.
+REFERENCES_OF_RIVALS = {"CLT": PEERS, "Hadamard": SCHECHNER}
+
+PURPOSES = {
+    "direct": "of the checkerboard, for direct light",
+    "near": "of sinusoids for near-range light",
+    "far": "of sinusoids for far-range light",
+    "reference": "of white and black",
+    "correspondence": "for correspondence",
+    "check": "to check by",
+}
+OFFSETS = {
+    "inverse": "Every pattern was followed by its inverse, which takes the offset out.",
+    "reference": (
+        "The sinusoids' offset, and the drift of lamp and ambient light, were taken out by the "
+        "whites and blacks, which were photographed at intervals."
+    ),
+    "none": "The patterns were complex, in theory, and have no offset.",
+}
+CORRESPONDENCES = {
+    "phase": "by the phase of the sinusoids' own photos",
+    "stripes": "by photos of stripes",
+    "gray": "by photos of Gray code",
+}
+ESTIMATES = {
+    "joint": (
+        "Each camera pixel's row was estimated from all its photos but those to check by, as the "
+        "mean of a Gaussian posterior whose prior the photos choose [2]; its covariance gives the "
+        "error bars."
+    ),
+    "paper": "Each camera pixel's row was estimated by the estimator of [1].",
+}
+
+
+def reconstruction_methods(
+    transport: StoredTransport | Transport,
+    plan: Plan,
+    checked: str,
+    *,
+    correspondence_given: bool = False,
+) -> Methods:
+    """Return how a transport was measured, estimated and checked.
+
+    Parameters
+    ----------
+    transport : StoredTransport or Transport
+    plan : Plan
+        Of the photos that it was reconstructed from.
+    checked : str
+        How it was checked, a sentence.
+    correspondence_given : bool
+        Whether q was given, and not found in the photos.
+    """
+    purposes = [f"{count} {PURPOSES[purpose]}" for purpose, count in plan.counts.items() if count]
+    sentences = [
+        f"The light transport from a projector of {plan.projector} pixels to a camera of "
+        f"{transport.camera} pixels ({counted(transport.channels, 'channel')}) was measured by "
+        f"frequency-space decomposition [1], from {len(plan.patterns)} photos: "
+        f"{', '.join(purposes)}.",
+        OFFSETS[plan.offset],
+        _correspondence(plan, given=correspondence_given),
+        _estimate(transport.provenance, plan.window, plan.far),
+    ]
+    return _methods([*sentences, checked])
+
+
+def checked_by_photos(held_out: HeldOut | None) -> str:
+    """Return in a sentence what check photos say of a transport; None if none were compared."""
+    if held_out is None:
+        return "The transport was not compared with photos that the estimate had not used."
+    expected = held_out.expected_snr
+    beside = "" if expected is None else f"; its error bars expect {expected:.1f} dB"
+    return (
+        f"Relit under {counted(len(held_out.lights), 'pattern')} whose photos no estimate used, "
+        f"the transport has a mean SNR_b of {held_out.snr:.1f} dB{beside}."
+    )
+
+
+def _correspondence(plan: Plan, *, given: bool) -> str:
+    which = "The projector pixel that lights each camera pixel directly"
+    if given or plan.correspondence == "none":
+        return f"{which} was known beforehand."
+    how = CORRESPONDENCES.get(plan.correspondence, f"by the method {plan.correspondence}")
+    return f"{which} was found {how}."
+
+
+def _estimate(provenance: Mapping[str, Any], window: int, far: Size) -> str:
+    method = provenance["method"]
+    parts = (
+        f"Light was taken to be the sum of direct light, near-range light from a window of "
+        f"{window} x {window} projector pixels about it, and far-range light in a band of {far} "
+        f"frequencies"
+    )
+    parts += " and at the others that were measured. " if method == "joint" else ". "
+    text = parts + ESTIMATES.get(method, f"Each camera pixel's row was estimated by {method!r}.")
+    if provenance["square"]:
+        text += " Camera pixels were averaged by the projector pixel that lights them."
+    return text
+
+
+def evaluation_methods(provenance: Mapping[str, Any], lights: int, *, by_truth: bool) -> Methods:
+    """Return how a transport was evaluated.
+
+    Parameters
+    ----------
+    provenance : mapping
+        Of the transport.
+    lights : int
+        Lights that it was relit under.
+    by_truth : bool
+        Whether the true transport was known, and not photos alone.
+    """
+    plan = provenance.get("plan")
+    sentences = []
+    if isinstance(plan, Mapping) and provenance.keys() >= {"method", "square"}:
+        sentences = [
+            f"The light transport was measured from {plan['photos']} photos by frequency-space "
+            f"decomposition [1].",
+            _estimate(provenance, plan["window"], Size(*plan["far"])),
+        ]
+    known = "those of the known transport" if by_truth else "photos that no estimate used"
+    sentences.append(
+        f"Pictures relit under {counted(lights, 'light')} were compared with {known}: SNR_b is 20 "
+        f"log10 of the norm of the known picture over the norm of the difference."
+    )
+    if by_truth:
+        sentences.append("SNR_t is the same of a camera pixel's row of the transport.")
+    return _methods(sentences)
+
+
+def check_methods(check: ModelCheck) -> Methods:
+    """Return how it was checked where the model holds."""
+    return _methods(
+        [
+            f"A known light transport was compared with the model of [1], direct light, near-range "
+            f"light in a window of {check.window} x {check.window} projector pixels and up to "
+            f"{check.k_near:.3f} cycles per projector pixel, and far-range light in a band of "
+            f"{check.far} frequencies, at {check.camera_pixels} camera pixels; and with the best "
+            f"that the model can do there without noise."
+        ]
+    )
+
+
+def comparison_methods(comparison: Comparison) -> Methods:
+    """Return how methods were compared."""
+    trials = (*comparison.equal_photos, *comparison.equal_exposure)
+    names = [name for name in RIVALS if any(trial.method == name for trial in trials)]
+    further = {
+        name: place
+        for place, name in enumerate((name for name in names if name in REFERENCES_OF_RIVALS), 3)
+    }
+    cited = [
+        RIVALS[name].title + (f" [{further[name]}]" if name in further else "") for name in names
+    ]
+    budgets = sorted({trial.budget for trial in comparison.equal_photos})
+    return _methods(
+        [
+            f"Methods ({', '.join(cited) or 'none'}) photographed a simulated scene, "
+            f"{comparison.scene}, of {comparison.projector} projector pixels and "
+            f"{comparison.camera} camera pixels, with the same camera and noise, within "
+            f"{', '.join(map(str, budgets)) or 'no'} photos, and within total exposures of as many "
+            f"photos' worth.",
+            "Transports were relit under five pictures, white and a random pattern, and compared "
+            "by SNR_b [1] with the true pictures.",
+        ],
+        [REFERENCES_OF_RIVALS[name] for name in further],
+    )
+
+
+def figures_methods() -> Methods:
+    """Return how the paper's figures were drawn again."""
+    return _methods(
+        [
+            "The experiments of [1] were done again on simulated scenes, whose light transport is "
+            "known exactly, and compressive light transport [3] beside them."
+        ],
+        [PEERS],
+    )
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural unless it is 1."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def _methods(sentences: list[str], further: list[str] | None = None) -> Methods:
+    text = " ".join([*sentences, f"The software was nearfar {version()} [2]."])
+    return Methods(text, (PAPER, software_reference(), *(further or [])))

@@ -1,0 +1,224 @@
+"""Where photos differ from relit pictures by more than noise: by frequency, and over the camera.
+
+Misfit is the mean squared difference over the variance that noise gives it, as in `misfit`, where
+the pictures of some camera pixels are compared to find causes; here all of them are, in bands of
+rows.
+
+Index convention: maps are over camera pixels [y, x], or over square cells of a large camera.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.capture import Capture
+from nearfar.illumination.frequencies import Frequency
+from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.plan import Plan, Sinusoid
+from nearfar.progress import Report, ignore_progress
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.diagnosis.misfit import (
+    fit_photos,
+    is_check,
+    is_for_correspondence,
+    is_white_or_black,
+)
+from nearfar.workflow.reconstruction.sources import photos_without_drift
+
+# Values of photos that are compared at once.
+VALUES_AT_ONCE = 2**22
+# A larger camera is compared in this many lines, spread evenly, of as many pixels in all.
+CAMERA_PIXELS = 2**18
+LINES_OF_LARGE_CAMERA = 64
+
+# Frequencies, or a part of the picture, stand out with this many times the misfit of the others.
+STANDS_OUT = 2.5
+# Less misfit than this is no matter, whatever the others have.
+LEAST_MISFIT = 2.0
+PARTS_A_SIDE = 3
+DOWN, ACROSS = ("top", "", "bottom"), ("left", "", "right")
+
+
+@dataclass(frozen=True, eq=False)
+class MisfitMaps:
+    """How badly photos fit, 1 being what noise makes of it.
+
+    Attributes
+    ----------
+    of_frequencies : dict of Frequency to float
+        Mean over the photos of a frequency, white left out.
+    of_checks : float or None
+        Mean over check photos, which no estimate uses; None without any.
+    of_camera : ndarray, shape (y, x)
+        Mean over photos without whites, blacks, stripes and Gray code; NaN where all is saturated.
+    saturated : ndarray of bool, shape (y, x)
+        Where something is.
+    cell : int
+        Camera pixels along the side of a cell of the map.
+    """
+
+    of_frequencies: dict[Frequency, float]
+    of_checks: float | None
+    of_camera: Floats
+    saturated: Booleans
+    cell: int
+
+
+def measure_misfit(
+    transport: StoredTransport, capture: Capture, progress: Report = ignore_progress
+) -> MisfitMaps | None:
+    """Compare every photo with the relit picture of its pattern.
+
+    Of a large camera, evenly spaced lines are compared.
+
+    Parameters
+    ----------
+    transport : StoredTransport
+    capture : Capture
+        The one that it was reconstructed from.
+    progress : callable
+        Called with the step and the share of it that is done.
+
+    Returns
+    -------
+    MisfitMaps or None
+        None if the photos do not tell their noise, as those of inverse pairs, or if the transport
+        is square.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the transport or the capture is damaged.
+    """
+    if transport.provenance["square"]:
+        return None
+    photos = photos_without_drift(capture, progress)
+    if not isinstance(photos, PhotosWithoutDrift):
+        return None
+    plan, camera = capture.plan, transport.camera
+    counted = ~is_white_or_black(plan) & ~is_for_correspondence(plan)
+    pitch = lines_apart(camera)
+    sums, values = np.zeros(len(plan.patterns)), 0
+    lines, marks = [], []
+    for rows in _bands(camera, len(plan.patterns) * transport.channels * camera.width, pitch):
+        fits = fit_photos(plan, photos, transport.rows(rows), rows.start)
+        share = (fits.photos - fits.relit) ** 2 / fits.variance
+        sums += share.sum(axis=(1, 2, 3), dtype=np.float64)
+        known = np.isfinite(fits.variance).any(axis=0)
+        values += int(known.sum())
+        lines.append(_in_cells(share[counted].mean(axis=0), known, pitch))
+        marks.append(_any_in_cells(~known.all(axis=-1), pitch))
+        progress("comparing photos", rows.stop / camera.height)
+    misfit = sums / max(values, 1)
+    checks = is_check(plan)
+    return MisfitMaps(
+        _of_frequencies(plan, misfit),
+        float(misfit[checks].mean()) if checks.any() else None,
+        np.concatenate(lines),
+        np.concatenate(marks),
+        pitch,
+    )
+
+
+def lines_apart(camera: Size) -> int:
+    """Return how many rows apart the lines of a large camera are; 1 for a camera compared whole."""
+    if camera.pixels <= CAMERA_PIXELS:
+        return 1
+    return max(1, camera.height // LINES_OF_LARGE_CAMERA)
+
+
+def _bands(camera: Size, values_of_row: int, pitch: int) -> Iterator[slice]:
+    """Yield the rows that are compared at once: all of them in turn, or some in each `pitch`."""
+    if pitch == 1:
+        yield from blocks(camera.height, max(1, VALUES_AT_ONCE // values_of_row))
+        return
+    height = min(pitch, max(1, CAMERA_PIXELS // (LINES_OF_LARGE_CAMERA * camera.width)))
+    for start in range(0, camera.height - pitch + 1, pitch):
+        first = start + (pitch - height) // 2
+        yield slice(first, first + height)
+
+
+def _in_cells(share: Floats, known: Booleans, pitch: int) -> Floats:
+    """Return the mean over known channels, (y, x), and over the cells of a large camera."""
+    total, count = share.sum(axis=-1), known.sum(axis=-1)
+    if pitch > 1:
+        total, count = (
+            np.stack([part.sum() for part in _cells(values, pitch)])[None]
+            for values in (total, count)
+        )
+    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
+def _any_in_cells(marks: Booleans, pitch: int) -> Booleans:
+    if pitch == 1:
+        return marks
+    return np.array([[bool(part.any()) for part in _cells(marks, pitch)]])
+
+
+def _cells(values: Floats | Booleans, pitch: int) -> list[Floats]:
+    return np.array_split(values, max(1, round(values.shape[1] / pitch)), axis=1)
+
+
+def _of_frequencies(plan: Plan, misfit: Floats) -> dict[Frequency, float]:
+    found: dict[Frequency, list[float]] = {}
+    is_reference = is_white_or_black(plan)
+    for number, pattern in enumerate(plan.patterns):
+        if isinstance(pattern, Sinusoid) and not is_reference[number]:
+            found.setdefault(pattern.frequency, []).append(float(misfit[number]))
+    return {frequency: float(np.mean(values)) for frequency, values in found.items()}
+
+
+def describe_worst(misfit: MisfitMaps) -> str:
+    """Return which photos and which part of the picture fit worst; empty if none stands out."""
+    found = [text for text in (_worst_frequencies(misfit), _worst_part(misfit)) if text]
+    return f"photos fit worst {' and '.join(found)}" if found else ""
+
+
+def _worst_frequencies(misfit: MisfitMaps) -> str:
+    """Name the coarse, the middle or the fine third of the frequencies."""
+    ordered = sorted(
+        (float(np.hypot(float(frequency.fy), float(frequency.fx))), value)
+        for frequency, value in misfit.of_frequencies.items()
+    )
+    number = len(ordered)
+    if number < 6:
+        return ""
+    thirds = [ordered[i * number // 3 : (i + 1) * number // 3] for i in range(3)]
+    # A single photo that does not fit is no matter of the model.
+    medians = [float(np.median([value for _, value in third])) for third in thirds]
+    worst = _outstanding(medians)
+    if worst is None:
+        return ""
+    (first, _), *_, (last, _) = thirds[worst]
+    return (
+        f"at frequencies of {first:.2g} to {last:.2g} cycles per projector pixel "
+        f"({_written(medians[worst])})"
+    )
+
+
+def _worst_part(misfit: MisfitMaps) -> str:
+    """Name a ninth of the picture."""
+    values = np.where(misfit.saturated, np.nan, misfit.of_camera)
+    means, names = [], []
+    for down, rows in zip(DOWN, np.array_split(values, PARTS_A_SIDE, axis=0), strict=True):
+        for across, part in zip(ACROSS, np.array_split(rows, PARTS_A_SIDE, axis=1), strict=True):
+            finite = part[np.isfinite(part)]
+            means.append(float(finite.mean()) if finite.size else 0.0)
+            names.append(" ".join(word for word in (down, across) if word) or "middle")
+    worst = _outstanding(means)
+    if worst is None:
+        return ""
+    return f"at the {names[worst]} of the picture ({_written(means[worst])})"
+
+
+def _written(misfit: float) -> str:
+    return f"misfit {misfit:.2g}, where noise alone makes 1"
+
+
+def _outstanding(misfits: Sequence[float]) -> int | None:
+    """Return the place of a misfit that is much larger than the next one."""
+    *_, next_worst, worst = np.argsort(misfits)
+    limit = max(LEAST_MISFIT, STANDS_OUT * misfits[next_worst])
+    return int(worst) if misfits[worst] > limit else None

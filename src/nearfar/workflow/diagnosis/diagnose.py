@@ -1,7 +1,5 @@
 """What spoils the photos of a capture, by all checks."""
 
-import numpy as np
-
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
@@ -58,14 +56,14 @@ def find_what_spoils(
     step = "comparing photos"
     sample = sample_camera(capture, lambda share: progress(step, share / 2))
     try:
-        photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
+        photos = sample.without_drift()
     except InputError:
         # Nothing but saturated camera pixels were sampled.
         return []
     sampled = sample.of_transport(transport)
-    fits = fit_photos(capture.plan, photos, sampled)
+    fits = fit_photos(photos, sampled)
     progress(step, 3 / 4)
-    single = find_spoilt_photos(sample, fits, sampled.correspondence, suspected=suspected)
+    single = find_spoilt_photos(fits, sampled.correspondence, suspected=suspected)
     progress(step, 1.0)
     if single.certain:
         return [*single.certain, *single.probable]

@@ -13,6 +13,7 @@ Index convention: photos are (photos, rows, columns, channels) of a camera sampl
 are (photos, regions, causes, causes) and (photos, regions, causes).
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,29 +71,31 @@ class PhotoFits:
     white: Floats
 
     @property
+    def plan(self) -> Plan:
+        """The plan of the photos."""
+        return self.without_drift.plan
+
+    @property
     def misfit(self) -> Floats:
         """Of each photo, (photos,)."""
         return np.asarray(((self.photos - self.relit) ** 2 / self.variance).mean(axis=(1, 2, 3)))
 
 
-def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> PhotoFits:
+def fit_photos(photos: PhotosWithoutDrift, transport: Transport) -> PhotoFits:
     """Relight a sample under every pattern of its plan.
 
     What is saturated under white counts for nothing.
 
     Parameters
     ----------
-    plan : Plan
     photos : PhotosWithoutDrift
         All photos of the sample.
     transport : Transport
         Of the sample's camera pixels.
     """
     size = (*transport.camera, transport.channels)
-    numbers = range(len(plan.patterns))
-    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
-    relit = transport.pictures(lights)
-    relit += transport.black
+    numbers = range(len(photos.plan.patterns))
+    relit = relight(photos.plan, transport, numbers)
     taken = photos.read(numbers, slice(0, transport.camera.height))
     white = np.asarray(
         transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
@@ -107,6 +110,14 @@ def fit_photos(plan: Plan, photos: PhotosWithoutDrift, transport: Transport) -> 
     variance += model
     variance[:, ~photos.drift.unsaturated] = np.inf
     return PhotoFits(photos, taken, relit, variance.astype(np.float32), transport.black, white)
+
+
+def relight(plan: Plan, transport: Transport, numbers: Iterable[int]) -> Floats:
+    """Return what some photos of a plan should show, (n, rows, columns, channels)."""
+    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
+    relit = transport.pictures(lights)
+    relit += transport.black
+    return relit
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,8 @@ from nearfar.plan import Plan, choose_plan
 
 
 @cache
-def chosen_plan(projector: Size, photos: int, window: int | None = None) -> Plan:
+def chosen_plan(
+    projector: Size, photos: int, window: int | None = None, checks: int | None = None
+) -> Plan:
     """Return a plan of so many photos; nothing changes a plan, so that tests share it."""
-    return choose_plan(projector, photos, window=window)[0]
+    return choose_plan(projector, photos, window=window, checks=checks)[0]

@@ -15,7 +15,7 @@ from nearfar.transport.rows import FACTORS
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
 
-SIZE = Size(24, 24)
+SIZE = Size(16, 16)
 PLANS = {"joint": lambda: choose_plan(SIZE, 60)[0], "paper": lambda: paper_plan(SIZE, 7, (3, 3))}
 
 

@@ -96,6 +96,20 @@ def test_without_noise_nothing_of_the_drift_is_left(world, shoot, lamp, ambient)
     assert left > 10 * error
 
 
+def test_some_photos_are_as_they_are_among_all(world, shoot):
+    photos = remove_drift(_drifting(shoot, world, LAMP, AMBIENT))
+    references = find_references(PLAN)
+    kept = [n for n in range(PHOTOS) if n % 3 == 0 or n in (*references.whites, *references.blacks)]
+    some = photos.only(np.array(kept))
+    assert some.plan.patterns == tuple(PLAN.patterns[n] for n in kept)
+    rows = slice(2, 9)
+    np.testing.assert_allclose(
+        some.read(range(len(kept)), rows), photos.read(kept, rows), rtol=0, atol=1e-6
+    )
+    grey = np.full((4, 2), 0.3)
+    np.testing.assert_allclose(some.variance(grey), photos.variance(grey), rtol=0.2)
+
+
 def replace_drift(photos):
     """The same photos, nothing taken out."""
     drift = photos.drift

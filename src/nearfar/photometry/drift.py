@@ -116,6 +116,11 @@ class Drift:
     def _pictures(self) -> tuple[Floats, Floats]:
         return self.black, self.light
 
+    def with_nothing_left(self, references: References) -> "Drift":
+        """Return the drift of photos from which it is removed, in a plan of these references."""
+        ambient, lamp = np.zeros_like(self.ambient), np.ones_like(self.lamp)
+        return replace(self, references=references, ambient=ambient, lamp=lamp)
+
     def remove_from(self, photos: Floats, numbers: Sequence[int], rows: slice) -> Floats:
         """Remove the drift from photos: as if lamp and ambient light had been at their means.
 

@@ -5,13 +5,14 @@ channels.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Floats, Integers, Size
 from nearfar.errors import InputError
-from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, follow_drift
+from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, find_references, follow_drift
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few, variance_by_channel
 from nearfar.photometry.photos import PHOTOS_AT_ONCE, Photos, Wave, find_waves, in_batches
 from nearfar.plan import Plan
@@ -60,6 +61,19 @@ class PhotosWithoutDrift:
         """Variance of one photo that reads `photo`, (C, channels)."""
         return variance_by_channel(self.noise, photo)
 
+    def only(self, numbers: Integers) -> "PhotosWithoutDrift":
+        """Return some of the photos, in order, in memory.
+
+        The drift is removed as from all, so every photo of white and black must be among them. The
+        noise is fitted to the scatter of these photos alone.
+        """
+        patterns = tuple(self.plan.patterns[number] for number in numbers)
+        plan = self.plan.model_copy(update={"patterns": patterns})
+        read = self.read(numbers.tolist(), slice(0, self.camera.height))
+        drift = self.drift.with_nothing_left(find_references(plan))
+        some = PhotosWithoutDrift(PhotosInMemory(plan, read, 1.0), drift)
+        return replace(some, noise=_noise_of_repeated_patterns(some, self.photos))
+
 
 def remove_drift(
     photos: Photos, progress: Callable[[int], None] | None = None
@@ -85,11 +99,16 @@ def remove_drift(
     """
     drift = follow_drift(photos, progress)
     found = PhotosWithoutDrift(photos, drift)
-    return PhotosWithoutDrift(photos, drift, _noise_of_repeated_patterns(found))
+    return replace(found, noise=_noise_of_repeated_patterns(found, photos))
 
 
-def _noise_of_repeated_patterns(photos: PhotosWithoutDrift) -> tuple[NoiseModel, ...]:
-    """Fit shot and read noise to the scatter of every pattern that was projected repeatedly."""
+def _noise_of_repeated_patterns(
+    photos: PhotosWithoutDrift, as_taken: Photos
+) -> tuple[NoiseModel, ...]:
+    """Fit shot and read noise to the scatter of every pattern that was projected repeatedly.
+
+    The levels of the camera are those of photos as they were taken.
+    """
     repeated: dict[tuple[Wave, bool], list[int]] = {}
     for wave, signed in find_waves(photos.plan).items():
         for number, sign in signed:
@@ -110,7 +129,7 @@ def _noise_of_repeated_patterns(photos: PhotosWithoutDrift) -> tuple[NoiseModel,
             means.append(first + total / len(numbers))
             variances.append((squares - total**2 / len(numbers)) / (len(numbers) - 1))
     mean, variance = np.stack(means), np.maximum(np.stack(variances), 0.0)
-    rounding = _rounding_variance(photos.photos)
+    rounding = _rounding_variance(as_taken)
     models = []
     for i in range(photos.channels):
         if not usable[:, i].any():

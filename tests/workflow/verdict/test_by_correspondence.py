@@ -14,7 +14,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.transport.store import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.inverse_pairs import find_motion_by_pairs
-from nearfar.workflow.diagnosis.misfit import fit_photos, is_for_correspondence
+from nearfar.workflow.diagnosis.misfit import fit_photos, serves
 from nearfar.workflow.diagnosis.sample import sample_camera
 from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
@@ -122,9 +122,8 @@ def test_pairs_tell_that_the_response_is_not_linear(reconstructed):
 def test_stripes_and_gray_code_are_no_photos_that_do_not_fit(reconstructed):
     _, capture, stored = reconstructed("reference", "gray")
     sample = sample_camera(capture, lambda _: None)
-    photos = sample.without_drift(np.arange(len(capture.plan.patterns)))
-    misfit = fit_photos(capture.plan, photos, sample.of_transport(stored)).misfit
-    own = is_for_correspondence(capture.plan)
+    misfit = fit_photos(sample.without_drift(), sample.of_transport(stored)).misfit
+    own = serves(capture.plan, "correspondence")
     assert np.all(misfit[own] == 0)
     assert np.all(misfit[~own] > 0)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan import paper_plan
 from nearfar.plan.checks import check_lights
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -22,6 +22,7 @@ from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.verdict.held_out import CAMERA_PIXELS, bands, measure_held_out
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
+from tests.plans import chosen_plan
 
 PROJECTOR = Size(24, 24)
 
@@ -38,7 +39,7 @@ def reconstructed(box, tmp_path_factory):
     @cache
     def make(photos=80, gamma=1.0, full_well=30_000.0, checks=None, exposure=0.9):
         folder = tmp_path_factory.mktemp("made")
-        plan, _ = choose_plan(PROJECTOR, photos, checks=checks)
+        plan = chosen_plan(PROJECTOR, photos, checks=checks)
         camera = SimulatedCamera(full_well=full_well)
         brightest = float((box @ np.ones(PROJECTOR)).max())
         rig = SimulatedRig(
@@ -97,7 +98,7 @@ def test_inverse_pairs_alone_and_square_transports_are_not_checked(box, tmp_path
     rig = SimulatedRig(box, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
     for plan, square in (
         (paper_plan(PROJECTOR, 5, (3, 3), correspondence="phase"), False),
-        (choose_plan(PROJECTOR, 60)[0], True),
+        (chosen_plan(PROJECTOR, 60), True),
     ):
         capture = acquire(plan, tmp_path / f"{square}.zarr", rig)
         made = tmp_path / f"t-{square}.zarr"

@@ -1,7 +1,5 @@
 """What spoils the photos of a capture, by all checks."""
 
-import numpy as np
-
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
@@ -66,7 +64,7 @@ def find_what_spoils(
         progress(step, 1.0)
         return [*compressed, *moved]
     try:
-        photos = sample.without_drift(np.arange(len(plan.patterns)))
+        photos = sample.without_drift()
     except InputError:
         # Nothing but saturated camera pixels were sampled.
         return []
@@ -75,9 +73,9 @@ def find_what_spoils(
         # Other estimates differ from the photos by far more than noise.
         q = sampled.correspondence
         sampled = estimate_jointly(measure(photos), q, plan.window, plan.far, sweeps=SWEEPS)
-    fits = fit_photos(plan, photos, sampled)
+    fits = fit_photos(photos, sampled)
     progress(step, 3 / 4)
-    single = find_spoilt_photos(sample, fits, sampled.correspondence, suspected=suspected)
+    single = find_spoilt_photos(fits, sampled.correspondence, suspected=suspected)
     progress(step, 1.0)
     if single.certain:
         return [*single.certain, *single.probable]

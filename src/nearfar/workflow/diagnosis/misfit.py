@@ -13,6 +13,7 @@ Index convention: photos are (photos, rows, columns, channels) of a camera sampl
 are (photos, regions, causes, causes) and (photos, regions, causes).
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,18 +88,20 @@ class PhotoFits(Fits):
 
     without_drift: PhotosWithoutDrift
 
+    @property
+    def plan(self) -> Plan:
+        """The plan of the photos."""
+        return self.without_drift.plan
 
-def fit_photos(
-    plan: Plan, photos: PhotosWithoutDrift, transport: Transport, start: int = 0
-) -> PhotoFits:
-    """Relight a sample, or some rows of a camera, under every pattern of a plan.
+
+def fit_photos(photos: PhotosWithoutDrift, transport: Transport, start: int = 0) -> PhotoFits:
+    """Relight a sample, or some rows of a camera, under every pattern of its plan.
 
     What is saturated under white counts for nothing. Nor do stripes and Gray code: no response is
     estimated from them, so that they differ from their relit pictures by more than noise.
 
     Parameters
     ----------
-    plan : Plan
     photos : PhotosWithoutDrift
         All photos.
     transport : Transport
@@ -108,10 +111,8 @@ def fit_photos(
     """
     rows = slice(start, start + transport.camera.height)
     size = (*transport.camera, transport.channels)
-    numbers = range(len(plan.patterns))
-    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
-    relit = transport.pictures(lights)
-    relit += transport.black
+    numbers = range(len(photos.plan.patterns))
+    relit = relight(photos.plan, transport, numbers)
     taken = photos.read(numbers, rows)
     white = np.asarray(
         transport @ np.ones(transport.projector, dtype=np.float32), dtype=np.float32
@@ -124,7 +125,7 @@ def fit_photos(
     )
     variance += model_variance(white)
     variance[:, ~photos.drift.unsaturated[rows]] = np.inf
-    variance[is_for_correspondence(plan)] = np.inf
+    variance[serves(photos.plan, "correspondence")] = np.inf
     return PhotoFits(
         photos=taken,
         relit=relit,
@@ -138,6 +139,14 @@ def fit_photos(
 def model_variance(white: Floats) -> Floats:
     """Return the error of the model that counts as noise, given a picture under white."""
     return np.asarray((MODEL_ERROR * white) ** 2 + (MODEL_ERROR_OF_MEAN * white.mean()) ** 2)
+
+
+def relight(plan: Plan, transport: Transport, numbers: Iterable[int]) -> Floats:
+    """Return what some photos of a plan should show, (n, rows, columns, channels)."""
+    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
+    relit = transport.pictures(lights)
+    relit += transport.black
+    return relit
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,15 +276,9 @@ def _regions(sample: CameraSample) -> Integers:
     return np.add.outer(REGIONS_A_SIDE * down, across)
 
 
-def is_held_out(plan: Plan) -> Booleans:
-    """Return from which photos of a plan no response is estimated, (photos,)."""
-    held_out = ("check", "correspondence")
-    return np.array([pattern.purpose in held_out for pattern in plan.patterns])
-
-
-def is_for_correspondence(plan: Plan) -> Booleans:
-    """Return which photos of a plan are of its correspondence method, (photos,)."""
-    return np.array([pattern.purpose == "correspondence" for pattern in plan.patterns])
+def serves(plan: Plan, *purposes: str) -> Booleans:
+    """Return which photos of a plan serve one of some purposes, (photos,)."""
+    return np.array([pattern.purpose in purposes for pattern in plan.patterns])
 
 
 def is_white_or_black(plan: Plan) -> Booleans:

@@ -21,9 +21,8 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.misfit import (
     fit_photos,
-    is_check,
-    is_for_correspondence,
     is_white_or_black,
+    serves,
 )
 from nearfar.workflow.reconstruction.sources import photos_without_drift
 
@@ -98,21 +97,21 @@ def measure_misfit(
     if not isinstance(photos, PhotosWithoutDrift):
         return None
     plan, camera = capture.plan, transport.camera
-    counted = ~is_white_or_black(plan) & ~is_for_correspondence(plan)
+    counted = ~is_white_or_black(plan) & ~serves(plan, "correspondence")
     pitch = lines_apart(camera)
     sums, values = np.zeros(len(plan.patterns)), 0
     lines, marks = [], []
     for rows in _bands(camera, len(plan.patterns) * transport.channels * camera.width, pitch):
-        fits = fit_photos(plan, photos, transport.rows(rows), rows.start)
+        fits = fit_photos(photos, transport.rows(rows), rows.start)
         share = (fits.photos - fits.relit) ** 2 / fits.variance
         sums += share.sum(axis=(1, 2, 3), dtype=np.float64)
-        known = np.isfinite(fits.variance).any(axis=0)
+        known = np.asarray(np.isfinite(fits.variance).any(axis=0))
         values += int(known.sum())
         lines.append(_in_cells(share[counted].mean(axis=0), known, pitch))
-        marks.append(_any_in_cells(~known.all(axis=-1), pitch))
+        marks.append(_any_in_cells(np.asarray(~known.all(axis=-1)), pitch))
         progress("comparing photos", rows.stop / camera.height)
     misfit = sums / max(values, 1)
-    checks = is_check(plan)
+    checks = serves(plan, "check")
     return MisfitMaps(
         _of_frequencies(plan, misfit),
         float(misfit[checks].mean()) if checks.any() else None,

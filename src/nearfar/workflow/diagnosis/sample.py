@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.capture import Capture
@@ -50,11 +49,9 @@ class CameraSample:
         """Rows and columns of the sample."""
         return Size(len(self.rows), len(self.columns))
 
-    def without_drift(self, numbers: NDArray[np.int64]) -> PhotosWithoutDrift:
-        """Return some photos, in order, without the drift of lamp and ambient light."""
-        patterns = tuple(self.plan.patterns[number] for number in numbers)
-        plan = self.plan.model_copy(update={"patterns": patterns})
-        return remove_drift(PhotosInMemory(plan, self.photos[numbers], 1.0))
+    def without_drift(self) -> PhotosWithoutDrift:
+        """Return the photos without the drift of lamp and ambient light."""
+        return remove_drift(PhotosInMemory(self.plan, self.photos, 1.0))
 
     def of_transport(self, stored: StoredTransport) -> Transport:
         """Read a transport at the sampled camera pixels."""

@@ -28,16 +28,16 @@ from nearfar.faults.of_photos import (
 )
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, Sinusoid
+from nearfar.transport.model import Transport
 from nearfar.workflow.diagnosis.misfit import (
     SMALLEST_CHANGE,
     PhotoFits,
     fit_photos,
-    is_for_correspondence,
-    is_held_out,
     is_white_or_black,
     mean_white,
+    relight,
+    serves,
 )
-from nearfar.workflow.diagnosis.sample import CameraSample
 
 # A photo is suspect above this misfit, in multiples of the usual one, which is at least 1.
 SUSPECT_MISFIT = 4.0
@@ -58,6 +58,8 @@ AS_GOOD = 1.3
 UNEXPLAINED_RATIO = 40.0
 # The pattern of a photo so many places away may show in part of another.
 TORN_REACH = 3
+# Photos of these purposes are not estimated from.
+HELD_OUT = ("check", "correspondence")
 # Sweeps of the estimate.
 SWEEPS = 2
 
@@ -114,14 +116,11 @@ class SpoiltPhotos(NamedTuple):
     probable: list[Spoilt]
 
 
-def find_spoilt_photos(
-    sample: CameraSample, fits: PhotoFits, known: Floats, *, suspected: bool
-) -> SpoiltPhotos:
+def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool) -> SpoiltPhotos:
     """Find photos that do not fit the others, and why.
 
     Parameters
     ----------
-    sample : CameraSample
     fits : PhotoFits
         To the transport that was estimated from all photos.
     known : ndarray, shape (rows, columns, 2)
@@ -130,25 +129,25 @@ def find_spoilt_photos(
         Whether there is reason to search where no photo has a large misfit: a photo that alone
         tells of its frequency fits itself.
     """
-    plan = sample.plan
-    fixed = is_white_or_black(plan) | is_for_correspondence(plan)
+    plan = fits.plan
+    fixed = is_white_or_black(plan) | serves(plan, "correspondence")
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
     if not suspected and not _suspects(fits.misfit, good & ~fixed):
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)
-        without = _fit_without(sample, fits, good, suspects, known) if suspects else None
+        without = _fit_without(fits, good, suspects, known) if suspects else None
         found = _explain_all(without, plan, suspects) if without is not None else {}
         if not found:
             break
         explained |= found
         good[list(found)] = False
-        again = _fit_without(sample, fits, good, [], known)
+        again = _fit_without(fits, good, [], known)
         if again is None:
             break
         fits = again
-    explained |= _explain_by_turns(sample, fits, good, explained, known)
+    explained |= _explain_by_turns(fits, good, explained, known)
     certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     probable = {n: e for n, e in explained.items() if n not in certain}
     return SpoiltPhotos(_as_faults(certain), _as_faults(probable))
@@ -165,7 +164,6 @@ def _suspects(misfit: Floats, tried: Booleans) -> list[int]:
 
 
 def _explain_by_turns(
-    sample: CameraSample,
     fits: PhotoFits,
     good: Booleans,
     explained: dict[int, Explanation | None],
@@ -176,19 +174,19 @@ def _explain_by_turns(
     A photo in the place of another may hide, because no other photo tells of its frequency. It
     shows once it is left out, and the other fits it.
     """
-    plan = sample.plan
+    plan = fits.plan
     turns = np.zeros(len(good), dtype=np.int64)
     turn_of: dict[object, int] = {}
     for number, pattern in enumerate(plan.patterns):
         if isinstance(pattern, Sinusoid) and good[number]:
             turns[number] = turn_of.setdefault(pattern.frequency, len(turn_of) % TURNS_OF_LEAVING)
     relit = fits.relit.copy()
-    measured = good & ~is_held_out(plan) & ~is_white_or_black(plan)
+    measured = good & ~serves(plan, *HELD_OUT) & ~is_white_or_black(plan)
     for turn in range(TURNS_OF_LEAVING):
-        left_out = np.flatnonzero(measured & (turns == turn))
-        without = _fit_without(sample, fits, good, left_out.tolist(), known)
+        left_out = np.flatnonzero(measured & (turns == turn)).tolist()
+        without = _estimate_without(fits, good, left_out, known) if left_out else None
         if without is not None:
-            relit[left_out] = without.relit[left_out]
+            relit[left_out] = relight(plan, without, left_out)
     by_turns = replace(fits, relit=relit)
     found: dict[int, Explanation | None] = {}
     misfit = np.where(measured, by_turns.misfit, 0.0)
@@ -207,11 +205,19 @@ def _explain_by_turns(
 
 
 def _fit_without(
-    sample: CameraSample, fits: PhotoFits, good: Booleans, left_out: list[int], known: Floats
+    fits: PhotoFits, good: Booleans, left_out: list[int], known: Floats
 ) -> PhotoFits | None:
     """Return the fits of all photos to an estimate without some; None if too few remain."""
-    plan = sample.plan
-    keep = good & ~is_held_out(plan)
+    transport = _estimate_without(fits, good, left_out, known)
+    return None if transport is None else fit_photos(fits.without_drift, transport)
+
+
+def _estimate_without(
+    fits: PhotoFits, good: Booleans, left_out: list[int], known: Floats
+) -> Transport | None:
+    """Estimate the transport without some photos; None if too few remain."""
+    plan = fits.plan
+    keep = good & ~serves(plan, *HELD_OUT)
     keep[left_out] = False
     # A cosine is nothing without its sine.
     kept = {
@@ -224,7 +230,7 @@ def _fit_without(
             other = "sine" if pattern.kind == "cosine" else "cosine"
             keep[number] &= (pattern.frequency, other) in kept
     try:
-        measurements = measure(sample.without_drift(np.flatnonzero(keep)))
+        measurements = measure(fits.without_drift.only(np.flatnonzero(keep)))
     except InputError:
         return None
     try:
@@ -232,8 +238,7 @@ def _fit_without(
     except InputError:
         # The lowest frequencies, which place q, are among those that were left out.
         q = known
-    transport = estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
-    return fit_photos(plan, fits.without_drift, transport)
+    return estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
 
 
 def _explain_all(fits: PhotoFits, plan: Plan, suspects: list[int]) -> dict[int, Explanation | None]:

@@ -16,6 +16,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.store import open_transport
 from nearfar.workflow.acquire import acquire
+from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
@@ -68,6 +69,19 @@ def test_held_out_snr_is_the_true_one(box, reconstructed, made):
         true.append(decibels(np.sum(known**2), np.sum((known - relit) ** 2)))
     assert held_out.snr == pytest.approx(np.mean(true), abs=1.5)
     assert judge_reconstruction(stored, capture).grade == "good"
+
+
+def test_photos_as_far_off_as_expected_are_not_searched(reconstructed, monkeypatch):
+    # One check photo fits badly, by the error of the estimate.
+    capture, stored = reconstructed()
+
+    def search(*_args, **_options):
+        raise AssertionError("photos were searched")
+
+    monkeypatch.setattr("nearfar.workflow.diagnosis.single_photos.estimate_jointly", search)
+    assert judge_reconstruction(stored, capture).grade == "good"
+    with pytest.raises(AssertionError, match="searched"):
+        find_what_spoils(stored, capture)
 
 
 def test_a_rig_that_is_not_linear_is_wrong_and_named(reconstructed):

@@ -27,7 +27,7 @@ def find_what_spoils(
     capture: Capture,
     progress: Report = ignore_progress,
     *,
-    suspected: bool = False,
+    suspected: bool | None = None,
 ) -> list[Spoilt]:
     """Find what spoils the photos of a capture.
 
@@ -38,8 +38,10 @@ def find_what_spoils(
     capture : Capture
     progress : callable
         Called with the step and the share of it that is done.
-    suspected : bool
-        Whether there is reason to search photos that seem to fit.
+    suspected : bool or None
+        Whether check photos and error bars hint at spoilt photos. If they do, photos that seem to
+        fit are searched; if they do not, check photos that fit badly are no reason to search, as
+        they are off by the error of the estimate. None if they may.
 
     Returns
     -------

@@ -116,7 +116,7 @@ class SpoiltPhotos(NamedTuple):
     probable: list[Spoilt]
 
 
-def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool) -> SpoiltPhotos:
+def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None) -> SpoiltPhotos:
     """Find photos that do not fit the others, and why.
 
     Parameters
@@ -125,15 +125,16 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool) -> Sp
         To the transport that was estimated from all photos.
     known : ndarray, shape (rows, columns, 2)
         q as it was found from all photos.
-    suspected : bool
+    suspected : bool or None
         Whether there is reason to search where no photo has a large misfit: a photo that alone
-        tells of its frequency fits itself.
+        tells of its frequency fits itself. If False, misfits of check photos are none either.
     """
     plan = fits.plan
     fixed = is_white_or_black(plan) | serves(plan, "correspondence")
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
-    if not suspected and not _suspects(fits.misfit, good & ~fixed):
+    reasons = good & ~fixed if suspected is None else good & ~fixed & ~is_check(plan)
+    if not suspected and not _suspects(fits.misfit, reasons):
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)

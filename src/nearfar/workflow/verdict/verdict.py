@@ -48,6 +48,8 @@ NOISE_DECIBELS = 6.0
 
 # Below this, error bars expect so much more error than there is that photos contradict each other.
 SMALLEST_ERROR_RATIO = 0.5
+# Up to this, check photos that fit badly do so by the error of the estimate.
+USUAL_ERROR_RATIO = 1.5
 
 # Photos that are of something else: what was estimated from them is wrong.
 WRONG_PHOTOS: tuple[Cause, ...] = ("order", "turned", "torn", "colours")
@@ -156,7 +158,7 @@ def judge_reconstruction(
         held_out,
         find_faults(capture, transport.provenance),
         find_what_spoils(
-            transport, capture, progress, suspected=held_out is not None and _contradicts(held_out)
+            transport, capture, progress, suspected=None if held_out is None else _hints(held_out)
         ),
         repeats,
     )
@@ -262,10 +264,15 @@ def _bends(held_out: HeldOut) -> bool:
     return excess > SURE_EXCESS and abs(held_out.lamp_excess) < excess / 4
 
 
-def _contradicts(held_out: HeldOut) -> bool:
-    """Return whether error bars are far too large, as where photos contradict each other."""
+def _hints(held_out: HeldOut) -> bool | None:
+    """Return whether error bars and check photos hint at spoilt photos; None if they may.
+
+    They do where error bars are far too large, as where photos contradict each other.
+    """
     ratio = held_out.error_ratio
-    return ratio is not None and ratio < SMALLEST_ERROR_RATIO
+    if ratio is None or ratio > USUAL_ERROR_RATIO:
+        return None
+    return ratio < SMALLEST_ERROR_RATIO
 
 
 def _is_of_brightness(each: Spoilt) -> bool:

@@ -133,7 +133,7 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
     fixed = is_white_or_black(plan) | serves(plan, "correspondence")
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
-    reasons = good & ~fixed if suspected is None else good & ~fixed & ~is_check(plan)
+    reasons = good & ~fixed if suspected is None else good & ~fixed & ~serves(plan, "check")
     if not suspected and not _suspects(fits.misfit, reasons):
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):

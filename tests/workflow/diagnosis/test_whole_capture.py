@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved
+from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved, NotLinear
 from nearfar.workflow.diagnosis.misfit import (
+    BEND,
     CAUSES,
     DOWN,
     GAIN,
@@ -22,15 +23,16 @@ VALUES = 1000
 INFORMATION = 500.0
 
 
-def found(cause, sizes, *, regions=slice(None), information=INFORMATION):
+def found(cause, sizes, *, regions=slice(None), information=INFORMATION, misfit=None):
     """Return what is found where photos differ by an effect of these sizes, and nothing else."""
     every = REGIONS_A_SIDE**2
     effects = np.zeros((PHOTOS, every, CAUSES))
     effects[:, regions, cause] = np.reshape(sizes, (PHOTOS, 1))
     matrix = np.broadcast_to(information * np.eye(CAUSES), (PHOTOS, every, CAUSES, CAUSES))
     vector = information * effects
-    misfit = 1 + np.einsum("nrc,nrc->n", effects, vector) / VALUES
-    return find_changes(NormalEquations(matrix, vector, VALUES), misfit, WHITES)
+    explained = np.einsum("nrc,nrc->n", effects, vector) / VALUES
+    misfits = 1 + explained if misfit is None else np.full(PHOTOS, misfit)
+    return find_changes(NormalEquations(matrix, vector, VALUES), misfits, WHITES)
 
 
 def step(photo, size=1.0):
@@ -73,3 +75,14 @@ def test_light_below_one_percent_is_no_change():
 def test_light_that_changes_all_the_time_flickers():
     (fault,) = found(GAIN, np.random.default_rng(0).standard_normal(PHOTOS))
     assert isinstance(fault, LampFlickers)
+
+
+def test_a_bend_that_explains_next_to_nothing_of_bad_fits_is_none():
+    # Of a scene that the model cannot represent.
+    (fault,) = found(BEND, np.full(PHOTOS, 0.2))
+    assert fault == NotLinear("")
+    assert found(BEND, np.full(PHOTOS, 0.2), misfit=20.0) == []
+
+
+def test_what_explains_more_than_photos_differ_beyond_noise_is_noise():
+    assert found(PROJECTOR_FOCUS, step(47), misfit=1.1) == []

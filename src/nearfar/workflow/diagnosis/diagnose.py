@@ -1,5 +1,7 @@
 """What spoils the photos of a capture, by all checks."""
 
+import numpy as np
+
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
@@ -9,7 +11,12 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.compression import find_compression
 from nearfar.workflow.diagnosis.inverse_pairs import find_motion_by_pairs
-from nearfar.workflow.diagnosis.misfit import fit_photos, is_white_or_black, normal_equations
+from nearfar.workflow.diagnosis.misfit import (
+    fit_photos,
+    is_white_or_black,
+    normal_equations,
+    serves,
+)
 from nearfar.workflow.diagnosis.sample import sample_camera
 from nearfar.workflow.diagnosis.single_photos import SWEEPS, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
@@ -40,8 +47,8 @@ def find_what_spoils(
         Called with the step and the share of it that is done.
     suspected : bool or None
         Whether check photos and error bars hint at spoilt photos. If they do, photos that seem to
-        fit are searched; if they do not, check photos that fit badly are no reason to search, as
-        they are off by the error of the estimate. None if they may.
+        fit are searched; if they do not, check photos that fit badly tell nothing, as they are off
+        by the error of the estimate. None if they may.
 
     Returns
     -------
@@ -81,9 +88,11 @@ def find_what_spoils(
     progress(step, 1.0)
     if single.certain:
         return [*single.certain, *single.probable]
-    found = find_changes(
-        normal_equations(sample, fits), fits.misfit, photos.drift.references.whites
-    )
+    equations, misfit = normal_equations(sample, fits), fits.misfit
+    if suspected is False:
+        checks = serves(plan, "check")
+        equations, misfit = equations.without(checks), np.where(checks, 1.0, misfit)
+    found = find_changes(equations, misfit, photos.drift.references.whites)
     if not found:
         return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.

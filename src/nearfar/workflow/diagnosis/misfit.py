@@ -174,6 +174,12 @@ class NormalEquations:
             self.values,
         )
 
+    def without(self, photos: Booleans) -> "NormalEquations":
+        """Return the equations to which some photos, (photos,), add nothing."""
+        matrix, vector = self.matrix.copy(), self.vector.copy()
+        matrix[photos] = vector[photos] = 0.0
+        return NormalEquations(matrix, vector, self.values)
+
 
 def normal_equations(sample: CameraSample, fits: Fits) -> NormalEquations:
     """Return the normal equations of all photos of a sample."""

@@ -47,8 +47,9 @@ FROM_THE_ENDS = 4
 LEAST_OF_EACH = 0.3
 # And of the photos of white alone, where it is camera or scene that moved.
 LEAST_OF_WHITE = 0.3
-# A bend of the response has to explain at least this.
+# A bend of the response has to explain at least this, and this share of the misfits beyond 1.
 LEAST_BEND = 0.5
+LEAST_SHARE_OF_BEND = 0.02
 # Exposure explains this many times what a bend does where it changes from photo to photo.
 EXPOSURE_OVER_BEND = 7.0
 # Above this, light changes from photo to photo, not in a few.
@@ -98,7 +99,8 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
     list of Spoilt
         The one that explains most first.
     """
-    least = max(LEAST_EXPLAINED, LEAST_SHARE * float(np.maximum(misfit - 1, 0).sum()))
+    beyond_noise = float(np.maximum(misfit - 1, 0).sum())
+    least = max(LEAST_EXPLAINED, LEAST_SHARE * beyond_noise)
     whole = equations.whole
     found: list[tuple[float, Spoilt]] = []
     camera = _step(whole, [DOWN, ACROSS], whites=whites)
@@ -114,6 +116,11 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
         key=lambda step: step.explained,
     )
     focus = _step(whole, [CAMERA_FOCUS])
+    # What explains more than photos differ by beyond noise explains noise.
+    projector, focus = (
+        step if step.explained < beyond_noise else step._replace(explained=0.0)
+        for step in (projector, focus)
+    )
     # White looks the same wherever the projector is, and under any lamp but for its brightness.
     of_white = _explained_of_white(equations, whites) > LEAST_OF_WHITE
     if of_white:
@@ -134,7 +141,8 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
     light = find_changes_of_light(whole)
     bend = _explained(whole.matrix.sum(axis=(0, 1)), whole.vector.sum(axis=(0, 1)), [BEND])
     bend /= whole.values
-    if bend > LEAST_BEND and (light is None or light[0] < EXPOSURE_OVER_BEND * bend):
+    least_bend = max(LEAST_BEND, LEAST_SHARE_OF_BEND * beyond_noise)
+    if bend > least_bend and (light is None or light[0] < EXPOSURE_OVER_BEND * bend):
         found.append((light[0] if light else bend, NotLinear("")))
     elif light is not None and light[0] > least:
         found.append(light)

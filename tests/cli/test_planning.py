@@ -175,6 +175,8 @@ def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
     assert read_plan(chosen) == by_noise[0] != by_noise[1]
     own = ("--near", 5, "--look", look)
     assert "planned with W = 5" in check_done(run_nearfar("plan", *wanted, *own)).out
+    ran = run_nearfar("plan", *wanted, "--near", 7, "--look", look)
+    assert "planned with W = 7, as asked, for which about " in check_done(ran).out
     for arguments, said in (
         (("--projector", "16x24", "--photos", 60, "--look", look), "same pattern grid"),
         (("--projector", "16x20", "--photos", 60, "--look", finished.transport), "--method joint"),

@@ -45,3 +45,15 @@ def test_a_dark_pair_and_dark_rows_do_no_harm():
     found = sum_pairs(PhotosInMemory(photos.plan, dark, 1.0), [slice(0, 8), slice(8, 40)])
     assert found.light[2] == 1.0
     assert np.isfinite(found.variance(np.ones((3, 1)))).all()
+
+
+def test_saturated_camera_pixels_count_for_nothing():
+    photos = _photos()
+    saturated = photos.photos.copy()
+    saturated[:, :2] *= 4.0
+    saturated = np.minimum(saturated, 1.0)
+    assert (saturated == 1.0).any()
+    found = sum_pairs(PhotosInMemory(photos.plan, saturated, 1.0), [slice(0, 40)])
+    assert found.scatter == pytest.approx(1.0, abs=0.1)
+    levels = np.array([[0.1], [0.4], [0.8]])
+    np.testing.assert_allclose(found.variance(levels), GAIN * levels + FLOOR, rtol=0.15)

@@ -195,7 +195,7 @@ def _choose(
     )
     needed = None
     if seen is not None and seen.model_holds and plan.window > seen.window:
-        needed = photos_for_window(seen, projector, photos)
+        needed = photos_for_window(seen, projector, photos, plan.window)
     return _Chosen(plan, expected_range(expected, is_looked_at=seen is not None), seen, needed)
 
 

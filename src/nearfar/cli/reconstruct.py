@@ -148,8 +148,10 @@ def _write_report(
     from nearfar.workflow.diagnosis.misfit_maps import measure_misfit
 
     transport = open_transport(output)
-    with progress_bar("reporting", quiet=quiet) as progress:
-        misfit = measure_misfit(transport, capture, progress)
+    misfit = verdict.misfit
+    if misfit is None:
+        with progress_bar("reporting", quiet=quiet) as progress:
+            misfit = measure_misfit(transport, capture, progress)
     text = reconstruction_page(
         transport,
         capture,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.by_inverse import Pair, find_pairs
 from nearfar.photometry.noise import NoiseModel, fit_noise, variance_by_channel
@@ -67,6 +67,8 @@ def sum_pairs(
 ) -> PhotosOfPairs:
     """Estimate noise and drift of a capture of inverse pairs from what the pairs sum to.
 
+    What is saturated under white counts for nothing.
+
     Parameters
     ----------
     photos : Photos
@@ -83,9 +85,12 @@ def sum_pairs(
     """
     pairs = find_pairs(photos.plan)
     report = progress or (lambda _share: None)
+    white = [pair.photo for pair in pairs if pair.frequency == DC]
     light = np.zeros(len(pairs))
+    usable = []
     for done, rows in enumerate(bands, 1):
-        light += [both.sum() for both in _sums(photos, pairs, rows)]
+        usable.append(below_full_scale(photos, white, rows))
+        light += [both[usable[-1]].sum() for both in _sums(photos, pairs, rows)]
         report(done / len(bands) / 2)
     # A pair without any light, such as of a projector that is off, divides nothing.
     light = np.where(light > 0, light / max(float(light.mean()), 1e-300), 1.0)
@@ -98,12 +103,25 @@ def sum_pairs(
         dark += [photos.read([number], rows).reshape(-1, photos.channels) for number in black]
         report((1 + done / len(bands)) / 2)
     mean, variance = np.concatenate(means), np.concatenate(variances)
+    known = np.concatenate(usable)
+    if not known.any(axis=0).all():
+        # Nothing is known of the noise of a channel that is all saturated.
+        known = np.ones_like(known)
     levels = np.median(np.concatenate(dark), axis=0) if dark else np.zeros(photos.channels)
     noise = tuple(
-        fit_noise(mean[:, i], variance[:, i], float(levels[i])) for i in range(photos.channels)
+        fit_noise(mean[known[:, i], i], variance[known[:, i], i], float(levels[i]))
+        for i in range(photos.channels)
     )
-    expected = 2 * float(variance_by_channel(noise, mean / 2).mean())
-    return PhotosOfPairs(photos, noise, light, float(variance.mean()) / expected)
+    expected = 2 * float(variance_by_channel(noise, mean / 2)[known].mean())
+    return PhotosOfPairs(photos, noise, light, float(variance[known].mean()) / expected)
+
+
+def below_full_scale(photos: Photos, white: Sequence[int], rows: slice) -> Booleans:
+    """Return where no photo of white is saturated, (C, channels)."""
+    shape = (len(range(*rows.indices(photos.camera.height))) * photos.camera.width, photos.channels)
+    if not white:
+        return np.ones(shape, dtype=bool)
+    return np.asarray((photos.read(white, rows) < 1.0).all(axis=0).reshape(shape))
 
 
 def _sums(photos: Photos, pairs: Sequence[Pair], rows: slice) -> Iterator[NDArray[np.float64]]:

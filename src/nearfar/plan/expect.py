@@ -41,7 +41,7 @@ OFF_PICTURES_LOOKED_AT, OFF_RANDOM_LOOKED_AT = (-4.0, 3.0), (-4.0, 6.0)
 class Expected(NamedTuple):
     """Expected SNR_b of relighting in dB, under pictures and under a random light.
 
-    That of the typical scenes; how far others differ says `expected_range`.
+    That of the typical scenes; `expected_range` says how far others differ.
     """
 
     pictures: float

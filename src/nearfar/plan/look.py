@@ -91,8 +91,8 @@ def look_at(transport: "Transport") -> Look:
     )
 
 
-def photos_for_window(look: Look, projector: Size, photos: int) -> int:
-    """Return how many photos leave as little unknown with the wanted window as with the look's own.
+def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> int:
+    """Return how many photos leave as little unknown with a window as with the look's own.
 
     Parameters
     ----------
@@ -100,6 +100,8 @@ def photos_for_window(look: Look, projector: Size, photos: int) -> int:
     projector : Size
     photos : int
         With the look's own window.
+    window : int
+        W, larger than the look's.
 
     Returns
     -------
@@ -115,7 +117,7 @@ def photos_for_window(look: Look, projector: Size, photos: int) -> int:
         return choice.expected.pictures
 
     before = expected(photos, look.window)
-    now, twice = (expected(count, look.wanted_window) for count in (photos, 2 * photos))
+    now, twice = (expected(count, window) for count in (photos, 2 * photos))
     doublings = max(before - now, 0.0) / max(twice - now, 1e-3)
     return round(photos * 2 ** min(doublings, 4.0))
 

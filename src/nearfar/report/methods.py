@@ -12,7 +12,7 @@ from nearfar.transport.store import StoredTransport
 from nearfar.workflow.check import ModelCheck
 from nearfar.workflow.compare import Comparison
 from nearfar.workflow.rivals import RIVALS
-from nearfar.workflow.verdict.held_out import HeldOut
+from nearfar.workflow.verdict.held_out import PICTURES, HeldOut
 
 PEERS = (
     "Peers, P., Mahajan, D.K., Lamond, B., Ghosh, A., Matusik, W., Ramamoorthi, R., Debevec, P.: "
@@ -34,7 +34,7 @@ PURPOSES = {
     "check": "to check by",
 }
 OFFSETS = {
-    "inverse": "Every pattern was followed by its inverse, which takes the offset out.",
+    "inverse": "Every sinusoid was followed by its inverse, which takes the offset out.",
     "reference": (
         "The sinusoids' offset, and the drift of lamp and ambient light, were taken out by the "
         "whites and blacks, which were photographed at intervals."
@@ -48,9 +48,9 @@ CORRESPONDENCES = {
 }
 ESTIMATES = {
     "joint": (
-        "Each camera pixel's row was estimated from all its photos but those to check by, as the "
-        "mean of a Gaussian posterior whose prior the photos choose [2]; its covariance gives the "
-        "error bars."
+        "Each camera pixel's row was estimated from its photos of sinusoids, white and black, as "
+        "the mean of a Gaussian posterior whose prior the photos choose [2]; its covariance gives "
+        "the error bars."
     ),
     "paper": "Each camera pixel's row was estimated by the estimator of [1].",
 }
@@ -89,14 +89,18 @@ def reconstruction_methods(
 
 
 def checked_by_photos(held_out: HeldOut | None) -> str:
-    """Return in a sentence what check photos say of a transport; None if none were compared."""
+    """Return in a sentence what check photos say of a transport, or that there are none."""
     if held_out is None:
         return "The transport was not compared with photos that the estimate had not used."
     expected = held_out.expected_snr
     beside = "" if expected is None else f"; its error bars expect {expected:.1f} dB"
+    use = "no estimate used"
+    if held_out.called != PICTURES:
+        use = "served to find q, but no response was estimated from"
+    least = "at least " if held_out.is_least else ""
     return (
-        f"Relit under {counted(len(held_out.lights), 'pattern')} whose photos no estimate used, "
-        f"the transport has a mean SNR_b of {held_out.snr:.1f} dB{beside}."
+        f"Relit under {counted(len(held_out.lights), 'pattern')} whose photos {use}, the transport "
+        f"has a mean SNR_b of {least}{held_out.snr:.1f} dB{beside}."
     )
 
 

@@ -80,10 +80,13 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
     falls = f"near-range light falls by a factor e in {look.reach:.1f}{more} projector pixels"
     if photos_for_window is None:
         return f"{falls} in the look: planned with W = {plan.window}"
+    wanted = ", as asked"
+    if look.wanted_window > look.window:
+        falls += f", and reaches further than the look's W = {look.window}"
+        wanted = "" if plan.window == look.wanted_window else wanted
     return (
-        f"{falls}, and reaches further than the look's W = {look.window}: planned with W = "
-        f"{plan.window}, for which about {photos_for_window} photos leave as little unknown as "
-        f"{len(plan.patterns)} for W = {look.window}"
+        f"{falls}: planned with W = {plan.window}{wanted}, for which about {photos_for_window} "
+        f"photos leave as little unknown as {len(plan.patterns)} for W = {look.window}"
     )
 
 

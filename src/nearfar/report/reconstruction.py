@@ -140,7 +140,9 @@ def _relit_pictures(verdict: Verdict) -> list[tuple[str, str]]:
         return []
     expected = verdict.held_out.expected_snr
     beside = "" if expected is None else f"; {expected:.1f} dB expected"
-    return [(f"{verdict.held_out.snr:.1f} dB", f"held-out SNR_b: pictures no estimate saw{beside}")]
+    least = "at least " if verdict.held_out.is_least else ""
+    lights = f"{verdict.held_out.called} no estimate saw"
+    return [(f"{least}{verdict.held_out.snr:.1f} dB", f"held-out SNR_b: {lights}{beside}")]
 
 
 def _saturated(transport: Transport) -> list[tuple[str, str]]:
@@ -159,19 +161,20 @@ def _held_out(verdict: Verdict) -> str:
     def written(decibels: float | None) -> str:
         return "" if decibels is None else f"{decibels:.1f}"
 
+    fine = verdict.held_out.fine
     rows = [
         [
-            light.description.removesuffix(" to check by"),
+            light.description.removesuffix(" to check by") + ", fine" * (light in fine),
             written(light.snr),
             written(light.expected_snr),
             written(light.photo_snr),
         ]
-        for light in (*verdict.held_out.lights, *verdict.held_out.fine)
+        for light in (*verdict.held_out.lights, *fine)
     ]
     head = ["light", "held-out SNR_b", "expected", "one photo over its noise"]
     return f"""<h2>Checked</h2>
-<p>The transport was relit under patterns from whose photos nothing was estimated, and compared with
-these photos; all in dB. Where it is much worse than expected, the scene or the photos break an
+<p>The transport was relit under patterns from whose photos no response was estimated, and compared
+with these photos; all in dB. Where it is much worse than expected, the scene or the photos break an
 assumption.</p>
 {numbers(head, rows)}
 """

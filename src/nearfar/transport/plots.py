@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 COLOUR_SCALE_DECADES = 5.0
 # Decades of the vertical axis of a line, below its largest value.
 LINE_DECADES = 6.0
+# Behind lines whose errors are unknown.
+UNKNOWN_COLOUR = "0.9"
 PARTS = ("direct", "near", "far")
 
 
@@ -159,7 +161,7 @@ class Plots:
         drawn.set_ylim(bottom=most * 10.0**-LINE_DECADES if most > 0 else None)
         is_saturated = bool(self._saturated()[y, x])
         if is_saturated and bars is not None:
-            drawn.axhspan(0, 1, transform=drawn.transAxes, alpha=0.15, color="grey")
+            drawn.patch.set_facecolor(UNKNOWN_COLOUR)
         says = ", saturated: errors unknown" if is_saturated else ""
         drawn.set_title(f"camera pixel ({y}, {x}){says}")
         drawn.legend()

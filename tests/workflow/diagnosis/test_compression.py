@@ -75,3 +75,9 @@ def test_photos_of_more_bits_and_flat_ones_are_not_accused(tmp_path):
 def test_a_camera_smaller_than_a_block_tells_nothing(tmp_path):
     plan, photos = pictures(3)
     assert not compressed(tmp_path, plan, photos[:, :5, :4])
+
+
+def test_a_plan_of_white_and_black_alone_tells_nothing(tmp_path):
+    plan, photos = pictures(1)
+    capture = write_capture(plan, tmp_path / "c.zarr", list(photos))
+    assert not find_compression(capture, np.zeros(len(photos), dtype=bool))

@@ -86,3 +86,8 @@ def test_a_bend_that_explains_next_to_nothing_of_bad_fits_is_none():
 
 def test_what_explains_more_than_photos_differ_beyond_noise_is_noise():
     assert found(PROJECTOR_FOCUS, step(47), misfit=1.1) == []
+
+
+def test_a_few_photos_tell_nothing():
+    equations = NormalEquations(np.zeros((8, 9, CAUSES, CAUSES)), np.zeros((8, 9, CAUSES)), VALUES)
+    assert find_changes(equations, np.full(8, 50.0), np.array([0, 7])) == []

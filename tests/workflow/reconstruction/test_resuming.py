@@ -28,6 +28,7 @@ from nearfar.workflow.reconstruction.job import tiling_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.reconstruction.sinks import LOG_NAME
+from nearfar.workflow.verdict.keeping import judge_transport
 from tests.absent import NEEDS_PYTORCH
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.plans import chosen_plan
@@ -113,6 +114,14 @@ def _check_same(one, other):
     for name in names:
         if (one / name).is_file():
             assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+def _judged(whole, capture, folder):
+    """Copy a transport, and judge the copy, as the command does."""
+    copy = folder / "judged.zarr"
+    shutil.copytree(whole, copy)
+    judge_transport(copy, capture)
+    return copy
 
 
 def _stop_after(count):
@@ -285,8 +294,8 @@ def test_kill_9_at_twenty_moments_costs_nothing(tall_capture, tall_whole, tmp_pa
         resume = ["--resume"] if log.parent.exists() else []
         check_done(run_nearfar(*command, *resume))
     assert kills == 20, "it ended before it was killed twenty times: give it more tiles"
-    _check_same(tall_whole, path)
     assert list(tmp_path.iterdir()) == [path]
+    _check_same(_judged(tall_whole, tall_capture, tmp_path), path)
 
 
 def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):
@@ -301,5 +310,5 @@ def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):
     log.write_bytes(log.read_bytes()[:-9])
     ran = run_nearfar("reconstruct", *options, "--resume")
     assert ran.status == 0, ran.err
-    _check_same(whole, path)
+    _check_same(_judged(whole, capture, tmp_path), path)
     assert load_transport(path).camera == CAMERA

@@ -1,6 +1,7 @@
 """Verdicts: good where all is well, and the cause by name where it is not."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -14,7 +15,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.transport.store import open_transport
+from nearfar.transport.store import open_transport, save_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.evaluate import decibels, exposure_of
@@ -105,7 +106,8 @@ def test_without_check_photos_nothing_was_checked(reconstructed):
         "expected_dB": None,
         "causes": ["unchecked"],
     }
-    assert reason.startswith("nothing was checked: the plan has no check photos. Known is this: ")
+    assert reason.startswith("nothing was checked: the plan has neither check photos, ")
+    assert ". Known is this: one photo of white is " in reason
 
 
 def test_inverse_pairs_alone_and_square_transports_are_not_checked(box, tmp_path):
@@ -117,7 +119,10 @@ def test_inverse_pairs_alone_and_square_transports_are_not_checked(box, tmp_path
         capture = acquire(plan, tmp_path / f"{square}.zarr", rig)
         made = tmp_path / f"t-{square}.zarr"
         reconstruct_to_file(capture, made, options=ReconstructionOptions(square=square))
-        assert judge_reconstruction(open_transport(made), capture).causes == ("unchecked",)
+        (reason,) = judge_reconstruction(open_transport(made), capture).reasons
+        assert reason.cause == "unchecked"
+        says = "a square T" if square else "neither check photos, nor stripes"
+        assert says in reason.sentence
 
 
 def test_the_command_ends_with_the_verdict(reconstructed, tmp_path):
@@ -143,3 +148,20 @@ def test_bands_are_spread_and_few(camera):
     assert count <= max(2 * CAMERA_PIXELS, 8 * camera.width)
     if camera.pixels <= CAMERA_PIXELS:
         assert count == camera.pixels
+
+
+def test_rows_that_are_all_saturated_are_left_out(reconstructed, tmp_path):
+    capture, stored = reconstructed()
+    transport = stored.rows()
+    for rows, is_checked in ((slice(0, 8), True), (slice(None), False)):
+        saturated = transport.quality.saturated.copy()
+        saturated[rows] = True
+        quality = replace(transport.quality, saturated=saturated)
+        path = tmp_path / f"{is_checked}.zarr"
+        save_transport(replace(transport, quality=quality), path)
+        verdict = judge_reconstruction(open_transport(path), capture)
+        assert (verdict.held_out is not None) == is_checked
+        if is_checked:
+            assert np.isfinite(verdict.held_out.snr)
+        else:
+            assert "every camera pixel is saturated" in str(verdict)

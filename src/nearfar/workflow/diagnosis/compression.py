@@ -51,6 +51,8 @@ def find_compression(capture: Capture, counted: Booleans) -> list[Spoilt]:
     camera = capture.camera
     rows, columns = (_middle(side) for side in camera)
     every = np.flatnonzero(counted)
+    if not len(every):
+        return []
     chosen = every[:: max(1, len(every) // PHOTOS)][:PHOTOS]
     photos = np.stack([photo[:, columns] for photo in capture.read(chosen, rows)])
     levels = _in_levels(photos.astype(np.float64))

@@ -54,7 +54,8 @@ def find_what_spoils(
     -------
     list of Spoilt
         The worst first; empty if all is well, or if the photos cannot tell: those by reference of
-        a square T. Inverse pairs tell of motion and JPEG alone.
+        a square T. Inverse pairs tell of motion and JPEG alone; that their
+        response is not linear is a fault of the capture.
 
     Raises
     ------

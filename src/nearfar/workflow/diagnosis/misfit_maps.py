@@ -7,30 +7,35 @@ rows.
 Index convention: maps are over camera pixels [y, x], or over square cells of a large camera.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.capture import Capture
+from nearfar.errors import InputError
 from nearfar.illumination.frequencies import Frequency
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.plan import Plan, Sinusoid
 from nearfar.progress import Report, ignore_progress
+from nearfar.transport.model import Transport
+from nearfar.transport.rows import of_pixels
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.misfit import (
     fit_photos,
     is_white_or_black,
     serves,
 )
+from nearfar.workflow.diagnosis.sample import read_lines
 from nearfar.workflow.reconstruction.sources import photos_without_drift
 
 # Values of photos that are compared at once.
 VALUES_AT_ONCE = 2**22
-# A larger camera is compared in this many lines, spread evenly, of as many pixels in all.
+# A larger camera is compared in this many lines, spread evenly, of so many values in all.
 CAMERA_PIXELS = 2**18
 LINES_OF_LARGE_CAMERA = 64
+VALUES_OF_LARGE_CAMERA = 2**17
 
 # Frequencies, or a part of the picture, stand out with this many times the misfit of the others.
 STANDS_OUT = 2.5
@@ -53,7 +58,7 @@ class MisfitMaps:
     of_camera : ndarray, shape (y, x)
         Mean over photos without whites, blacks, stripes and Gray code; NaN where all is saturated.
     saturated : ndarray of bool, shape (y, x)
-        Where something is.
+        Where any channel is saturated, or most of a cell.
     cell : int
         Camera pixels along the side of a cell of the map.
     """
@@ -83,8 +88,8 @@ def measure_misfit(
     Returns
     -------
     MisfitMaps or None
-        None if the photos do not tell their noise, as those of inverse pairs, or if the transport
-        is square.
+        None if the photos do not tell their noise, as those of inverse pairs, if the transport is
+        square, or if all is saturated.
 
     Raises
     ------
@@ -93,23 +98,29 @@ def measure_misfit(
     """
     if transport.provenance["square"]:
         return None
-    photos = photos_without_drift(capture, progress)
-    if not isinstance(photos, PhotosWithoutDrift):
-        return None
     plan, camera = capture.plan, transport.camera
+    if plan.offset != "reference":
+        return None
+    try:
+        photos, part = _compared(transport, capture, progress)
+    except InputError:
+        # All of the lines are saturated.
+        return None
     counted = ~is_white_or_black(plan) & ~serves(plan, "correspondence")
     pitch = lines_apart(camera)
+    cells = max(1, round(camera.width / pitch)) if pitch > 1 else None
     sums, values = np.zeros(len(plan.patterns)), 0
     lines, marks = [], []
-    for rows in _bands(camera, len(plan.patterns) * transport.channels * camera.width, pitch):
-        fits = fit_photos(photos, transport.rows(rows), rows.start)
+    values_of_row = len(plan.patterns) * transport.channels * photos.camera.width
+    for rows in blocks(photos.camera.height, max(1, VALUES_AT_ONCE // values_of_row)):
+        fits = fit_photos(photos, part(rows), rows.start)
         share = (fits.photos - fits.relit) ** 2 / fits.variance
         sums += share.sum(axis=(1, 2, 3), dtype=np.float64)
         known = np.asarray(np.isfinite(fits.variance).any(axis=0))
         values += int(known.sum())
-        lines.append(_in_cells(share[counted].mean(axis=0), known, pitch))
-        marks.append(_any_in_cells(np.asarray(~known.all(axis=-1)), pitch))
-        progress("comparing photos", rows.stop / camera.height)
+        lines.append(_in_cells(share[counted].mean(axis=0), known, cells))
+        marks.append(_most_in_cells(np.asarray(~known.all(axis=-1)), cells))
+        progress("comparing photos", rows.stop / photos.camera.height)
     misfit = sums / max(values, 1)
     checks = serves(plan, "check")
     return MisfitMaps(
@@ -128,36 +139,50 @@ def lines_apart(camera: Size) -> int:
     return max(1, camera.height // LINES_OF_LARGE_CAMERA)
 
 
-def _bands(camera: Size, values_of_row: int, pitch: int) -> Iterator[slice]:
-    """Yield the rows that are compared at once: all of them in turn, or some in each `pitch`."""
+def _compared(
+    transport: StoredTransport, capture: Capture, progress: Report
+) -> tuple[PhotosWithoutDrift, Callable[[slice], Transport]]:
+    """Return the photos that are compared, and what returns the transport at some of their rows.
+
+    Photos of a large camera are single chunks of their file, so that each is read once, and the
+    lines that are compared are kept.
+    """
+    camera = capture.camera
+    pitch = lines_apart(camera)
     if pitch == 1:
-        yield from blocks(camera.height, max(1, VALUES_AT_ONCE // values_of_row))
-        return
-    height = min(pitch, max(1, CAMERA_PIXELS // (LINES_OF_LARGE_CAMERA * camera.width)))
-    for start in range(0, camera.height - pitch + 1, pitch):
-        first = start + (pitch - height) // 2
-        yield slice(first, first + height)
+        photos = photos_without_drift(capture, progress)
+        assert isinstance(photos, PhotosWithoutDrift)
+        return photos, transport.rows
+    rows = np.arange(pitch // 2, camera.height, pitch)
+    step = max(1, len(rows) * camera.width * capture.channels // VALUES_OF_LARGE_CAMERA)
+    columns = np.arange(step // 2, camera.width, step)
+    sample = read_lines(
+        capture, rows, columns, lambda share: progress("reading photos to compare", share)
+    )
+    sampled = sample.of_transport(transport)
+    every = np.arange(len(columns))
+    return sample.without_drift(), lambda band: of_pixels(
+        sampled, np.arange(band.start, band.stop), every
+    )
 
 
-def _in_cells(share: Floats, known: Booleans, pitch: int) -> Floats:
-    """Return the mean over known channels, (y, x), and over the cells of a large camera."""
+def _in_cells(share: Floats, known: Booleans, cells: int | None) -> Floats:
+    """Return the mean over known channels, (y, x), or over so many cells of each line."""
     total, count = share.sum(axis=-1), known.sum(axis=-1)
-    if pitch > 1:
+    if cells is not None:
         total, count = (
-            np.stack([part.sum() for part in _cells(values, pitch)])[None]
+            np.stack([part.sum(axis=1) for part in np.array_split(values, cells, axis=1)], axis=1)
             for values in (total, count)
         )
     return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
-def _any_in_cells(marks: Booleans, pitch: int) -> Booleans:
-    if pitch == 1:
+def _most_in_cells(marks: Booleans, cells: int | None) -> Booleans:
+    """Return marks, (y, x), or whether more than half of each cell of a line is marked."""
+    if cells is None:
         return marks
-    return np.array([[bool(part.any()) for part in _cells(marks, pitch)]])
-
-
-def _cells(values: Floats | Booleans, pitch: int) -> list[Floats]:
-    return np.array_split(values, max(1, round(values.shape[1] / pitch)), axis=1)
+    parts = np.array_split(marks, cells, axis=1)
+    return np.stack([part.mean(axis=1) > 1 / 2 for part in parts], axis=1)
 
 
 def _of_frequencies(plan: Plan, misfit: Floats) -> dict[Frequency, float]:

@@ -33,7 +33,7 @@ class CameraSample:
     photos : ndarray, shape (photos, rows, columns, channels), float32
         In photo units, as they were taken.
     rows, columns : ndarray of int
-        Of the camera; in runs of `PATCH` or more.
+        Of the camera.
     camera : Size
         The whole camera's.
     """
@@ -65,7 +65,7 @@ class CameraSample:
 
 
 def sample_camera(capture: Capture, progress: Callable[[float], None]) -> CameraSample:
-    """Read the photos of a capture at some camera pixels.
+    """Read the photos of a capture at some camera pixels, in patches.
 
     Parameters
     ----------
@@ -78,8 +78,29 @@ def sample_camera(capture: Capture, progress: Callable[[float], None]) -> Camera
     UnreadableFileError
         If photos are damaged.
     """
+    return read_lines(capture, *sampled_lines(capture.camera), progress)
+
+
+def read_lines(
+    capture: Capture, rows: Integers, columns: Integers, progress: Callable[[float], None]
+) -> CameraSample:
+    """Read the photos of a capture where some rows and columns of the camera cross.
+
+    Each photo is read once, whole.
+
+    Parameters
+    ----------
+    capture : Capture
+    rows, columns : ndarray of int
+    progress : callable
+        Called with the share of the photos that have been read.
+
+    Raises
+    ------
+    UnreadableFileError
+        If photos are damaged.
+    """
     camera = capture.camera
-    rows, columns = sampled_lines(camera)
     numbers = len(capture.plan.patterns)
     photos = np.empty((numbers, len(rows), len(columns), capture.channels), dtype=np.float32)
     for number in range(numbers):

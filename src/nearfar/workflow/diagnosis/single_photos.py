@@ -127,7 +127,7 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
         q as it was found from all photos.
     suspected : bool or None
         Whether there is reason to search where no photo has a large misfit: a photo that alone
-        tells of its frequency fits itself. If False, misfits of check photos are none either.
+        tells of its frequency fits itself. If False, misfits of check photos are no reason either.
     """
     plan = fits.plan
     fixed = is_white_or_black(plan) | serves(plan, "correspondence")

@@ -97,8 +97,11 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
     Returns
     -------
     list of Spoilt
-        The one that explains most first.
+        The one that explains most first, but motion before all else where photos of white show it;
+        empty if there are too few photos to tell.
     """
+    if len(misfit) <= 2 * FROM_THE_ENDS:
+        return []
     beyond_noise = float(np.maximum(misfit - 1, 0).sum())
     least = max(LEAST_EXPLAINED, LEAST_SHARE * beyond_noise)
     whole = equations.whole

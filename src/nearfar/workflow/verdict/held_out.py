@@ -21,6 +21,8 @@ from nearfar.workflow.reconstruction.sources import photos_without_drift
 from nearfar.workflow.verdict.check_pairs import CheckPair, compare_pair, over_both
 from nearfar.workflow.verdict.weighed_photos import WeighedPhotos
 
+# What check photos are of, in a word.
+PICTURES = "pictures"
 # Camera pixels that are compared, about, in bands of this many rows.
 CAMERA_PIXELS = 2**17
 ROWS_PER_BAND = 8
@@ -94,7 +96,7 @@ class HeldOut:
 
     lights: tuple[HeldOutLight, ...]
     fine: tuple[HeldOutLight, ...] = ()
-    called: str = "pictures"
+    called: str = PICTURES
 
     @property
     def snr(self) -> float:
@@ -215,7 +217,8 @@ def measure_held_out(
     Returns
     -------
     HeldOut or None
-        None if the plan has no check patterns with their inverses.
+        None if the plan has no check patterns with their inverses, or every camera pixel is
+        saturated.
 
     Raises
     ------
@@ -231,11 +234,14 @@ def measure_held_out(
     found: list[HeldOutLight | None] = [None] * len(lights)
     for rows in bands(transport.camera):
         block = transport.rows(rows)
+        if block.quality is not None and block.quality.saturated.all():
+            continue
         bars = bars_of(block)
         for number, light in enumerate(lights):
             found[number] = joined(found[number], compare_light(block, bars, photos, light, rows))
         progress("check photos", rows.stop / transport.camera.height)
-    return HeldOut(tuple(light for light in found if light is not None))
+    compared = tuple(light for light in found if light is not None)
+    return HeldOut(compared) if compared else None
 
 
 def bands(camera: Size) -> list[slice]:

@@ -53,10 +53,9 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     --------
     >>> done = nearfar.reconstruct_to_file(capture, "judged.zarr")
     >>> nearfar.judge_transport("judged.zarr", capture).grade
-    'doubtful'
-    >>> verdict = nearfar.load_transport("judged.zarr").verdict
-    >>> verdict.grade, verdict.causes  # plans of the paper have no check photos
-    ('doubtful', ('unchecked',))
+    'good'
+    >>> nearfar.load_transport("judged.zarr").verdict.checked_by  # its stripes are light as well
+    'half-screens and wide bars'
     """
     require_instance(capture, Capture, "capture", "nearfar.open_capture")
     path = Path(path)

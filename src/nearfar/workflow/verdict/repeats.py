@@ -13,7 +13,7 @@ import numpy as np
 from nearfar.capture import Capture
 from nearfar.photometry.by_inverse import find_pairs
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
-from nearfar.photometry.pair_sums import PhotosOfPairs, sum_pairs
+from nearfar.photometry.pair_sums import PhotosOfPairs, below_full_scale, sum_pairs
 from nearfar.photometry.photos import mean_photo
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import is_reference
@@ -36,14 +36,14 @@ class Repeats:
         expects.
     lamp, ambient : float
         Largest less smallest lamp, and ambient light, as shares of white; of pairs, which do not
-        tell them apart, both together as the lamp.
+        tell them apart, both together as the lamp. None if a single pair tells of light.
     excess : float or None
         What inverse pairs show beyond white and black, as a share of white; None without pairs.
     """
 
     white_snr: float
     scatter: float
-    lamp: float
+    lamp: float | None
     ambient: float
     excess: float | None
 
@@ -57,8 +57,10 @@ class Repeats:
                 f"{said}; the lamp changed by {self.lamp:.2%}, ambient light by {self.ambient:.2%} "
                 f"of white."
             )
+        if self.lamp is not None:
+            said += f"; the light changed by {self.lamp:.2%}"
         return (
-            f"{said}; the light changed by {self.lamp:.2%}; what pairs sum to differs from white "
+            f"{said}; what pairs sum to differs from white "
             f"and black by {self.excess:+.2%} of white, by nothing if the response is linear."
         )
 
@@ -68,7 +70,8 @@ def measure_repeats(
 ) -> Repeats:
     """Measure what photos of one and the same light tell of a capture.
 
-    Of a large camera, evenly spaced rows are looked at.
+    Of a large camera, evenly spaced rows are looked at. What is saturated under white counts for
+    nothing.
 
     Parameters
     ----------
@@ -88,26 +91,25 @@ def measure_repeats(
     signal = noise = scattered = expected = 0.0
     for rows in bands(photos.camera):
         white, black = (mean_photo(photos, numbers, rows) for numbers in shown)
-        signal += float(np.sum((white - black) ** 2))
-        noise += float(np.sum(photos.variance(white)))
+        usable = below_full_scale(photos, shown[0], rows)
+        signal += float(np.sum((white - black)[usable] ** 2))
+        noise += float(np.sum(photos.variance(white)[usable]))
         for numbers, mean in zip(shown, (white, black), strict=True):
             for number in numbers if len(numbers) > 1 else []:
                 photo = photos.read([number], rows).reshape(mean.shape)
-                scattered += float(np.sum((photo - mean) ** 2)) * len(numbers) / (len(numbers) - 1)
-                expected += float(np.sum(photos.variance(mean)))
+                scattered += (
+                    float(np.sum((photo - mean)[usable] ** 2)) * len(numbers) / (len(numbers) - 1)
+                )
+                expected += float(np.sum(photos.variance(mean)[usable]))
     white_snr = decibels(signal, noise)
     if isinstance(photos, PhotosOfPairs):
         # White and the checkerboard sum to more than others where the response bends.
-        lamp = float(
-            np.ptp(
-                [
-                    light
-                    for pair, light in zip(find_pairs(photos.plan), photos.light, strict=True)
-                    if not pair.frequency.is_own_negative
-                ]
-                or [1.0]
-            )
-        )
+        lights = [
+            light
+            for pair, light in zip(find_pairs(photos.plan), photos.light, strict=True)
+            if not pair.frequency.is_own_negative
+        ]
+        lamp = float(np.ptp(lights)) if len(lights) > 1 else None
         return Repeats(white_snr, photos.scatter, lamp, 0.0, float(provenance["excess_of_sums"]))
     drift = photos.drift
     return Repeats(

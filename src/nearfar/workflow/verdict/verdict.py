@@ -1,7 +1,7 @@
 """The verdict on a transport: good, doubtful or wrong, and why."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,12 +11,15 @@ from nearfar.faults import of_photos
 from nearfar.faults.of_capture import find_faults
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
 from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
+from nearfar.plan import Plan
+from nearfar.plan.checks import check_lights
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.store import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
 from nearfar.workflow.verdict.by_correspondence import measure_by_correspondence
+from nearfar.workflow.verdict.correspondence_lights import correspondence_lights
 from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
 from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
@@ -58,6 +61,9 @@ CAUSES_OF_FAULTS: Mapping[type[Any], Cause] = {
     LightDrifted: "lamp",
     PhotosSaturated: "saturated",
 }
+# Why nothing was checked although there are photos to check by.
+OF_SQUARE = "nothing was checked: a square T is of no single camera pixel's photos."
+OF_SATURATED = "nothing was checked: every camera pixel is saturated."
 # What is wrong, and what to do.
 SENTENCES: Mapping[Cause, str] = {
     "not-linear": str(NotLinear("")),
@@ -66,7 +72,10 @@ SENTENCES: Mapping[Cause, str] = {
     "model": "the scene has light that the model cannot represent, or something moved.",
     "noise": "the photos are noisy: expose longer, or average several.",
     "too-few-photos": "too little was measured: plan for more photos.",
-    "unchecked": "nothing was checked: the plan has no check photos.",
+    "unchecked": (
+        "nothing was checked: the plan has neither check photos, nor stripes or Gray code that "
+        "serve as well."
+    ),
 }
 
 
@@ -81,11 +90,14 @@ class Verdict:
         None if nothing was checked.
     reasons : tuple of Reason
         Why the transport is not good, the most probable first.
+    misfit : MisfitMaps or None
+        Where photos do not fit, if it was measured.
     """
 
     grade: Grade
     held_out: HeldOut | None
     reasons: tuple[Reason, ...]
+    misfit: MisfitMaps | None = field(default=None, compare=False)
 
     @property
     def kept(self) -> KeptVerdict:
@@ -161,11 +173,12 @@ def judge_reconstruction(
             transport, capture, progress, suspected=None if held_out is None else _hints(held_out)
         ),
         repeats,
+        _why_unchecked(transport, capture.plan),
     )
     if "model" not in verdict.causes:
         return verdict
     misfit = measure_misfit(transport, capture, progress)
-    return verdict if misfit is None else with_worst(verdict, misfit)
+    return verdict if misfit is None else replace(with_worst(verdict, misfit), misfit=misfit)
 
 
 def with_worst(verdict: Verdict, misfit: MisfitMaps) -> Verdict:
@@ -187,6 +200,7 @@ def judge(
     faults: Sequence[Fault],
     spoilt: Sequence[Spoilt] = (),
     repeats: Repeats | None = None,
+    unchecked: str = SENTENCES["unchecked"],
 ) -> Verdict:
     """Return the verdict on a transport.
 
@@ -200,6 +214,8 @@ def judge(
         What spoils its photos.
     repeats : Repeats, optional
         What is known where nothing was checked.
+    unchecked : str
+        Why nothing was checked, if it was not.
     """
     if held_out is not None and _bends(held_out):
         # What bends the response makes pictures of other brightness than expected, too.
@@ -218,7 +234,7 @@ def judge(
             add(cause)
     if held_out is None:
         known = "" if repeats is None else f" Known is this: {repeats}"
-        reasons.append(Reason("unchecked", SENTENCES["unchecked"] + known))
+        reasons.append(Reason("unchecked", unchecked + known))
         wrong = any(reason.cause in WRONG_PHOTOS for reason in reasons)
         return Verdict("wrong" if wrong else "doubtful", None, tuple(reasons))
     if not spoilt:
@@ -242,6 +258,14 @@ def judge(
     return Verdict(
         "wrong" if wrong else "doubtful" if reasons else "good", held_out, tuple(reasons)
     )
+
+
+def _why_unchecked(transport: StoredTransport, plan: Plan) -> str:
+    """Return why nothing was checked, if it was not."""
+    if transport.provenance["square"]:
+        return OF_SQUARE
+    is_told = plan.offset == "reference" and check_lights(plan)
+    return OF_SATURATED if is_told or correspondence_lights(plan) else SENTENCES["unchecked"]
 
 
 def _surprises(held_out: HeldOut, most: float) -> bool:

@@ -8,23 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size, blocks
+from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import new_output, read_arrays
 from nearfar.files.stores import (
-    add_array,
     create_store,
     is_plain_array,
-    open_array,
     open_store,
-    read_array,
     read_plain_array,
-    read_selection,
 )
 from nearfar.transport.exact import ExactTransport
-from nearfar.transport.store import MAXIMUM_REASON, stored_size, write_in_rows
+from nearfar.transport.matrix_store import (
+    read_in_rows,
+    read_sparse,
+    write_in_rows,
+    write_sparse,
+)
+from nearfar.transport.store import MAXIMUM_REASON, stored_size
 
 KIND = "nearfar exact transport"
 FORMAT_VERSION = 1
@@ -73,26 +75,7 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
             write_in_rows(group, f"far-{i}", transport.far[i])
             if transport.is_apart:
                 for name, part in (("direct", transport.direct[i]), ("near", transport.near[i])):
-                    _write_sparse(group, f"{name}-{i}", part)
-
-
-def _write_sparse(group: Any, name: str, matrix: sparse.csr_array) -> None:
-    for suffix, values in (
-        ("data", matrix.data.astype(np.float32)),
-        ("indices", matrix.indices.astype(np.int64)),
-        ("starts", matrix.indptr.astype(np.int64)),
-    ):
-        # Zarr stores no empty array: append one value, which reading drops.
-        padded = np.append(values, values.dtype.type(0))
-        add_array(group, f"{name}-{suffix}", padded.shape, padded.dtype, padded.shape)[:] = padded
-
-
-def _read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_array:
-    parts = [read_array(group, f"{name}-{suffix}")[:-1] for suffix in ("data", "indices")]
-    starts = read_array(group, f"{name}-starts")[:-1]
-    matrix = sparse.csr_array((*parts, starts), shape=shape)
-    matrix.check_format()
-    return matrix
+                    write_sparse(group, f"{name}-{i}", part)
 
 
 def load_exact(
@@ -146,11 +129,11 @@ def load_exact(
         shape = (stored_camera.pixels, stored_projector.pixels)
         channels = int(str(attributes["channels"]))
         apart = range(channels if attributes["apart"] else 0)
-        direct = tuple(_read_sparse(group, f"direct-{i}", shape) for i in apart)
-        near = tuple(_read_sparse(group, f"near-{i}", shape) for i in apart)
+        direct = tuple(read_sparse(group, f"direct-{i}", shape) for i in apart)
+        near = tuple(read_sparse(group, f"near-{i}", shape) for i in apart)
         far = np.empty((channels, *shape), dtype=np.float32)
         for i in range(channels):
-            _read_rows(group, f"far-{i}", far[i])
+            read_in_rows(group, f"far-{i}", far[i])
         return ExactTransport(
             stored_projector, stored_camera, direct, near, far, str(attributes["name"])
         )
@@ -158,15 +141,6 @@ def load_exact(
         raise UnreadableFileError(
             f"{path} is a damaged exact transport ({str(error)[:MAXIMUM_REASON]}): render it again."
         ) from error
-
-
-def _read_rows(group: Any, name: str, out: Floats) -> None:
-    """Read a matrix into its place chunk by chunk: a second copy of a large one would not fit."""
-    stored = open_array(group, name)
-    if stored.shape != out.shape:
-        raise ValueError(f"{name} has the shape {stored.shape} instead of {out.shape}")
-    for block in blocks(len(out), stored.chunks[0]):
-        out[block] = read_selection(stored, (block, slice(None)))
 
 
 def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> ExactTransport:

@@ -11,7 +11,6 @@ projector.
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from scipy import fft, sparse
@@ -20,33 +19,6 @@ from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.parallel import threads
 from nearfar.transport.sparse_products import rows_of, scaled, times, transposed_times
-
-
-class Between(Protocol):
-    """Symmetric transport between nodes, a matrix per channel."""
-
-    @property
-    def channels(self) -> int:
-        """Number of channels."""
-        ...
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes."""
-        ...
-
-    def carry(self, light: Floats) -> Floats:
-        """Carry light from node to node.
-
-        Parameters
-        ----------
-        light : ndarray, shape (n, channels or 1, nodes), float32
-
-        Returns
-        -------
-        ndarray, shape (n, channels, nodes), float32
-        """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +44,16 @@ class DenseBetween:
         return int(self.matrices.shape[1])
 
     def carry(self, light: Floats) -> Floats:
-        """Carry light from node to node; see `Between.carry`."""
+        """Carry light from node to node.
+
+        Parameters
+        ----------
+        light : ndarray, shape (n, channels or 1, nodes), float32
+
+        Returns
+        -------
+        ndarray, shape (n, channels, nodes), float32
+        """
         carried = np.empty((len(light), self.channels, self.nodes), dtype=np.float32)
         for channel, matrix in enumerate(self.matrices):
             carried[:, channel] = light[:, min(channel, light.shape[1] - 1)] @ matrix
@@ -108,7 +89,7 @@ class ConvolvedBetween:
         return int(np.prod(self.lattice))
 
     def carry(self, light: Floats) -> Floats:
-        """Carry light from node to node; see `Between.carry`."""
+        """Carry light from node to node; see `DenseBetween.carry`."""
         carried = np.empty((len(light), self.channels, self.nodes), dtype=np.float32)
         inside = tuple(slice(side) for side in self.lattice)
         axes = (0, 1, 2)
@@ -126,6 +107,9 @@ class ConvolvedBetween:
         return carried
 
 
+Between = DenseBetween | ConvolvedBetween
+
+
 @dataclass(frozen=True, eq=False)
 class Mediated:
     """Transport by way of nodes.
@@ -136,7 +120,12 @@ class Mediated:
         Weight of each node in each camera pixel.
     projector : scipy.sparse.csr_array, shape (P, nodes), float32
         Light that each projector pixel sends to each node.
-    between : Between
+    between : DenseBetween or ConvolvedBetween
+
+    Raises
+    ------
+    InputError
+        If the weights are of other nodes.
     """
 
     camera: sparse.csr_array

@@ -25,6 +25,7 @@ from nearfar.files.stores import (
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent
+from nearfar.transport.matrix_store import rows_of_chunk
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
@@ -40,8 +41,6 @@ from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to
 
 KIND = "nearfar transport"
 FORMAT_VERSION = 1
-# Bytes of a chunk: large enough for the disk, small enough to read a few rows.
-CHUNK_BYTES = 8 * 2**20
 
 # Of a projector or a camera in a file, in pixels.
 LARGEST_SIDE = 2**20
@@ -197,20 +196,9 @@ def _described(posterior: Posterior) -> dict[str, Any]:
     }
 
 
-def rows_of_chunk(values: Floats) -> int:
-    """Return how many rows of an array fit in a chunk."""
-    return max(1, CHUNK_BYTES // max(1, values[:1].nbytes))
-
-
 def _dividing(rows: int, most: int) -> int:
     """Return the largest number up to `most` that divides `rows`."""
     return next(count for count in range(min(most, rows), 0, -1) if rows % count == 0)
-
-
-def write_in_rows(group: Any, name: str, values: Floats) -> None:
-    """Write an array in chunks of rows."""
-    rows = min(len(values), rows_of_chunk(values))
-    add_array(group, name, values.shape, values.dtype, (rows, *values.shape[1:]))[:] = values
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from nearfar.report.plan import describe_plan
 from nearfar.rigs.tables import read_rig_table
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.transport.exact_store import KIND as EXACT_KIND
-from nearfar.transport.exact_store import load_exact
+from nearfar.transport.known import load_known
+from nearfar.transport.operator_store import KIND as OPERATOR_KIND
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
 from nearfar.transport.verdict import NOT_JUDGED
@@ -91,6 +92,7 @@ def _describe_folder(path: Path) -> str:
         CAPTURE_KIND: _describe_capture,
         TRANSPORT_KIND: _describe_transport,
         EXACT_KIND: _describe_exact,
+        OPERATOR_KIND: _describe_exact,
     }.get(kind_of_store(path) or "")
     if describe is not None:
         return describe(path)
@@ -147,9 +149,9 @@ def _describe_transport(path: Path) -> str:
 
 
 def _describe_exact(path: Path) -> str:
-    exact = load_exact(path)
+    exact = load_known(path)
     return (
-        f"{EXACT_KIND}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
+        f"{kind_of_store(path)}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
         f"{_channels(exact.channels)}, components {'apart' if exact.is_apart else 'together'}"
     )
 

@@ -11,7 +11,7 @@ from nearfar.checks import NoArray, as_image, as_light, as_lights, as_number, as
 from nearfar.errors import InputError
 from nearfar.transport.adjoint import AdjointTransport
 from nearfar.transport.mediated import Mediated
-from nearfar.transport.sparse_products import rows_of, scaled, times, transposed_times
+from nearfar.transport.sparse_products import scaled, times, transposed_times
 
 # Lights that a product takes at once.
 LIGHTS_AT_ONCE = 4
@@ -103,12 +103,10 @@ class ExactOperator(NoArray):
 
     def component_rows(self, pixels: slice) -> tuple[Floats, Floats, Floats]:
         """Return dense rows of D, N and F of chosen camera pixels; see `rows`."""
-        start, stop, step = as_pixels(pixels, self.camera.pixels).indices(self.camera.pixels)
-        whole = slice(start, max(start, stop))
-        chosen = slice(None, None, step)
-        direct = np.stack([rows_of(part, whole)[chosen].toarray() for part in self.direct], axis=1)
-        near = np.zeros_like(direct) if self.near is None else self.near.rows(whole)[chosen]
-        return direct, near, self.far.rows(whole)[chosen]
+        pixels = as_pixels(pixels, self.camera.pixels)
+        direct = np.stack([part[pixels].toarray() for part in self.direct], axis=1)
+        near = np.zeros_like(direct) if self.near is None else self.near.rows(pixels)
+        return direct, near, self.far.rows(pixels)
 
     def __matmul__(self, light: Floats) -> Floats:
         light = as_light(light, self.projector, self.channels)

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft, sparse
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Complexes, Floats, blocks
 from nearfar.errors import InputError
 from nearfar.parallel import threads
-from nearfar.transport.sparse_products import rows_of, scaled, times, transposed_times
+from nearfar.transport.sparse_products import scaled, times, transposed_times
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,21 +91,34 @@ class ConvolvedBetween:
     def carry(self, light: Floats) -> Floats:
         """Carry light from node to node; see `DenseBetween.carry`."""
         carried = np.empty((len(light), self.channels, self.nodes), dtype=np.float32)
-        inside = tuple(slice(side) for side in self.lattice)
-        axes = (0, 1, 2)
         for one, out in zip(light, carried, strict=True):
             for channel in range(self.channels):
                 # One spectrum serves all channels of a grey light.
                 if channel < len(one):
-                    spectrum = fft.rfftn(
-                        one[channel].reshape(self.lattice), self.padded, axes, workers=threads()
-                    )
-                spread = fft.irfftn(
-                    spectrum * self.spectra[channel], self.padded, axes, workers=threads()
-                )
-                out[channel] = spread[inside].ravel()
+                    spectrum = self._spectrum(one[channel].reshape(self.lattice))
+                out[channel] = self._on_lattice(spectrum * self.spectra[channel]).ravel()
         return carried
 
+    def _spectrum(self, values: Floats) -> Complexes:
+        """Real DFT of values on the lattice, axis by axis: most of the padding stays out."""
+        deep, high, wide = self.padded
+        spectrum = fft.rfft(values, wide, axis=2, workers=threads())
+        spectrum = fft.fft(spectrum, high, axis=1, workers=threads())
+        return np.asarray(fft.fft(spectrum, deep, axis=0, workers=threads()))
+
+    def _on_lattice(self, spectrum: Complexes) -> Floats:
+        """Inverse of `_spectrum`, on the lattice alone."""
+        deep, high, _ = self.lattice
+        values = fft.ifft(spectrum, axis=0, workers=threads(), overwrite_x=True)[:deep]
+        values = fft.ifft(values, axis=1, workers=threads())[:, :high]
+        wide = self.padded[2]
+        return np.asarray(
+            fft.irfft(values, wide, axis=2, workers=threads())[..., : self.lattice[2]]
+        )
+
+
+# Rows that are made dense at once.
+ROWS_AT_ONCE = 16
 
 Between = DenseBetween | ConvolvedBetween
 
@@ -169,8 +182,14 @@ class Mediated:
 
     def rows(self, pixels: slice) -> Floats:
         """Return dense rows of camera pixels, (n, channels, P), float32."""
-        seen = rows_of(self.camera, pixels).toarray()[:, None]
-        carried = self.between.carry(seen)
-        count = len(seen)
-        flat = np.ascontiguousarray(carried.reshape(count * self.between.channels, -1).T)
-        return times(self.projector, flat).T.reshape(count, self.between.channels, -1)
+        seen = self.camera[pixels]
+        channels = self.between.channels
+        rows = np.zeros((seen.shape[0], channels, self.projector.shape[0]), dtype=np.float32)
+        # Pixels that see no node stay 0.
+        reached = np.flatnonzero(np.diff(seen.indptr))
+        for some in blocks(len(reached), ROWS_AT_ONCE):
+            carried = self.between.carry(seen[reached[some]].toarray()[:, None])
+            flat = carried.reshape(-1, self.between.nodes).T
+            found = times(self.projector, np.ascontiguousarray(flat)).T
+            rows[reached[some]] = found.reshape(-1, channels, self.projector.shape[0])
+        return rows

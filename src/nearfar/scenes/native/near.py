@@ -17,7 +17,7 @@ from nearfar.scenes.dipole import Dipole, diffuse_profile
 from nearfar.transport.mediated import ConvolvedBetween
 
 # Step of the lattice over the smallest depth of a real source, the scale of R_d's peak.
-STEP_OF_DEPTH = 0.35
+STEP_OF_DEPTH = 0.4
 # Nodes along an axis that a cubic B-spline reaches.
 REACH = 4
 
@@ -62,9 +62,8 @@ class Lattice:
         node = (first[:, 0, None] + along)[:, :, None, None] * self.sides[1]
         node = (node + (first[:, 1, None] + along)[:, None, :, None]) * self.sides[2]
         node = node + (first[:, 2, None] + along)[:, None, None, :]
-        return node.reshape(len(node), -1).astype(np.int32), weight.reshape(len(node), -1).astype(
-            np.float32
-        )
+        each = (len(node), REACH**3)
+        return node.reshape(each).astype(np.int32), weight.reshape(each).astype(np.float32)
 
 
 def _spline(fraction: Floats) -> Floats:

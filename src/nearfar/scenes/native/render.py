@@ -20,6 +20,7 @@ from nearfar.scenes.native.points import (
     spots_of,
     texture_at,
 )
+from nearfar.scenes.native.sizes import patch_size
 from nearfar.scenes.optics import Pinhole, pinhole
 from nearfar.scenes.patches import Patches, albedo, build_patches, texture, with_medium
 from nearfar.scenes.radiosity import bounced, reflection_factor
@@ -28,8 +29,6 @@ from nearfar.scenes.render import SAMPLES_PER_SIDE, WHITE_LEVEL, subsurface_of
 from nearfar.transport.exact_operator import ExactOperator
 from nearfar.transport.mediated import DenseBetween, Mediated
 
-# Patches that the projector lights, about.
-LIT_PATCHES = 6400
 # Sub-rays of the camera, about, and the most along each side of its pixels.
 CAMERA_RAYS = 10_000_000
 CAMERA_SAMPLES = 4
@@ -37,14 +36,6 @@ CAMERA_SAMPLES = 4
 CELLS_PER_STEP = 2
 # Sub-rays of the projector along the shorter side, at least.
 PROJECTOR_RAYS = 256
-
-
-def patch_size(projector: Size) -> Size:
-    """Return the grid that patches are made for: the projector's, or a coarser one."""
-    coarser = np.sqrt(LIT_PATCHES / projector.pixels)
-    if coarser >= 1:
-        return projector
-    return Size(*(max(1, round(side * coarser)) for side in projector))
 
 
 def render_native(

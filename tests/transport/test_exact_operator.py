@@ -9,7 +9,7 @@ from scipy import sparse
 from nearfar.arrays import Size
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.transport.exact_operator import ExactOperator
-from nearfar.transport.known import load_known, save_known
+from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.mediated import ConvolvedBetween, DenseBetween, Mediated
 from nearfar.transport.operator_store import load_operator, save_operator
 from tests.metadata import change_attributes
@@ -154,7 +154,7 @@ def stored(operator, tmp_path):
 
 def test_an_operator_is_the_same_from_a_file(operator, stored):
     light = np.random.default_rng(5).random((*PROJECTOR, CHANNELS))
-    again = load_known(stored)
+    again = load_exact(stored)
     assert (again.name, again.projector, again.camera) == ("made up", PROJECTOR, CAMERA)
     for one, other in zip(
         operator.component_pictures(light), again.component_pictures(light), strict=True
@@ -168,7 +168,7 @@ def test_channels_with_indices_of_their_own_and_no_near_are_the_same_from_a_file
     generator = np.random.default_rng(6)
     direct = [matrix(generator, CAMERA.pixels, PROJECTOR.pixels) for _ in range(CHANNELS)]
     alone = ExactOperator(PROJECTOR, CAMERA, tuple(direct), None, operator.far)
-    save_known(alone, tmp_path / "o.zarr")
+    save_exact(alone, tmp_path / "o.zarr")
     again = load_operator(tmp_path / "o.zarr")
     assert again.near is None
     for one, other in zip(direct, again.direct, strict=True):

@@ -50,7 +50,7 @@ def evaluate(
 
     Example: nearfar evaluate transport.zarr --truth truth.zarr --json
     """
-    from nearfar.transport.known import load_known
+    from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
     from nearfar.workflow.evaluate import row_snr
     from nearfar.workflow.judge import (
@@ -74,7 +74,7 @@ def evaluate(
         opened = load_transport(transport)
         warn_if_wrong(transport, opened.verdict)
         if truth is not None:
-            known = load_known(truth, projector=opened.projector, camera=opened.camera)
+            known = load_exact(truth, projector=opened.projector, camera=opened.camera)
             rows = row_snr(opened, known, progress=told)
             found = judge_by_truth(opened, known, rows, progress=told)
             faults = find_faults_of_units(opened, known, str(truth))

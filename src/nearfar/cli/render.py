@@ -56,7 +56,7 @@ def render(
     """
     from nearfar.files import check_output
     from nearfar.rigs.opening import is_mitsuba
-    from nearfar.transport.known import save_known
+    from nearfar.transport.exact_store import save_exact
 
     if scene not in SCENES:
         keep_input(output, Path(scene))
@@ -75,7 +75,7 @@ def render(
             from nearfar.scenes.cache import cached_known
 
             transport = cached_known(scene, projector, camera, progress=report)
-        save_known(transport, output, force=force)
+        save_exact(transport, output, force=force)
     say(
         f"transport of {scene}, projector {transport.projector}, camera {transport.camera}, "
         f"written to {output}",

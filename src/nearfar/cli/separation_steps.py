@@ -111,14 +111,14 @@ def compare(
     projector: Size | None,
 ) -> dict[str, dict[str, float]]:
     """Return the SNR of direct and global against a truth or a reconstruction, in dB."""
-    from nearfar.transport.known import load_known
+    from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
     from nearfar.workflow.separate import compare_to_transport, compare_to_truth
 
     answer = {}
     if truth is not None:
         camera = Size(*found.direct.shape[:2])
-        known = load_known(truth, projector=projector, camera=camera)
+        known = load_exact(truth, projector=projector, camera=camera)
         answer["truth"] = compare_to_truth(found, known, exposure)
     if transport is not None:
         answer["transport"] = compare_to_transport(found, load_transport(transport))

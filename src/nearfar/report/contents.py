@@ -15,7 +15,7 @@ from nearfar.report.plan import describe_plan
 from nearfar.rigs.tables import read_rig_table
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.transport.exact_store import KIND as EXACT_KIND
-from nearfar.transport.known import load_known
+from nearfar.transport.exact_store import load_exact
 from nearfar.transport.operator_store import KIND as OPERATOR_KIND
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
@@ -149,7 +149,7 @@ def _describe_transport(path: Path) -> str:
 
 
 def _describe_exact(path: Path) -> str:
-    exact = load_known(path)
+    exact = load_exact(path)
     return (
         f"{kind_of_store(path)}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
         f"{_channels(exact.channels)}, components {'apart' if exact.is_apart else 'together'}"

@@ -15,7 +15,7 @@ from nearfar.scenes import SCENES, build, build_operator, sizes
 from nearfar.scenes.description import ByRadiosity
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_operator import ExactOperator
-from nearfar.transport.exact_store import load_exact, save_exact
+from nearfar.transport.exact_store import load_matrices, save_exact
 from nearfar.transport.known import KnownTransport
 from nearfar.transport.operator_store import load_operator, save_operator
 
@@ -135,7 +135,7 @@ def cached_scene(
     projector, camera = sizes(name, projector, camera)
     return _kept(
         _path(name, projector, camera),
-        load_exact,
+        load_matrices,
         lambda: build(name, projector, camera, progress=progress),
         save_exact,
     )

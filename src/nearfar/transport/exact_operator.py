@@ -42,6 +42,19 @@ class ExactOperator(NoArray):
     ------
     InputError
         If the factors do not fit the sizes or each other.
+
+    Examples
+    --------
+    A mirror, in haze that sends a thousandth of all light to every camera pixel:
+
+    >>> from scipy import sparse
+    >>> from nearfar.transport.mediated import DenseBetween, Mediated
+    >>> mirror = sparse.eye_array(64, format="csr", dtype=np.float32)
+    >>> one = sparse.csr_array(np.ones((64, 1), dtype=np.float32))
+    >>> haze = Mediated(one, one, DenseBetween(np.full((1, 1, 1), 0.001, dtype=np.float32)))
+    >>> hazy = nearfar.ExactOperator((8, 8), (8, 8), (mirror,), None, haze, "a mirror in haze")
+    >>> bool(np.allclose((hazy @ light)[..., 0], light + 0.001 * light.sum(), atol=1e-4))
+    True
     """
 
     projector: Size

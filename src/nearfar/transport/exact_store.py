@@ -12,7 +12,7 @@ from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
-from nearfar.files import new_output, read_arrays
+from nearfar.files import kind_of_store, new_output, read_arrays
 from nearfar.files.stores import (
     create_store,
     is_plain_array,
@@ -20,12 +20,16 @@ from nearfar.files.stores import (
     read_plain_array,
 )
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.exact_operator import ExactOperator
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.matrix_store import (
     read_in_rows,
     read_sparse,
     write_in_rows,
     write_sparse,
 )
+from nearfar.transport.operator_store import KIND as OPERATOR_KIND
+from nearfar.transport.operator_store import load_operator, save_operator
 from nearfar.transport.store import MAXIMUM_REASON, stored_size
 
 KIND = "nearfar exact transport"
@@ -38,12 +42,12 @@ SIZES = ("projector", "camera")
 
 
 @path_after_content
-def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False) -> None:
+def save_exact(transport: KnownTransport, path: AnyPath, *, force: bool = False) -> None:
     """Write an exact transport, each component by itself, as a Zarr group.
 
     Parameters
     ----------
-    transport : ExactTransport
+    transport : ExactTransport or ExactOperator
     path : str or Path
         Folder to make, ending in ``.zarr`` by custom.
     force : bool
@@ -60,6 +64,9 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
     >>> nearfar.load_exact("truth.zarr").projector
     Size(height=8, width=8)
     """
+    if isinstance(transport, ExactOperator):
+        save_operator(transport, path, force=force)
+        return
     require_instance(transport, ExactTransport, "transport", "nearfar.load_exact")
     path = Path(path)
     attributes = {
@@ -80,8 +87,10 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
 
 def load_exact(
     path: AnyPath, *, projector: AnySize | None = None, camera: AnySize | None = None
-) -> ExactTransport:
+) -> KnownTransport:
     """Read an exact transport: a Zarr of `save_exact`, or a dense .npy, .npz or Zarr array.
+
+    That of a scene at native size is an operator, which answers lights as matrices do.
 
     Parameters
     ----------
@@ -93,6 +102,10 @@ def load_exact(
     projector, camera : Size or (height, width), optional
         Sizes for a dense T whose file has none. By default the camera has the projector's size
         times the whole number that gives the rows of T.
+
+    Returns
+    -------
+    ExactTransport or ExactOperator
 
     Raises
     ------
@@ -106,6 +119,15 @@ def load_exact(
     >>> nearfar.load_exact("scene.npy", projector=(8, 8)).camera
     Size(height=8, width=8)
     """
+    if kind_of_store(Path(path)) == OPERATOR_KIND:
+        return load_operator(path)
+    return load_matrices(path, projector=projector, camera=camera)
+
+
+def load_matrices(
+    path: AnyPath, *, projector: AnySize | None = None, camera: AnySize | None = None
+) -> ExactTransport:
+    """Read an exact transport as matrices, an operator refused; otherwise as `load_exact`."""
     path = Path(path)
     sizes = (
         None if projector is None else as_size(projector, "projector"),

@@ -12,7 +12,8 @@ from nearfar.rigs.tables import SimulatedTable
 from nearfar.scenes.cache import cached_known
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.scenes.mitsuba.photos import RenderedWorld
-from nearfar.transport.known import KnownTransport, load_known
+from nearfar.transport.exact_store import load_exact
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
@@ -84,7 +85,7 @@ def load_world(
     """Load a stored transport: a measured one, an exact one, or a dense array."""
     measured = kind_of_store(path) == TRANSPORT_KIND
     world: KnownTransport | Transport = (
-        load_transport(path) if measured else load_known(path, projector=projector, camera=camera)
+        load_transport(path) if measured else load_exact(path, projector=projector, camera=camera)
     )
     if camera is not None and world.camera != camera:
         raise InputError(

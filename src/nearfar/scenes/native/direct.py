@@ -20,6 +20,8 @@ from nearfar.scenes.rays import SURFACE_OFFSET, Surface, blocked
 
 # A grazing cell's box has at most this many times the sides of one that faces both pinholes.
 LARGEST_STRETCH = 4.0
+# Entries of some rows of D (entries, channels), their columns, and how many each row has.
+Rows = tuple[Floats, Integers, Integers]
 # Smaller shares of a box in a pixel are rounding.
 LEAST_SHARE = 2e-3
 
@@ -45,7 +47,7 @@ def direct_rows(
     *,
     samples: int,
     rows: slice,
-) -> tuple[Floats, Integers, Integers]:
+) -> Rows:
     """Compute D of some rows of camera pixels, from their sub-rays that the projector lights.
 
     Parameters
@@ -148,9 +150,7 @@ def _boxes(
     return height, width
 
 
-def as_matrices(
-    pieces: Sequence[tuple[Floats, Integers, Integers]], columns: int
-) -> tuple[sparse.csr_array, ...]:
+def as_matrices(pieces: Sequence[Rows], columns: int) -> tuple[sparse.csr_array, ...]:
     """Put rows together as one matrix per channel; they share their indices."""
     data, indices, counts = (np.concatenate(values) for values in zip(*pieces, strict=True))
     starts = np.concatenate([[0], np.cumsum(counts)])

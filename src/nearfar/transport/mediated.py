@@ -17,8 +17,12 @@ from scipy import fft, sparse
 
 from nearfar.arrays import Complexes, Floats, blocks
 from nearfar.errors import InputError
-from nearfar.parallel import threads
+from nearfar.parallel import side_by_side, threads
 from nearfar.transport.sparse_products import scaled, times, transposed_times
+
+# Rows that are made dense at once, and rows of a matrix in a product.
+ROWS_AT_ONCE = 16
+NODES_AT_ONCE = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +59,13 @@ class DenseBetween:
         ndarray, shape (n, channels, nodes), float32
         """
         carried = np.empty((len(light), self.channels, self.nodes), dtype=np.float32)
-        for channel, matrix in enumerate(self.matrices):
-            carried[:, channel] = light[:, min(channel, light.shape[1] - 1)] @ matrix
+
+        def fill(some: slice) -> None:
+            for channel, matrix in enumerate(self.matrices):
+                given = light[:, min(channel, light.shape[1] - 1)]
+                carried[:, channel, some] = (matrix[some] @ given.T).T
+
+        side_by_side(fill, blocks(self.nodes, NODES_AT_ONCE))
         return carried
 
 
@@ -116,9 +125,6 @@ class ConvolvedBetween:
             fft.irfft(values, wide, axis=2, workers=threads())[..., : self.lattice[2]]
         )
 
-
-# Rows that are made dense at once.
-ROWS_AT_ONCE = 16
 
 Between = DenseBetween | ConvolvedBetween
 

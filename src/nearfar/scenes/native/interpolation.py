@@ -90,7 +90,7 @@ def weights_at(spots: Spots, grid: PatchGrid, seen: Booleans) -> tuple[Integers,
         mine = left[spots.part[left] == part]
         chosen, tree = grid.trees[part]
         count = min(NEAREST, len(chosen))
-        distance, number = tree.query(spots.position[mine], k=count, workers=-1)
+        distance, number = tree.query(spots.position[mine], k=count)
         distance, number = distance.reshape(-1, count), number.reshape(-1, count)
         found = chosen[number]
         share = np.maximum(1 - distance / np.maximum(distance[:, -1:], 1e-9), 0) ** 2

@@ -21,7 +21,8 @@ from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
-from nearfar.workflow.verdict.held_out import CAMERA_PIXELS, bands, measure_held_out
+from nearfar.workflow.verdict.bands import CAMERA_PIXELS, bands
+from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
 from tests.plans import chosen_plan

@@ -20,8 +20,9 @@ from nearfar.transport.store import open_transport
 from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to_json
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.check_pairs import CheckPair
-from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight, measure_held_out
+from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 from nearfar.workflow.verdict.verdict import Verdict
 from nearfar.workflow.verdict.widening import widening_of
 

@@ -24,7 +24,9 @@ from nearfar.photometry.measure import measure
 from nearfar.plan import Plan
 from nearfar.plan.checks import check_lights, ends
 from nearfar.workflow.evaluate import HIGHEST
-from nearfar.workflow.verdict.held_out import HeldOut, bars_of, compare_light
+from nearfar.workflow.verdict.bars import bars_of
+from nearfar.workflow.verdict.by_check_photos import compare_light
+from nearfar.workflow.verdict.held_out import HeldOut
 
 # The chosen rows of the camera come in bands of this many, because the estimate of a camera pixel
 # uses its neighbours.

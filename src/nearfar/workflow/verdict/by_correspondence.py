@@ -9,16 +9,10 @@ from nearfar.photometry.photos import PhotosWithNoise, in_batches, mean_photo
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
+from nearfar.workflow.verdict.bands import bands
+from nearfar.workflow.verdict.bars import Bars, bars_of, mean_square
 from nearfar.workflow.verdict.correspondence_lights import WeighedLight, correspondence_lights
-from nearfar.workflow.verdict.held_out import (
-    Bars,
-    HeldOut,
-    HeldOutLight,
-    bands,
-    bars_of,
-    joined,
-    mean_square,
-)
+from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight, joined
 from nearfar.workflow.verdict.repeats import photos_with_noise
 from nearfar.workflow.verdict.weighed_photos import compare_weighed
 

@@ -20,7 +20,7 @@ from nearfar.plan.checks import is_reference
 from nearfar.progress import Report, ignore_progress
 from nearfar.workflow.evaluate import decibels
 from nearfar.workflow.reconstruction.sources import photos_without_drift
-from nearfar.workflow.verdict.held_out import bands
+from nearfar.workflow.verdict.bands import bands
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from nearfar.transport.store import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
+from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.by_correspondence import measure_by_correspondence
 from nearfar.workflow.verdict.correspondence_lights import correspondence_lights
-from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
+from nearfar.workflow.verdict.held_out import HeldOut
 from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
 

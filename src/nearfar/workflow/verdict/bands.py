@@ -1,6 +1,14 @@
-"""Bands of camera rows in which relit pictures are compared with photos."""
+"""Comparison of a transport with photos in bands of camera rows."""
 
-from nearfar.arrays import Size, blocks
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Size, blocks
+from nearfar.transport.model import Transport
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.verdict.bars import Bars, bars_of
+from nearfar.workflow.verdict.held_out import HeldOutLight, joined
 
 # Camera pixels that are compared, about, in bands of this many rows.
 CAMERA_PIXELS = 2**17
@@ -12,3 +20,45 @@ def bands(camera: Size) -> list[slice]:
     every = list(blocks(camera.height, ROWS_PER_BAND))
     step = max(1, round(camera.pixels / CAMERA_PIXELS))
     return every[step // 2 :: step] or every[:1]
+
+
+def usable_pixels(block: Transport) -> Booleans:
+    """Return which camera pixels of a block of rows are not saturated, shape (C,)."""
+    if block.quality is None:
+        return np.ones(block.camera.pixels, dtype=bool)
+    return ~block.quality.saturated.ravel()
+
+
+def compare_in_bands(
+    transport: StoredTransport,
+    compare: Callable[[Transport, Bars | None, slice], Sequence[HeldOutLight]],
+    progress: Callable[[float], None],
+) -> tuple[HeldOutLight, ...]:
+    """Compare a transport with photos under some lights, in the bands of its camera.
+
+    Bands whose camera pixels are all saturated are skipped.
+
+    Parameters
+    ----------
+    transport : StoredTransport
+        Of the camera's pixels, not a square T.
+    compare : callable
+        Called with the transport of a band, its error bars and its rows. Returns the comparison
+        under each light, in the same order for every band.
+    progress : callable
+        Called with the share of the camera that is done.
+
+    Returns
+    -------
+    tuple of HeldOutLight
+        Of each light, over all bands; empty if every camera pixel is saturated.
+    """
+    found: Sequence[HeldOutLight] = ()
+    for rows in bands(transport.camera):
+        block = transport.rows(rows)
+        if not usable_pixels(block).any():
+            continue
+        compared = compare(block, bars_of(block), rows)
+        found = [joined(*both) for both in zip(found, compared, strict=True)] if found else compared
+        progress(rows.stop / transport.camera.height)
+    return tuple(found)

@@ -14,10 +14,10 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.reconstruction.sources import photos_without_drift
-from nearfar.workflow.verdict.bands import bands
-from nearfar.workflow.verdict.bars import Bars, bars_of, mean_square
+from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
+from nearfar.workflow.verdict.bars import Bars, mean_square
 from nearfar.workflow.verdict.check_pairs import compare_pair
-from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight, joined
+from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 
 
 def measure_held_out(
@@ -52,16 +52,13 @@ def measure_held_out(
     photos = photos_without_drift(capture, progress)
     if not isinstance(photos, PhotosWithoutDrift):
         return None
-    found: list[HeldOutLight | None] = [None] * len(lights)
-    for rows in bands(transport.camera):
-        block = transport.rows(rows)
-        if block.quality is not None and block.quality.saturated.all():
-            continue
-        bars = bars_of(block)
-        for number, light in enumerate(lights):
-            found[number] = joined(found[number], compare_light(block, bars, photos, light, rows))
-        progress("check photos", rows.stop / transport.camera.height)
-    compared = tuple(light for light in found if light is not None)
+    compared = compare_in_bands(
+        transport,
+        lambda block, bars, rows: [
+            compare_light(block, bars, photos, light, rows) for light in lights
+        ],
+        lambda share: progress("check photos", share),
+    )
     return HeldOut(compared) if compared else None
 
 
@@ -86,9 +83,7 @@ def compare_light(
     rows : slice
     """
     size = (block.camera.pixels, block.channels)
-    usable = np.ones(block.camera.pixels, dtype=bool)
-    if block.quality is not None:
-        usable &= ~block.quality.saturated.ravel()
+    usable = usable_pixels(block)
     pattern = light.pattern.draw(block.projector) / np.float32(255)
     relit, white = (
         np.asarray(block @ shown).reshape(size)[usable]

@@ -154,12 +154,8 @@ def _mean(values: Iterable[float]) -> float:
     return float(np.mean(listed)) if listed else 0.0
 
 
-def joined(one: HeldOutLight | None, other: HeldOutLight) -> HeldOutLight:
+def joined(one: HeldOutLight, other: HeldOutLight) -> HeldOutLight:
     """Return the comparison under one light over the camera pixels of both."""
-    if one is None or not one.pair.values:
-        return other
-    if not other.pair.values:
-        return one
     counts = (one.pair.values, other.pair.values)
 
     def mean(first: float | None, second: float | None) -> float | None:

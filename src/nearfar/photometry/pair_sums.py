@@ -9,57 +9,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Booleans, Floats
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.by_inverse import Pair, find_pairs
-from nearfar.photometry.noise import NoiseModel, fit_noise, variance_by_channel
-from nearfar.photometry.photos import Photos, in_batches
-from nearfar.plan import Plan
+from nearfar.photometry.noise import fit_noise, variance_by_channel
+from nearfar.photometry.photos import Photos, PhotosWithNoise, in_batches
 
 
 @dataclass(frozen=True, eq=False)
-class PhotosOfPairs:
-    """Photos of inverse pairs with a model of their noise; read as any others.
+class PhotosOfPairs(PhotosWithNoise):
+    """Photos of inverse pairs with a model of their noise.
 
     Attributes
     ----------
-    photos : Photos
-        As they were taken.
-    noise : tuple of NoiseModel
-        One for each channel.
     light : ndarray, shape (pairs,)
         What each pair sums to, mean over the camera, as a share of the mean of all pairs.
     scatter : float
         Variance of what pairs sum to, over that which the noise expects.
     """
 
-    photos: Photos
-    noise: tuple[NoiseModel, ...]
     light: Floats
     scatter: float
-
-    @property
-    def plan(self) -> Plan:
-        """The plan that was shot."""
-        return self.photos.plan
-
-    @property
-    def camera(self) -> Size:
-        """Height and width of the photos."""
-        return self.photos.camera
-
-    @property
-    def channels(self) -> int:
-        """Channels of the photos."""
-        return self.photos.channels
-
-    def read(self, indices: Sequence[int], rows: slice) -> Floats:
-        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
-        return self.photos.read(indices, rows)
-
-    def variance(self, photo: Floats) -> Floats:
-        """Variance of one photo that reads `photo`, (C, channels)."""
-        return variance_by_channel(self.noise, photo)
 
 
 def sum_pairs(

@@ -5,6 +5,7 @@ real responses.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +17,7 @@ from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.parallel import ahead
+from nearfar.photometry.noise import NoiseModel, variance_by_channel
 from nearfar.plan import Plan, Sinusoid, Stripe
 
 # Photos read at once.
@@ -48,12 +50,43 @@ class Photos(Protocol):
         ...
 
 
-class PhotosWithNoise(Photos, Protocol):
-    """Photos with a model of their noise."""
+@dataclass(frozen=True, eq=False)
+class PhotosWithNoise:
+    """Photos of a plan with a model of their noise; read as any others.
+
+    Attributes
+    ----------
+    photos : Photos
+        As they were taken.
+    noise : tuple of NoiseModel
+        One for each channel.
+    """
+
+    photos: Photos
+    noise: tuple[NoiseModel, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that was shot."""
+        return self.photos.plan
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        return self.photos.camera
+
+    @property
+    def channels(self) -> int:
+        """Channels of the photos."""
+        return self.photos.channels
+
+    def read(self, indices: Sequence[int], rows: slice) -> Floats:
+        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
+        return self.photos.read(indices, rows)
 
     def variance(self, photo: Floats) -> Floats:
         """Variance of one photo that reads `photo`, (C, channels)."""
-        ...
+        return variance_by_channel(self.noise, photo)
 
 
 def size_of_rows(photos: Photos, rows: slice) -> Size:

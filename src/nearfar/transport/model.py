@@ -27,6 +27,7 @@ from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.adjoint import AdjointTransport
+from nearfar.transport.gains import as_gains, with_gains
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior
@@ -238,6 +239,8 @@ class Transport(NoArray):
     ) -> "Transport":
         """Return the transport with its components scaled, without error bars or a verdict.
 
+        Its provenance has, as ``gains``, what the components were multiplied by in all.
+
         Parameters
         ----------
         direct, near, far : float
@@ -251,14 +254,15 @@ class Transport(NoArray):
         InputError
             If a gain is not a finite number.
         """
-        direct, near, far = as_gains(direct, near, far)
+        gains = as_gains(direct, near, far)
         return replace(
             self,
+            provenance=with_gains(self.provenance, gains),
             posterior=None,
             verdict=None,
-            direct=self.direct * np.float32(direct),
-            near=self.near * np.float32(near),
-            far=self.far * np.float32(far),
+            direct=self.direct * np.float32(gains.direct),
+            near=self.near * np.float32(gains.near),
+            far=self.far * np.float32(gains.far),
         )
 
     def pictures(self, lights: Floats) -> Floats:
@@ -456,18 +460,3 @@ class Transport(NoArray):
             values = n[batch] * image[batch, None]
             back += windows.spread(values, self._centres[batch], self.window, self.projector)
         return np.asarray(back)
-
-
-def as_gains(direct: float, near: float, far: float) -> tuple[float, float, float]:
-    """Return the gains of the components as floats.
-
-    Raises
-    ------
-    InputError
-        If one is not a finite number.
-    """
-    return (
-        as_number(direct, "the gain of direct"),
-        as_number(near, "the gain of near"),
-        as_number(far, "the gain of far"),
-    )

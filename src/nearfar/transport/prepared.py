@@ -21,8 +21,9 @@ from nearfar.checks import NoArray, as_light, as_lights, require_instance
 from nearfar.devices import Device, mover
 from nearfar.transport import near as windows
 from nearfar.transport.direct import footprint
+from nearfar.transport.gains import as_gains
 from nearfar.transport.half import rounding_over_noise
-from nearfar.transport.model import Transport, as_gains
+from nearfar.transport.model import Transport
 
 # Values gathered at once: on a processor as many as its cache holds, on an accelerator enough to
 # outweigh the time that a call takes.

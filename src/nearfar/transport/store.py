@@ -25,6 +25,7 @@ from nearfar.files.stores import (
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent
+from nearfar.transport.gains import gains_of
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
@@ -316,6 +317,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
         projector = stored_size(group.attrs["projector"])
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
+        gains_of(provenance)
         if POSTERIOR in group.attrs:
             posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
         if VERDICT in group.attrs:

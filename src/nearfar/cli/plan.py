@@ -130,7 +130,7 @@ def plan(
 
 
 class _Chosen(NamedTuple):
-    """A plan that was chosen, what it is expected to reach, and what it takes from a look."""
+    """A plan that was chosen, its expected SNR_b, and the look that it was chosen by."""
 
     plan: "Plan"
     expected: "ExpectedRange"
@@ -138,7 +138,7 @@ class _Chosen(NamedTuple):
     photos_for_window: int | None
 
     def sentences(self) -> list[str]:
-        """Return what is said of the choice."""
+        """Return the lines about the choice that the command prints."""
         from nearfar.report.plan import describe_expected, describe_look
 
         found = []
@@ -149,7 +149,7 @@ class _Chosen(NamedTuple):
 
 
 def _numbers(chosen: _Chosen | None) -> dict[str, Any]:
-    """Return what JSON says of the choice; nothing of a plan that was not chosen."""
+    """Return the entries of `--json` about a chosen plan; None each for the paper's plan."""
     if chosen is None:
         return {"expected_dB": None, "look": None}
     look = chosen.look and {
@@ -200,7 +200,7 @@ def _choose(
 
 
 def _looked_at(look: Path, projector: Size) -> "Look":
-    """Read what a quick first estimate shows."""
+    """Read the first estimate of a scene and summarise it."""
     from nearfar.plan.look import look_at
     from nearfar.transport.store import load_transport
 

@@ -1,4 +1,4 @@
-"""What inverse pairs sum to: always white + black, so that they tell noise and drift of the light.
+"""Sums of inverse pairs: all are white + black, so that they show noise and drift of the light.
 
 Index convention: arrays are (C, channels) with C camera pixels row by row.
 """
@@ -23,9 +23,9 @@ class PhotosOfPairs(PhotosWithNoise):
     Attributes
     ----------
     light : ndarray, shape (pairs,)
-        What each pair sums to, mean over the camera, as a share of the mean of all pairs.
+        Sum of each pair, mean over the camera, as a share of the mean over all pairs.
     scatter : float
-        Variance of what pairs sum to, over that which the noise expects.
+        Variance of the sums over that which the noise model expects.
     """
 
     light: Floats
@@ -35,16 +35,16 @@ class PhotosOfPairs(PhotosWithNoise):
 def sum_pairs(
     photos: Photos, bands: Sequence[slice], progress: Callable[[float], None] | None = None
 ) -> PhotosOfPairs:
-    """Estimate noise and drift of a capture of inverse pairs from what the pairs sum to.
+    """Estimate noise and drift of a capture of inverse pairs from the sums of the pairs.
 
-    What is saturated under white counts for nothing.
+    Camera pixels that are saturated under white are left out.
 
     Parameters
     ----------
     photos : Photos
         A capture of a plan with offset inverse.
     bands : sequence of slice
-        Rows of the camera to look at.
+        Rows of the camera that are measured.
     progress : callable, optional
         Called with the share that is done.
 
@@ -95,7 +95,7 @@ def below_full_scale(photos: Photos, white: Sequence[int], rows: slice) -> Boole
 
 
 def _sums(photos: Photos, pairs: Sequence[Pair], rows: slice) -> Iterator[NDArray[np.float64]]:
-    """Yield what each pair sums to, (C, channels)."""
+    """Yield the sum of each pair, (C, channels)."""
     # Batches hold an even number of photos, and so whole pairs.
     numbers = [number for pair in pairs for number in (pair.photo, pair.inverse)]
     for _, read in in_batches(photos, numbers, rows):

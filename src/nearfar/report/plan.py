@@ -30,13 +30,13 @@ def describe_plan(plan: Plan) -> str:
 
 
 def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
-    """Return what relighting is expected to reach, and for which scenes, in a sentence.
+    """Return a sentence on the expected SNR_b of relighting and the scenes that it holds for.
 
     Parameters
     ----------
     expected : ExpectedRange
     is_looked_at : bool
-        Whether it follows from a first estimate of the scene, not from typical scenes.
+        Whether a first estimate of the scene gave the priors, and not typical scenes.
     """
     ranges = " and ".join(
         f"{low:.0f} to {high:.0f} dB under {light}"
@@ -51,7 +51,7 @@ def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
 
 
 def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
-    """Return what a plan takes from a first estimate of the scene, and by what it was decided.
+    """Return a sentence on how a first estimate of the scene decided the window of a plan.
 
     Parameters
     ----------

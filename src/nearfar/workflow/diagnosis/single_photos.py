@@ -126,8 +126,8 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
     known : ndarray, shape (rows, columns, 2)
         q as it was found from all photos.
     suspected : bool or None
-        Whether there is reason to search where no photo has a large misfit: a photo that alone
-        tells of its frequency fits itself. If False, misfits of check photos are no reason either.
+        Whether to search even if no photo has a large misfit, since the only photo of a frequency
+        always fits the estimate. If False, large misfits of check photos are no reason to search.
     """
     plan = fits.plan
     fixed = is_white_or_black(plan) | serves(plan, "correspondence")

@@ -37,15 +37,15 @@ from nearfar.workflow.diagnosis.misfit import (
 )
 from nearfar.workflow.diagnosis.sample import CameraSample
 
-# What a cause has to explain at least.
+# Misfit that a cause has to explain at least.
 LEAST_EXPLAINED = 1.0
-# Share of the misfits beyond 1 for each photo that a change at one moment has to explain.
+# Share of the photos' misfits beyond 1, summed, that a change at one moment has to explain.
 LEAST_SHARE = 0.05
 # A change at one moment lies at least so many photos from both ends.
 FROM_THE_ENDS = 4
-# Of what a size of its own in each photo explains, one change has to explain at least this share.
+# One change has to explain this share of what effects of a size of their own in each photo do.
 LEAST_OF_EACH = 0.3
-# And of the photos of white alone, where it is camera or scene that moved.
+# Misfit of the photos of white that has to be explained where camera or scene moved.
 LEAST_OF_WHITE = 0.3
 # A bend of the response has to explain at least this, and this share of the misfits beyond 1.
 LEAST_BEND = 0.5
@@ -56,7 +56,8 @@ EXPOSURE_OVER_BEND = 7.0
 FLICKER = 8.0
 # Of the photos, the share in which it does.
 FLICKER_SHARE = 0.2
-# Encodings of light, each with its inverse, and what of the sums' excess is left if it is one.
+# Decoders of light by the name of the encoding; if it is the photos', at most this share of the
+# excess of their sums is left.
 DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
     "sRGB": lambda values: from_srgb(np.clip(values, 0.0, 1.0)),
     "a gamma of 2.2": lambda values: np.maximum(values, 0.0) ** 2.2,

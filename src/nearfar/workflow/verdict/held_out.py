@@ -26,7 +26,8 @@ class HeldOutLight:
     is_binary : bool
         Whether it is white and black alone, whose photos do not tell whether the rig is linear.
     pair : CheckPair or WeighedPhotos
-        What its photo and its inverse's say; or the photos for correspondence that show it.
+        Comparison with the photos of the pattern and its inverse, or with the photos for
+        correspondence that show the light.
     expected_error : float or None
         Mean square of the error that the error bars expect; None without error bars.
     unmeasured_error : float or None
@@ -85,9 +86,9 @@ class HeldOut:
     def snr(self) -> float:
         """Held-out SNR_b, dB: the mean over the check patterns.
 
-        Where noise hides the error of a pattern, that of all patterns of its kind over what the
-        error bars expect stands for its own. Pictures and half-screens weigh frequencies
-        differently.
+        Where noise hides the error of a pattern, its expected SNR_b is taken, corrected by the
+        error ratio of all patterns of its kind (pictures or half-screens, which weigh frequencies
+        differently).
         """
         values = []
         for light in self.lights:
@@ -101,19 +102,19 @@ class HeldOut:
 
     @property
     def is_least(self) -> bool:
-        """Whether `snr` may be higher: noise hides all errors, and no error bars tell them."""
+        """Whether the true SNR_b may be higher: noise hides all errors, without error bars."""
         return self.expected_snr is None and all(light.is_hidden for light in self.lights)
 
     @property
     def lamp_excess(self) -> float:
-        """What half-screens and their inverses show beyond white, as a share of white; or 0."""
+        """Mean `excess_share` of the half-screens; 0 without any."""
         return _mean(light.pair.excess_share for light in self.lights if light.is_binary)
 
     @property
     def nonlinear_excess(self) -> float:
-        """What pictures and their inverses show beyond that, as a share of white.
+        """Mean `excess_share` of the pictures less that of the half-screens; 0 without pictures.
 
-        A response that bends downwards shows less of both than of white.
+        A response that bends downwards makes it negative.
         """
         pictures = [light.pair.excess_share for light in self.lights if not light.is_binary]
         return _mean(pictures) - self.lamp_excess if pictures else 0.0

@@ -37,7 +37,8 @@ DOUBTFUL_ERROR_RATIO = 2.0
 # The same of fine lights, which error bars expect less well.
 DOUBTFUL_FINE_ERROR_RATIO = 10.0
 WRONG_ERROR_RATIO = 20.0
-# Held-out SNR_b in dB above which no error, however unexpected, makes a transport doubtful.
+# Held-out SNR_b in dB above which a transport is neither doubtful nor wrong for an error that the
+# error bars do not expect.
 GOOD_DECIBELS = 40.0
 # Held-out SNR_b in dB below which a transport is doubtful, or wrong, whatever was expected.
 DOUBTFUL_DECIBELS = 25.0
@@ -243,7 +244,6 @@ def judge(
             add("not-linear")
         elif abs(held_out.lamp_excess) > LARGEST_EXCESS and not reasons:
             add("lamp")
-    ratio = held_out.error_ratio
     surprises = _surprises(held_out, DOUBTFUL_ERROR_RATIO) or (
         held_out.fine and _surprises(HeldOut(held_out.fine), DOUBTFUL_FINE_ERROR_RATIO)
     )
@@ -253,7 +253,7 @@ def judge(
         add(_what_limits(held_out))
     wrong = (
         held_out.snr < WRONG_DECIBELS
-        or (ratio is not None and ratio > WRONG_ERROR_RATIO)
+        or _surprises(held_out, WRONG_ERROR_RATIO)
         or any(reason.cause in WRONG_PHOTOS for reason in reasons)
     )
     return Verdict(

@@ -10,6 +10,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.plan import choose_plan, read_plan
 from nearfar.plan.choose import NOISE
+from nearfar.plan.look import look_at, photos_for_window
 from nearfar.plan.typical import noise_of, typical_of
 from nearfar.scenes.hostile import hostile_transport
 from nearfar.transport.store import load_transport
@@ -174,9 +175,11 @@ def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
     ]
     assert read_plan(chosen) == by_noise[0] != by_noise[1]
     own = ("--near", 5, "--look", look)
-    assert "planned with W = 5" in check_done(run_nearfar("plan", *wanted, *own)).out
+    assert "planned with W = 5\n" in check_done(run_nearfar("plan", *wanted, *own)).out
     ran = run_nearfar("plan", *wanted, "--near", 7, "--look", look)
-    assert "planned with W = 7, as asked, for which about " in check_done(ran).out
+    needed = photos_for_window(look_at(seen), seen.projector, 60, window=7)
+    said = f"planned with W = 7, as asked, for which about {needed} photos leave as little unknown"
+    assert said in check_done(ran).out
     for arguments, said in (
         (("--projector", "16x24", "--photos", 60, "--look", look), "same pattern grid"),
         (("--projector", "16x20", "--photos", 60, "--look", finished.transport), "--method joint"),

@@ -160,6 +160,8 @@ class QualityObserver:
 
 def choose_rows(height: int, width: int) -> Integers:
     """Choose rows of a camera in bands, spread evenly, about `CAMERA_PIXELS` in all."""
+    # Far fewer than the `bands` of a finished capture: these rows of all photos are kept in memory,
+    # and are estimated again and again between photos.
     wanted = min(height, max(ROWS_PER_BAND, CAMERA_PIXELS // width))
     bands = max(1, wanted // ROWS_PER_BAND)
     if wanted == height:

@@ -17,6 +17,8 @@ ROWS_PER_BAND = 8
 
 def bands(camera: Size) -> list[slice]:
     """Return bands of rows of a camera, spread evenly, about `CAMERA_PIXELS` in all."""
+    # Whole rows, which files are read by. Nothing is estimated and no photo is kept, so that there
+    # may be many more of them than `choose_rows` and `sampled_lines` choose.
     every = list(blocks(camera.height, ROWS_PER_BAND))
     step = max(1, round(camera.pixels / CAMERA_PIXELS))
     return every[step // 2 :: step] or every[:1]

@@ -129,8 +129,14 @@ def test_faults_of_photos_are_reasons(faults, spoilt, expected):
         assert reason.sentence == str(each)
 
 
+def test_a_cause_that_is_found_twice_is_one_reason():
+    lights = (at(32, excess=0.02), at(32, is_binary=True))
+    assert len(judge(HeldOut(lights), [PairsDoNotAdd("c.zarr", 0.02)]).reasons) == 1
+
+
 def test_faults_are_named_before_what_they_may_have_caused():
-    for lights in ((at(14),), (at(32, 5.0),), (at(32, excess=0.0, is_binary=True),)):
+    of_lamp = (at(32, excess=0.02), at(32, excess=0.02, is_binary=True))
+    for lights in ((at(14),), (at(32, 5.0),), of_lamp):
         assert judge(HeldOut(lights), [SATURATED]).causes == ("saturated",)
         assert judge(HeldOut(lights), [], [MOVED]).causes == ("moved",)
     # Pictures that do not add tell of a bend, whatever else is wrong.

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.correspondence import Correspondence
 from nearfar.plan import paper_plan
 from nearfar.plan.checks import check_lights
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -125,6 +126,19 @@ def test_inverse_pairs_alone_and_square_transports_are_not_checked(box, tmp_path
         assert reason.cause == "unchecked"
         says = "a square T" if square else "neither check photos, nor stripes"
         assert says in reason.sentence
+
+
+@pytest.mark.parametrize(("offset", "photos"), [("reference", 5), ("inverse", 4)])
+def test_a_handful_of_photos_is_judged(box, tmp_path, offset, photos):
+    plan = paper_plan(PROJECTOR, 1, (1, 1), offset=offset, correspondence="none")
+    assert len(plan.patterns) == photos
+    rig = SimulatedRig(box, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    capture = acquire(plan, tmp_path / "c.zarr", rig)
+    q = box.correspondence.astype(np.float32)
+    known = Correspondence(q, np.ones(q.shape[:2], dtype=np.float32))
+    reconstruct_to_file(capture, tmp_path / "t.zarr", known)
+    verdict = judge_reconstruction(open_transport(tmp_path / "t.zarr"), capture)
+    assert (verdict.grade, verdict.causes) == ("doubtful", ("unchecked",))
 
 
 def test_the_command_ends_with_the_verdict(reconstructed, tmp_path):

@@ -28,7 +28,7 @@ Wave = tuple[Frequency, bool]
 
 
 class Photos(Protocol):
-    """Whatever holds the photos of a plan, in photo units (full scale = 1)."""
+    """Photos of a plan in photo units (full scale = 1), wherever they are stored."""
 
     @property
     def plan(self) -> Plan:

@@ -106,7 +106,7 @@ def choose_plan(
     window : int, optional
         W, an upper bound of how far near-range light reaches; `default_window` if left out.
     typical : TypicalScenes
-        What to plan for: the simulated scenes, or a quick first estimate of this one.
+        Scenes to plan for: typical simulated ones, or the one of a first estimate.
     noise : float
         Standard deviation of the response to a sinusoid, as a share of white.
     checks : int, optional
@@ -123,8 +123,8 @@ def choose_plan(
     -------
     plan : Plan
     expected : Expected
-        What relighting is expected to reach on the typical scenes;
-        `nearfar.plan.expect.expected_range` says how far others differ.
+        SNR_b expected of relighting the typical scenes; `nearfar.plan.expect.expected_range` says
+        how far others differ.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def choose_frequencies(
     window : int
         W.
     typical : TypicalScenes
-        What to plan for.
+        Scenes to plan for.
     noise : float
         Standard deviation of a response, as a share of white.
     every_frequency : bool

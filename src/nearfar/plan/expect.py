@@ -224,9 +224,9 @@ def _covariances(
 
 
 def light_weights(frequencies: list[Frequency], projector: Size) -> Floats:
-    """Return how much of pictures' and of the random light's variance each candidate holds, (2, K).
+    """Return the variance of pictures and of a random light at each candidate frequency, (2, K).
 
-    A low frequency stands for itself, one of the coarse grid for all around it.
+    A low frequency stands for itself, one of the coarse grid for all frequencies around it.
     """
     points = as_array(frequencies)
     density = 1.0 / np.sum((points * np.array(projector)) ** 2, axis=1)

@@ -3,7 +3,8 @@
 A photo that spoils an estimate hides in it, because the estimate bends to it. So photos with large
 misfits are left out, the transport is estimated again without them, and they are compared with its
 pictures: under their own pattern, turned, under the patterns of other photos, in part under those,
-with other colours, or brighter or darker. What fits well without having been used is taken back.
+with other colours, or brighter or darker. Photos that fit well though they were left out are taken
+back.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -72,7 +73,7 @@ TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a photo would be, and the misfit that remains.
+    """A hypothesis on how a photo was spoilt, and the misfit that it leaves.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What spoils a capture as a whole: motion, focus, flicker, a response that is not linear.
+"""Faults of a capture as a whole: motion, focus, flicker, a response that is not linear.
 
 How much of the photos' misfits each of them explains is read off the normal equations of
 `nearfar.workflow.diagnosis.misfit`, in misfits summed over photos: 1 is a photo's noise.
@@ -86,7 +86,7 @@ class Step(NamedTuple):
 
 
 def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -> list[Spoilt]:
-    """Find what changed while photos were taken, at one moment or all the time.
+    """Find the changes of rig and scene while photos were taken, at one moment or all the time.
 
     Parameters
     ----------
@@ -235,8 +235,8 @@ def _best_step(
 ) -> Step:
     """Return the change that explains most, before one of some photos.
 
-    What an effect that never changes explains is no change: estimates that a prior pulls towards 0
-    look out of focus in all photos.
+    A constant effect is no change, so that the misfit it explains is subtracted: estimates that a
+    prior pulls towards 0 look out of focus in all photos.
     """
     matrix, vector = matrix.cumsum(axis=0), vector.cumsum(axis=0)
     unchanged = float(_solved(matrix[-1], vector[-1]) @ vector[-1])

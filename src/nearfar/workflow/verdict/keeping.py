@@ -100,7 +100,7 @@ def _require_origin(stored: StoredTransport, capture: Capture) -> None:
 
 
 def _differ(kept: Any, found: Any) -> bool:
-    """Return whether what is kept of a capture is of another; older transports keep less."""
+    """Return whether entries of both differ; older transports keep fewer of their capture."""
     if isinstance(kept, Mapping) and isinstance(found, Mapping):
         return any(kept[name] != found[name] for name in kept.keys() & found.keys())
     return kept is not None and kept != found

@@ -83,7 +83,7 @@ SENTENCES: Mapping[Cause, str] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What check photos, and faults of the others, say of a transport.
+    """The grade of a transport, the reasons for it, and the comparison with held-out photos.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Verdict:
 
     @property
     def kept(self) -> KeptVerdict:
-        """What is kept of it with the transport."""
+        """The part of the verdict that is stored with the transport."""
         checked = self.held_out
         if checked is None:
             return KeptVerdict(self.grade, self.reasons)
@@ -213,9 +213,9 @@ def judge(
     faults : sequence of Fault
         Of the capture.
     spoilt : sequence of Spoilt
-        What spoils its photos.
+        Causes that spoil its photos.
     repeats : Repeats, optional
-        What is known where nothing was checked.
+        Noise, drift and linearity of the capture, where nothing was checked.
     unchecked : str
         Why nothing was checked, if it was not.
     """

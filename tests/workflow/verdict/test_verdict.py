@@ -21,7 +21,12 @@ from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
-from nearfar.workflow.verdict.held_out import CAMERA_PIXELS, bands, measure_held_out
+from nearfar.workflow.verdict.held_out import (
+    CAMERA_PIXELS,
+    bands,
+    measure_held_out,
+    taller_bands,
+)
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
 from tests.plans import chosen_plan
@@ -148,6 +153,10 @@ def test_bands_are_spread_and_few(camera):
     assert count <= max(2 * CAMERA_PIXELS, 8 * camera.width)
     if camera.pixels <= CAMERA_PIXELS:
         assert count == camera.pixels
+    assert {row for rows in taller_bands(camera) for row in range(*rows.indices(10**6))} == {
+        row for rows in found for row in range(*rows.indices(10**6))
+    }
+    assert len(taller_bands(camera)) <= len(found)
 
 
 def test_rows_that_are_all_saturated_are_left_out(reconstructed, tmp_path):

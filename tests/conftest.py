@@ -5,6 +5,7 @@ import shutil
 import signal
 import tempfile
 from collections.abc import Callable, Generator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,20 @@ def pytest_configure(config: pytest.Config) -> None:
         cache = tempfile.mkdtemp(prefix="nearfar-cache-")
         os.environ["NEARFAR_CACHE"] = cache
         config.add_cleanup(lambda: shutil.rmtree(cache, ignore_errors=True))
+    _wait_for_no_disk(config)
+
+
+def _wait_for_no_disk(config: pytest.Config) -> None:
+    """Let `os.fsync` check its file alone: no test cuts the power, and a capture waits often.
+
+    Commands in processes of their own wait as they do for users.
+    """
+    config.add_cleanup(partial(setattr, os, "fsync", os.fsync))
+
+    def check_file(file: int) -> None:
+        os.fstat(file)
+
+    os.fsync = check_file
 
 
 def pytest_xdist_auto_num_workers() -> int:

@@ -38,6 +38,20 @@ _DAMAGE = (
 )
 
 
+# Bytes of a file that is read where it is asked for: zarr hands every file to a thread, which takes
+# longer than reading a small one.
+SMALL_FILE_BYTES = 2**16
+
+
+def _read_if_small(path: Path, prototype: BufferPrototype) -> Buffer | None:
+    try:
+        if path.stat().st_size > SMALL_FILE_BYTES:
+            return None
+        return prototype.buffer.from_bytes(path.read_bytes())
+    except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+        return None
+
+
 class _CheckedStore(LocalStore):
     """A folder store whose metadata must have the checksum with which they were written."""
 
@@ -48,7 +62,11 @@ class _CheckedStore(LocalStore):
         byte_range: ByteRequest | None = None,
     ) -> Buffer | None:
         """Read a file, metadata without their checksum."""
-        value = await super().get(key, prototype, byte_range)
+        value = None
+        if prototype is not None and byte_range is None:
+            value = _read_if_small(self.root / key, prototype)
+        if value is None:
+            value = await super().get(key, prototype, byte_range)
         if value is None or (self.root / key).name != METADATA:
             return value
         try:

@@ -23,7 +23,7 @@ from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.verdict import bands as bands_of_cameras
-from nearfar.workflow.verdict.bands import CAMERA_PIXELS, bands
+from nearfar.workflow.verdict.bands import CAMERA_PIXELS, bands, taller_bands
 from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
@@ -164,6 +164,10 @@ def test_bands_are_spread_and_few(camera):
     assert count <= max(2 * CAMERA_PIXELS, 8 * camera.width)
     if camera.pixels <= CAMERA_PIXELS:
         assert count == camera.pixels
+    assert {row for rows in taller_bands(camera) for row in range(*rows.indices(10**6))} == {
+        row for rows in found for row in range(*rows.indices(10**6))
+    }
+    assert len(taller_bands(camera)) <= len(found)
 
 
 def test_bands_of_any_height_are_the_whole_camera(reconstructed, monkeypatch):

@@ -13,6 +13,7 @@ from nearfar.workflow.verdict.held_out import HeldOutLight, joined
 # Camera pixels that are compared, about, in bands of this many rows.
 CAMERA_PIXELS = 2**17
 ROWS_PER_BAND = 8
+PIXELS_PER_TALLER_BAND = 2**14
 
 
 def bands(camera: Size) -> list[slice]:
@@ -22,6 +23,18 @@ def bands(camera: Size) -> list[slice]:
     every = list(blocks(camera.height, ROWS_PER_BAND))
     step = max(1, round(camera.pixels / CAMERA_PIXELS))
     return every[step // 2 :: step] or every[:1]
+
+
+def taller_bands(camera: Size) -> list[slice]:
+    """Return the rows of `bands` in fewer bands, where they are all rows of the camera.
+
+    For what is done to each camera pixel by itself. A photo of a small camera is one chunk, which
+    every band reads again.
+    """
+    found = bands(camera)
+    if sum(rows.stop - rows.start for rows in found) < camera.height:
+        return found
+    return list(blocks(camera.height, max(ROWS_PER_BAND, PIXELS_PER_TALLER_BAND // camera.width)))
 
 
 def usable_pixels(block: Transport) -> Booleans:

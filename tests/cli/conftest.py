@@ -135,32 +135,12 @@ def photograph(
         )
 
 
-class CopiedJob:
-    """A copy of a job, each of whose files and folders is copied when it is first named.
-
-    Most tests spoil one of them, and photos and patterns are hundreds of files.
-    """
-
-    def __init__(self, finished: Job, folder: Path) -> None:
-        folder.mkdir()
-        self._finished, self.folder = finished, folder
-
-    def __getattr__(self, name: str) -> Path:
-        """Copy what is named."""
-        source = getattr(self._finished, name)
-        copy = self.folder / source.name
-        if source.is_dir():
-            shutil.copytree(source, copy)
-        else:
-            shutil.copy(source, copy)
-        setattr(self, name, copy)
-        return copy
-
-
 @pytest.fixture
-def job(finished: Job, tmp_path: Path) -> CopiedJob:
+def job(finished: Job, tmp_path: Path) -> Job:
     """Give a copy of the small job to spoil, in the test's own folder."""
-    return CopiedJob(finished, tmp_path / "job")
+    copy = tmp_path / "job"
+    shutil.copytree(finished.folder, copy)
+    return Job(copy, *(copy / path.name for path in finished[1:]))
 
 
 @pytest.fixture

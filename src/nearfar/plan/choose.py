@@ -38,10 +38,11 @@ from nearfar.plan.expect import (
     errors_of_none_measured,
     expected_of,
 )
-from nearfar.plan.model import LARGEST_SIDE, Plan, largest_window
+from nearfar.plan.model import LARGEST_SIDE, Plan
 from nearfar.plan.paper import sinusoids
 from nearfar.plan.patterns import Purpose
 from nearfar.plan.references import FEWEST, with_references
+from nearfar.plan.window import default_window, largest_window
 from nearfar.priors.fitted import TYPICAL_SCENES
 from nearfar.priors.typical import TypicalScenes
 
@@ -225,15 +226,6 @@ def choose_plan(
 def photos_of_every_frequency(projector: Size) -> int:
     """Return how many photos show every frequency of a projector's DFT, without check photos."""
     return projector.pixels - 1 + 2 * FEWEST
-
-
-def default_window(projector: Size) -> int:
-    """W where nothing is known: a sixth of the shorter side, odd, between 5 and 25.
-
-    On a projector of one row or column it is a sixth of the longer side.
-    """
-    side = largest_window(projector)
-    return int(min(2 * (min(25, max(5, round(side / 6))) // 2) + 1, side))
 
 
 def finest_pattern(projector: Size) -> Frequency:

@@ -6,8 +6,8 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.plan.choose import choose_frequencies
-from nearfar.plan.model import largest_window
 from nearfar.plan.typical import noise_of, typical_of
+from nearfar.plan.window import largest_window
 from nearfar.priors.fitted import FREE
 from nearfar.priors.typical import TypicalScenes
 

@@ -34,10 +34,10 @@ from nearfar.plan.patterns import (
 )
 
 # Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
-# 3 Gray code, version 4 half-screens and inverse pictures; a plan of an earlier version is one of
-# the next as well.
-FORMAT_VERSION = 4
-READABLE_VERSIONS = (1, 2, 3, 4)
+# 3 Gray code, version 4 half-screens and inverse pictures, version 5 the pitch. A plan of an
+# earlier version is one of the next as well.
+FORMAT_VERSION = 5
+READABLE_VERSIONS = (1, 2, 3, 4, 5)
 
 # Characters of a message that are quoted from a plan.
 MAXIMUM_REASON = 200
@@ -66,7 +66,11 @@ class Plan(Frozen):
     projector : Size
         Pattern grid.
     window : int
-        W of the near-range window, W x W; 1 x W on a projector of one row, W x 1 of one column.
+        W of the near-range window, W x W functions; 1 x W on a projector of one row, W x 1 of one
+        column.
+    pitch : int
+        Projector pixels between neighbouring functions of the window, a power of two; 1 for the
+        paper's window of single pixels.
     far, dropped : Size
         Far band, and the block of lowest near frequencies that are not shot.
     offset : {"inverse", "reference", "none"}
@@ -89,9 +93,10 @@ class Plan(Frozen):
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[4] = 4
+    version: Literal[5] = 5
     projector: SizeField
     window: int = Field(ge=1, strict=True)
+    pitch: int = Field(default=1, ge=1, le=LARGEST_SIDE, strict=True)
     far: SizeField
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
@@ -109,6 +114,13 @@ class Plan(Frozen):
                 {"name": repr(name[:MAXIMUM_NAME]), "known": ", ".join(CORRESPONDENCE_METHODS)},
             )
         return name
+
+    @field_validator("pitch")
+    @classmethod
+    def _pitch_is_a_power_of_two(cls, pitch: int) -> int:
+        if pitch & (pitch - 1):
+            raise ValueError(f"a pitch of {pitch} is not a power of two")
+        return pitch
 
     @field_validator("patterns", mode="before")
     @classmethod
@@ -131,9 +143,10 @@ class Plan(Frozen):
     def _is_a_plan_for_the_projector(self) -> "Plan":
         # Before anybody works with them for minutes.
         widest = self.projector if min(self.projector) > 1 else _square(max(self.projector))
+        window = _square(self.pitch * (self.window - 1) + 1)
         for name, size, largest in (
             ("projector", self.projector, Size(LARGEST_SIDE, LARGEST_SIDE)),
-            ("window", _square(self.window), widest),
+            ("window", window, widest),
             ("far", self.far, self.projector),
             ("dropped", self.dropped, _square(self.window)),
         ):
@@ -228,14 +241,6 @@ class Plan(Frozen):
         lines = ",\n".join(f"    {json.dumps(pattern)}" for pattern in data.pop("patterns"))
         head = ",\n".join(f"  {json.dumps(key)}: {json.dumps(data[key])}" for key in data)
         return f'{{\n{head},\n  "patterns": [\n{lines}\n  ]\n}}\n'
-
-
-def largest_window(projector: Size) -> int:
-    """Return the largest W: the shorter side, or the longer one where the other is one pixel.
-
-    On a projector of one row, a window is the part of its middle row that lies on the projector.
-    """
-    return min(projector) if min(projector) > 1 else max(projector)
 
 
 def _square(side: int) -> Size:

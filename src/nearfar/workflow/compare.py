@@ -16,7 +16,8 @@ from nearfar.arrays import Floats, Size
 from nearfar.callbacks import Report
 from nearfar.errors import InputError, NearfarError, PlanError
 from nearfar.illumination.pictures import standard_lights
-from nearfar.plan.choose import FEWEST_PHOTOS, default_window
+from nearfar.plan.choose import FEWEST_PHOTOS
+from nearfar.plan.window import default_window
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.opening import choose_exposure
 from nearfar.transport.exact import ExactTransport

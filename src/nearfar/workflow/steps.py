@@ -21,7 +21,7 @@ from nearfar.illumination.frequencies import default_dropped
 from nearfar.parallel import single_threaded_products
 from nearfar.photometry.measure import measure as measure_photos
 from nearfar.photometry.measurements import Measurements
-from nearfar.plan.model import largest_window
+from nearfar.plan.window import largest_window
 from nearfar.progress import Report, counting, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.workflow.reconstruction.sources import brightest_white, photos_without_drift

@@ -16,9 +16,9 @@ from nearfar.illumination.frequencies import (
 )
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan import choose_plan, parse_plan
+from nearfar.plan.candidates import candidates
 from nearfar.plan.choose import (
     FEWEST_PHOTOS,
-    candidates,
     choose_frequencies,
     photos_of_every_frequency,
 )

@@ -7,7 +7,7 @@ import numpy as np
 from nearfar.arrays import Size
 from nearfar.plan.choose import choose_frequencies
 from nearfar.plan.typical import noise_of, typical_of
-from nearfar.plan.window import largest_window
+from nearfar.plan.window import largest_window, pitch_of
 from nearfar.priors.fitted import FREE
 from nearfar.priors.typical import TypicalScenes
 
@@ -112,7 +112,12 @@ def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> 
 
     def expected(photos: int, window: int) -> float:
         choice = choose_frequencies(
-            projector, photos, window, typical=look.typical, noise=look.noise
+            projector,
+            photos,
+            window,
+            pitch=pitch_of(projector),
+            typical=look.typical,
+            noise=look.noise,
         )
         return choice.expected.pictures
 

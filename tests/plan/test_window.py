@@ -1,7 +1,10 @@
 """How far apart the functions of a window stand, and how many there are."""
 
+import base64
 import json
+import re
 
+import imagecodecs
 import pytest
 
 from nearfar.arrays import Size
@@ -54,3 +57,12 @@ def test_plans_without_a_pitch_are_of_single_pixels():
 def test_a_pitch_comes_back_from_its_file():
     plan = paper_plan(Size(64, 72), 3, Size(3, 3)).model_copy(update={"pitch": 16})
     assert parse_plan(plan.to_json()) == plan
+
+
+def test_the_card_of_a_notebook_holds_small_pictures():
+    plan = paper_plan(Size(300, 700), 3, Size(3, 3), correspondence="none")
+    card = plan._repr_html_()
+    found = [base64.b64decode(part) for part in re.findall(r"base64,([^\"]*)", card)]
+    assert len(found) == 5
+    for png in found:
+        assert imagecodecs.imread(png).shape == (100, 233)

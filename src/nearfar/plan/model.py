@@ -20,7 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from nearfar.arrays import AnyPath, Size, as_size
+from nearfar.arrays import AnyPath, Floats, Size, as_size
 from nearfar.errors import MissingFileError, PlanError, UnreadableFileError
 from nearfar.plan.correspondence import CORRESPONDENCE_METHODS, pattern_types_of
 from nearfar.plan.patterns import (
@@ -45,6 +45,9 @@ MAXIMUM_NAME = 60
 
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence", "check")
 
+
+# Patterns of a longer side are averaged for a notebook's card.
+SIDE_ON_A_CARD = 256
 
 # No projector has a longer side.
 LARGEST_SIDE = 16384
@@ -226,13 +229,13 @@ class Plan(Frozen):
         counted = ", ".join(f"{count} {name}" for name, count in self.counts.items() if count)
         rows = [
             ("projector", str(self.projector)),
-            ("window W, far band", f"{self.window}, {self.far}"),
+            ("window W, its pitch, far band", f"{self.window}, {self.pitch}, {self.far}"),
             ("offset, correspondence", f"{self.offset}, {self.correspondence}"),
             ("photos", f"{len(self.patterns)}: {counted}"),
             ("brute force over photos of transport", f"{self.savings:.2f}"),
         ]
         chosen = [] if self.offset == "none" else [0, *range(3, len(self.patterns), 7)][:5]
-        images = [(f"pattern {i}", picture(self.draw(i) / np.float32(255), "")) for i in chosen]
+        images = [(f"pattern {i}", picture(_small(self.draw(i)), "")) for i in chosen]
         return card("plan", rows, images)
 
     def to_json(self) -> str:
@@ -241,6 +244,17 @@ class Plan(Frozen):
         lines = ",\n".join(f"    {json.dumps(pattern)}" for pattern in data.pop("patterns"))
         head = ",\n".join(f"  {json.dumps(key)}: {json.dumps(data[key])}" for key in data)
         return f'{{\n{head},\n  "patterns": [\n{lines}\n  ]\n}}\n'
+
+
+def _small(drawn: NDArray[np.uint8]) -> Floats:
+    """Return a pattern in [0, 1] for the card of a notebook: averages where it has many pixels."""
+    side = -(-max(drawn.shape) // SIDE_ON_A_CARD)
+    if side == 1 or min(drawn.shape) < side:
+        return np.asarray(drawn / np.float32(255))
+    height, width = (length // side for length in drawn.shape)
+    cut = drawn[: height * side, : width * side]
+    averaged = cut.reshape(height, side, width, side).mean(axis=(1, 3), dtype=np.float32)
+    return np.asarray(averaged / np.float32(255))
 
 
 def _square(side: int) -> Size:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats, Size, beside, namespace, product
+from nearfar.arrays import Complexes, Floats, Integers, Size, beside, namespace, product
 from nearfar.illumination.frequencies import Frequency, as_array
 
 
@@ -107,7 +107,7 @@ class RealBasis:
             drawn[m] = wave.imag if sine else wave.real
         return drawn.reshape(self.count, len(down) * len(across))
 
-    def patterns_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
+    def patterns_at(self, offsets: Floats | Integers) -> NDArray[np.float32]:
         """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""
         angle = 2 * np.pi * (self.cycles @ offsets.T)[self.index]
         patterns = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))

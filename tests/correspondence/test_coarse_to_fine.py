@@ -133,10 +133,10 @@ def test_places_that_were_searched_for_wrongly_are_mended_by_neighbours(monkeypa
     at[5:8, 10:13] = at[15, 3] = at[0, 0] = at[12:16, 20:24] = True
     _mislead(monkeypatch, lambda candidates: at.ravel()[candidates.pixel], wrong)
     basis = without_dc(world.measurements)
-    q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis, 2.25)
+    q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis)
     assert np.abs(q - world.q).max() < 0.5
     monkeypatch.setattr(coarse_to_fine, "ROUNDS", 0)
-    q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis, 2.25)
+    q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis)
     assert np.all(np.abs(q - world.q).max(axis=-1)[at] > 3)
 
 
@@ -184,7 +184,7 @@ def test_small_projectors_are_scored_at_every_place(monkeypatch):
     found = correspond_by_phase(world.measurements)
     # Both ways agree.
     basis = without_dc(world.measurements)
-    q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis, 2.25)
+    q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis)
     np.testing.assert_allclose(found.q, q, atol=0.1)
     monkeypatch.setattr(phase, "correspond_coarse_to_fine", None)
     np.testing.assert_array_equal(correspond_by_phase(world.measurements).q, found.q)
@@ -201,7 +201,7 @@ def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
     for beyond, seen in ((x, True), (430 - x, False)):
         q = np.stack([y, np.where(x > 215, beyond, x)], axis=-1)
         world = lit_surface(
-            FULL_HD, camera, q=q, shadow=shadow, direct=(0.125, 0.126), footprint=(0.5, 0.6)
+            FULL_HD, camera, q=q, shadow=shadow, direct=(0.085, 0.086), footprint=(0.5, 0.6)
         )
         found = correspond_by_phase(world.measurements)
         assert found.lit[:, :14].all()

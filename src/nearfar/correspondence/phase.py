@@ -9,7 +9,8 @@ one place from another. Stronger ones measure the footprint, the 5 x 5 entries o
 tell direct light from concentrated near-range light, as in a crease.
 
 The inverse transform is computed as matrix products, first along rows and then down, so that
-frequencies may lie off the DFT grid.
+frequencies may lie off the DFT grid. On projectors too large for that, places are searched for from
+coarse to fine (`nearfar.correspondence.coarse_to_fine`).
 
 Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
 frequencies of one fy, o and i over the offsets of a footprint.
@@ -28,7 +29,11 @@ from nearfar.correspondence.background import (
     FOOTPRINT_BACKGROUND,
     SEARCH_BACKGROUND,
 )
-from nearfar.correspondence.coarse_to_fine import ROWS_BESIDE, correspond_coarse_to_fine
+from nearfar.correspondence.coarse_to_fine import (
+    LEAST_LARGE_EXCESS,
+    ROWS_BESIDE,
+    correspond_coarse_to_fine,
+)
 from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
@@ -90,11 +95,13 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     basis = without_dc(measurements)
     require_settled(basis)
     if is_large(basis.projector):
-        q, excess = correspond_coarse_to_fine(measurements, basis, LEAST_EXCESS)
+        least = LEAST_LARGE_EXCESS
+        q, excess = correspond_coarse_to_fine(measurements, basis)
     else:
+        least = LEAST_EXCESS
         q, excess = _correspond_at_every_place(measurements, basis)
-    q[excess <= LEAST_EXCESS] = np.nan
-    ratio = excess / np.where(is_mirrored(q), MIRRORED_FACTOR * LEAST_EXCESS, LEAST_EXCESS)
+    q[excess <= least] = np.nan
+    ratio = excess / np.where(is_mirrored(q), MIRRORED_FACTOR * least, least)
     q[ratio <= 1] = np.nan
     power = ratio**4
     return Correspondence(q, (power / (1 + power)).astype(np.float32))

@@ -58,6 +58,7 @@ Lights to relight under
 Judge
     judge_transport        judge a transport by the photos that its estimate never saw
     ExactTransport         the transport of a scene, known without a model
+    ExactOperator          the same at native size, of which no matrix is kept
     save_exact             write an exact transport
     load_exact             read an exact transport
     relighting_snr         SNR_b: how well pictures under lights agree
@@ -121,6 +122,7 @@ if TYPE_CHECKING:
     from nearfar.progress import progress_bar
     from nearfar.rigs.opening import open_rig
     from nearfar.transport.exact import ExactTransport
+    from nearfar.transport.exact_operator import ExactOperator
     from nearfar.transport.exact_store import load_exact, save_exact
     from nearfar.transport.model import Transport
     from nearfar.transport.prepared import prepare_transport
@@ -173,6 +175,7 @@ _HOMES = {
     "random_pattern": "nearfar.illumination.pictures",
     "judge_transport": "nearfar.workflow.verdict.keeping",
     "ExactTransport": "nearfar.transport.exact",
+    "ExactOperator": "nearfar.transport.exact_operator",
     "save_exact": "nearfar.transport.exact_store",
     "load_exact": "nearfar.transport.exact_store",
     "relighting_snr": "nearfar.workflow.evaluate",
@@ -220,6 +223,7 @@ __all__ = [  # noqa: RUF022
     "random_pattern",
     "judge_transport",
     "ExactTransport",
+    "ExactOperator",
     "save_exact",
     "load_exact",
     "relighting_snr",

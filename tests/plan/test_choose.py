@@ -16,11 +16,10 @@ from nearfar.illumination.frequencies import (
 )
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan import choose_plan, parse_plan
+from nearfar.plan.candidates import candidates
 from nearfar.plan.choose import (
     FEWEST_PHOTOS,
-    candidates,
     choose_frequencies,
-    default_window,
     photos_of_every_frequency,
 )
 from nearfar.plan.look import look_at, photos_for_window
@@ -123,13 +122,6 @@ def test_below_that_the_lowest_frequencies_of_all_are_shown():
 def test_more_noise_asks_for_more_repeats():
     quiet, loud = (choose_frequencies(Size(24, 24), 120, 5, noise=n) for n in (0.002, 0.05))
     assert len(loud.frequencies) < len(quiet.frequencies)
-
-
-@pytest.mark.parametrize("side", [8, 64, 68, 128, 1080])
-def test_the_default_window_is_odd_and_fits(side):
-    window = default_window(Size(side, 2 * side))
-    assert window % 2 == 1
-    assert 1 <= window <= min(side, 25)
 
 
 @pytest.mark.parametrize(

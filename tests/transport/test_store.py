@@ -240,7 +240,7 @@ def test_a_verdict_in_words():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 9}, "version 9, this nearfar reads version 1"),
+        ({"version": 9}, "version 9, this nearfar reads versions 1 to 2"),
         ({"format": "nearfar capture"}, "not a nearfar transport but a nearfar capture"),
         ({"projector": None}, "does not describe a transport"),
         ({"projector": [3]}, "does not describe a transport"),

@@ -193,12 +193,12 @@ def _load(
 ) -> "ExactTransport":
     """Compute a scene, or load a transport."""
     from nearfar.scenes.cache import cached_scene
-    from nearfar.transport.exact_store import load_exact
+    from nearfar.transport.exact_store import load_matrices
 
     if scene in SCENES:
         say_memory(scene, projector, camera, quiet=quiet)
         return cached_scene(scene, projector, camera, progress=report)
-    return load_exact(Path(scene), projector=projector, camera=camera)
+    return load_matrices(Path(scene), projector=projector, camera=camera)
 
 
 def _budgets(text: str | None) -> list[int] | None:

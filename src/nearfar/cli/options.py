@@ -70,7 +70,7 @@ def require_reconstructed(path: Path) -> None:
     from nearfar.files import kind_of_store
 
     kind, here = kind_of_store(path), quote(str(path))
-    if kind == "nearfar exact transport":
+    if kind in {"nearfar exact transport", "nearfar exact operator"}:
         raise UnreadableFileError(
             f"{path} is a scene's exact transport, not one that was reconstructed: photograph it "
             f"by 'nearfar acquire PLAN.json CAPTURE.zarr --rig {here}', then run 'nearfar "

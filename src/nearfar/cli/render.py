@@ -19,7 +19,7 @@ from nearfar.progress import Report, progress_bar
 from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
-    from nearfar.transport.exact import ExactTransport
+    from nearfar.transport.known import KnownTransport
 
 
 def render(
@@ -49,7 +49,8 @@ def render(
 ) -> None:
     """Compute a scene's transport: exactly, or by path tracing for a Mitsuba scene.
 
-    The components of a built-in scene are kept apart; a Mitsuba scene's are not known.
+    The components of a built-in scene are kept apart; a Mitsuba scene's are not known. Where the
+    matrices of a built-in scene would be too large, an operator is written instead.
 
     Example: nearfar render cornell truth.zarr --projector 64x64
     """
@@ -71,9 +72,9 @@ def render(
         if from_file:
             transport = _render_file(scene, projector, camera, samples, seed or 0, report)
         else:
-            from nearfar.scenes.cache import cached_scene
+            from nearfar.scenes.cache import cached_known
 
-            transport = cached_scene(scene, projector, camera, progress=report)
+            transport = cached_known(scene, projector, camera, progress=report)
         save_exact(transport, output, force=force)
     say(
         f"transport of {scene}, projector {transport.projector}, camera {transport.camera}, "
@@ -89,7 +90,7 @@ def _render_file(
     samples: int | None,
     seed: int,
     report: Report,
-) -> "ExactTransport":
+) -> "KnownTransport":
     from nearfar.scenes.mitsuba.loading import load_scene
     from nearfar.scenes.mitsuba.transport import DEFAULT_SAMPLES, render_transport
 

@@ -252,7 +252,7 @@ def _new_array(
     )
 
 
-def open_store(path: Path, kind: str, version: int) -> zarr.Group:
+def open_store(path: Path, kind: str, *versions: int) -> zarr.Group:
     """Open a Zarr group of ours for reading.
 
     Parameters
@@ -260,8 +260,8 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
     path : Path
     kind : str
         What it must hold.
-    version : int
-        The version of the format that is read.
+    *versions : int
+        The versions of the format that are read, rising.
 
     Raises
     ------
@@ -290,10 +290,11 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
     if found != kind:
         other = f"a {found}" if str(found).startswith("nearfar ") else "of another kind"
         raise UnreadableFileError(f"{path} is not {article} {kind} but {other}: check the name.")
-    if found_version != version:
+    if found_version not in versions:
+        read = f"versions {versions[0]} to" if len(versions) > 1 else "version"
         raise UnreadableFileError(
-            f"{path} is {article} {kind} of version {found_version!r}, this nearfar reads version "
-            f"{version}: make it again, or use the nearfar that made it."
+            f"{path} is {article} {kind} of version {found_version!r}, this nearfar reads {read} "
+            f"{versions[-1]}: make it again, or use the nearfar that made it."
         )
     return group
 

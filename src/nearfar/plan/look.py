@@ -6,8 +6,8 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.plan.choose import choose_frequencies
-from nearfar.plan.model import largest_window
 from nearfar.plan.typical import noise_of, typical_of
+from nearfar.plan.window import largest_window, pitch_of
 from nearfar.priors.fitted import FREE
 from nearfar.priors.typical import TypicalScenes
 
@@ -112,7 +112,12 @@ def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> 
 
     def expected(photos: int, window: int) -> float:
         choice = choose_frequencies(
-            projector, photos, window, typical=look.typical, noise=look.noise
+            projector,
+            photos,
+            window,
+            pitch=pitch_of(projector),
+            typical=look.typical,
+            noise=look.noise,
         )
         return choice.expected.pictures
 
@@ -123,13 +128,14 @@ def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> 
 
 
 def _reach(transport: "Transport") -> float | None:
-    """Return the distance in which the mean window falls by a factor e; None if it has no light.
+    """Return the functions over which the mean window falls by a factor e; None without light.
 
     The entry at q is left out, where near-range light is hard to tell from direct light.
     """
     side = np.abs(np.arange(transport.window) - transport.window // 2)
     distance = np.maximum(side[:, None], side)
-    window = transport.near.astype(np.float64).mean(axis=(0, 1, 2))
+    coarsest = transport.near.reshape(*transport.near.shape[:3], -1)[..., : transport.window**2]
+    window = coarsest.astype(np.float64).mean(axis=(0, 1, 2)).reshape(side.size, side.size)
     # Beyond a projector of a single row entries are 0.
     entries = [window[(distance == r) & (window != 0)] for r in range(1, transport.window // 2 + 1)]
     light = np.array([float(np.mean(entry)) for entry in entries if entry.size])

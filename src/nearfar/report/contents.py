@@ -18,6 +18,7 @@ from nearfar.transport.exact_store import KIND as EXACT_KIND
 from nearfar.transport.exact_store import load_exact
 from nearfar.transport.gains import why_unjudgeable
 from nearfar.transport.model import Transport
+from nearfar.transport.operator_store import KIND as OPERATOR_KIND
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
 from nearfar.transport.verdict import NOT_JUDGED
@@ -93,6 +94,7 @@ def _describe_folder(path: Path) -> str:
         CAPTURE_KIND: _describe_capture,
         TRANSPORT_KIND: _describe_transport,
         EXACT_KIND: _describe_exact,
+        OPERATOR_KIND: _describe_exact,
     }.get(kind_of_store(path) or "")
     if describe is not None:
         return describe(path)
@@ -159,7 +161,7 @@ def _verdict_of(transport: Transport) -> str:
 def _describe_exact(path: Path) -> str:
     exact = load_exact(path)
     return (
-        f"{EXACT_KIND}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
+        f"{kind_of_store(path)}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
         f"{_channels(exact.channels)}, components {'apart' if exact.is_apart else 'together'}"
     )
 

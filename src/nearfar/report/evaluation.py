@@ -110,12 +110,17 @@ def _components(judgement: Mapping[str, Any]) -> str:
     split = judgement.get("snr", {})
     if "physical" not in split:
         return ""
+    heads = {
+        "floodlit": "its floodlit picture",
+        "physical": "its rows, by physics",
+        "model": "its rows, by the model",
+    }
+    shown = [how for how in heads if how in split]
     rows = [
-        [what, *(_decibels(split[how][key]) for how in ("floodlit", "physical", "model"))]
+        [what, *(_decibels(split[how][key]) for how in shown)]
         for what, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
     ]
-    head = ["component", "its floodlit picture", "its rows, by physics", "its rows, by the model"]
-    return f"<p></p>{numbers(head, rows)}"
+    return f"<p></p>{numbers(['component', *(heads[how] for how in shown)], rows)}"
 
 
 def _remarks(judgement: Mapping[str, Any], faults: Sequence[str]) -> str:
@@ -152,7 +157,8 @@ def _row_section(rows: Rows | None, transport: Transport) -> str:
         ),
     )
     drawn = ""
-    for values, marked, caption, how in maps:
+    # A sample of rows makes no map.
+    for values, marked, caption, how in maps[rows.compared < rows.snr_t.size :]:
         known = values[np.isfinite(values)]
         low, high = map(float, np.percentile(known, [1, 99]) if known.size else (0.0, 1.0))
         drawn += colour_map(values, low, high, "dB", caption, reading=how, saturated=marked)

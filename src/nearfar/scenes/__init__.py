@@ -11,12 +11,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from nearfar.arrays import Size
-from nearfar.errors import ExtensionError
+from nearfar.errors import ExtensionError, InputError
 from nearfar.registry import Registry
-from nearfar.scenes.description import SceneDescription
+from nearfar.scenes.description import ByRadiosity, SceneDescription
 
 if TYPE_CHECKING:
     from nearfar.transport.exact import ExactTransport
+    from nearfar.transport.exact_operator import ExactOperator
 
 SCENES: Registry[SceneDescription] = Registry(
     "scene",
@@ -90,3 +91,39 @@ def build(
             f"these sizes, or update the package that adds the scene."
         )
     return transport
+
+
+def build_operator(
+    name: str,
+    projector: Size | None = None,
+    camera: Size | None = None,
+    *,
+    progress: Callable[[str, float], None] | None = None,
+) -> "ExactOperator":
+    """Compute the transport of a scene as an operator, of which nothing is of size C x P.
+
+    Parameters
+    ----------
+    name, projector, camera, progress
+        As `build`.
+
+    Returns
+    -------
+    ExactOperator
+        In the units of `build`.
+
+    Raises
+    ------
+    InputError
+        If there is no scene of that name, or it can be computed as a matrix alone.
+    ExtensionError
+        If a scene of another package cannot be loaded.
+    """
+    projector, camera = sizes(name, projector, camera)
+    compute = SCENES[name].compute
+    if not isinstance(compute, ByRadiosity):
+        raise InputError(
+            f"the scene {name} can be computed as a matrix alone, not as an operator: choose a "
+            f"built-in scene, or smaller sizes of projector and camera."
+        )
+    return compute.operator(projector, camera, progress or (lambda _, __: None))

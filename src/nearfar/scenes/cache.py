@@ -4,15 +4,20 @@ import hashlib
 import os
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from nearfar.arrays import Size
 from nearfar.callbacks import Report
 from nearfar.errors import NearfarError
-from nearfar.scenes import SCENES, build, sizes
+from nearfar.scenes import SCENES, build, build_operator, sizes
+from nearfar.scenes.description import ByRadiosity
 from nearfar.transport.exact import ExactTransport
-from nearfar.transport.exact_store import load_exact, save_exact
+from nearfar.transport.exact_operator import ExactOperator
+from nearfar.transport.exact_store import load_matrices, save_exact
+from nearfar.transport.known import KnownTransport
+from nearfar.transport.operator_store import load_operator, save_operator
 
 # Of the scenes by radiosity, the large ones: floats, red, green and blue, and at most one patch
 # without light for so many projector pixels (`nearfar.scenes.patches`).
@@ -22,6 +27,12 @@ PIXELS_PER_CELL = 8
 # Matrices of form factors between all patches that are there at once, and what factoring them
 # takes: measured.
 FORM_FACTORS_AT_ONCE = 2.5
+# Matrices of a scene that take more memory than this while they are computed are too large.
+LARGEST_MATRICES = 16 * 10**9
+# Of an operator, for each pixel of projector and camera: measured.
+BYTES_PER_PIXEL = 220
+
+Kept = TypeVar("Kept")
 
 
 def cache_folder() -> Path:
@@ -50,7 +61,7 @@ class SceneMemory(NamedTuple):
 def scene_memory(
     name: str, projector: Size | None = None, camera: Size | None = None
 ) -> SceneMemory:
-    """Estimate the memory that `cached_scene` takes.
+    """Estimate the memory that `cached_known` takes.
 
     Parameters
     ----------
@@ -63,20 +74,39 @@ def scene_memory(
         If there is no scene of that name.
     """
     projector, camera = sizes(name, projector, camera)
+    if needs_operator(name, projector, camera):
+        return _memory_of_operator(projector, camera)
+    known = _memory_of_matrices(projector, camera)
+    if _path(name, projector, camera).exists():
+        return SceneMemory(known.kept, known.kept)
+    return known
+
+
+def _memory_of_matrices(projector: Size, camera: Size) -> SceneMemory:
+    """Estimate the memory of a scene's matrices, which are still to be computed."""
     matrix = BYTES_PER_ENTRY * camera.pixels * projector.pixels
     kept = CHANNELS * matrix
-    if _path(name, projector, camera).exists():
-        return SceneMemory(kept, kept)
     patches = projector.pixels * (1 + 1 / PIXELS_PER_CELL)
     between = FORM_FACTORS_AT_ONCE * BYTES_PER_ENTRY * patches**2
     # All but the last channel of the transport are there by then.
     return SceneMemory(max(kept, int(between + kept - matrix)), kept)
 
 
-def _path(name: str, projector: Size, camera: Size) -> Path:
+def _memory_of_operator(projector: Size, camera: Size) -> SceneMemory:
+    """Estimate the memory of a scene's operator."""
+    # Its module imports ray casting, which is heavy.
+    from nearfar.scenes.native.sizes import patch_size
+
+    nodes = patch_size(projector).pixels * (1 + 1 / PIXELS_PER_CELL)
+    between = BYTES_PER_ENTRY * nodes**2
+    kept = CHANNELS * between + BYTES_PER_PIXEL * (camera.pixels + projector.pixels)
+    return SceneMemory(int(kept + FORM_FACTORS_AT_ONCE * between), int(kept))
+
+
+def _path(name: str, projector: Size, camera: Size, kind: str = "") -> Path:
     # A scene of another package may have a name with characters that a file name cannot have.
     known_as = re.sub(r"[^A-Za-z0-9_-]", "_", name)
-    return cache_folder() / f"{known_as}-{projector}-{camera}-{_fingerprint(name)}.zarr"
+    return cache_folder() / f"{known_as}-{projector}-{camera}{kind}-{_fingerprint(name)}.zarr"
 
 
 def cached_scene(
@@ -103,21 +133,100 @@ def cached_scene(
         As `nearfar.scenes.build`.
     """
     projector, camera = sizes(name, projector, camera)
-    path = _path(name, projector, camera)
+    return _kept(
+        _path(name, projector, camera),
+        load_matrices,
+        lambda: build(name, projector, camera, progress=progress),
+        save_exact,
+    )
+
+
+def cached_operator(
+    name: str,
+    projector: Size | None = None,
+    camera: Size | None = None,
+    *,
+    progress: Report | None = None,
+) -> ExactOperator:
+    """Compute a scene's transport as an operator, or read what an earlier call kept.
+
+    Parameters
+    ----------
+    name, projector, camera, progress
+        As `nearfar.scenes.build_operator`.
+
+    Raises
+    ------
+    InputError, ExtensionError
+        As `nearfar.scenes.build_operator`.
+    """
+    projector, camera = sizes(name, projector, camera)
+    return _kept(
+        _path(name, projector, camera, kind="-operator"),
+        load_operator,
+        lambda: build_operator(name, projector, camera, progress=progress),
+        save_operator,
+    )
+
+
+def cached_known(
+    name: str,
+    projector: Size | None = None,
+    camera: Size | None = None,
+    *,
+    progress: Report | None = None,
+) -> KnownTransport:
+    """Return a scene's transport as matrices, or as an operator where these are too large.
+
+    Parameters
+    ----------
+    name, projector, camera, progress
+        As `nearfar.scenes.build`.
+
+    Raises
+    ------
+    InputError, ExtensionError
+        As `nearfar.scenes.build`.
+    """
+    make = cached_operator if needs_operator(name, projector, camera) else cached_scene
+    return make(name, projector, camera, progress=progress)
+
+
+def needs_operator(name: str, projector: Size | None = None, camera: Size | None = None) -> bool:
+    """Return whether the matrices of a scene are too large, and it has an operator.
+
+    Raises
+    ------
+    InputError
+        If there is no scene of that name.
+    """
+    projector, camera = sizes(name, projector, camera)
+    if not isinstance(SCENES[name].compute, ByRadiosity):
+        return False
+    return _memory_of_matrices(projector, camera).peak > LARGEST_MATRICES
+
+
+def _kept(
+    path: Path,
+    load: Callable[[Path], Kept],
+    make: Callable[[], Kept],
+    save: Callable[..., None],
+) -> Kept:
+    """Read what is kept at a path, or make and keep it."""
     if path.exists():
         try:
-            return load_exact(path)
+            return load(path)
         except NearfarError:
             # A damaged entry is computed again.
             pass
-    transport = build(name, projector, camera, progress=progress)
+    made = make()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        save_exact(transport, path, force=True)
+        save(made, path, force=True)
     except (NearfarError, OSError):
         # On a full or read-only disk the scene is returned all the same.
         pass
-    return transport
+    return made
 
 
 def _fingerprint(name: str) -> str:
@@ -126,7 +235,8 @@ def _fingerprint(name: str) -> str:
     Of a scene of another package, that is the package's version and the module of the scene.
     """
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    folder = Path(__file__).parent
+    for source in (*sorted(folder.glob("*.py")), *sorted(folder.glob("native/*.py"))):
         digest.update(source.read_bytes())
     entry = SCENES.entry(name)
     if entry.dist is not None:

@@ -68,7 +68,7 @@ def gather(
     patch = _patch_at(where, patches, projector, face, position, coaxial=coaxial)
     weights = np.full(len(patch), 1 / samples**2)
     normal = np.einsum("nk,nkx->nx", hits.weights[seen], where.shading[face])
-    lobe = _highlight(parts, where.part[face], normal, projector[0].position - position, -direction)
+    lobe = highlight(parts, where.part[face], normal, projector[0].position - position, -direction)
     lobe[patches.pixel[patch] < 0] = 0
     shape = (size.pixels, len(patches))
 
@@ -119,7 +119,7 @@ def _patch_at(
     return np.asarray(result)
 
 
-def _highlight(
+def highlight(
     parts: Sequence[Part], part: Integers, normal: Floats, light: Floats, view: Floats
 ) -> Floats:
     """Blinn-Phong lobe times pi, normalised by (n + 8) / (8 pi); shape (n,)."""

@@ -14,6 +14,7 @@ from nearfar.callbacks import Report
 if TYPE_CHECKING:
     from nearfar.scenes.geometry import Scene
     from nearfar.transport.exact import ExactTransport
+    from nearfar.transport.exact_operator import ExactOperator
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,3 +63,9 @@ class ByRadiosity:
         from nearfar.scenes.render import render
 
         return render(self.surfaces(), projector, camera, progress=progress)
+
+    def operator(self, projector: Size, camera: Size, progress: Report) -> "ExactOperator":
+        """Compute the transport as an operator, for sizes at which a matrix is too large."""
+        from nearfar.scenes.native.render import render_native
+
+        return render_native(self.surfaces(), projector, camera, progress=progress)

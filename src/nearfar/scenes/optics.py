@@ -41,7 +41,9 @@ def pinhole(view: View, aspect: Size) -> Pinhole:
     return Pinhole(position, axes, view.half_tangent * np.asarray(aspect) / max(aspect))
 
 
-def sub_rays(eye: Pinhole, size: Size, samples: int) -> tuple[Floats, Floats, Integers]:
+def sub_rays(
+    eye: Pinhole, size: Size, samples: int, rows: slice | None = None
+) -> tuple[Floats, Floats, Integers]:
     """Return the rays through the s x s cells of every pixel.
 
     Parameters
@@ -51,34 +53,58 @@ def sub_rays(eye: Pinhole, size: Size, samples: int) -> tuple[Floats, Floats, In
         The grid of pixels over the field of view.
     samples : int
         s, cells along each side of a pixel.
+    rows : slice, optional
+        Consecutive rows of pixels, whose pixels are numbered from 0; all if left out.
 
     Returns
     -------
     directions : ndarray, shape (n, 3)
-        Unit vectors, n = H s W s, row by row of the fine grid.
+        Unit vectors, n = H s W s for all rows, row by row of the fine grid.
     solid_angle : ndarray, shape (n,)
         Of each cell, in steradians (cell area on the plane at distance 1, times cos^3).
     pixel : ndarray, shape (n,), int64
         The pixel of each cell.
     """
-    rows, columns = size.height * samples, size.width * samples
-    up = eye.half[0] * (1 - (2 * np.arange(rows) + 1) / rows)
-    right = eye.half[1] * ((2 * np.arange(columns) + 1) / columns - 1)
+    height, width = size.height * samples, size.width * samples
+    first, last, _ = (rows or slice(None)).indices(size.height)
+    fine_rows = np.arange(first * samples, last * samples)
+    up = eye.half[0] * (1 - (2 * fine_rows + 1) / height)
+    right = eye.half[1] * ((2 * np.arange(width) + 1) / width - 1)
     plane = np.stack(
-        np.broadcast_arrays(right[None, :], up[:, None], np.ones((rows, columns))), axis=-1
+        np.broadcast_arrays(right[None, :], up[:, None], np.ones((len(up), width))), axis=-1
     ).reshape(-1, 3)
     length = np.linalg.norm(plane, axis=-1)
-    cell = 4 * eye.half[0] * eye.half[1] / (rows * columns)
-    pixel = (np.arange(rows) // samples)[:, None] * size.width + np.arange(columns) // samples
+    cell = 4 * eye.half[0] * eye.half[1] / (height * width)
+    pixel = (fine_rows // samples - first)[:, None] * size.width + np.arange(width) // samples
     return (plane / length[:, None]) @ eye.axes, cell / length**3, pixel.ravel()
+
+
+def place_of(eye: Pinhole, size: Size, position: Floats) -> tuple[Floats, Floats, Booleans]:
+    """Find where points (n, 3) fall on the grid: y, x, and whether they are in view.
+
+    Pixel i reaches from i to i + 1.
+    """
+    right, up, forward = eye.axes @ (position - eye.position).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        y = (1 - up / forward / eye.half[0]) * size.height / 2
+        x = (1 + right / forward / eye.half[1]) * size.width / 2
+    inside = (forward > 0) & (y >= 0) & (y < size.height) & (x >= 0) & (x < size.width)
+    return y, x, inside
+
+
+def moved(eye: Pinhole, size: Size, position: Floats, way: Floats) -> tuple[Floats, Floats]:
+    """Return how far points (n, 3) move on the grid, in y and x, by short ways (n, 3) in space."""
+    right, up, forward = eye.axes @ (position - eye.position).T
+    to_right, upwards, onwards = eye.axes @ way.T
+    per_tangent = np.asarray(size) / (2 * eye.half)
+    y = per_tangent[0] * (up * onwards - upwards * forward) / forward**2
+    x = per_tangent[1] * (to_right * forward - right * onwards) / forward**2
+    return y, x
 
 
 def pixel_of(eye: Pinhole, size: Size, position: Floats) -> tuple[Integers, Booleans]:
     """Find the pixel that points (n, 3) fall on, shape (n,), and whether they are in view."""
-    right, up, forward = eye.axes @ (position - eye.position).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        y = np.floor((1 - up / forward / eye.half[0]) * size.height / 2)
-        x = np.floor((1 + right / forward / eye.half[1]) * size.width / 2)
-    inside = (forward > 0) & (y >= 0) & (y < size.height) & (x >= 0) & (x < size.width)
+    y, x, inside = place_of(eye, size, position)
+    y, x = np.floor(y), np.floor(x)
     flat = np.where(inside, y * size.width + x, 0).astype(np.int64)
     return flat, inside

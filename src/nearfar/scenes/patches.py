@@ -237,12 +237,18 @@ def build_patches(
 def albedo(patches: Patches, parts: Sequence[Part]) -> Floats:
     """Diffuse albedo of the patches, shape (n, 3)."""
     values = np.array([part.material.albedo for part in parts])[patches.part]
+    return np.asarray(values * texture(patches, parts)[:, None])
+
+
+def texture(patches: Patches, parts: Sequence[Part]) -> Floats:
+    """Mean factor of the textures on the albedo of the patches, shape (n,)."""
+    values = np.ones(len(patches))
     for index, part in enumerate(parts):
         if part.material.texture is not None:
             mine = patches.part == index
             factor = part.material.texture(patches.positions[mine])
             weight = patches.areas[mine] / patches.area[mine, None]
-            values[mine] *= (factor * weight).sum(axis=1)[:, None]
+            values[mine] = (factor * weight).sum(axis=1)
     return values
 
 

@@ -62,7 +62,7 @@ def render(
     form = exchange(patches, scene.parts, occluders)
     progress("subsurface", 0.3)
     translucent = np.flatnonzero(with_medium(patches, scene.parts))
-    inside = _subsurface(patches, scene, translucent)
+    inside = subsurface_of(patches, scene, translucent)
     direct, near, far = components(
         seen,
         patches,
@@ -96,7 +96,7 @@ def body_of(patches: Patches, chosen: Integers) -> Patches:
     )
 
 
-def _subsurface(patches: Patches, scene: Scene, translucent: Integers) -> tuple[Floats, ...]:
+def subsurface_of(patches: Patches, scene: Scene, translucent: Integers) -> tuple[Floats, ...]:
     """Compute the dipole of the translucent body per channel; empty where there is none."""
     if not len(translucent):
         return ()

@@ -8,23 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size, blocks
+from nearfar.arrays import AnyPath, AnySize, Floats, Size, as_size
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError
-from nearfar.files import new_output, read_arrays
+from nearfar.files import kind_of_store, new_output, read_arrays
 from nearfar.files.stores import (
-    add_array,
     create_store,
     is_plain_array,
-    open_array,
     open_store,
-    read_array,
     read_plain_array,
-    read_selection,
 )
 from nearfar.transport.exact import ExactTransport
-from nearfar.transport.store import MAXIMUM_REASON, stored_size, write_in_rows
+from nearfar.transport.exact_operator import ExactOperator
+from nearfar.transport.known import KnownTransport
+from nearfar.transport.matrix_store import (
+    read_in_rows,
+    read_sparse,
+    write_in_rows,
+    write_sparse,
+)
+from nearfar.transport.operator_store import KIND as OPERATOR_KIND
+from nearfar.transport.operator_store import load_operator, save_operator
+from nearfar.transport.store import MAXIMUM_REASON, stored_size
 
 KIND = "nearfar exact transport"
 FORMAT_VERSION = 1
@@ -36,12 +42,12 @@ SIZES = ("projector", "camera")
 
 
 @path_after_content
-def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False) -> None:
+def save_exact(transport: KnownTransport, path: AnyPath, *, force: bool = False) -> None:
     """Write an exact transport, each component by itself, as a Zarr group.
 
     Parameters
     ----------
-    transport : ExactTransport
+    transport : ExactTransport or ExactOperator
     path : str or Path
         Folder to make, ending in ``.zarr`` by custom.
     force : bool
@@ -58,6 +64,9 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
     >>> nearfar.load_exact("truth.zarr").projector
     Size(height=8, width=8)
     """
+    if isinstance(transport, ExactOperator):
+        save_operator(transport, path, force=force)
+        return
     require_instance(transport, ExactTransport, "transport", "nearfar.load_exact")
     path = Path(path)
     attributes = {
@@ -73,32 +82,15 @@ def save_exact(transport: ExactTransport, path: AnyPath, *, force: bool = False)
             write_in_rows(group, f"far-{i}", transport.far[i])
             if transport.is_apart:
                 for name, part in (("direct", transport.direct[i]), ("near", transport.near[i])):
-                    _write_sparse(group, f"{name}-{i}", part)
-
-
-def _write_sparse(group: Any, name: str, matrix: sparse.csr_array) -> None:
-    for suffix, values in (
-        ("data", matrix.data.astype(np.float32)),
-        ("indices", matrix.indices.astype(np.int64)),
-        ("starts", matrix.indptr.astype(np.int64)),
-    ):
-        # Zarr stores no empty array: append one value, which reading drops.
-        padded = np.append(values, values.dtype.type(0))
-        add_array(group, f"{name}-{suffix}", padded.shape, padded.dtype, padded.shape)[:] = padded
-
-
-def _read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_array:
-    parts = [read_array(group, f"{name}-{suffix}")[:-1] for suffix in ("data", "indices")]
-    starts = read_array(group, f"{name}-starts")[:-1]
-    matrix = sparse.csr_array((*parts, starts), shape=shape)
-    matrix.check_format()
-    return matrix
+                    write_sparse(group, f"{name}-{i}", part)
 
 
 def load_exact(
     path: AnyPath, *, projector: AnySize | None = None, camera: AnySize | None = None
-) -> ExactTransport:
+) -> KnownTransport:
     """Read an exact transport: a Zarr of `save_exact`, or a dense .npy, .npz or Zarr array.
+
+    That of a scene at native size is an operator, which answers lights as matrices do.
 
     Parameters
     ----------
@@ -110,6 +102,10 @@ def load_exact(
     projector, camera : Size or (height, width), optional
         Sizes for a dense T whose file has none. By default the camera has the projector's size
         times the whole number that gives the rows of T.
+
+    Returns
+    -------
+    ExactTransport or ExactOperator
 
     Raises
     ------
@@ -123,6 +119,15 @@ def load_exact(
     >>> nearfar.load_exact("scene.npy", projector=(8, 8)).camera
     Size(height=8, width=8)
     """
+    if kind_of_store(Path(path)) == OPERATOR_KIND:
+        return load_operator(path)
+    return load_matrices(path, projector=projector, camera=camera)
+
+
+def load_matrices(
+    path: AnyPath, *, projector: AnySize | None = None, camera: AnySize | None = None
+) -> ExactTransport:
+    """Read an exact transport as matrices, an operator refused; otherwise as `load_exact`."""
     path = Path(path)
     sizes = (
         None if projector is None else as_size(projector, "projector"),
@@ -146,11 +151,11 @@ def load_exact(
         shape = (stored_camera.pixels, stored_projector.pixels)
         channels = int(str(attributes["channels"]))
         apart = range(channels if attributes["apart"] else 0)
-        direct = tuple(_read_sparse(group, f"direct-{i}", shape) for i in apart)
-        near = tuple(_read_sparse(group, f"near-{i}", shape) for i in apart)
+        direct = tuple(read_sparse(group, f"direct-{i}", shape) for i in apart)
+        near = tuple(read_sparse(group, f"near-{i}", shape) for i in apart)
         far = np.empty((channels, *shape), dtype=np.float32)
         for i in range(channels):
-            _read_rows(group, f"far-{i}", far[i])
+            read_in_rows(group, f"far-{i}", far[i])
         return ExactTransport(
             stored_projector, stored_camera, direct, near, far, str(attributes["name"])
         )
@@ -158,15 +163,6 @@ def load_exact(
         raise UnreadableFileError(
             f"{path} is a damaged exact transport ({str(error)[:MAXIMUM_REASON]}): render it again."
         ) from error
-
-
-def _read_rows(group: Any, name: str, out: Floats) -> None:
-    """Read a matrix into its place chunk by chunk: a second copy of a large one would not fit."""
-    stored = open_array(group, name)
-    if stored.shape != out.shape:
-        raise ValueError(f"{name} has the shape {stored.shape} instead of {out.shape}")
-    for block in blocks(len(out), stored.chunks[0]):
-        out[block] = read_selection(stored, (block, slice(None)))
 
 
 def _load_dense(path: Path, projector: Size | None, camera: Size | None) -> ExactTransport:

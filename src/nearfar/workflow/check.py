@@ -22,10 +22,11 @@ from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band, default_dropped
 from nearfar.illumination.pictures import standard_lights
 from nearfar.plan import paper_plan
-from nearfar.plan.model import largest_window
+from nearfar.plan.window import largest_window
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import decibels, snr_where_lit
 from nearfar.workflow.model_fit import far_basis_of, held_by_model, split_by_model
@@ -107,7 +108,7 @@ def default_k_near(window: int) -> float:
 
 
 def check_model(
-    transport: ExactTransport | Transport,
+    transport: KnownTransport | Transport,
     window: int,
     far: AnySize,
     *,
@@ -119,7 +120,7 @@ def check_model(
 
     Parameters
     ----------
-    transport : ExactTransport or Transport
+    transport : ExactTransport, ExactOperator or Transport
         If its components are not known apart, they are split as the model fits them best.
     window : int
         W.

@@ -11,16 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from nearfar.arrays import Floats, blocks, processors
+from nearfar.arrays import Floats, blocks, middles, processors
 from nearfar.callbacks import OldReport, Report, as_report
 from nearfar.checks import as_number, finite_numbers
 from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
 from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 
 BLOCK = 128
+# Rows along each side of the camera that are compared with an operator's: all would be C x P.
+ROWS_ALONG = 11
 WORKERS = processors()
 # An exact match has no finite SNR; JSON needs a number.
 HIGHEST = 300.0
@@ -78,19 +81,28 @@ class Rows:
     Attributes
     ----------
     snr_t : ndarray, shape (Cy, Cx)
-        SNR_t of each camera pixel, channels together, dB; NaN where the truth holds no light.
+        SNR_t of each camera pixel, channels together, dB; NaN where the truth holds no light, and
+        at pixels that were not compared.
     snr_b_of_frequency : ndarray, shape (Py, Px)
         SNR_b under exp(-j 2 pi k.p) for every DFT frequency k, DC in the middle, dB.
     components : mapping
         SNR of ``T``, and of ``D``, ``N`` and ``F`` where they are known, dB.
+    compared : int
+        Camera pixels that were compared: all, or a sample where the truth is an operator.
     """
 
     snr_t: Floats
     snr_b_of_frequency: Floats
     components: Mapping[str, float]
+    compared: int
+
+    @property
+    def without_light(self) -> int:
+        """Number of camera pixels that were compared and that the truth leaves dark."""
+        return self.compared - int(np.isfinite(self.snr_t).sum())
 
 
-def require_same_kind(transport: Transport, truth: ExactTransport) -> None:
+def require_same_kind(transport: Transport, truth: KnownTransport) -> None:
     """Refuse a truth of another size.
 
     Raises
@@ -121,7 +133,7 @@ class Exposure(NamedTuple):
     is_fitted: bool
 
 
-def exposure_of(transport: Transport, truth: ExactTransport) -> Exposure:
+def exposure_of(transport: Transport, truth: KnownTransport) -> Exposure:
     """Return the exposure that the capture's rig recorded, or that fits best where it did not.
 
     Only a simulated rig knows it: a real camera has units of its own, and so has a truth that was
@@ -136,7 +148,7 @@ def exposure_of(transport: Transport, truth: ExactTransport) -> Exposure:
     return Exposure(float(recorded), is_fitted=False)
 
 
-def fitted_exposure(transport: Transport, truth: ExactTransport) -> float:
+def fitted_exposure(transport: Transport, truth: KnownTransport) -> float:
     """Return the factor that brings the truth nearest to the transport, by least squares.
 
     Both are compared by pictures under white, under a random light and under natural pictures.
@@ -157,7 +169,7 @@ def fitted_exposure(transport: Transport, truth: ExactTransport) -> float:
 
 def relighting_snr(
     transport: Transport,
-    truth: ExactTransport,
+    truth: KnownTransport,
     lights: Mapping[str, Floats],
     *,
     exposure: float | None = None,
@@ -167,7 +179,7 @@ def relighting_snr(
     Parameters
     ----------
     transport : Transport
-    truth : ExactTransport
+    truth : ExactTransport or ExactOperator
     lights : mapping of str to ndarray
         Lights by name, (Py, Px) or (Py, Px, channels).
     exposure : float, optional
@@ -199,7 +211,7 @@ def relighting_snr(
     return found
 
 
-def _factor(exposure: float | None, transport: Transport, truth: ExactTransport) -> np.float32:
+def _factor(exposure: float | None, transport: Transport, truth: KnownTransport) -> np.float32:
     """Return the exposure as a float32: as given, recorded, or fitted."""
     if exposure is None:
         return np.float32(exposure_of(transport, truth).factor)
@@ -208,17 +220,17 @@ def _factor(exposure: float | None, transport: Transport, truth: ExactTransport)
 
 def row_snr(
     transport: Transport,
-    truth: ExactTransport,
+    truth: KnownTransport,
     *,
     exposure: float | None = None,
     progress: Report | OldReport | None = None,
 ) -> Rows:
-    """Compare every row of T with the truth.
+    """Compare every row of T with the truth, or a sample where the truth is an operator.
 
     Parameters
     ----------
     transport : Transport
-    truth : ExactTransport
+    truth : ExactTransport or ExactOperator
         Where its components are apart, D, N and F are compared as the scene's physics has them.
     exposure : float, optional
         As of `relighting_snr`.
@@ -245,7 +257,8 @@ def row_snr(
     signal, error = np.zeros(pixels), np.zeros(pixels)
     signal_k, error_k = np.zeros(projector), np.zeros(projector)
     parts = dict.fromkeys("DNF" if truth.is_apart else "", (0.0, 0.0))
-    for block in blocks(pixels, BLOCK):
+    compared = _rows_to_compare(truth)
+    for block in compared:
         known = truth.component_rows(block) if truth.is_apart else (truth.rows(block),)
         found = transport.component_rows(block)
         rows = _sum(known)
@@ -265,7 +278,17 @@ def row_snr(
         snr_where_lit(signal, error).reshape(transport.camera),
         np.fft.fftshift(snr_where_lit(signal_k, error_k)),
         components,
+        sum(block.stop - block.start for block in compared),
     )
+
+
+def _rows_to_compare(truth: KnownTransport) -> list[slice]:
+    """Return the blocks of camera pixels whose rows are compared."""
+    if isinstance(truth, ExactTransport):
+        return list(blocks(truth.camera.pixels, BLOCK))
+    along = (middles(side, -(-side // ROWS_ALONG)) for side in truth.camera)
+    chosen = np.add.outer(next(along) * truth.camera.width, next(along))
+    return [slice(pixel, pixel + 1) for pixel in chosen.ravel().tolist()]
 
 
 def snr_where_lit(signal: Floats, error: Floats) -> Floats:
@@ -347,7 +370,7 @@ def split_snr(transport: Transport, model: Transport) -> dict[str, float]:
 
 
 def floodlit_snr(
-    transport: Transport, truth: ExactTransport, exposure: float | None = None
+    transport: Transport, truth: KnownTransport, exposure: float | None = None
 ) -> dict[str, float]:
     """SNR of the direct, near and far pictures under full white, as physics has them, dB."""
     light = np.ones(transport.projector, dtype=np.float32)

@@ -11,6 +11,7 @@ from nearfar.errors import InputError, MissingFileError
 from nearfar.files import full_scale_of, list_pictures, luminance, read_light, read_picture
 from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import (
     Rows,
@@ -51,7 +52,7 @@ class Pair(NamedTuple):
 
 def judge_by_truth(
     transport: Transport,
-    truth: ExactTransport,
+    truth: KnownTransport,
     rows: Rows | None = None,
     *,
     progress: Callable[[str, float], None] | None = None,
@@ -61,7 +62,7 @@ def judge_by_truth(
     Parameters
     ----------
     transport : Transport
-    truth : ExactTransport
+    truth : ExactTransport or ExactOperator
     rows : Rows, optional
         As `nearfar.row_snr` gives them, if they are there already.
     progress : callable, optional
@@ -76,7 +77,8 @@ def judge_by_truth(
         ``ceiling``, the same lights with the model fitted to the truth. ``exposure`` is the
         photo units per unit of the truth, ``exposure_is_fitted`` whether they were fitted to it,
         and ``pixels_without_light`` the camera pixels that the truth leaves dark: they have no
-        SNR_t.
+        SNR_t. Beside an operator rows are a sample, and there are no model's split and no
+        ceiling, which take all rows.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def judge_by_truth(
     numbers: dict[str, Any] = {
         "exposure": factor,
         "exposure_is_fitted": exposure.is_fitted,
-        "pixels_without_light": int(np.isnan(rows.snr_t).sum()),
+        "pixels_without_light": rows.without_light,
         "snr_b_pictures": _mean_of_pictures(found),
         "snr_b": white_last(found),
         "snr_b_frequency": percentiles(rows.snr_b_of_frequency),
@@ -102,14 +104,14 @@ def judge_by_truth(
         "snr": {"T": components.pop("T")},
     }
     if truth.is_apart:
+        floodlit = floodlit_snr(transport, truth, factor)
+        numbers["snr"] |= {"physical": components, "floodlit": floodlit}
+    # The model is fitted to every row, of which an operator has too many.
+    if truth.is_apart and isinstance(truth, ExactTransport):
         report("model's truth", 0.0)
         fitted = model_truth(transport, truth, factor)
         ceiling = relighting_snr(fitted, truth, lights, exposure=factor)
-        numbers["snr"] |= {
-            "physical": components,
-            "model": split_snr(transport, fitted),
-            "floodlit": floodlit_snr(transport, truth, factor),
-        }
+        numbers["snr"]["model"] = split_snr(transport, fitted)
         numbers["ceiling"] = {
             "snr_b_pictures": _mean_of_pictures(ceiling),
             "snr_b": white_last(ceiling),
@@ -141,13 +143,13 @@ def describe_units(judgement: Mapping[str, Any]) -> list[str]:
     return said
 
 
-def find_faults_of_units(transport: Transport, truth: ExactTransport, name: str) -> list[str]:
+def find_faults_of_units(transport: Transport, truth: KnownTransport, name: str) -> list[str]:
     """Find whether a truth is in other units than the rig recorded.
 
     Parameters
     ----------
     transport : Transport
-    truth : ExactTransport
+    truth : ExactTransport or ExactOperator
     name : str
         What the truth is called in the sentence.
 
@@ -176,7 +178,7 @@ def _mean_of_pictures(found: dict[str, float]) -> float:
     return float(np.mean([value for name, value in found.items() if name.startswith("picture")]))
 
 
-def beside_truth(transport: Transport, truth: ExactTransport) -> dict[str, Pair]:
+def beside_truth(transport: Transport, truth: KnownTransport) -> dict[str, Pair]:
     """Relight under lights of every sort, beside the exact pictures.
 
     Raises

@@ -15,9 +15,10 @@ from nearfar.errors import InputError
 from nearfar.faults.of_capture import find_saturation
 from nearfar.files import encode_png, new_output, write_picture
 from nearfar.illumination.frames import FrameLayout, draw_frame, fit_frame
-from nearfar.plan.choose import default_window
+from nearfar.plan.window import default_window
 from nearfar.release import version
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import snr
 from nearfar.workflow.model_fit import split_by_model
@@ -186,14 +187,14 @@ def is_separation(folder: Path) -> bool:
 
 
 def compare_to_truth(
-    found: Separation, truth: ExactTransport, exposure: float | None = 1.0
+    found: Separation, truth: KnownTransport, exposure: float | None = 1.0
 ) -> dict[str, float]:
     """SNR of direct and global under full white (global = N + F), dB.
 
     Parameters
     ----------
     found : Separation
-    truth : ExactTransport
+    truth : ExactTransport or ExactOperator
         Its components are as physics has them where they are known apart, and else as the model
         with the window and far band of the paper's plans fits them best.
     exposure : float, optional
@@ -204,13 +205,13 @@ def compare_to_truth(
     InputError
         If the truth holds no light, or its camera or channels differ from those of `found`.
     """
-    if truth.is_apart:
+    if isinstance(truth, ExactTransport) and not truth.is_apart:
+        window, band = default_model(truth.projector)
+        known = Separation(*split_by_model(truth, window, band).floodlit())
+    else:
         light = np.ones(truth.projector, dtype=np.float32)
         direct, near, far = truth.component_pictures(light)
         known = Separation(direct, near + far)
-    else:
-        window, band = default_model(truth.projector)
-        known = Separation(*split_by_model(truth, window, band).floodlit())
     _require_same_sizes(found, known, "truth")
     scale = np.float32(_fitted(found, known) if exposure is None else exposure)
     return _snr_of(found, Separation(*(scale * picture for picture in known)), "truth")

@@ -9,11 +9,11 @@ from nearfar.files import kind_of_store
 from nearfar.progress import Report
 from nearfar.rigs.simulated.rig import SimulatedRig, World, brightest
 from nearfar.rigs.tables import SimulatedTable
-from nearfar.scenes.cache import cached_scene
+from nearfar.scenes.cache import cached_known
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.scenes.mitsuba.photos import RenderedWorld
-from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_store import load_exact
+from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
@@ -52,7 +52,7 @@ def open_simulated_rig(
     world: World
     if table.scene.name is not None:
         name = table.scene.name
-        world = cached_scene(name, projector, camera, progress=progress)
+        world = cached_known(name, projector, camera, progress=progress)
     elif table.scene.mitsuba is not None:
         path = folder / table.scene.mitsuba
         name = path.name
@@ -81,10 +81,10 @@ def open_simulated_rig(
 
 def load_world(
     path: Path, projector: Size | None, camera: Size | None
-) -> ExactTransport | Transport:
+) -> KnownTransport | Transport:
     """Load a stored transport: a measured one, an exact one, or a dense array."""
     measured = kind_of_store(path) == TRANSPORT_KIND
-    world: ExactTransport | Transport = (
+    world: KnownTransport | Transport = (
         load_transport(path) if measured else load_exact(path, projector=projector, camera=camera)
     )
     if camera is not None and world.camera != camera:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.plan import Plan, Sinusoid
@@ -33,6 +33,8 @@ MODEL_ERROR_OF_MEAN = 0.0005
 # Smallest change of exposure, and of ambient light as a share of white, that is reported: errors of
 # the model may look like smaller ones.
 SMALLEST_CHANGE = 0.01
+# Values of patterns that are drawn at a time.
+MOST_DRAWN = 2**26
 # The picture is divided into as many regions down and across.
 REGIONS_A_SIDE = 3
 
@@ -144,10 +146,16 @@ def model_variance(white: Floats) -> Floats:
 
 def relight(plan: Plan, transport: Transport, numbers: Iterable[int]) -> Floats:
     """Relight under some patterns of a plan and add black, (n, rows, columns, channels)."""
-    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
-    relit = transport.pictures(lights)
-    relit += transport.black
-    return relit
+    wanted = list(numbers)
+    relit = [
+        transport.pictures(
+            np.stack([plan.draw(number) / np.float32(255) for number in wanted[together]])
+        )
+        for together in blocks(len(wanted), MOST_DRAWN // plan.projector.pixels)
+    ]
+    found = relit[0] if len(relit) == 1 else np.concatenate(relit)
+    found += transport.black
+    return found
 
 
 @dataclass(frozen=True, eq=False)

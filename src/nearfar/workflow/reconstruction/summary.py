@@ -63,6 +63,8 @@ def description_of(capture: Capture) -> dict[str, Any]:
     return {
         "plan": {
             "window": plan.window,
+            # Left out at 1, as before there was a pitch, so that captures are known again.
+            **({} if plan.pitch == 1 else {"pitch": plan.pitch}),
             "far": list(plan.far),
             "dropped": list(plan.dropped),
             "offset": plan.offset,

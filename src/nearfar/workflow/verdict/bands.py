@@ -13,11 +13,29 @@ from nearfar.workflow.verdict.held_out import HeldOutLight, joined
 # Camera pixels that are compared, about, in bands of this many rows.
 CAMERA_PIXELS = 2**17
 ROWS_PER_BAND = 8
+# The same at a pitch of several projector pixels, where lights are blurred anew for every band.
+CAMERA_PIXELS_AT_PITCH, BANDS_AT_PITCH = 2**15, 8
 PIXELS_PER_TALLER_BAND = 2**14
 
 
-def bands(camera: Size) -> list[slice]:
-    """Return bands of rows of a camera, spread evenly, about `CAMERA_PIXELS` in all."""
+def bands(camera: Size, pitch: int = 1) -> list[slice]:
+    """Return bands of rows of a camera, spread evenly, about `CAMERA_PIXELS` in all.
+
+    Parameters
+    ----------
+    camera : Size
+    pitch : int
+        Of the transport; see `nearfar.Transport`.
+    """
+    if pitch > 1:
+        every = list(blocks(camera.height, -(-camera.height // BANDS_AT_PITCH)))
+        most = max(1, CAMERA_PIXELS_AT_PITCH // (camera.width * len(every)))
+        middles = [(rows.start + rows.stop) // 2 for rows in every]
+        firsts = [max(0, middle - most // 2) for middle in middles]
+        return [
+            slice(max(first, rows.start), min(first + most, rows.stop))
+            for first, rows in zip(firsts, every, strict=True)
+        ]
     # Whole rows, which files are read by. Nothing is estimated and no photo is kept, so that there
     # may be many more of them than `choose_rows` and `sampled_lines` choose.
     every = list(blocks(camera.height, ROWS_PER_BAND))
@@ -69,7 +87,7 @@ def compare_in_bands(
         Of each light, over all bands; empty if every camera pixel is saturated.
     """
     found: Sequence[HeldOutLight] = ()
-    for rows in bands(transport.camera):
+    for rows in bands(transport.camera, transport.pitch):
         block = transport.rows(rows)
         if not usable_pixels(block).any():
             continue

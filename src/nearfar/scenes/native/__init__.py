@@ -1,0 +1,1 @@
+"""Built-in scenes at native size: an operator instead of a matrix."""

@@ -12,8 +12,8 @@ from sklearn.linear_model import ARDRegression
 
 from nearfar import Size
 from nearfar.estimate.sparse import least_risk, solve
-from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import near_frequencies, representatives
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.real_basis import real_basis
 
 WINDOW, NOISE = 19, 0.003

@@ -33,6 +33,7 @@ from nearfar.arrays import Floats, Integers
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.evidence import log_evidence, whiten
 from nearfar.estimate.joint.problem import Model, lay_out
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measure
 from nearfar.plan.choose import choose_frequencies
 from nearfar.priors.component import PriorComponent
@@ -88,7 +89,7 @@ def drawn_pixels(
     """Photograph a scene, and gather some of its lit camera pixels."""
     plan, _ = choose_plan(scene.projector, photos, window=window, checks=0)
     measurements = measure(shoot(plan, scene, SimulatedCamera()))
-    problem = lay_out(measurements, scene.correspondence, window, "cpu")
+    problem = lay_out(measurements, scene.correspondence, NearBasis(window), "cpu")
     lit = np.flatnonzero(problem.pixels.lit)
     selected = np.random.default_rng(0).choice(lit, min(count, len(lit)), replace=False)
     return gather(problem.pixels, selected, problem.model.centred, scene.projector), problem.model

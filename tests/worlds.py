@@ -3,8 +3,8 @@
 import numpy as np
 
 from nearfar.arrays import Size
-from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.theory import measure_in_theory

@@ -21,6 +21,7 @@ from tests.worlds import model_transport
 Untouched = Callable[[], bool]
 
 PROJECTOR = "16x20"
+GRID = ("--projector", PROJECTOR)
 # The worlds of these tests obey the paper's model, which its own estimator recovers exactly.
 BY_PAPER = ("--method", "paper")
 PLAN = ("plan", "--projector", PROJECTOR, "--near", "5", "--far", "3x3")
@@ -140,6 +141,23 @@ def job(finished: Job, tmp_path: Path) -> Job:
     copy = tmp_path / "job"
     shutil.copytree(finished.folder, copy)
     return Job(copy, *(copy / path.name for path in finished[1:]))
+
+
+@pytest.fixture
+def shot(finished: Job, tmp_path: Path) -> Callable[..., Path]:
+    """Photograph the patterns of `separate`, black last, on one channel of the small world."""
+
+    def shoot(*options: object, black_level: float = 0.0, ambient: float = 0.02) -> Path:
+        patterns, photos = tmp_path / "patterns", tmp_path / "photos"
+        check_done(run_nearfar("separate", patterns, "--export", *GRID, *options))
+        dense = np.load(finished.truth)[..., 0]
+        photograph(patterns, photos, dense, ambient=ambient)
+        floodlit = dense.sum(axis=(2, 3)) * black_level / (1 - black_level)
+        for photo in photos.iterdir():
+            np.save(photo, np.load(photo) + np.rint(65535 * floodlit).astype(np.uint16))
+        return photos
+
+    return shoot
 
 
 @pytest.fixture

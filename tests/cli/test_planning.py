@@ -10,6 +10,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.plan import choose_plan, read_plan
 from nearfar.plan.choose import NOISE
+from nearfar.plan.look import look_at, photos_for_window
 from nearfar.plan.typical import noise_of, typical_of
 from nearfar.scenes.hostile import hostile_transport
 from nearfar.transport.store import load_transport
@@ -134,6 +135,22 @@ def test_a_number_of_photos_is_the_whole_command(tmp_path: Path):
     assert "scenes of direct, near-range and far-range light" in ran.out
 
 
+def test_a_plan_for_every_pixel_of_a_projector_says_so(tmp_path: Path):
+    plan = tmp_path / "plan.json"
+    ran = check_done(run_nearfar("plan", "--projector", "270x480", "--photos", 60, "-o", plan))
+    assert read_plan(plan).pitch == 4
+    assert "for every projector pixel: the window's functions are 4 projector pixels" in ran.out
+    assert "up to 20 pixels from q, 7% of the screen's shorter side" in ran.out
+    assert "plan for blocks of pixels" in ran.out
+    assert "--projector 33x60, and nearfar export --native 270x480" in ran.out
+    info = check_done(run_nearfar("info", plan))
+    assert "for every projector pixel" in info.out
+    blocks = check_done(run_nearfar("plan", "--projector", "27x48", "--photos", 60))
+    assert "for every projector pixel" not in blocks.out
+    ran = run_nearfar("plan", "--projector", "270x480", "--photos", 60, "--near", 69)
+    check_sentence(ran, "W = 69 at a pitch of 4 projector pixels does not fit")
+
+
 @pytest.mark.parametrize(
     ("options", "status", "said"),
     [
@@ -174,9 +191,11 @@ def test_a_plan_for_the_scene_of_a_quick_look(finished: Job, tmp_path: Path):
     ]
     assert read_plan(chosen) == by_noise[0] != by_noise[1]
     own = ("--near", 5, "--look", look)
-    assert "planned with W = 5" in check_done(run_nearfar("plan", *wanted, *own)).out
+    assert "planned with W = 5\n" in check_done(run_nearfar("plan", *wanted, *own)).out
     ran = run_nearfar("plan", *wanted, "--near", 7, "--look", look)
-    assert "planned with W = 7, as asked, for which about " in check_done(ran).out
+    needed = photos_for_window(look_at(seen), seen.projector, 60, window=7)
+    said = f"planned with W = 7, as asked, for which about {needed} photos leave as little unknown"
+    assert said in check_done(ran).out
     for arguments, said in (
         (("--projector", "16x24", "--photos", 60, "--look", look), "same pattern grid"),
         (("--projector", "16x20", "--photos", 60, "--look", finished.transport), "--method joint"),

@@ -74,6 +74,21 @@ def test_whole_pixels_are_found_exactly(projector, shoot):
     assert (found.confidence > 0.999).all()
 
 
+def test_a_projectors_own_pixels_are_found():
+    projector, camera = Size(1080, 1920), Size(6, 8)
+    plan = _plan(projector)
+    q = np.random.default_rng(0).integers(0, projector, size=(*camera, 2))
+    photos = np.full((len(plan.patterns), *camera, 1), 0.5, dtype=np.float32)
+    for photo, pattern in zip(photos, plan.patterns, strict=True):
+        if isinstance(pattern, GrayCode):
+            along = q[..., 0 if pattern.kind == "gray rows" else 1]
+            white = ((along ^ (along >> 1)) >> pattern.bit) % 2 != pattern.inverse
+            photo[..., 0] = 0.1 + 0.6 * white
+    photos += 0.002 * np.random.default_rng(1).normal(size=photos.shape)
+    found = _found(PhotosInMemory(plan, photos, 1.0))
+    np.testing.assert_array_equal(found.q, q)
+
+
 def test_blocks_of_rows_are_those_of_the_whole(shoot):
     world = model_transport(SIZES[1], Size(12, 9), window=3, far=Size(3, 3), channels=2)
     photos = shoot(_plan(SIZES[1]), world)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.correspondence.phase import _scores, _search, _waves, _Weighed
+from nearfar.correspondence.phase import _scores, _search, _waves
+from nearfar.correspondence.weighing import Weighed
 from nearfar.illumination.frequencies import (
     Frequency,
     far_frequencies,
@@ -44,7 +45,7 @@ def test_no_place_explains_the_responses_better(basis, noise):
     places = generator.integers(0, 2 * (np.array(PROJECTOR) - 1) + 1, size=(200, 2)) / 2
     responses = _patterns_at(basis, places) + noise * generator.normal(size=(200, basis.count))
     weights = generator.uniform(0.2, 2.0, size=(200, len(basis.frequencies)))
-    weighed = _Weighed(
+    weighed = Weighed(
         (responses * weights[:, basis.index]).astype(np.float32), weights.astype(np.float32)
     )
     every = np.stack(np.meshgrid(*(np.arange(2 * s - 1) / 2 for s in PROJECTOR), indexing="ij"), -1)

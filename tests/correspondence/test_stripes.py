@@ -13,8 +13,9 @@ from nearfar.correspondence import (
     read_correspondence,
 )
 from nearfar.errors import InputError, NearfarError
+from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure
-from nearfar.plan import paper_plan
+from nearfar.plan import Stripe, paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from tests.worlds import model_transport
 
@@ -37,6 +38,21 @@ def test_whole_pixels_are_found_exactly(shoot):
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.25)
     found = correspond_by_stripes(shoot(PLAN, world.with_gains(near=0)))
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.01)
+
+
+def test_a_projectors_own_pixels_are_found():
+    projector, camera = Size(1080, 1920), Size(6, 8)
+    plan = paper_plan(projector, 5, Size(3, 3))
+    q = np.random.default_rng(0).integers(1, np.array(projector) - 1, size=(*camera, 2))
+    photos = np.full((len(plan.patterns), *camera, 1), 0.8, dtype=np.float32)
+    for photo, pattern in zip(photos, plan.patterns, strict=True):
+        if isinstance(pattern, Stripe):
+            along = q[..., 0 if pattern.kind == "black row" else 1]
+            photo[..., 0] -= 0.4 * (along == pattern.index)
+    photos += 0.002 * np.random.default_rng(1).normal(size=photos.shape)
+    found = correspond_by_stripes(PhotosInMemory(plan, photos, 1.0))
+    assert found.lit.all()
+    np.testing.assert_allclose(found.q, q, atol=0.05)
 
 
 def test_noise_moves_nothing_by_half_a_pixel(shoot):

@@ -1,10 +1,6 @@
-"""Pictures come back exactly as stored, or not at all."""
+"""Pictures come back exactly as stored."""
 
-import io
 import struct
-import subprocess
-import sys
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +8,6 @@ import imagecodecs
 import numpy as np
 import OpenEXR  # type: ignore[import-not-found]
 import pytest
-import tifffile
-from numpy.typing import NDArray
 
 from nearfar.arrays import Size
 from nearfar.errors import (
@@ -35,85 +29,19 @@ from nearfar.files import (
     to_srgb,
     write_picture,
 )
-
-SHAPES = [(17, 23), (17, 23, 3)]
-TIFF_WAYS: list[dict[str, Any]] = [
-    {},
-    {"rowsperstrip": 5},
-    {"byteorder": ">"},
-    {"bigtiff": True},
-    {"tile": (16, 16)},
-    {"compression": "zlib", "predictor": True, "rowsperstrip": 5},
-    {"compression": "zstd", "tile": (16, 16)},
-    {"compression": "lzw", "rowsperstrip": 5},
-]
-
-
-def random_pixels(dtype: str, shape: tuple[int, ...]) -> NDArray[Any]:
-    generator = np.random.default_rng(0)
-    if np.dtype(dtype).kind == "f":
-        return (generator.random(shape) * 3 - 1).astype(dtype)
-    return generator.integers(0, np.iinfo(dtype).max, shape, dtype=dtype, endpoint=True)
-
-
-def png_bytes(depth: int, kind: int, size: Size, rows: bytes, *chunks: bytes) -> bytes:
-    head = struct.pack(">IIBBBBB", size.width, size.height, depth, kind, 0, 0, 0)
-    body = (b"IHDR" + head, *chunks, b"IDAT" + zlib.compress(rows), b"IEND")
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in body
-    )
-
-
-def bmp_bytes(
-    size: tuple[int, int],
-    bits: int,
-    rows: bytes,
-    palette: bytes = b"",
-    *,
-    compression: int = 0,
-    masks: tuple[int, ...] = (),
-    header: int = 40,
-) -> bytes:
-    """Return a BMP; a negative height is of rows that lie from the top."""
-    (height, width), colours = size, palette + struct.pack(f"<{len(masks)}I", *masks)
-    start = 14 + header + len(colours)
-    number = (header, width, height, 1, bits, compression, len(rows), 0, 0, len(palette) // 4, 0)
-    about = struct.pack("<IiiHHIIiiII", *number)
-    return b"BM" + struct.pack("<IHHI", start + len(rows), 0, 0, start) + about + colours + rows
-
-
-def tiff_bytes(pixels: NDArray[Any], **options: Any) -> bytes:
-    data = io.BytesIO()
-    options.setdefault("photometric", "rgb" if pixels.ndim == 3 else "minisblack")
-    tifffile.imwrite(data, pixels, metadata=None, **options)
-    return data.getvalue()
-
-
-def exr_bytes(channels: dict[str, NDArray[Any]], **header: Any) -> bytes:
-    data = io.BytesIO()
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
-    OpenEXR.File(header, channels).write(data)
-    return data.getvalue()
-
-
-def npy_bytes(array: NDArray[Any], *, allow_pickle: bool = False) -> bytes:
-    data = io.BytesIO()
-    np.save(data, array, allow_pickle=allow_pickle)
-    return data.getvalue()
-
-
-def write(folder: Path, name: str, data: bytes) -> Path:
-    path = folder / name
-    path.write_bytes(data)
-    return path
-
-
-def assert_same(read: NDArray[Any], expected: NDArray[Any]) -> None:
-    assert read.dtype == expected.dtype
-    assert read.shape == expected.shape
-    assert read.dtype.isnative
-    assert read.flags.c_contiguous
-    np.testing.assert_array_equal(read, expected)
+from tests.files.pictures import (
+    PALETTE,
+    SHAPES,
+    TIFF_WAYS,
+    assert_same,
+    bmp_bytes,
+    exr_bytes,
+    npy_bytes,
+    png_bytes,
+    random_pixels,
+    tiff_bytes,
+    write,
+)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -225,9 +153,6 @@ def test_bmp_is_exact(tmp_path: Path, shape: tuple[int, ...]) -> None:
     assert_same(read_picture(path), pixels)
 
 
-COLOURS = bytes([10, 20, 30, 0, 40, 50, 60, 0])
-
-
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
@@ -238,185 +163,14 @@ COLOURS = bytes([10, 20, 30, 0, 40, 50, 60, 0])
             bmp_bytes((1, 1), 32, b"\1\2\3\4", compression=3, masks=(0xFF0000, 0xFF00, 0xFF)),
             [[[3, 2, 1]]],
         ),
-        (bmp_bytes((1, 2), 8, b"\1\0\0\0", COLOURS), [[[60, 50, 40], [30, 20, 10]]]),
-        (bmp_bytes((1, 2), 4, b"\x10\0\0\0", COLOURS), [[[60, 50, 40], [30, 20, 10]]]),
+        (bmp_bytes((1, 2), 8, b"\1\0\0\0", PALETTE), [[[60, 50, 40], [30, 20, 10]]]),
+        (bmp_bytes((1, 2), 4, b"\x10\0\0\0", PALETTE), [[[60, 50, 40], [30, 20, 10]]]),
         (bmp_bytes((1, 3), 1, b"\xa0\0\0\0", b"\7\7\7\0\5\5\5\0"), [[5, 7, 5]]),
     ],
 )
 def test_other_bmps_give_their_numbers(tmp_path: Path, data: bytes, expected: Any) -> None:
     found = read_picture(write(tmp_path, "a.bmp", data))
     assert_same(found, np.array(expected, dtype=np.uint8))
-
-
-def test_a_damaged_png_says_nothing_of_its_own(tmp_path: Path) -> None:
-    """What libpng has to say reaches nobody: in a process of its own, as pytest hears logs."""
-    path = write(tmp_path, "a.png", png_bytes(8, 0, Size(2, 3), bytes(99)))
-    script = f"""
-import logging
-from pathlib import Path
-from nearfar.files import read_picture
-from nearfar.errors import NearfarError
-try: read_picture(Path({str(path)!r}))
-except NearfarError as error: print(error)
-"""
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert ran.stderr == ""
-
-
-@pytest.mark.parametrize("back", [0, 1])
-def test_a_tiff_whose_pages_run_in_a_circle_is_refused(tmp_path: Path, back: int) -> None:
-    pixels = random_pixels("uint8", (2, 5, 7))
-    data = bytearray(tiff_bytes(pixels, photometric="minisblack"))
-    with tifffile.TiffFile(io.BytesIO(data)) as tiff:
-        first, last = (page.offset for page in tiff.pages)
-    (tags,) = struct.unpack_from("<H", data, last)
-    struct.pack_into("<I", data, last + 2 + 12 * tags, (first, last)[back])
-    with pytest.raises(UnreadableFileError, match=r"a\.tif is damaged"):
-        read_picture(write(tmp_path, "a.tif", bytes(data)))
-
-
-def whole_files() -> dict[str, bytes]:
-    small, colour = random_pixels("uint16", (20, 30)), random_pixels("float32", (20, 30, 3))
-    tiffs = {f"tiff {way}": tiff_bytes(small, **way) for way in TIFF_WAYS}
-    exrs = {
-        f"exr {c}": exr_bytes({"RGB": colour}, compression=OpenEXR.Compression(c)) for c in range(6)
-    }
-    planes = np.moveaxis(colour, 2, 0).copy()
-    return {
-        "png": encode_png(small),
-        "png colour": encode_png(random_pixels("uint8", (20, 30, 3))),
-        "npy": npy_bytes(colour),
-        "bmp": imagecodecs.bmp_encode(random_pixels("uint8", (20, 30, 3))),
-        "bmp palette": bmp_bytes((3, 4), 4, b"\x01\x10\0\0" * 3, COLOURS),
-        "tiff planes": tiff_bytes(planes, photometric="rgb", planarconfig="separate"),
-        **tiffs,
-        **exrs,
-    }
-
-
-@pytest.mark.parametrize(("name", "data"), whole_files().items(), ids=whole_files().keys())
-def test_a_file_cut_anywhere_is_refused(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, data: bytes
-) -> None:
-    lengths = [*range(0, len(data), max(1, len(data) // 60)), *range(len(data) - 9, len(data))]
-    for length in lengths:
-        path = write(tmp_path, "cut.bin", data[:length])
-        with pytest.raises(UnreadableFileError, match=r"cut\.bin") as caught:
-            read_picture(path)
-        assert "\n" not in str(caught.value)
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize(("name", "data"), whole_files().items(), ids=whole_files().keys())
-def test_a_changed_byte_gives_a_picture_or_a_sentence(
-    tmp_path: Path, name: str, data: bytes
-) -> None:
-    for position in range(0, len(data), max(1, len(data) // 60)):
-        for bit in (1, 128):
-            changed = bytearray(data)
-            changed[position] ^= bit
-            path = write(tmp_path, "a.bin", bytes(changed))
-            try:
-                read_picture(path)
-            except (UnreadableFileError, InputError) as error:
-                assert str(path) in str(error)
-
-
-def test_missing_strips_and_rows_are_never_zeros(tmp_path: Path) -> None:
-    pixels = random_pixels("uint16", (20, 30)) | 1
-    data = bytearray(tiff_bytes(pixels, rowsperstrip=5, compression="zlib"))
-    with tifffile.TiffFile(io.BytesIO(data)) as tiff:
-        tag = tiff.pages.first.tags["StripByteCounts"]
-    for i in range(4):
-        changed = data[:]
-        size = tag.valuebytecount // 4
-        changed[tag.valueoffset + i * size : tag.valueoffset + (i + 1) * size] = bytes(size)
-        with pytest.raises(UnreadableFileError):
-            read_picture(write(tmp_path, "a.tif", bytes(changed)))
-
-
-BAD_FILES: dict[str, tuple[bytes, str]] = {
-    "empty.png": (b"", "is empty"),
-    "text.png": (b"not a picture", "is no picture"),
-    "old.jpg": (b"\xff\xd8\xff\xe0" + bytes(99), "is a JPEG, which has 8 bits and is not linear"),
-    "still.gif": (
-        b"GIF89a" + bytes(99),
-        "of the kind GIF, which is not read: give a PNG",
-    ),
-    "web.webp": (b"RIFF\7\0\0\0WEBPVP8 " + bytes(99), "of the kind WebP"),
-    "phone.heic": (b"\0\0\0\x18ftypheic" + bytes(99), "of the kind HEIC or AVIF"),
-    "old.bmp": (bmp_bytes((1, 1), 24, bytes(4), header=12), "a BMP of OS/2"),
-    "runs.bmp": (bmp_bytes((1, 2), 8, b"\2\1\0\1", COLOURS, compression=1), "save it without"),
-    "sixteen.bmp": (bmp_bytes((1, 2), 16, bytes(4)), "a BMP of 16 bits"),
-    "short.bmp": (bmp_bytes((5, 5), 24, bytes(4)), "is damaged or cut short"),
-    "flat.bmp": (bmp_bytes((0, 5), 24, bytes(4)), "is damaged or cut short"),
-    "colours.bmp": (bmp_bytes((1, 2), 8, b"\7\0\0\0", COLOURS), "is damaged or cut short"),
-    "photo.NEF": (b"MM\0*" + bytes(99), "camera raw"),
-    "pages.tif": (
-        tiff_bytes(np.ones((2, 5, 7), np.uint8), photometric="minisblack"),
-        "has 2 pages: save one picture per file",
-    ),
-    "palette.tif": (
-        tiff_bytes(
-            np.ones((5, 7), np.uint8), photometric="palette", colormap=np.zeros((3, 256), "u2")
-        ),
-        "kind PALETTE",
-    ),
-    "bits.tif": (tiff_bytes(np.ones((8, 8), bool)), "of 1 bits"),
-    "jpeg.tif": (tiff_bytes(np.ones((16, 16), np.uint8), compression="jpeg"), "JPEG inside"),
-    "depth.exr": (exr_bytes({"Z": np.ones((5, 7), np.float32)}), "has the channels Z"),
-    "layers.exr": (
-        exr_bytes({n: np.ones((5, 7), np.float32) for n in ("Y", "glow.Y")}),
-        r"has the channels Y, glow\.Y",
-    ),
-    "whole.exr": (exr_bytes({"Y": np.ones((5, 7), np.uint32)}), "whole numbers"),
-    "pickle.npy": (npy_bytes(np.array([{}], dtype=object), allow_pickle=True), "damaged"),
-}
-BAD_VALUES: dict[str, tuple[bytes, str]] = {
-    "nan.npy": (npy_bytes(np.array([[0, np.nan, np.inf]])), "has 2 values of 3"),
-    "huge.npy": (npy_bytes(np.array([[0, 1e300]])), "has 1 values of 2"),
-    "nan.tif": (tiff_bytes(np.full((4, 5), np.nan, np.float32)), "has 20 values"),
-    "nan.exr": (exr_bytes({"Y": np.full((4, 5), np.nan, np.float32)}), "has 20 values"),
-    "int.npy": (npy_bytes(np.ones((4, 5), np.int64)), "holds int64 numbers"),
-    "bool.npy": (npy_bytes(np.ones((4, 5), bool)), "holds bool numbers"),
-    "complex.npy": (npy_bytes(np.ones((4, 5), complex)), "holds complex128 numbers"),
-    "int.tif": (tiff_bytes(np.ones((4, 5), np.int16)), "holds int16 numbers"),
-    "line.npy": (npy_bytes(np.ones(4, np.float32)), "has the shape 4"),
-    "five.npy": (npy_bytes(np.ones((4, 5, 5), np.float32)), "has the shape 4 x 5 x 5"),
-    "four.npy": (npy_bytes(np.ones((4, 5, 4), np.float32)), "has the shape 4 x 5 x 4"),
-    "none.npy": (npy_bytes(np.ones((0, 5), np.float32)), "has the shape 0 x 5"),
-}
-
-
-@pytest.mark.parametrize("name", BAD_FILES)
-def test_a_file_that_is_not_read_gets_a_sentence(tmp_path: Path, name: str) -> None:
-    data, words = BAD_FILES[name]
-    path = write(tmp_path, name, data)
-    with pytest.raises(UnreadableFileError, match=words) as caught:
-        read_picture(path)
-    assert str(path) in str(caught.value)
-    assert str(caught.value).endswith(".")
-
-
-@pytest.mark.parametrize("name", BAD_VALUES)
-def test_values_that_are_not_read_get_a_sentence(tmp_path: Path, name: str) -> None:
-    data, words = BAD_VALUES[name]
-    with pytest.raises(InputError, match=words):
-        read_picture(write(tmp_path, name, data))
-
-
-def test_a_missing_file_and_a_folder_get_a_sentence(tmp_path: Path) -> None:
-    with pytest.raises(MissingFileError, match=r"no\.png is not there"):
-        read_picture(tmp_path / "no.png")
-    with pytest.raises(UnreadableFileError, match="cannot be read"):
-        read_picture(tmp_path)
-
-
-def test_a_cropped_exr_is_refused(tmp_path: Path) -> None:
-    window = (np.array([0, 0], np.int32), np.array([9, 9], np.int32))
-    data = exr_bytes({"Y": np.ones((5, 7), np.float32)}, displayWindow=window)
-    with pytest.raises(UnreadableFileError, match="display window"):
-        read_picture(write(tmp_path, "a.exr", data))
 
 
 def test_linear_is_divided_by_full_scale(tmp_path: Path) -> None:

@@ -39,3 +39,13 @@ def test_letters_hold_finer_detail_than_pictures():
     assert letters > 0.3
     assert letters > 5 * share_of_high_frequencies(natural_picture(size, 1))
     assert set(np.unique(lettering(size))) == {0.0, 1.0}
+
+
+def test_a_picture_is_the_same_at_any_size():
+    # Oversampled 4 times, 2 times and not at all.
+    small, *larger = (natural_picture(Size(96 * n, 128 * n), 5) for n in (1, 8, 16))
+    for light in larger:
+        n = len(light) // 96
+        averaged = light.reshape(96, n, 128, n).mean(axis=(1, 3))
+        # What is left are edges, which oversampling by 4 finds to a quarter of a small pixel.
+        assert np.sqrt(np.mean((averaged - small) ** 2)) < 0.1 * small.std()

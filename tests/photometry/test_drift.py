@@ -108,6 +108,32 @@ def test_some_photos_are_as_they_are_among_all(world, shoot):
     )
     grey = np.full((4, 2), 0.3)
     np.testing.assert_allclose(some.variance(grey), photos.variance(grey), rtol=0.2)
+    for mine, expected in zip(some.drift.references, find_references(some.plan), strict=True):
+        np.testing.assert_array_equal(mine, expected)
+
+
+def test_the_noise_of_some_photos_is_theirs_alone(world, shoot):
+    repeated = (*PLAN.patterns[:-2], *OTHERS[:8], *PLAN.patterns[-2:])
+    plan = PLAN.model_copy(update={"patterns": repeated})
+    shot = shoot(plan, world, NOISY)
+    again = np.arange(PHOTOS - 2, PHOTOS + 6)
+    turned = shot.photos.copy()
+    turned[again] = turned[again, ::-1]
+    photos = remove_drift(replace(shot, photos=turned))
+    grey = np.full((4, 2), 0.3)
+    plain = remove_drift(shoot(PLAN, world, NOISY)).variance(grey)
+    assert (photos.variance(grey) > 2 * plain).all()
+    some = photos.only(np.setdiff1d(np.arange(len(repeated)), again))
+    np.testing.assert_allclose(some.variance(grey), plain, rtol=0.2)
+
+
+def test_the_noise_of_some_photos_is_that_of_rounding_at_least(world, shoot):
+    coarse = QUIET.model_copy(update={"bits": 8})
+    # Black reads the same level in all photos; others are off the levels once drift is removed.
+    photos = remove_drift(_drifting(shoot, world, LAMP, STEADY, coarse))
+    some = photos.only(np.arange(PHOTOS))
+    rounding = 1 / 255**2 / 12
+    assert (some.variance(np.array([[0.0, 0.0], [0.3, 0.3]])) > 0.99 * rounding).all()
 
 
 def replace_drift(photos):

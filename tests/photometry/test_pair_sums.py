@@ -5,7 +5,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.photometry.in_memory import PhotosInMemory
-from nearfar.photometry.pair_sums import sum_pairs
+from nearfar.photometry.pair_sums import below_full_scale, sum_pairs
 from nearfar.plan import paper_plan
 
 PROJECTOR = Size(8, 8)
@@ -47,13 +47,55 @@ def test_a_dark_pair_and_dark_rows_do_no_harm():
     assert np.isfinite(found.variance(np.ones((3, 1)))).all()
 
 
-def test_saturated_camera_pixels_count_for_nothing():
+@pytest.mark.parametrize("rows", [2, 12])
+def test_saturated_camera_pixels_count_for_nothing(rows):
     photos = _photos()
     saturated = photos.photos.copy()
-    saturated[:, :2] *= 4.0
+    saturated[:, :rows] *= 4.0
     saturated = np.minimum(saturated, 1.0)
     assert (saturated == 1.0).any()
     found = sum_pairs(PhotosInMemory(photos.plan, saturated, 1.0), [slice(0, 40)])
     assert found.scatter == pytest.approx(1.0, abs=0.1)
+    levels = np.array([[0.1], [0.4], [0.8]])
+    np.testing.assert_allclose(found.variance(levels), GAIN * levels + FLOOR, rtol=0.15)
+
+
+def test_a_channel_that_is_all_saturated_does_no_harm():
+    photos = _photos()
+    both = np.concatenate([photos.photos, np.ones_like(photos.photos)], axis=-1)
+    found = sum_pairs(PhotosInMemory(photos.plan, both, 1.0), [slice(0, 40)])
+    variance = found.variance(np.full((1, 2), 0.4))
+    assert variance[0, 0] == pytest.approx(GAIN * 0.4 + FLOOR, rel=0.15)
+    assert np.isfinite(variance).all()
+
+
+def test_a_value_at_full_scale_in_any_photo_of_white_is_saturated():
+    taken = np.full((2, 3, 2, 1), 0.5)
+    taken[0, 0, 1] = taken[1, 2, 0] = 1.0
+    photos = PhotosInMemory(_photos().plan, taken, 1.0)
+    assert below_full_scale(photos, [0, 1], slice(0, 3)).ravel().tolist() == [1, 0, 1, 1, 0, 1]
+    assert below_full_scale(photos, [0, 1], slice(1, 3)).ravel().tolist() == [1, 1, 0, 1]
+    assert below_full_scale(photos, [], slice(0, 3)).all()
+
+
+def test_the_light_of_a_pair_is_its_mean_over_all_rows():
+    photos = _photos()
+    taken = photos.photos.copy()
+    taken[6:8, :8] *= 0.5
+    found = sum_pairs(PhotosInMemory(photos.plan, taken, 1.0), [slice(0, 8), slice(16, 40)])
+    rows = np.r_[0:8, 16:40]
+    light = taken[::2][:, rows].sum(axis=(1, 2, 3)) + taken[1::2][:, rows].sum(axis=(1, 2, 3))
+    np.testing.assert_allclose(found.light, light / light.mean(), rtol=1e-4)
+
+
+def test_what_moves_at_a_few_camera_pixels_scatters_and_is_no_noise():
+    photos = _photos()
+    taken = photos.photos.astype(np.float64)
+    generator = np.random.default_rng(1)
+    moving = generator.random(taken.shape[1:]) < 0.05
+    quiet = 2 * np.mean(GAIN * (0.05 + 0.25) + FLOOR)
+    taken[::2, moving] += np.sqrt(20 * quiet) * generator.normal(size=taken[::2, moving].shape)
+    found = sum_pairs(PhotosInMemory(photos.plan, taken, 1.0), [slice(0, 40)])
+    assert found.scatter == pytest.approx(1 + 20 * moving.mean(), rel=0.1)
     levels = np.array([[0.1], [0.4], [0.8]])
     np.testing.assert_allclose(found.variance(levels), GAIN * levels + FLOOR, rtol=0.15)

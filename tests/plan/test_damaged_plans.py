@@ -56,11 +56,18 @@ def test_a_size_of_any_kind_is_refused_at_once(name: str):
         assert not _read(json.dumps(json.loads(TEXT) | {name: value}))
 
 
+@pytest.mark.parametrize("pitch", [0, -2, 4.0, 10**300, None, "2", True])
+def test_a_pitch_that_is_none_is_refused(pitch: object):
+    assert not _read(json.dumps(json.loads(TEXT) | {"pitch": pitch}))
+
+
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
         ("projector", [8, LARGEST_SIDE + 1], f"its projector of 8x{LARGEST_SIDE + 1}"),
         ("window", 9, "its window of 9x9 is larger than 8x9"),
+        ("pitch", 4, "its window of 9x9 is larger than 8x9"),
+        ("pitch", 3, "pitch: a pitch of 3 is not a power of two"),
         ("far", [3, 10], "its far of 3x10 is larger than 8x9"),
         ("dropped", [5, 1], "its dropped of 5x1 is larger than 3x3"),
         ("patterns", [], "it has no photos of transport"),
@@ -100,8 +107,8 @@ def test_a_frequency_that_is_none_is_refused_at_once(frequency: object):
         "[" * 100_000,
         '{"format": ' + "[" * 100_000,
         TEXT.replace('"window": 3', f'"window": {"9" * 5000}'),
-        TEXT.replace('"version": 4', f'"version": {"9" * 4000}'),
-        TEXT.replace('"version": 4', f'"version": {[[]] * 500}'),
+        TEXT.replace('"version": 5', f'"version": {"9" * 4000}'),
+        TEXT.replace('"version": 5', f'"version": {[[]] * 500}'),
     ],
 )
 def test_text_that_no_reader_takes_is_refused(text: str):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.illumination.centred_basis import centred_basis, window_offsets
+from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.priors.covariance import far_variance, near_covariance, spectral_density
 from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
@@ -59,7 +60,7 @@ def test_a_cosine_and_its_sine_share_the_spectral_density():
 @pytest.mark.parametrize("component", [LIT_COMPONENTS[2], LIT_COMPONENTS[10], UNLIT_COMPONENTS[1]])
 def test_eigenvectors_make_the_responses_independent(component):
     basis = _basis()
-    centred = centred_basis(basis, window_offsets(WINDOW))
+    centred = centred_basis(basis, NearBasis(WINDOW))
     multiplicity = np.random.default_rng(0).integers(1, 5, basis.count).astype(np.float32)
     prior = response_prior(component, centred, multiplicity)
     patterns = centred.on_window.astype(np.float64)

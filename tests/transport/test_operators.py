@@ -1,5 +1,8 @@
 """Every operator against its adjoint, and every way to apply a transport against the others."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -19,6 +22,7 @@ from nearfar.illumination.frequencies import (
 from nearfar.illumination.real_basis import real_basis
 from nearfar.transport import direct, near
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.gains import Gains, with_gains
 from nearfar.transport.model import Transport
 from tests.worlds import ideal_measurements, model_transport
 
@@ -182,6 +186,23 @@ def test_components_sum_and_gains_scale_them(generator):
     )
     scaled = transport.with_gains(direct=2, near=-0.5, far=0)
     np.testing.assert_allclose(scaled @ light, expected, atol=2e-5)
+
+
+def test_the_provenance_keeps_the_product_of_all_gains(generator):
+    transport = replace(_transport(generator), provenance={"method": "joint"})
+    twice = transport.with_gains(direct=2, near=np.float32(0.5), far=0)
+    assert twice.provenance == {
+        "method": "joint",
+        "gains": {"direct": 2.0, "near": 0.5, "far": 0.0},
+    }
+    assert json.loads(json.dumps(twice.provenance)) == twice.provenance
+    kept = (-3 * twice).provenance["gains"]
+    assert kept == {"direct": -6.0, "near": -1.5, "far": 0.0}
+    for same in (1 * transport, transport.with_gains(), 0.25 * (4 * transport)):
+        assert same.provenance == transport.provenance
+    huge = Gains(near=1e200)
+    with pytest.raises(InputError, match="the gain of near is inf"):
+        with_gains(with_gains({}, huge), huge)
 
 
 def test_a_column_is_the_picture_of_one_projector_pixel(generator):

@@ -240,7 +240,7 @@ def test_a_verdict_in_words():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 9}, "version 9, this nearfar reads version 1"),
+        ({"version": 9}, "version 9, this nearfar reads versions 1 to 2"),
         ({"format": "nearfar capture"}, "not a nearfar transport but a nearfar capture"),
         ({"projector": None}, "does not describe a transport"),
         ({"projector": [3]}, "does not describe a transport"),
@@ -251,6 +251,12 @@ def test_a_verdict_in_words():
         ({"far_frequencies": [["1/7"]]}, "does not describe a transport"),
         ({"far_frequencies": [["0", "0"]]}, "its far has shape"),
         ({"provenance": 3}, "does not describe a transport"),
+        ({"provenance": {"gains": 2.0}}, "does not describe a transport"),
+        ({"provenance": {"gains": {"direct": 2.0, "near": 1.0}}}, "does not describe a transport"),
+        (
+            {"provenance": {"gains": {"direct": float("nan"), "near": 1.0, "far": 1.0}}},
+            "are not finite gains",
+        ),
         ({"verdict": "good"}, "does not describe a transport"),
         ({"verdict": {}}, "does not describe a transport"),
         ({"verdict": VERDICT | {"grade": "perfect"}}, "'perfect' is no grade"),

@@ -91,6 +91,15 @@ def test_the_page_leads_with_the_verdict(open_page, transport, tmp_path, verdict
         assert page.inner_text("#play") == "play"
 
 
+def test_what_gains_changed_cannot_be_judged(open_page, transport, tmp_path):
+    save_transport(transport.with_gains(near=2.5), tmp_path / "t.zarr")
+    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
+        page = open_page(address)
+        assert page.inner_text("#verdict").startswith("Not judged.")
+        meaning = page.text_content("#meaning")
+        assert meaning.startswith("It was multiplied by the gains direct 1, near 2.5 and far 1 ")
+
+
 @pytest.mark.parametrize(
     "hash_",
     [

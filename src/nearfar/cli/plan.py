@@ -20,18 +20,31 @@ if TYPE_CHECKING:
     from nearfar.plan.paper import Offset
     from nearfar.progress import Report
 
+# Side of the blocks that are named as an example.
+PIXELS_OF_A_BLOCK = 8
+
 
 def plan(
     projector: Annotated[
         Size,
-        typer.Option(parser=size, metavar="HxW", help="Pattern grid, height x width in pixels."),
+        typer.Option(
+            parser=size,
+            metavar="HxW",
+            help="The projector's pixels, height x width; or a smaller grid, shown in blocks.",
+        ),
     ],
     photos: Annotated[
         int | None,
         typer.Option(min=1, help="Choose the best plan of at most N photos.", metavar="N"),
     ] = None,
     near: Annotated[
-        int | None, typer.Option(min=1, help="W of the near-range window.", metavar="W")
+        int | None,
+        typer.Option(
+            min=1,
+            help="W of the near-range window: projector pixels, or, by --photos for fine "
+            "projectors, functions several pixels apart.",
+            metavar="W",
+        ),
     ] = None,
     far: Annotated[
         Size | None, typer.Option(parser=size, metavar="HxW", help="Far band, height x width.")
@@ -86,7 +99,7 @@ def plan(
 ) -> None:
     """Plan what to project: the best patterns for a number of photos, or the paper's.
 
-    Example: nearfar plan --projector 128x128 --photos 150 -o plan.json
+    Example: nearfar plan --projector 1080x1920 --photos 200 -o plan.json
 
     The paper's: nearfar plan --projector 128x128 --near 19 --far 13x13 -o plan.json
     """
@@ -124,13 +137,24 @@ def plan(
         print(json.dumps({**made.summary(), **_numbers(chosen)}))
     else:
         said = [describe_plan(made), *(() if chosen is None else chosen.sentences())]
+        if made.pitch > 1:
+            said.append(_on_blocks(made.projector))
         said += [] if output is None else [f"plan written to {output}"]
         for line in said:
             say(line, quiet=quiet)
 
 
+def _on_blocks(projector: Size) -> str:
+    """Return how a plan for blocks of a projector's pixels is made and shown."""
+    grid = Size(*(max(1, side // PIXELS_OF_A_BLOCK) for side in projector))
+    return (
+        f"blocks of {PIXELS_OF_A_BLOCK} x {PIXELS_OF_A_BLOCK} pixels: --projector {grid}, and "
+        f"nearfar export --native {projector}"
+    )
+
+
 class _Chosen(NamedTuple):
-    """A plan that was chosen, what it is expected to reach, and what it takes from a look."""
+    """A plan that was chosen, its expected SNR_b, and the look that it was chosen by."""
 
     plan: "Plan"
     expected: "ExpectedRange"
@@ -138,7 +162,7 @@ class _Chosen(NamedTuple):
     photos_for_window: int | None
 
     def sentences(self) -> list[str]:
-        """Return what is said of the choice."""
+        """Return the lines about the choice that the command prints."""
         from nearfar.report.plan import describe_expected, describe_look
 
         found = []
@@ -149,7 +173,7 @@ class _Chosen(NamedTuple):
 
 
 def _numbers(chosen: _Chosen | None) -> dict[str, Any]:
-    """Return what JSON says of the choice; nothing of a plan that was not chosen."""
+    """Return the entries of `--json` about a chosen plan; None each for the paper's plan."""
     if chosen is None:
         return {"expected_dB": None, "look": None}
     look = chosen.look and {
@@ -200,7 +224,7 @@ def _choose(
 
 
 def _looked_at(look: Path, projector: Size) -> "Look":
-    """Read what a quick first estimate shows."""
+    """Read the first estimate of a scene and summarise it."""
     from nearfar.plan.look import look_at
     from nearfar.transport.store import load_transport
 

@@ -34,7 +34,7 @@ def _gains(texts: list[str]) -> dict[str, float]:
 
 def relight(
     transport: TransportPath,
-    light: Annotated[Path, typer.Argument(metavar="LIGHT", help="Light, the projector's size.")],
+    light: Annotated[Path, typer.Argument(metavar="LIGHT", help="Light, of the projector's size.")],
     output: Annotated[Path, typer.Argument(metavar="OUT", help=".npy, .exr, .tiff or .png.")],
     gain: Annotated[
         list[str] | None,
@@ -45,6 +45,9 @@ def relight(
     ] = None,
     srgb: Annotated[
         bool, typer.Option("--srgb", help="LIGHT is an ordinary sRGB picture.")
+    ] = False,
+    resize: Annotated[
+        bool, typer.Option("--resize", help="Resize LIGHT to the projector's size.")
     ] = False,
     error_bars: Annotated[
         bool,
@@ -74,7 +77,7 @@ def relight(
         require_reconstructed(transport)
         opened = open_transport(transport)
         warn_if_wrong(transport, opened.verdict)
-        projected = read_light(light, opened.projector, srgb=srgb)
+        projected = read_light(light, opened.projector, srgb=srgb, resize=resize)
         projected = as_channels_see(projected, opened.channels, opened.provenance)
         make = error_bars_of_stored if error_bars else relight_stored
         picture = make(opened, projected, gains)

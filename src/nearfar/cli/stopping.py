@@ -1,7 +1,8 @@
 """Signals to stop a command.
 
-Loading what a command needs takes a good part of its time. Until then it has begun nothing, and
-what is loaded, or reads the command line, has words of its own for an interrupt, or none.
+Importing the modules of a command takes a good part of its time. Until they are imported the
+command has begun nothing, and some of them, as Typer, would end it with a message of their own or
+with none.
 """
 
 import signal
@@ -16,7 +17,7 @@ STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def stopped_at_once() -> Iterator[None]:
-    """On a signal to stop say so, and end the process without further ado."""
+    """Exit at once, with a line that says so, on a signal to stop."""
     with handled_by(_end):
         yield
 

@@ -60,13 +60,18 @@ class CorrespondenceMethod(CorrespondencePatterns):
         From a plan to whether it holds all that the method needs.
     find : callable
         Finds q in the photos of a plan that the method serves; see `Find`.
-    rows_beside : int
-        Rows of the camera on each side of some rows that q in them depends on.
+    rows_beside : int, or callable
+        Rows of the camera on each side of some rows that q in them depends on; or, from a plan to
+        this number.
     """
 
     serves: Callable[[Plan], bool]
     find: Find
-    rows_beside: int = 0
+    rows_beside: int | Callable[[Plan], int] = 0
+
+    def rows_needed(self, plan: Plan) -> int:
+        """Return the rows of the camera on each side of some rows that q in them depends on."""
+        return self.rows_beside(plan) if callable(self.rows_beside) else self.rows_beside
 
 
 def method_named(name: str) -> CorrespondenceMethod:

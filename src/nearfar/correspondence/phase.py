@@ -9,7 +9,8 @@ one place from another. Stronger ones measure the footprint, the 5 x 5 entries o
 tell direct light from concentrated near-range light, as in a crease.
 
 The inverse transform is computed as matrix products, first along rows and then down, so that
-frequencies may lie off the DFT grid.
+frequencies may lie off the DFT grid. On projectors too large for that, places are searched for from
+coarse to fine (`nearfar.correspondence.coarse_to_fine`).
 
 Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
 frequencies of one fy, o and i over the offsets of a footprint.
@@ -21,30 +22,38 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.arrays import Booleans, Floats, blocks
 from nearfar.correspondence.ambiguity import require_settled
 from nearfar.correspondence.background import (
     DETECTION_BACKGROUND,
     FOOTPRINT_BACKGROUND,
     SEARCH_BACKGROUND,
-    Background,
+)
+from nearfar.correspondence.coarse_to_fine import (
+    LEAST_LARGE_EXCESS,
+    ROWS_BESIDE,
+    correspond_coarse_to_fine,
 )
 from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
-from nearfar.errors import InputError
-from nearfar.illumination.frequencies import DC
+from nearfar.correspondence.size import is_large
+from nearfar.correspondence.weighing import (
+    Weighed,
+    division_by_white,
+    weigh,
+    without_dc,
+)
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos
+from nearfar.plan import Plan
 
 # Values of the score that are in memory at once.
 SCORES_AT_ONCE = 2**22
 # Camera pixels at once.
 PIXELS_AT_ONCE = 1024
-# White below this share of the brightest white is rounding.
-LEAST_WHITE = 1e-6
 # Pixels on each side of the middle of a footprint.
 FOOTPRINT_REACH = 2
 # Sweeps over a footprint's entries.
@@ -60,17 +69,6 @@ LEAST_EXCESS = 2.25
 # Factor on that where q is mirrored, as by light by way of another surface. This value makes the
 # fewest errors, lit and unlit together, on the same box.
 MIRRORED_FACTOR = 1.35
-
-
-class _Weighed(NamedTuple):
-    """Responses over white, channels summed by their weights.
-
-    `responses` (C, R) are the sums of weight times response, `weights` (C, K) the sums of weights,
-    one for both cosine and sine of a frequency.
-    """
-
-    responses: Floats
-    weights: Floats
 
 
 def correspond_by_phase(measurements: Measurements) -> Correspondence:
@@ -94,75 +92,39 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
     InputError
         If there is no response to DC, or if the frequencies leave several places alike.
     """
-    basis = _without_dc(measurements)
+    basis = without_dc(measurements)
     require_settled(basis)
-    camera = measurements.camera
-    white = measurements.responses[..., measurements.response_indices([DC])[0]]
-    brightest = measurements.brightest or float(white.max(initial=0.0))
-    pixels = np.empty((camera.pixels, 2), dtype=np.float32)
-    excess = np.empty(camera.pixels, dtype=np.float32)
-    waves = _waves(basis)
-
-    def work(block: slice) -> None:
-        part = measurements.of_pixels(Size(1, block.stop - block.start), block)
-        responses, variance = _relative(part, LEAST_WHITE * brightest)
-        found = _search(basis, waves, _weigh(basis, responses, variance, SEARCH_BACKGROUND))
-        pixels[block], _ = _footprints(
-            basis, _weigh(basis, responses, variance, FOOTPRINT_BACKGROUND), found
-        )
-        _, excess[block] = _footprints(
-            basis, _weigh(basis, responses, variance, DETECTION_BACKGROUND), found
-        )
-
-    side_by_side(work, blocks(camera.pixels, PIXELS_AT_ONCE))
-    pixels[excess <= LEAST_EXCESS] = np.nan
-    q = pixels.reshape(*camera, 2)
-    ratio = excess.reshape(camera) / np.where(
-        is_mirrored(q), MIRRORED_FACTOR * LEAST_EXCESS, LEAST_EXCESS
-    )
+    if is_large(basis.projector):
+        least = LEAST_LARGE_EXCESS
+        q, excess = correspond_coarse_to_fine(measurements, basis)
+    else:
+        least = LEAST_EXCESS
+        q, excess = _correspond_at_every_place(measurements, basis)
+    q[excess <= least] = np.nan
+    ratio = excess / np.where(is_mirrored(q), MIRRORED_FACTOR * least, least)
     q[ratio <= 1] = np.nan
     power = ratio**4
     return Correspondence(q, (power / (1 + power)).astype(np.float32))
 
 
-def response_variance(measurements: Measurements) -> Floats:
-    """Return the variance of each response, broadcastable to (C, channels, R)."""
-    references = measurements.white_noise**2 + measurements.black_noise**2
-    repeated = measurements.noise[..., None] ** 2 / measurements.multiplicity
-    return np.asarray(repeated + references[..., None])
+def _correspond_at_every_place(
+    measurements: Measurements, basis: RealBasis
+) -> tuple[Floats, Floats]:
+    """Return q, (Cy, Cx, 2), and how far direct light stands above the background, (Cy, Cx)."""
+    camera = measurements.camera
+    division = division_by_white(measurements, basis)
+    q = np.empty((camera.pixels, 2), dtype=np.float32)
+    excess = np.empty(camera.pixels, dtype=np.float32)
+    waves = _waves(basis)
 
+    def work(block: slice) -> None:
+        relative = division.of_pixels(block)
+        found = _search(basis, waves, weigh(basis, relative, SEARCH_BACKGROUND))
+        q[block], _ = _footprints(basis, weigh(basis, relative, FOOTPRINT_BACKGROUND), found)
+        _, excess[block] = _footprints(basis, weigh(basis, relative, DETECTION_BACKGROUND), found)
 
-def _without_dc(measurements: Measurements) -> RealBasis:
-    basis = measurements.basis
-    if DC not in basis.frequencies:
-        raise InputError(
-            "the measurements have no response to white, of which direct light is a share: "
-            "plan with a white photo."
-        )
-    return RealBasis(tuple(k for k in basis.frequencies if k != DC), basis.projector)
-
-
-def _relative(measurements: Measurements, least_white: float) -> tuple[Floats, Floats]:
-    """Responses over each pixel's own white, (C, channels, R), and their variances; DC left out."""
-    places = measurements.response_indices([k for k in measurements.basis.frequencies if k != DC])
-    white = measurements.responses[..., measurements.response_indices([DC])[0]]
-    scale = np.maximum(white, least_white)
-    inverse = np.divide(1.0, scale, where=scale > 0, out=np.zeros_like(scale))[..., None]
-    shape = measurements.responses.shape
-    variance = np.broadcast_to(response_variance(measurements), shape)[..., places] * inverse**2
-    return measurements.responses[..., places] * inverse, variance
-
-
-def _weigh(
-    basis: RealBasis, responses: Floats, variance: Floats, background: Background
-) -> _Weighed:
-    cosine = np.flatnonzero(~basis.is_sine)
-    count = np.bincount(basis.index, minlength=len(basis.frequencies))
-    # A cosine and its sine have the same weight, so that no place is favoured.
-    of_pair = np.add.reduceat(variance, cosine, axis=-1) / count if len(cosine) else variance
-    weights = 1.0 / (of_pair + background.spectral_density(basis))
-    summed = np.einsum("cir,cir->cr", responses, weights[..., basis.index])
-    return _Weighed(summed.astype(np.float32), weights.sum(axis=1).astype(np.float32))
+    side_by_side(work, blocks(camera.pixels, PIXELS_AT_ONCE))
+    return q.reshape(*camera, 2), excess.reshape(camera)
 
 
 class _Group(NamedTuple):
@@ -224,7 +186,7 @@ def _scores(responses: Floats, waves: _Waves) -> Floats:
     return np.asarray(np.matmul(waves.down, sums.reshape(len(responses), -1, width)))
 
 
-def _search(basis: RealBasis, waves: _Waves, weighed: _Weighed) -> NDArray[np.float64]:
+def _search(basis: RealBasis, waves: _Waves, weighed: Weighed) -> NDArray[np.float64]:
     """Return the place, to half a pixel, at which direct light explains the responses best: (C, 2).
 
     Light at half a pixel is shared by the two pixels beside it, so its score is the mean of theirs.
@@ -272,7 +234,7 @@ def _highest(basis: RealBasis, score: Floats, weights: Floats) -> NDArray[np.flo
 
 
 def _footprints(
-    basis: RealBasis, weighed: _Weighed, around: NDArray[np.float64]
+    basis: RealBasis, weighed: Weighed, around: NDArray[np.float64]
 ) -> tuple[Floats, Floats]:
     """Fit the entries of t around a place, none negative.
 
@@ -349,6 +311,10 @@ def _find(
     return correspond_by_phase(measure())
 
 
-# Every plan has sinusoids; whether they determine q is checked when they are measured. Whether q is
-# mirrored depends on the rows beside.
-PHASE = CorrespondenceMethod(serves=lambda _plan: True, find=_find, rows_beside=1)
+def _rows_beside(plan: Plan) -> int:
+    """Return the rows of neighbours that tell where to look, and whether q is mirrored."""
+    return ROWS_BESIDE + 1 if is_large(plan.projector) else 1
+
+
+# Every plan has sinusoids; whether they determine q is checked when they are measured.
+PHASE = CorrespondenceMethod(serves=lambda _plan: True, find=_find, rows_beside=_rows_beside)

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers, Size
+from nearfar.arrays import Floats, Integers, Size, blocks
 from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.normal import normal_cdf
 from nearfar.correspondence.result import Correspondence
@@ -24,6 +24,8 @@ from nearfar.plan import Plan, Stripe
 StripeKind = Literal["black row", "black column"]
 # In the order of the axes, y before x.
 KINDS: tuple[StripeKind, StripeKind] = ("black row", "black column")
+# Values of photos whose peaks are found at once.
+VALUES_AT_ONCE = 2**20
 # Distance of the pixels, on both sides, that a peak is compared with.
 BACKGROUND_REACH = 2
 # Stripes away from the peak that are needed to estimate its noise.
@@ -141,10 +143,15 @@ def _axis(
     before: int = 0,
 ) -> _Axis:
     numbers = _numbers(photos.plan, kind)
-    removed, white = _marginal(photos, [numbers[s] for s in sorted(numbers)], rows)
+    values = _summed(photos, [numbers[s] for s in sorted(numbers)], rows)
     if progress is not None:
         progress(before + len(numbers))
-    return _peak(removed, white)
+    # The temporary arrays of all camera pixels would take several times as much as the photos.
+    parts = [
+        _peak(*_marginal(values[:, pixels]))
+        for pixels in blocks(values.shape[1], VALUES_AT_ONCE // len(values))
+    ]
+    return _Axis(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
 def _numbers(plan: Plan, kind: str) -> dict[int, int]:
@@ -156,18 +163,23 @@ def _numbers(plan: Plan, kind: str) -> dict[int, int]:
     }
 
 
-def _marginal(photos: Photos, numbers: Sequence[int], rows: slice) -> tuple[Floats, Floats]:
-    """Return the light that each stripe removes, (C, s), and the photo without stripes, (C,).
+def _summed(photos: Photos, numbers: Sequence[int], rows: slice) -> Floats:
+    """Return photos summed over channels, (s, C), float32.
 
-    Channels are summed as they are, which is the best sum where shot noise dominates.
+    As they are, which is the best sum where shot noise dominates.
     """
-    stack = [
-        photos.read(numbers[start : start + PHOTOS_AT_ONCE], rows)
-        for start in range(0, len(numbers), PHOTOS_AT_ONCE)
-    ]
-    values = np.concatenate(stack).sum(axis=-1).reshape(len(numbers), -1).T
+    values = np.empty((len(numbers), size_of_rows(photos, rows).pixels), dtype=np.float32)
+    for batch in blocks(len(numbers), PHOTOS_AT_ONCE):
+        read = photos.read(numbers[batch], rows).sum(axis=-1)
+        values[batch] = read.reshape(len(read), -1)
+    return values
+
+
+def _marginal(values: Floats) -> tuple[Floats, Floats]:
+    """Return the light that each stripe removes, (C, s), and the photo without stripes, (C,)."""
+    values = np.ascontiguousarray(values.T)
     # Most stripes do not touch a pixel's direct light: their median is the photo without stripes.
-    white = np.median(values, axis=1) if len(numbers) > 2 else values.max(axis=1)
+    white = np.median(values, axis=1) if values.shape[1] > 2 else values.max(axis=1)
     return white[:, None] - values, white
 
 

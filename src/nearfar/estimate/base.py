@@ -22,21 +22,24 @@ class Model(NamedTuple):
     Attributes
     ----------
     window : int
-        W, the side of the near-range window in projector pixels.
+        W, the side of the near-range window in functions.
     far : Size
         Far band, in frequencies.
     dropped : Size
         Block of lowest near frequencies that are not measured.
+    pitch : int
+        Projector pixels between the window's functions; 1 for a window of single pixels.
     """
 
     window: int
     far: Size
     dropped: Size
+    pitch: int = 1
 
 
 def model_of(plan: Plan) -> Model:
     """Return the sizes of the model that a plan was made for."""
-    return Model(plan.window, plan.far, plan.dropped)
+    return Model(plan.window, plan.far, plan.dropped, plan.pitch)
 
 
 class Memory(NamedTuple):
@@ -66,6 +69,10 @@ class Estimator(ABC):
     def halo(self) -> int:
         """Rows of the camera on either side of a tile that its estimate depends on."""
         return 0
+
+    def rows_beside(self, plan: Plan) -> int:
+        """Return the rows on either side of a tile that the estimate from a plan depends on."""
+        return self.halo
 
     @abstractmethod
     def require(self, plan: Plan) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, blocks, product
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import direct, near
 from nearfar.transport.exact import ExactTransport
@@ -49,7 +50,7 @@ def fit_model(
     where = direct.footprint(q, truth.projector)
     centres = near.centre(q, truth.projector)
     lit = np.isfinite(q[..., 0]).ravel()
-    centred = centred_basis(far_basis, window_offsets(window))
+    centred = centred_basis(far_basis, NearBasis(window))
     pixels, channels = truth.camera.pixels, truth.channels
     d = np.zeros((pixels, channels), dtype=np.float32)
     n = np.zeros((pixels, channels, window**2), dtype=np.float32)

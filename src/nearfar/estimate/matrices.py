@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Floats, Size
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import (
     CHECKERBOARD,
     Frequency,
@@ -19,6 +19,7 @@ from nearfar.illumination.frequencies import (
     near_frequencies,
     representatives,
 )
+from nearfar.illumination.near_basis import NearBasis, window_offsets
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.photometry.measurements import Measurements
 
@@ -28,7 +29,7 @@ def _centred(
 ) -> CentredBasis:
     basis = real_basis(representatives(frequencies), measurements.projector)
     return replace(
-        centred_basis(basis, window_offsets(window)),
+        centred_basis(basis, NearBasis(window)),
         response_indices=measurements.response_indices(basis.frequencies),
     )
 

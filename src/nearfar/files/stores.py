@@ -38,6 +38,20 @@ _DAMAGE = (
 )
 
 
+# Bytes of a file that is read where it is asked for: zarr hands every file to a thread, which takes
+# longer than reading a small one.
+SMALL_FILE_BYTES = 2**16
+
+
+def _read_if_small(path: Path, prototype: BufferPrototype) -> Buffer | None:
+    try:
+        if path.stat().st_size > SMALL_FILE_BYTES:
+            return None
+        return prototype.buffer.from_bytes(path.read_bytes())
+    except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+        return None
+
+
 class _CheckedStore(LocalStore):
     """A folder store whose metadata must have the checksum with which they were written."""
 
@@ -48,7 +62,11 @@ class _CheckedStore(LocalStore):
         byte_range: ByteRequest | None = None,
     ) -> Buffer | None:
         """Read a file, metadata without their checksum."""
-        value = await super().get(key, prototype, byte_range)
+        value = None
+        if prototype is not None and byte_range is None:
+            value = _read_if_small(self.root / key, prototype)
+        if value is None:
+            value = await super().get(key, prototype, byte_range)
         if value is None or (self.root / key).name != METADATA:
             return value
         try:
@@ -234,7 +252,7 @@ def _new_array(
     )
 
 
-def open_store(path: Path, kind: str, version: int) -> zarr.Group:
+def open_store(path: Path, kind: str, *versions: int) -> zarr.Group:
     """Open a Zarr group of ours for reading.
 
     Parameters
@@ -242,8 +260,8 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
     path : Path
     kind : str
         What it must hold.
-    version : int
-        The version of the format that is read.
+    *versions : int
+        The versions of the format that are read, rising.
 
     Raises
     ------
@@ -272,10 +290,11 @@ def open_store(path: Path, kind: str, version: int) -> zarr.Group:
     if found != kind:
         other = f"a {found}" if str(found).startswith("nearfar ") else "of another kind"
         raise UnreadableFileError(f"{path} is not {article} {kind} but {other}: check the name.")
-    if found_version != version:
+    if found_version not in versions:
+        read = f"versions {versions[0]} to" if len(versions) > 1 else "version"
         raise UnreadableFileError(
-            f"{path} is {article} {kind} of version {found_version!r}, this nearfar reads version "
-            f"{version}: make it again, or use the nearfar that made it."
+            f"{path} is {article} {kind} of version {found_version!r}, this nearfar reads {read} "
+            f"{versions[-1]}: make it again, or use the nearfar that made it."
         )
     return group
 

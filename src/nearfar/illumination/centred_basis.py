@@ -3,9 +3,7 @@
 Responses whose phases are shifted to a camera pixel's own place meet patterns that are drawn about
 that place, and these are the same at every camera pixel.
 
-Index convention: r runs over real responses, w over the W x W offsets of a window from the rounded
-q, row by row. The window of an odd W reaches (W-1)/2 to each side, that of an even W from -W/2 to
-W/2 - 1.
+Index convention: r runs over real responses, w over the functions of a `NearBasis`.
 """
 
 from collections.abc import Callable
@@ -16,25 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats, Size
+from nearfar.arrays import Complexes, Floats
+from nearfar.illumination.near_basis import NearBasis, hat_response, window_offsets
 from nearfar.illumination.real_basis import RealBasis
-
-
-def window_offsets(window: int) -> NDArray[np.int64]:
-    """Return the window's offsets (y, x) from the rounded q, shape (W^2, 2)."""
-    side = np.arange(window) - window // 2
-    y, x = np.meshgrid(side, side, indexing="ij")
-    return np.stack([y.ravel(), x.ravel()], axis=1)
-
-
-def reachable(window: int, projector: Size) -> NDArray[np.bool_]:
-    """Return which offsets of a window lead from some projector pixel to another, shape (W^2,).
-
-    On a projector of one row, those of the window's middle row alone.
-    """
-    found: NDArray[np.bool_] = np.all(np.abs(window_offsets(window)) < projector, axis=1)
-    return found
-
 
 # Offsets from the rounded q that the 2 x 2 footprint of direct light can touch.
 FOOTPRINT_OFFSETS = window_offsets(3)
@@ -49,21 +31,24 @@ class CentredBasis:
     basis : RealBasis
     response_indices : ndarray of int, shape (R,)
         Indices of its responses among those of the measurements.
-    on_window : ndarray, shape (R, W^2), float32
-        Patterns over the window.
+    near_basis : NearBasis
+    on_window : ndarray, shape (R, J), float32
+        Responses to the patterns of the functions of near-range light.
     on_footprint : ndarray, shape (R, 9), float32
-        Patterns over `FOOTPRINT_OFFSETS`.
+        Patterns over `FOOTPRINT_OFFSETS`; (R, R), the unit matrix, where functions are of several
+        projector pixels: footprints are then given by their responses.
     """
 
     basis: RealBasis
     response_indices: NDArray[np.int64]
+    near_basis: NearBasis
     on_window: Floats
     on_footprint: Floats
 
     @cached_property
     def side_waves(self) -> tuple[Complexes, Complexes]:
         """exp(j 2 pi k y) and exp(j 2 pi k x) over differences of entries, each (K, 2 W - 1)."""
-        window = round(np.sqrt(self.on_window.shape[1]))
+        window = self.near_basis.window
         side = np.arange(1 - window, window)
         down, across = (
             np.exp(2j * np.pi * self.basis.cycles[:, axis, None] * side) for axis in (0, 1)
@@ -83,14 +68,13 @@ class CentredBasis:
         return self.basis.uncentre(responses, centres)
 
 
-def centred_basis(basis: RealBasis, offsets: NDArray[np.int64]) -> CentredBasis:
+def centred_basis(basis: RealBasis, near_basis: NearBasis) -> CentredBasis:
     """Draw a basis about q.
 
     Parameters
     ----------
     basis : RealBasis
-    offsets : ndarray of int, shape (W^2, 2)
-        Where `on_window` is drawn, by `window_offsets`.
+    near_basis : NearBasis
 
     Returns
     -------
@@ -100,6 +84,19 @@ def centred_basis(basis: RealBasis, offsets: NDArray[np.int64]) -> CentredBasis:
     return CentredBasis(
         basis,
         np.arange(basis.count),
-        basis.patterns_at(offsets),
-        basis.patterns_at(FOOTPRINT_OFFSETS),
+        near_basis,
+        _responses(basis, near_basis.offsets, near_basis.pitches),
+        basis.patterns_at(FOOTPRINT_OFFSETS)
+        if near_basis.pitch == 1
+        else np.eye(basis.count, dtype=np.float32),
     )
+
+
+def _responses(
+    basis: RealBasis, offsets: NDArray[np.int64], pitches: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Return the responses of hats at offsets (O, 2), shape (M, O)."""
+    patterns = basis.patterns_at(offsets)
+    if np.all(pitches == 1):
+        return patterns
+    return (patterns * hat_response(basis.cycles, pitches)[basis.index]).astype(np.float32)

@@ -3,17 +3,25 @@
 A pattern is (Py, Px), values in [0, 1], 1 = full white.
 """
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Size
+from nearfar.arrays import Size, blocks
 from nearfar.illumination.frequencies import Frequency
 
+Wave = Callable[[Frequency, Size, slice], NDArray[np.float64]]
 
-def phase(frequency: Frequency, size: Size) -> NDArray[np.float64]:
-    """Return k . p modulo one cycle at every projector pixel, in cycles, shape (Py, Px).
+
+# Rows of a pattern are drawn together up to as many pixels, which stay in the processor's cache.
+PIXELS_TOGETHER = 2**16
+ALL_ROWS = slice(None)
+
+
+def phase(frequency: Frequency, size: Size, rows: slice = ALL_ROWS) -> NDArray[np.float64]:
+    """Return k . p modulo one cycle at the projector pixels of some rows, in cycles, (rows, Px).
 
     Reduced in whole numbers, so that a pattern of a thousand pixels is as exact as its first.
     """
@@ -22,18 +30,26 @@ def phase(frequency: Frequency, size: Size) -> NDArray[np.float64]:
         steps = (np.arange(length, dtype=np.int64) * cycles.numerator) % cycles.denominator
         return np.asarray(steps / cycles.denominator)
 
-    total = axis(frequency.fy, size.height)[:, None] + axis(frequency.fx, size.width)[None, :]
-    return np.asarray(total % 1.0)
+    down, across = axis(frequency.fy, size.height), axis(frequency.fx, size.width)
+    return np.asarray((down[rows, None] + across) % 1.0)
 
 
-def cosine(frequency: Frequency, size: Size) -> NDArray[np.float64]:
+def cosine(frequency: Frequency, size: Size, rows: slice = ALL_ROWS) -> NDArray[np.float64]:
     """0.5 + 0.5 cos(2 pi k.p) (section 5.1)."""
-    return np.asarray(0.5 + 0.5 * np.cos(2 * np.pi * phase(frequency, size)))
+    return np.asarray(0.5 + 0.5 * np.cos(2 * np.pi * phase(frequency, size, rows)))
 
 
-def sine(frequency: Frequency, size: Size) -> NDArray[np.float64]:
+def sine(frequency: Frequency, size: Size, rows: slice = ALL_ROWS) -> NDArray[np.float64]:
     """0.5 + 0.5 sin(2 pi k.p) (section 5.1)."""
-    return np.asarray(0.5 + 0.5 * np.sin(2 * np.pi * phase(frequency, size)))
+    return np.asarray(0.5 + 0.5 * np.sin(2 * np.pi * phase(frequency, size, rows)))
+
+
+def draw_wave(wave: Wave, frequency: Frequency, size: Size) -> NDArray[np.uint8]:
+    """Draw the 8-bit pattern of `cosine` or `sine`, a few rows at a time, shape (Py, Px)."""
+    drawn = np.empty(size, dtype=np.uint8)
+    for rows in blocks(size.height, PIXELS_TOGETHER // size.width):
+        drawn[rows] = quantise(wave(frequency, size, rows))
+    return drawn
 
 
 def exponential(frequency: Frequency, size: Size) -> NDArray[np.complex128]:

@@ -13,6 +13,9 @@ from nearfar.checks import as_count
 # Drawn this many times finer on each axis, then averaged: edges fall between pixels, as in
 # photographs.
 OVERSAMPLING = 4
+# Natural pictures of more drawn points are oversampled half as much, or not at all: on the pixels
+# of a fine projector an edge is of little account, and a picture takes a second.
+MOST_DRAWN = 2**23
 NUMBER_OF_LEAVES = 2000
 # Radii, as shares of the longer side.
 SMALLEST_RADIUS = 0.035
@@ -46,9 +49,8 @@ def white(size: AnySize) -> Floats:
 
 def _averaged(drawn: Floats, size: Size) -> Floats:
     """Average what was drawn finer: (Py, Px, channels), float32."""
-    averaged = drawn.reshape(size.height, OVERSAMPLING, size.width, OVERSAMPLING, -1).mean(
-        axis=(1, 3)
-    )
+    finer = drawn.shape[0] // size.height
+    averaged = drawn.reshape(size.height, finer, size.width, finer, -1).mean(axis=(1, 3))
     return np.asarray(averaged, dtype=np.float32)
 
 
@@ -81,7 +83,10 @@ def natural_picture(size: AnySize, seed: int, *, colour: bool = False) -> Floats
     """
     size, seed = as_size(size), as_count(seed, "the seed", 0)
     generator = np.random.default_rng([seed, 2001])
-    height, width = size.height * OVERSAMPLING, size.width * OVERSAMPLING
+    finer = OVERSAMPLING
+    while finer > 1 and size.pixels * finer**2 > MOST_DRAWN:
+        finer //= 2
+    height, width = size.height * finer, size.width * finer
     longest = max(height, width)
     drawn = np.zeros((height, width, 3 if colour else 1))
     empty = np.ones((height, width), dtype=bool)

@@ -16,8 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats, Size, beside, namespace, product
+from nearfar.arrays import Complexes, Floats, Integers, Size, beside, namespace, product
 from nearfar.illumination.frequencies import Frequency, as_array
+
+# Values of drawn patterns, (M, P), up to which they are kept; beyond, sums go an axis at a time.
+MOST_HELD = 2**26
 
 
 class _Layout(NamedTuple):
@@ -107,7 +110,7 @@ class RealBasis:
             drawn[m] = wave.imag if sine else wave.real
         return drawn.reshape(self.count, len(down) * len(across))
 
-    def patterns_at(self, offsets: NDArray[np.int64]) -> NDArray[np.float32]:
+    def patterns_at(self, offsets: Floats | Integers) -> NDArray[np.float32]:
         """Cosines and sines at chosen offsets (O, 2) from the origin, shape (M, O)."""
         angle = 2 * np.pi * (self.cycles @ offsets.T)[self.index]
         patterns = np.where(self.is_sine[:, None], np.sin(angle), np.cos(angle))
@@ -182,6 +185,8 @@ class RealBasis:
     def analyse(self, light: Floats) -> Floats:
         """Return weights times the light's overlap with each pattern: (..., P) to (..., M)."""
         dtype = np.result_type(light.dtype, np.float32)
+        if self.count * self.projector.pixels > MOST_HELD:
+            return np.asarray(self._overlaps_by_axes(light) * self.weights)
         overlaps = light.astype(dtype, copy=False) @ self.patterns.T.astype(dtype, copy=False)
         return np.asarray(overlaps * self.weights)
 
@@ -189,7 +194,39 @@ class RealBasis:
         """Adjoint of `analyse`, and the rows of F: (..., M) to (..., P)."""
         dtype = np.result_type(coefficients.dtype, np.float32)
         weighted = coefficients * self.weights.astype(dtype)
+        if self.count * self.projector.pixels > MOST_HELD:
+            return self._sum_by_axes(weighted)
         return product(weighted, self.patterns.astype(dtype, copy=False))
+
+    def _overlaps_by_axes(self, light: Floats) -> Floats:
+        """Return the light's overlap with each pattern, (..., P) to (..., M), an axis at a time."""
+        flat = light.reshape(-1, *self.projector)
+        down, across = self._single_phases
+        (columns, of_column) = np.unique(self.cycles[:, 1], return_inverse=True)
+        first = np.unique(of_column, return_index=True)[1]
+        found = np.empty((len(flat), self.count))
+        for one, overlaps in zip(flat, found, strict=True):
+            # By real products, of which a light needs half as many.
+            waves = across[:, first]
+            along = one.astype(np.float32, copy=False) @ np.concatenate(
+                [waves.real, waves.imag], axis=1
+            )
+            summed = along[:, : len(columns)] + 1j * along[:, len(columns) :]
+            total = np.einsum("yk,yk->k", down, summed[:, of_column])
+            overlaps[:] = np.where(self.is_sine, total.imag[self.index], total.real[self.index])
+        return found.reshape(*light.shape[:-1], self.count)
+
+    def _sum_by_axes(self, weighted: Floats) -> Floats:
+        """Return sums of patterns, (..., M) to (..., P), an axis at a time."""
+        flat = weighted.reshape(-1, self.count)
+        down, across = self._single_phases
+        found = np.empty((len(flat), *self.projector), dtype=np.float32)
+        for one, picture in zip(flat, found, strict=True):
+            both = np.zeros(len(self.frequencies), dtype=np.complex64)
+            np.add.at(both, self.index, np.where(self.is_sine, -1j * one, one).astype(np.complex64))
+            of_down = down * both
+            picture[:] = of_down.real @ across.real.T - of_down.imag @ across.imag.T
+        return found.reshape(*weighted.shape[:-1], self.projector.pixels)
 
 
 def real_basis(frequencies: Sequence[Frequency], projector: Size) -> RealBasis:

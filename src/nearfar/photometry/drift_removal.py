@@ -9,57 +9,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers, Size
+from nearfar.arrays import Floats, Integers
 from nearfar.errors import InputError
 from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, find_references, follow_drift
 from nearfar.photometry.in_memory import PhotosInMemory
-from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few, variance_by_channel
-from nearfar.photometry.photos import PHOTOS_AT_ONCE, Photos, Wave, find_waves, in_batches
-from nearfar.plan import Plan
+from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few
+from nearfar.photometry.photos import (
+    PHOTOS_AT_ONCE,
+    Photos,
+    PhotosWithNoise,
+    Wave,
+    find_waves,
+    in_batches,
+)
 
 # Values among which the smallest difference of two levels is searched.
 SAMPLED_VALUES = 2**18
 
 
-@dataclass(frozen=True)
-class PhotosWithoutDrift:
-    """Photos by reference without the drift of lamp and ambient light; read as any others.
+@dataclass(frozen=True, eq=False)
+class PhotosWithoutDrift(PhotosWithNoise):
+    """Photos by reference without the drift of lamp and ambient light.
 
     Attributes
     ----------
-    photos : Photos
-        As they were taken.
     drift : Drift
-    noise : tuple of NoiseModel
-        One for each channel.
     """
 
-    photos: Photos
     drift: Drift
-    noise: tuple[NoiseModel, ...] = ()
-
-    @property
-    def plan(self) -> Plan:
-        """The plan that was shot."""
-        return self.photos.plan
-
-    @property
-    def camera(self) -> Size:
-        """Height and width of the photos."""
-        return self.photos.camera
-
-    @property
-    def channels(self) -> int:
-        """Channels of the photos."""
-        return self.photos.channels
 
     def read(self, indices: Sequence[int], rows: slice) -> Floats:
         """Photos `indices` as float32, (n, len(rows), Cx, channels), without drift."""
         return self.drift.remove_from(self.photos.read(indices, rows), indices, rows)
-
-    def variance(self, photo: Floats) -> Floats:
-        """Variance of one photo that reads `photo`, (C, channels)."""
-        return variance_by_channel(self.noise, photo)
 
     def only(self, numbers: Integers) -> "PhotosWithoutDrift":
         """Return some of the photos, in order, in memory.
@@ -71,7 +52,7 @@ class PhotosWithoutDrift:
         plan = self.plan.model_copy(update={"patterns": patterns})
         read = self.read(numbers.tolist(), slice(0, self.camera.height))
         drift = self.drift.with_nothing_left(find_references(plan))
-        some = PhotosWithoutDrift(PhotosInMemory(plan, read, 1.0), drift)
+        some = PhotosWithoutDrift(PhotosInMemory(plan, read, 1.0), (), drift)
         return replace(some, noise=_noise_of_repeated_patterns(some, self.photos))
 
 
@@ -98,7 +79,7 @@ def remove_drift(
         If the plan has fewer than two whites or two blacks, or the lamp failed.
     """
     drift = follow_drift(photos, progress)
-    found = PhotosWithoutDrift(photos, drift)
+    found = PhotosWithoutDrift(photos, (), drift)
     return replace(found, noise=_noise_of_repeated_patterns(found, photos))
 
 

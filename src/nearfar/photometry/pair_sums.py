@@ -1,4 +1,4 @@
-"""What inverse pairs sum to: always white + black, so that they tell noise and drift of the light.
+"""Sums of inverse pairs: all are white + black, so that they show noise and drift of the light.
 
 Index convention: arrays are (C, channels) with C camera pixels row by row.
 """
@@ -9,72 +9,42 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.arrays import Booleans, Floats
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.by_inverse import Pair, find_pairs
-from nearfar.photometry.noise import NoiseModel, fit_noise, variance_by_channel
-from nearfar.photometry.photos import Photos, in_batches
-from nearfar.plan import Plan
+from nearfar.photometry.noise import fit_noise, variance_by_channel
+from nearfar.photometry.photos import Photos, PhotosWithNoise, in_batches
 
 
 @dataclass(frozen=True, eq=False)
-class PhotosOfPairs:
-    """Photos of inverse pairs with a model of their noise; read as any others.
+class PhotosOfPairs(PhotosWithNoise):
+    """Photos of inverse pairs with a model of their noise.
 
     Attributes
     ----------
-    photos : Photos
-        As they were taken.
-    noise : tuple of NoiseModel
-        One for each channel.
     light : ndarray, shape (pairs,)
-        What each pair sums to, mean over the camera, as a share of the mean of all pairs.
+        Sum of each pair, mean over the camera, as a share of the mean over all pairs.
     scatter : float
-        Variance of what pairs sum to, over that which the noise expects.
+        Variance of the sums over that which the noise model expects.
     """
 
-    photos: Photos
-    noise: tuple[NoiseModel, ...]
     light: Floats
     scatter: float
-
-    @property
-    def plan(self) -> Plan:
-        """The plan that was shot."""
-        return self.photos.plan
-
-    @property
-    def camera(self) -> Size:
-        """Height and width of the photos."""
-        return self.photos.camera
-
-    @property
-    def channels(self) -> int:
-        """Channels of the photos."""
-        return self.photos.channels
-
-    def read(self, indices: Sequence[int], rows: slice) -> Floats:
-        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
-        return self.photos.read(indices, rows)
-
-    def variance(self, photo: Floats) -> Floats:
-        """Variance of one photo that reads `photo`, (C, channels)."""
-        return variance_by_channel(self.noise, photo)
 
 
 def sum_pairs(
     photos: Photos, bands: Sequence[slice], progress: Callable[[float], None] | None = None
 ) -> PhotosOfPairs:
-    """Estimate noise and drift of a capture of inverse pairs from what the pairs sum to.
+    """Estimate noise and drift of a capture of inverse pairs from the sums of the pairs.
 
-    What is saturated under white counts for nothing.
+    Camera pixels that are saturated under white are left out.
 
     Parameters
     ----------
     photos : Photos
         A capture of a plan with offset inverse.
     bands : sequence of slice
-        Rows of the camera to look at.
+        Rows of the camera that are measured.
     progress : callable, optional
         Called with the share that is done.
 
@@ -125,7 +95,7 @@ def below_full_scale(photos: Photos, white: Sequence[int], rows: slice) -> Boole
 
 
 def _sums(photos: Photos, pairs: Sequence[Pair], rows: slice) -> Iterator[NDArray[np.float64]]:
-    """Yield what each pair sums to, (C, channels)."""
+    """Yield the sum of each pair, (C, channels)."""
     # Batches hold an even number of photos, and so whole pairs.
     numbers = [number for pair in pairs for number in (pair.photo, pair.inverse)]
     for _, read in in_batches(photos, numbers, rows):

@@ -5,6 +5,7 @@ real responses.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -14,8 +15,9 @@ from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import Frequency
-from nearfar.illumination.real_basis import RealBasis, real_basis
+from nearfar.illumination.real_basis import MOST_HELD, RealBasis, real_basis
 from nearfar.parallel import ahead
+from nearfar.photometry.noise import NoiseModel, variance_by_channel
 from nearfar.plan import Plan, Sinusoid, Stripe
 
 # Photos read at once.
@@ -26,7 +28,7 @@ Wave = tuple[Frequency, bool]
 
 
 class Photos(Protocol):
-    """Whatever holds the photos of a plan, in photo units (full scale = 1)."""
+    """Photos of a plan in photo units (full scale = 1), wherever they are stored."""
 
     @property
     def plan(self) -> Plan:
@@ -48,12 +50,43 @@ class Photos(Protocol):
         ...
 
 
-class PhotosWithNoise(Photos, Protocol):
-    """Photos with a model of their noise."""
+@dataclass(frozen=True, eq=False)
+class PhotosWithNoise:
+    """Photos of a plan with a model of their noise; read as any others.
+
+    Attributes
+    ----------
+    photos : Photos
+        As they were taken.
+    noise : tuple of NoiseModel
+        One for each channel.
+    """
+
+    photos: Photos
+    noise: tuple[NoiseModel, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that was shot."""
+        return self.photos.plan
+
+    @property
+    def camera(self) -> Size:
+        """Height and width of the photos."""
+        return self.photos.camera
+
+    @property
+    def channels(self) -> int:
+        """Channels of the photos."""
+        return self.photos.channels
+
+    def read(self, indices: Sequence[int], rows: slice) -> Floats:
+        """Photos `indices` as float32, (n, len(rows), Cx, channels)."""
+        return self.photos.read(indices, rows)
 
     def variance(self, photo: Floats) -> Floats:
         """Variance of one photo that reads `photo`, (C, channels)."""
-        ...
+        return variance_by_channel(self.noise, photo)
 
 
 def size_of_rows(photos: Photos, rows: slice) -> Size:
@@ -116,7 +149,13 @@ def basis_of(responses: Sequence[Wave], projector: Size) -> tuple[RealBasis, dic
 
 
 def quantisation_error(basis: RealBasis) -> Floats:
-    """Return each 8-bit cosine and sine, 2 l / 255 - 1, less the ideal one, shape (R, P)."""
+    """Return each 8-bit cosine and sine, 2 l / 255 - 1, less the ideal one, shape (R, P).
+
+    Without projector pixels, (R, 0), where there are so many of them that footprints of direct
+    light average the error.
+    """
+    if basis.count * basis.projector.pixels > MOST_HELD:
+        return np.empty((basis.count, 0), dtype=np.float32)
     ideal = basis.patterns
     error = np.empty_like(ideal)
     for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True)):

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats
 
 REWEIGHTINGS = 15
+# Coefficients that change by less, relative to the largest, are final.
+CONVERGED = 1e-9
 # Standard deviations beyond which a pixel has no weight.
 BIWEIGHT_CUTOFF = 4.685
 # Eigenvalues of the shapes' Gram matrix below this share of the largest are left out: shapes that
@@ -42,7 +44,7 @@ def robust_fit(shapes: Floats, values: Floats) -> tuple[NDArray[np.float64], flo
     weight, found = np.ones_like(values), np.zeros(len(shapes))
     error = np.inf
     for _ in range(REWEIGHTINGS):
-        weighted = unit * weight
+        before, weighted = found, unit * weight
         gram = weighted @ unit.T
         found = np.asarray(
             np.linalg.lstsq(gram, weighted @ values, rcond=LEAST_EIGENVALUE)[0], dtype=float
@@ -50,5 +52,7 @@ def robust_fit(shapes: Floats, values: Floats) -> tuple[NDArray[np.float64], flo
         off = np.abs(values - found @ unit)
         scale = 1.4826 * np.median(off) + 1e-12
         error = scale / np.sqrt(gram[0, 0])
+        if np.abs(found - before).max() <= CONVERGED * np.abs(found).max():
+            break
         weight = np.maximum(1.0 - (off / (BIWEIGHT_CUTOFF * scale)) ** 2, 0.0) ** 2
     return np.where(size > 0, found / np.where(size > 0, size, 1.0), 0.0), error / size[0]

@@ -6,6 +6,7 @@ from nearfar.plan.model import Plan, parse_plan, read_plan
 from nearfar.plan.paper import paper_plan
 from nearfar.plan.patterns import GrayCode, Pattern, Sinusoid, Stripe
 from nearfar.plan.references import with_references
+from nearfar.plan.window import default_window, largest_window, pitch_of
 
 __all__ = [
     "CORRESPONDENCE_METHODS",
@@ -15,8 +16,11 @@ __all__ = [
     "Sinusoid",
     "Stripe",
     "choose_plan",
+    "default_window",
+    "largest_window",
     "paper_plan",
     "parse_plan",
+    "pitch_of",
     "read_plan",
     "with_references",
 ]

@@ -5,11 +5,13 @@ light most (`nearfar.plan.expect`) is added, again and again: a new frequency, o
 more. With as many photos as unknowns, every frequency is measured before any is repeated, whatever
 scenes are expected to be.
 
+At a pitch over 1 a share of the photos is of frequencies above those to choose from: they measure
+direct light and its place, and the photos that they take do not grow with the projector either.
+
 Index convention: k runs over candidate frequencies.
 """
 
-from collections.abc import Callable
-from fractions import Fraction
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,39 +20,30 @@ from nearfar.arrays import AnySize, Size, as_size
 from nearfar.callbacks import OldReport, Report, as_report, counting
 from nearfar.checks import as_count, as_number
 from nearfar.errors import PlanError
-from nearfar.illumination.frequencies import (
-    CHECKERBOARD,
-    DC,
-    Frequency,
-    as_array,
-    far_frequencies,
-    grid,
-    representatives,
-    wrap,
-)
+from nearfar.illumination.frequencies import Frequency, far_frequencies, representatives
+from nearfar.plan.candidates import candidates, finest_pattern, high_frequencies, lowest_first
 from nearfar.plan.checks import check_pairs, check_patterns, spread_checks
 from nearfar.plan.expect import (
-    LOWEST_CYCLES,
     ErrorsTogether,
     Expected,
     ExpectedErrors,
     errors_of_all_measured,
     errors_of_none_measured,
+    errors_of_place,
     expected_of,
 )
-from nearfar.plan.model import LARGEST_SIDE, Plan, largest_window
+from nearfar.plan.low_rank import ErrorsLowRank
+from nearfar.plan.model import LARGEST_SIDE, Plan
 from nearfar.plan.paper import sinusoids
 from nearfar.plan.patterns import Purpose
 from nearfar.plan.references import FEWEST, with_references
+from nearfar.plan.window import default_window, largest_window, pitch_of
 from nearfar.priors.fitted import TYPICAL_SCENES
 from nearfar.priors.typical import TypicalScenes
 
 # Standard deviation of the response to a sinusoid, as a share of white: 30 000 electrons at full
 # scale and a scene of middling brightness.
 NOISE = 0.011
-# Beyond LOWEST_CYCLES, one frequency in each of these shares of 1/W is a candidate: a window's
-# spectrum changes no faster.
-STEP_SHARE = 0.5
 # Fewer photos than this settle neither q nor light.
 FEWEST_PHOTOS = 24
 # f is kept at the measured ones of as many DFT frequencies on each side.
@@ -75,12 +68,15 @@ class FrequencyChoice(NamedTuple):
     ----------
     frequencies : dict
         How often the photos of each frequency are taken, in the order of choice.
+    of_direct : list of Frequency
+        Those among them that are taken for direct light.
     references : int
         How often white and black are each photographed.
     expected : Expected
     """
 
     frequencies: dict[Frequency, int]
+    of_direct: list[Frequency]
     references: int
     expected: Expected
 
@@ -104,9 +100,10 @@ def choose_plan(
     photos : int
         All photos, whites, blacks and check photos included.
     window : int, optional
-        W, an upper bound of how far near-range light reaches; `default_window` if left out.
+        W, an upper bound of how far near-range light reaches, in functions that stand `pitch_of`
+        the projector apart; `default_window` if left out.
     typical : TypicalScenes
-        What to plan for: the simulated scenes, or a quick first estimate of this one.
+        Scenes to plan for: typical simulated ones, or the one of a first estimate.
     noise : float
         Standard deviation of the response to a sinusoid, as a share of white.
     checks : int, optional
@@ -123,8 +120,8 @@ def choose_plan(
     -------
     plan : Plan
     expected : Expected
-        What relighting is expected to reach on the typical scenes;
-        `nearfar.plan.expect.expected_range` says how far others differ.
+        SNR_b expected of relighting the typical scenes; `nearfar.plan.expect.expected_range` says
+        how far others differ.
 
     Raises
     ------
@@ -159,11 +156,13 @@ def choose_plan(
             f"a projector of {projector} has too many frequencies to list them all: plan for a "
             f"pattern grid of at most {MOST_LISTED} pixels."
         )
-    window = default_window(projector) if window is None else window
-    if not 1 <= window <= largest_window(projector):
+    pitch = pitch_of(projector)
+    window = default_window(projector, pitch) if window is None else window
+    if not 1 <= window <= largest_window(projector, pitch):
+        apart = "" if pitch == 1 else f" at a pitch of {pitch} projector pixels"
         raise PlanError(
-            f"W = {window} does not fit a projector of {projector}: choose `window` between 1 and "
-            f"{largest_window(projector)}."
+            f"W = {window}{apart} does not fit a projector of {projector}: choose `window` "
+            f"between 1 and {largest_window(projector, pitch)}."
         )
     if checks is not None:
         checks = as_count(checks, "checks", 0)
@@ -182,6 +181,7 @@ def choose_plan(
         projector,
         own,
         window,
+        pitch=pitch,
         typical=typical or TYPICAL_SCENES,
         noise=noise,
         every_frequency=every_frequency,
@@ -190,10 +190,8 @@ def choose_plan(
     band = Size(*(min(FAR_BAND_SIDE, side - 1 + side % 2) for side in projector))
     low = set(far_frequencies(band, projector))
 
-    finest = finest_pattern(projector)
-
     def purpose(frequency: Frequency) -> Purpose:
-        if frequency == finest:
+        if frequency in choice.of_direct:
             return "direct"
         return "far" if frequency in low or -frequency in low else "near"
 
@@ -209,6 +207,7 @@ def choose_plan(
     plan = Plan(
         projector=projector,
         window=window,
+        pitch=pitch,
         far=band,
         dropped=Size(1, 1),
         offset="reference",
@@ -227,53 +226,12 @@ def photos_of_every_frequency(projector: Size) -> int:
     return projector.pixels - 1 + 2 * FEWEST
 
 
-def default_window(projector: Size) -> int:
-    """W where nothing is known: a sixth of the shorter side, odd, between 5 and 25.
-
-    On a projector of one row or column it is a sixth of the longer side.
-    """
-    side = largest_window(projector)
-    return int(min(2 * (min(25, max(5, round(side / 6))) // 2) + 1, side))
-
-
-def finest_pattern(projector: Size) -> Frequency:
-    """Return the highest frequency: the checkerboard, or alternate pixels of one row or column."""
-    return wrap(
-        *(k if side > 1 else DC.fy for k, side in zip(CHECKERBOARD, projector, strict=True))
-    )
-
-
-def candidates(projector: Size, window: int) -> list[Frequency]:
-    """Frequencies of the projector's DFT to choose from, one of each +-k, without DC."""
-    low = Size(*(min(2 * LOWEST_CYCLES + 1, side) for side in projector))
-    steps = round(window / STEP_SHARE)
-    rounded = [
-        wrap(*(_on_grid(part, side) for part, side in zip(k, projector, strict=True)))
-        for k in grid(Size(steps, steps), Size(steps, steps))
-    ]
-    finest = finest_pattern(projector)
-    halves = [finest, wrap(finest.fy, DC.fx), wrap(DC.fy, finest.fx)]
-    even = all(side % 2 == 0 for side in projector)
-    listed = far_frequencies(low, projector) + rounded + (halves if even else [finest])
-    return [k for k in representatives(listed) if k != DC]
-
-
-def _lowest_first(projector: Size) -> list[Frequency]:
-    """All frequencies of the projector's DFT, one of each +-k, without DC, the lowest first."""
-    listed = [k for k in representatives(grid(projector, projector)) if k != DC]
-    cycles = np.linalg.norm(as_array(listed) * np.array(projector), axis=1)
-    return [listed[i] for i in np.argsort(cycles, kind="stable")]
-
-
-def _on_grid(part: Fraction, side: int) -> Fraction:
-    return Fraction(round(part * side), side)
-
-
 def choose_frequencies(
     projector: Size,
     photos: int,
     window: int,
     *,
+    pitch: int = 1,
     typical: TypicalScenes = TYPICAL_SCENES,
     noise: float = NOISE,
     every_frequency: bool = False,
@@ -286,10 +244,10 @@ def choose_frequencies(
     projector : Size
     photos : int
         Photos of transport and references together.
-    window : int
-        W.
+    window, pitch : int
+        W, and the projector pixels between the window's functions.
     typical : TypicalScenes
-        What to plan for.
+        Scenes to plan for.
     noise : float
         Standard deviation of a response, as a share of white.
     every_frequency : bool
@@ -301,24 +259,8 @@ def choose_frequencies(
     -------
     FrequencyChoice
     """
-    references = max(FEWEST, photos // (REFERENCE_INTERVAL + 2))
-    half = max(FEWEST, references // 2)
-    # With as many photos as unknowns, nothing is left to what scenes are expected to be. For that,
-    # half of the references are given up, or all but the fewest where no scene is expected.
-    unknowns = projector.pixels - 1
-    is_complete = photos - 2 * (FEWEST if every_frequency else half) >= unknowns
-    errors: ExpectedErrors
-    if is_complete:
-        references = min(references, (photos - unknowns) // 2)
-        listed = _lowest_first(projector)
-        errors = errors_of_all_measured(listed, projector, window, typical, noise)
-    elif every_frequency:
-        references = half
-        listed = _lowest_first(projector)
-        errors = errors_of_none_measured(listed, projector, window, typical)
-    else:
-        listed = candidates(projector, window)
-        errors = ErrorsTogether(listed, projector, window, typical)
+    start = _start(projector, photos, window, pitch, typical, noise, every=every_frequency)
+    listed, errors, references = start.listed, start.errors, start.references
     cost = np.array([1 if k.is_own_negative else 2 for k in listed])
     left = photos - 2 * references
     chosen: dict[Frequency, int] = {}
@@ -328,26 +270,84 @@ def choose_frequencies(
         chosen[listed[place]] = chosen.get(listed[place], 0) + 1
         left -= int(cost[place])
 
-    if is_complete or every_frequency:
-        for place in range(len(listed)):
-            if cost[place] <= left:
-                take(place)
-                if not is_complete:
-                    errors.condition_on(place, noise)
-    else:
-        finest = listed.index(finest_pattern(projector))
-        take(finest)
-        errors.condition_on(finest, noise)
+    for place in start.first:
+        if cost[place] <= left:
+            take(place)
+            if not start.all_measured:
+                errors.condition_on(place, noise)
     while left > 0:
         relative = errors.gains(noise) / errors.errors()[..., None]
         per_photo = typical.weights @ np.einsum("l,slk->sk", LIGHT_WEIGHTS, relative) / cost
         per_photo[cost > left] = -np.inf
-        if not np.isfinite(per_photo.max()):
+        highest = per_photo.max()
+        if not np.isfinite(highest):
             break
-        best = int(np.argmax(per_photo))
+        best = int(np.argmax(per_photo >= highest * (1.0 - errors.rounding)))
         take(best)
         errors.condition_on(best, noise)
         if progress is not None:
             progress(photos - left)
-    expected = expected_of(errors, references, typical, noise)
-    return FrequencyChoice(chosen, references, expected)
+    expected = expected_of(errors, references, errors_of_place(projector, pitch), typical, noise)
+    return FrequencyChoice(chosen, start.of_direct, references, expected)
+
+
+class _Start(NamedTuple):
+    """What a choice starts from.
+
+    Attributes
+    ----------
+    references : int
+        How often white and black are each photographed.
+    listed : list of Frequency
+        What is chosen from.
+    errors : ExpectedErrors
+    first : list of int
+        Which of them are taken before any is chosen, as many as there are photos for.
+    of_direct : list of Frequency
+        Those that are taken for direct light.
+    all_measured : bool
+        Whether the errors are those after `first` already.
+    """
+
+    references: int
+    listed: list[Frequency]
+    errors: ExpectedErrors
+    first: Sequence[int]
+    of_direct: list[Frequency]
+    all_measured: bool = False
+
+
+def _start(
+    projector: Size,
+    photos: int,
+    window: int,
+    pitch: int,
+    typical: TypicalScenes,
+    noise: float,
+    *,
+    every: bool,
+) -> _Start:
+    references = max(FEWEST, photos // (REFERENCE_INTERVAL + 2))
+    half = max(FEWEST, references // 2)
+    # With as many photos as unknowns, nothing is left to what scenes are expected to be. For that,
+    # half of the references are given up, or all but the fewest where no scene is expected.
+    unknowns = projector.pixels - 1
+    finest = finest_pattern(projector)
+    if photos - 2 * (FEWEST if every else half) >= unknowns:
+        references = min(references, (photos - unknowns) // 2)
+        listed = lowest_first(projector)
+        measured = errors_of_all_measured(listed, projector, window, pitch, typical, noise)
+        return _Start(references, listed, measured, range(len(listed)), [finest], True)
+    if every:
+        listed = lowest_first(projector)
+        unknown = errors_of_none_measured(listed, projector, window, pitch, typical)
+        return _Start(half, listed, unknown, range(len(listed)), [finest])
+    if pitch == 1:
+        listed = candidates(projector, window)
+        together = ErrorsTogether(listed, projector, window, typical)
+        return _Start(references, listed, together, [listed.index(finest)], [finest])
+    high = high_frequencies(projector, pitch, photos)
+    listed = representatives([*candidates(projector, window, pitch), *high])
+    most = (photos - 2 * references) // 2
+    thin = ErrorsLowRank(listed, projector, window, pitch, typical, most)
+    return _Start(references, listed, thin, [listed.index(k) for k in high], high)

@@ -7,6 +7,10 @@ the picture's spectral density; under a random light all frequencies count alike
 
 Scenes differ, and an expectation for a scene that nobody has seen is a range.
 
+A window's functions are hats, as wide as the pitch on each side. In cycles per screen, and for the
+light of a function, they are the single pixels of a grid of cells, each of pitch x pitch projector
+pixels; what is said of typical scenes in pixels holds for cells.
+
 Index convention: k runs over candidate frequencies, j over prior components with cosines and sines
 apart, which are independent because a window's prior is the same to both sides of q.
 """
@@ -17,20 +21,26 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from nearfar.arrays import Floats, Size
-from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import Frequency, as_array
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.real_basis import real_basis
+from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.priors.typical import TypicalScenes
 
 # Standard deviation of direct light in the typical scenes, as a share of white.
 TYPICAL_DIRECT_DEVIATION = 0.5
+# Standard deviation of q on each axis at a pitch over 1, in projector pixels, for what is expected
+# alone. Phase finds q to a tenth of a pixel in dim light and to a few hundredths in bright.
+TYPICAL_Q_DEVIATION = 0.05
 # All frequencies up to as many cycles per pattern grid are candidates of a plan, each for itself.
 LOWEST_CYCLES = 8
 # Up to this many frequencies, what those of a complete plan tell of one another is counted.
 MOST_TOGETHER = 1024
 # Squared mean of a picture, and the variance about it, as shares of white squared.
 PICTURE_SQUARED_MEAN, PICTURE_VARIANCE = 0.25, 0.06
+# Variance of a uniform random light.
+RANDOM_VARIANCE = 1.0 / 12.0
 # What relighting reached less what was expected of the typical scenes, dB, from the lowest to the
 # highest: all six built-in scenes at two sizes and four or five budgets each, with a margin of half
 # a decibel (docs/decisions/0041). Where a first estimate of the scene was planned for, the same.
@@ -79,9 +89,12 @@ class ExpectedErrors(Protocol):
     ----------
     weights : ndarray, shape (2, K)
         See `light_weights`.
+    rounding : float
+        Share by which gains may differ and count as equal; the first of the equal ones is chosen.
     """
 
     weights: Floats
+    rounding: float
 
     def errors(self) -> Floats:
         """Return the expected squared errors of pictures and of the random light, (scenes, 2)."""
@@ -97,15 +110,23 @@ class ExpectedErrors(Protocol):
 
 
 class ErrorsTogether:
-    """Posterior covariances of the responses of typical camera pixels while a plan grows."""
+    """Posterior covariances of the responses of typical camera pixels while a plan grows.
+
+    At a pitch of 1. Frequencies that mirror one another are worth the same, and rounding decides
+    between them: `nearfar.plan.low_rank`, several times as fast, chooses others as good.
+    """
+
+    rounding: float = 0.0
 
     def __init__(
         self, frequencies: list[Frequency], projector: Size, window: int, typical: TypicalScenes
     ) -> None:
-        parts = list(_covariances(frequencies, projector, window, typical))
-        self.covariance = np.stack(parts)
+        count = len(frequencies)
+        self.covariance = np.empty((2 * len(typical.prior_components), count, count))
+        for place, covariance in _covariances(frequencies, projector, window, 1, typical):
+            self.covariance[place] = covariance
         self.shares = np.repeat(typical.shares, 2, axis=1)
-        self.weights = light_weights(frequencies, projector)
+        self.weights = light_weights(frequencies, projector, 1)
 
     def errors(self) -> Floats:
         """Return the expected squared errors of pictures and of the random light, (scenes, 2)."""
@@ -136,16 +157,19 @@ class ErrorsApart:
         Of each response, so far.
     """
 
+    rounding: float = 0.0
+
     def __init__(
         self,
         variance: Floats,
         frequencies: list[Frequency],
         projector: Size,
+        pitch: int,
         typical: TypicalScenes,
     ) -> None:
         self.variance = variance
         self.shares = np.repeat(typical.shares, 2, axis=1)
-        self.weights = light_weights(frequencies, projector)
+        self.weights = light_weights(frequencies, projector, pitch)
 
     def errors(self) -> Floats:
         """Return the expected squared errors, as `ErrorsTogether.errors`."""
@@ -166,6 +190,7 @@ def errors_of_all_measured(
     frequencies: list[Frequency],
     projector: Size,
     window: int,
+    pitch: int,
     typical: TypicalScenes,
     noise: float,
 ) -> ErrorsApart:
@@ -175,17 +200,19 @@ def errors_of_all_measured(
         variance = np.full((2 * len(typical.prior_components), len(frequencies)), squared)
     else:
         unit = squared * np.eye(len(frequencies))
-        variance = np.stack(
-            [
-                squared * (1.0 - squared * np.diagonal(np.linalg.inv(covariance + unit)))
-                for covariance in _covariances(frequencies, projector, window, typical)
-            ]
-        )
-    return ErrorsApart(variance, frequencies, projector, typical)
+        variance = np.empty((2 * len(typical.prior_components), len(frequencies)))
+        for place, covariance in _covariances(frequencies, projector, window, pitch, typical):
+            left = np.diagonal(np.linalg.inv(covariance + unit))
+            variance[place] = squared * (1.0 - squared * left)
+    return ErrorsApart(variance, frequencies, projector, pitch, typical)
 
 
 def errors_of_none_measured(
-    frequencies: list[Frequency], projector: Size, window: int, typical: TypicalScenes
+    frequencies: list[Frequency],
+    projector: Size,
+    window: int,
+    pitch: int,
+    typical: TypicalScenes,
 ) -> ErrorsApart:
     """Return the errors of a plan that has measured nothing, of direct light known all the same.
 
@@ -193,8 +220,7 @@ def errors_of_none_measured(
     none what the other frequencies answer.
     """
     basis = real_basis(frequencies, projector)
-    angle = 2 * np.pi * (as_array(frequencies) @ window_offsets(window).T)
-    cosines, sines = np.cos(angle), np.sin(angle)
+    cosines, sines = waves_on_window(frequencies, window, pitch)
     paired = np.array([not k.is_own_negative for k in frequencies])
     variance = []
     for prior_component, scale in typical.prior_components:
@@ -203,51 +229,94 @@ def errors_of_none_measured(
         for waves, has in ((cosines, np.ones_like(paired)), (sines, paired)):
             near = np.einsum("kw,kw->k", waves @ covariance, waves)
             variance.append(scale**2 * (near + far) * has)
-    return ErrorsApart(np.stack(variance), frequencies, projector, typical)
+    return ErrorsApart(np.stack(variance), frequencies, projector, pitch, typical)
+
+
+def waves_on_window(frequencies: list[Frequency], window: int, pitch: int) -> tuple[Floats, Floats]:
+    """Return the responses of a window's functions to cosines and to sines, (K, W^2) each.
+
+    A hat of 2 * pitch - 1 projector pixels, of light 1, answers exp(-j 2 pi k.p) as the square of
+    a box of pitch pixels does on each axis; at a pitch of 1 it is a single pixel, and answers 1.
+    """
+    cycles = as_array(frequencies)
+    hat = np.prod((np.sinc(pitch * cycles) / np.sinc(cycles)) ** 2, axis=1)[:, None]
+    angle = 2 * np.pi * (cycles @ (pitch * window_offsets(window)).T)
+    return np.asarray(hat * np.cos(angle)), np.asarray(hat * np.sin(angle))
 
 
 def _covariances(
-    frequencies: list[Frequency], projector: Size, window: int, typical: TypicalScenes
-) -> Iterator[Floats]:
-    """Yield the covariances of cosines, and of sines, of each prior component, (K, K)."""
+    frequencies: list[Frequency],
+    projector: Size,
+    window: int,
+    pitch: int,
+    typical: TypicalScenes,
+) -> Iterator[tuple[int, Floats]]:
+    """Yield j and the covariance, (K, K), of each prior component's cosines and of its sines."""
     basis = real_basis(frequencies, projector)
-    angle = 2 * np.pi * (as_array(frequencies) @ window_offsets(window).T)
-    cosines, sines = np.cos(angle), np.sin(angle)
+    cosines, sines = waves_on_window(frequencies, window, pitch)
     paired = np.array([not k.is_own_negative for k in frequencies])
-    for prior_component, scale in typical.prior_components:
+    # Components that differ in scale alone share what takes longest.
+    scales: dict[PriorComponent, list[tuple[int, float]]] = {}
+    for place, (prior_component, scale) in enumerate(typical.prior_components):
+        scales.setdefault(prior_component, []).append((place, scale))
+    for prior_component, places in scales.items():
         covariance = near_covariance(prior_component, window, projector)
         far = np.diag(far_variance(basis, prior_component)[~basis.is_sine])
         direct = np.full_like(far, TYPICAL_DIRECT_DEVIATION**2)
-        squared = scale**2
-        yield direct + squared * (cosines @ covariance @ cosines.T + far)
-        yield squared * (sines @ covariance @ sines.T + far) * np.outer(paired, paired)
+        of_cosines = cosines @ covariance @ cosines.T + far
+        of_sines = sines @ covariance @ sines.T + far
+        for place, scale in places:
+            yield 2 * place, direct + scale**2 * of_cosines
+            yield 2 * place + 1, scale**2 * of_sines * np.outer(paired, paired)
 
 
-def light_weights(frequencies: list[Frequency], projector: Size) -> Floats:
-    """Return how much of pictures' and of the random light's variance each candidate holds, (2, K).
+def light_weights(frequencies: list[Frequency], projector: Size, pitch: int) -> Floats:
+    """Return the variance of pictures and of a random light at each candidate frequency, (2, K).
 
-    A low frequency stands for itself, one of the coarse grid for all around it.
+    A low frequency stands for itself, one of the coarse grid for all frequencies around it. Light
+    is that of the grid of cells: frequencies of more than half a cycle a cell on an axis hold none.
     """
     points = as_array(frequencies)
     density = 1.0 / np.sum((points * np.array(projector)) ** 2, axis=1)
     low = np.all(np.abs(points) * np.array(projector) <= LOWEST_CYCLES, axis=1)
+    half = 0.5 / pitch + 0.5 / np.array(projector)
+    within = np.all(np.abs(points) <= half, axis=1)
     below = int(np.count_nonzero(low))
-    beyond = max(projector.pixels / 2 - below, 0.0)
-    area = np.where(low, 1.0, beyond / max(len(low) - below, 1))
-    # A uniform random light has the variance 1/12.
+    beyond = max(projector.pixels / pitch**2 / 2 - below, 0.0)
+    coarse = max(int(np.count_nonzero(within)) - below, 1)
+    area = np.where(low, 1.0, beyond / coarse) * within
     pictures, even = density * area, area
     return np.stack([PICTURE_VARIANCE * pictures / pictures.sum(), even / even.sum() / 12.0])
 
 
+def errors_of_place(projector: Size, pitch: int) -> Floats:
+    """Return the squared errors of pictures and of the random light that q makes, (2,).
+
+    At a pitch of 1 they are not counted: what relighting reached has them in it. Beyond it light is
+    as fine as the projector's pixels, and direct light that is looked up beside its place is wrong
+    by as much as light differs there. That is little but at the few edges of pictures; a random
+    light differs from each pixel to the next.
+    """
+    if pitch == 1:
+        return np.zeros(2)
+    difference = 2.0 * RANDOM_VARIANCE * sum(side > 1 for side in projector)
+    lost = (TYPICAL_DIRECT_DEVIATION * TYPICAL_Q_DEVIATION) ** 2
+    return np.array([0.0, lost * difference])
+
+
 def expected_of(
-    errors: ExpectedErrors, references: int, typical: TypicalScenes, noise: float
+    errors: ExpectedErrors,
+    references: int,
+    of_place: Floats,
+    typical: TypicalScenes,
+    noise: float,
 ) -> Expected:
-    """Return the SNR_b that errors come to, beside those of so many whites and blacks."""
+    """Return the SNR_b that errors come to, beside those of q and of so many whites and blacks."""
     # White has twice the light of a sinusoid, and is one response and not half of one; its error
     # is in every other response too.
     of_white = PICTURE_SQUARED_MEAN + errors.weights.sum(axis=1)
     common = 0.5 * noise**2 / references * of_white
-    light = PICTURE_SQUARED_MEAN + np.array([PICTURE_VARIANCE, 1.0 / 12.0])
-    decibels = 10 * np.log10(light / (errors.errors() + common))
+    light = PICTURE_SQUARED_MEAN + np.array([PICTURE_VARIANCE, RANDOM_VARIANCE])
+    decibels = 10 * np.log10(light / (errors.errors() + common + of_place))
     expected = np.average(decibels, axis=0, weights=typical.weights)
     return Expected(*(float(value) for value in expected))

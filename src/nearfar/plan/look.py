@@ -1,4 +1,4 @@
-"""What a first estimate of a scene shows: what to plan for when it is measured again."""
+"""Looks: first estimates of scenes, from few photos, by which to plan for more photos."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from nearfar.arrays import Size
 from nearfar.plan.choose import choose_frequencies
-from nearfar.plan.model import largest_window
 from nearfar.plan.typical import noise_of, typical_of
+from nearfar.plan.window import largest_window, pitch_of
 from nearfar.priors.fitted import FREE
 from nearfar.priors.typical import TypicalScenes
 
@@ -22,19 +22,19 @@ WINDOW_OVER_REACH = 5.4
 LARGEST_WINDOW = 25
 # Near-range light of less than this share of all light tells no reach.
 LEAST_NEAR_SHARE = 0.01
-# Share of the squared light that is of camera pixels with free rows, above which the model does not
-# hold. In looks of 30 to 80 photos it was at most 0.08 on the built-in scenes, and 0.15 to 0.85 on
-# caustics, glass, hair, dense and permuted rows.
+# The model does not hold where camera pixels with free rows have more than this share of the
+# squared light. In looks of 30 to 80 photos it was at most 0.08 on the built-in scenes, and 0.15 to
+# 0.85 on caustics, glass, hair, dense and permuted rows.
 LARGEST_FREE_SHARE = 0.12
 
 
 class Look(NamedTuple):
-    """What a first estimate of a scene shows.
+    """Priors, noise and reach of near-range light in a first estimate of a scene.
 
     Attributes
     ----------
     typical : TypicalScenes
-        The mixture of prior components that it found.
+        The mixture of prior components that the estimate chose.
     noise : float
         Standard deviation of the response to a sinusoid, as a share of white.
     window : int
@@ -45,7 +45,7 @@ class Look(NamedTuple):
     wanted_window : int
         W that holds near-range light of this reach; not below that of the estimate.
     free_share : float
-        Share of the squared light that is of camera pixels whose rows no model describes.
+        Share of the squared light at camera pixels whose rows no model describes.
     """
 
     typical: TypicalScenes
@@ -57,12 +57,12 @@ class Look(NamedTuple):
 
     @property
     def model_holds(self) -> bool:
-        """Whether the scene is direct, near-range and far-range light."""
+        """Whether direct, near-range and far-range light describe the scene."""
         return self.free_share <= LARGEST_FREE_SHARE
 
 
 def look_at(transport: "Transport") -> Look:
-    """Return what a first estimate shows.
+    """Return priors, noise and reach of near-range light of a first estimate.
 
     Parameters
     ----------
@@ -112,7 +112,12 @@ def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> 
 
     def expected(photos: int, window: int) -> float:
         choice = choose_frequencies(
-            projector, photos, window, typical=look.typical, noise=look.noise
+            projector,
+            photos,
+            window,
+            pitch=pitch_of(projector),
+            typical=look.typical,
+            noise=look.noise,
         )
         return choice.expected.pictures
 
@@ -123,13 +128,14 @@ def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> 
 
 
 def _reach(transport: "Transport") -> float | None:
-    """Return the distance in which the mean window falls by a factor e; None if it tells none.
+    """Return the functions over which the mean window falls by a factor e; None without light.
 
-    Next to q near-range light is hard to tell from direct light, so that it is left out.
+    The entry at q is left out, where near-range light is hard to tell from direct light.
     """
     side = np.abs(np.arange(transport.window) - transport.window // 2)
     distance = np.maximum(side[:, None], side)
-    window = transport.near.astype(np.float64).mean(axis=(0, 1, 2))
+    coarsest = transport.near.reshape(*transport.near.shape[:3], -1)[..., : transport.window**2]
+    window = coarsest.astype(np.float64).mean(axis=(0, 1, 2)).reshape(side.size, side.size)
     # Beyond a projector of a single row entries are 0.
     entries = [window[(distance == r) & (window != 0)] for r in range(1, transport.window // 2 + 1)]
     light = np.array([float(np.mean(entry)) for entry in entries if entry.size])

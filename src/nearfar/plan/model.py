@@ -20,7 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from nearfar.arrays import AnyPath, Size, as_size
+from nearfar.arrays import AnyPath, Floats, Size, as_size
 from nearfar.errors import MissingFileError, PlanError, UnreadableFileError
 from nearfar.plan.correspondence import CORRESPONDENCE_METHODS, pattern_types_of
 from nearfar.plan.patterns import (
@@ -34,10 +34,10 @@ from nearfar.plan.patterns import (
 )
 
 # Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
-# 3 Gray code, version 4 half-screens and inverse pictures; a plan of an earlier version is one of
-# the next as well.
-FORMAT_VERSION = 4
-READABLE_VERSIONS = (1, 2, 3, 4)
+# 3 Gray code, version 4 half-screens and inverse pictures, version 5 the pitch. A plan of an
+# earlier version is one of the next as well.
+FORMAT_VERSION = 5
+READABLE_VERSIONS = (1, 2, 3, 4, 5)
 
 # Characters of a message that are quoted from a plan.
 MAXIMUM_REASON = 200
@@ -45,6 +45,9 @@ MAXIMUM_NAME = 60
 
 PURPOSES: tuple[Purpose, ...] = ("direct", "near", "far", "reference", "correspondence", "check")
 
+
+# Patterns of a longer side are averaged for a notebook's card.
+SIDE_ON_A_CARD = 256
 
 # No projector has a longer side.
 LARGEST_SIDE = 16384
@@ -66,7 +69,11 @@ class Plan(Frozen):
     projector : Size
         Pattern grid.
     window : int
-        W of the near-range window, W x W; 1 x W on a projector of one row, W x 1 of one column.
+        W of the near-range window, W x W functions; 1 x W on a projector of one row, W x 1 of one
+        column.
+    pitch : int
+        Projector pixels between neighbouring functions of the window, a power of two; 1 for the
+        paper's window of single pixels.
     far, dropped : Size
         Far band, and the block of lowest near frequencies that are not shot.
     offset : {"inverse", "reference", "none"}
@@ -89,9 +96,10 @@ class Plan(Frozen):
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[4] = 4
+    version: Literal[5] = 5
     projector: SizeField
     window: int = Field(ge=1, strict=True)
+    pitch: int = Field(default=1, ge=1, le=LARGEST_SIDE, strict=True)
     far: SizeField
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
@@ -109,6 +117,13 @@ class Plan(Frozen):
                 {"name": repr(name[:MAXIMUM_NAME]), "known": ", ".join(CORRESPONDENCE_METHODS)},
             )
         return name
+
+    @field_validator("pitch")
+    @classmethod
+    def _pitch_is_a_power_of_two(cls, pitch: int) -> int:
+        if pitch & (pitch - 1):
+            raise ValueError(f"a pitch of {pitch} is not a power of two")
+        return pitch
 
     @field_validator("patterns", mode="before")
     @classmethod
@@ -131,9 +146,10 @@ class Plan(Frozen):
     def _is_a_plan_for_the_projector(self) -> "Plan":
         # Before anybody works with them for minutes.
         widest = self.projector if min(self.projector) > 1 else _square(max(self.projector))
+        window = _square(self.pitch * (self.window - 1) + 1)
         for name, size, largest in (
             ("projector", self.projector, Size(LARGEST_SIDE, LARGEST_SIDE)),
-            ("window", _square(self.window), widest),
+            ("window", window, widest),
             ("far", self.far, self.projector),
             ("dropped", self.dropped, _square(self.window)),
         ):
@@ -213,13 +229,13 @@ class Plan(Frozen):
         counted = ", ".join(f"{count} {name}" for name, count in self.counts.items() if count)
         rows = [
             ("projector", str(self.projector)),
-            ("window W, far band", f"{self.window}, {self.far}"),
+            ("window W, its pitch, far band", f"{self.window}, {self.pitch}, {self.far}"),
             ("offset, correspondence", f"{self.offset}, {self.correspondence}"),
             ("photos", f"{len(self.patterns)}: {counted}"),
             ("brute force over photos of transport", f"{self.savings:.2f}"),
         ]
         chosen = [] if self.offset == "none" else [0, *range(3, len(self.patterns), 7)][:5]
-        images = [(f"pattern {i}", picture(self.draw(i) / np.float32(255), "")) for i in chosen]
+        images = [(f"pattern {i}", picture(_small(self.draw(i)), "")) for i in chosen]
         return card("plan", rows, images)
 
     def to_json(self) -> str:
@@ -230,12 +246,15 @@ class Plan(Frozen):
         return f'{{\n{head},\n  "patterns": [\n{lines}\n  ]\n}}\n'
 
 
-def largest_window(projector: Size) -> int:
-    """Return the largest W: the shorter side, or the longer one where the other is one pixel.
-
-    On a projector of one row, a window is the part of its middle row that lies on the projector.
-    """
-    return min(projector) if min(projector) > 1 else max(projector)
+def _small(drawn: NDArray[np.uint8]) -> Floats:
+    """Return a pattern in [0, 1] for the card of a notebook: averages where it has many pixels."""
+    side = -(-max(drawn.shape) // SIDE_ON_A_CARD)
+    if side == 1 or min(drawn.shape) < side:
+        return np.asarray(drawn / np.float32(255))
+    height, width = (length // side for length in drawn.shape)
+    cut = drawn[: height * side, : width * side]
+    averaged = cut.reshape(height, side, width, side).mean(axis=(1, 3), dtype=np.float32)
+    return np.asarray(averaged / np.float32(255))
 
 
 def _square(side: int) -> Size:

@@ -93,8 +93,8 @@ class Sinusoid(Pattern):
 
     def draw(self, size: Size) -> NDArray[np.uint8]:
         """Draw the 8-bit pattern, shape (Py, Px)."""
-        shape = patterns.cosine if self.kind == "cosine" else patterns.sine
-        drawn = patterns.quantise(shape(self.frequency, size))
+        wave = patterns.cosine if self.kind == "cosine" else patterns.sine
+        drawn = patterns.draw_wave(wave, self.frequency, size)
         return patterns.invert(drawn) if self.inverse else drawn
 
 

@@ -8,12 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Size
-from nearfar.illumination.centred_basis import reachable, window_offsets
+from nearfar.illumination.near_basis import NearBasis, reachable, window_offsets
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.priors.component import PriorComponent
 
 # Length, in projector pixels, over which neighbouring window entries are correlated.
 CORRELATION_LENGTH = 1.0
+# At pitches of several projector pixels: the correlation length at q, in cells, its growth with
+# distance, and the distance at which it has become `CORRELATION_LENGTH`.
+LENGTH_AT_Q = 0.15
+LENGTH_GROWTH = 0.85
+LAST_SHARP = (CORRELATION_LENGTH - LENGTH_AT_Q) / LENGTH_GROWTH
 # Floor of far-range light's spectral density, as a share of that at DC: sharp shadows have light
 # at every frequency.
 SPECTRAL_DENSITY_FLOOR = 1e-6
@@ -89,3 +94,42 @@ def near_covariance(prior_component: PriorComponent, window: int, projector: Siz
     deviation, smooth, independent = near_covariance_factors(prior_component, window, projector)
     middle = np.kron(smooth, smooth) + np.diag(independent)
     return np.asarray(deviation[:, None] * middle * deviation)
+
+
+def covariance_of_coefficients(
+    prior_component: PriorComponent, near_basis: NearBasis, projector: Size
+) -> Floats:
+    """Return the covariance of the coefficients of near-range light at unit prior scale, (J, J).
+
+    `near_covariance` for single pixels. Else lengths count in cells of the coarsest pitch. Light
+    next to q is correlated over shorter distances than that farther away, so that it may be as
+    sharp as the finest functions.
+    """
+    if near_basis.pitch == 1:
+        return near_covariance(prior_component, near_basis.window, projector)
+    cells = near_basis.offsets / near_basis.pitch
+    coarse = near_basis.window**2
+    if prior_component.near_reach == 0:
+        return np.zeros((len(cells), len(cells)))
+    distance = np.hypot(cells[:, 0], cells[:, 1])
+    deviation = np.exp(-distance / prior_component.near_reach)
+    deviation *= np.all(np.abs(near_basis.offsets) < projector, axis=1)
+    # Distances in correlation lengths, which grow up to a cell away from q.
+    lengths = _correlation_lengths(distance)
+    stretch = np.divide(lengths, distance, out=np.ones_like(lengths), where=distance > 0)
+    warped = cells * stretch[:, None]
+    apart = np.sum((warped[:, None] - warped) ** 2, axis=-1)
+    densities = deviation[:, None] * np.exp(-apart / 2) * deviation
+    covariance = near_basis.from_densities @ densities @ near_basis.from_densities.T
+    around = np.flatnonzero(np.abs(cells[:coarse]).max(axis=1) <= 1)
+    independent = (prior_component.roughness * deviation[:coarse]) ** 2
+    independent[around] += prior_component.direct_spread**2
+    covariance[np.arange(coarse), np.arange(coarse)] += independent
+    return np.asarray(covariance)
+
+
+def _correlation_lengths(distance: Floats) -> Floats:
+    """Return distances from q, in cells, in units of the correlation length at every distance."""
+    near = np.minimum(distance, LAST_SHARP)
+    within = np.log1p(near * LENGTH_GROWTH / LENGTH_AT_Q) / LENGTH_GROWTH
+    return np.asarray(within + np.maximum(distance - LAST_SHARP, 0.0) / CORRELATION_LENGTH)

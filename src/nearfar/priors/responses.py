@@ -21,8 +21,8 @@ from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import (
     NearCovariance,
+    covariance_of_coefficients,
     far_variance,
-    near_covariance,
     near_covariance_factors,
 )
 
@@ -135,9 +135,8 @@ def response_prior(
         m, how often each response was measured.
     """
     patterns = centred.on_window.astype(np.float64)
-    window = round(np.sqrt(patterns.shape[1]))
     projector = centred.basis.projector
-    covariance = near_covariance(prior_component, window, projector)
+    covariance = covariance_of_coefficients(prior_component, centred.near_basis, projector)
     seen = patterns @ covariance
     variance = far_variance(centred.basis, prior_component)
     eigenvalues, eigenvectors = _eigenbasis(seen @ patterns.T + np.diag(variance), multiplicity)
@@ -155,7 +154,7 @@ def response_prior(
         variance_ratios=VARIANCE_RATIOS,
         spike_information=(precision @ of_window**2).astype(np.float32),
         noise_gain=shrinkage**2 @ np.sum(to_near**2, axis=1) / to_near.shape[1],
-        factors=near_covariance_factors(prior_component, window, projector),
+        factors=near_covariance_factors(prior_component, centred.near_basis.window, projector),
         covariance=covariance,
         far_variance=variance,
     )

@@ -1,4 +1,4 @@
-"""What a page says of itself: the methods, ready to cite, and when and by what it was made."""
+"""The end of a page: the methods, ready to cite, the date, and the command line."""
 
 import os
 from datetime import UTC, datetime
@@ -55,7 +55,7 @@ def about_page(methods: Methods | None, command: str | None) -> str:
     ----------
     methods : Methods, optional
     command : str, optional
-        What was typed; None of a page that was made by Python.
+        The command line; None for a page made in Python.
     """
     typed = "none: made in Python" if command is None else f"<code>{escape(command)}</code>"
     rows = [

@@ -16,6 +16,8 @@ from nearfar.rigs.tables import read_rig_table
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.transport.exact_store import KIND as EXACT_KIND
 from nearfar.transport.exact_store import load_exact
+from nearfar.transport.gains import why_unjudgeable
+from nearfar.transport.model import Transport
 from nearfar.transport.operator_store import KIND as OPERATOR_KIND
 from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
@@ -137,7 +139,7 @@ def _describe_transport(path: Path) -> str:
     shares = ", ".join(f"{name} {value / total:.1%}" for name, value in sums.items() if total)
     return "\n".join(
         [
-            NOT_JUDGED if transport.verdict is None else str(transport.verdict),
+            _verdict_of(transport),
             f"{TRANSPORT_KIND}: projector {transport.projector}, camera {transport.camera}, "
             f"{_channels(transport.channels)}, W = {transport.window}, "
             f"{transport.far_basis.count} far coefficients",
@@ -146,6 +148,14 @@ def _describe_transport(path: Path) -> str:
             f"provenance: {json.dumps(dict(transport.provenance))}",
         ]
     )
+
+
+def _verdict_of(transport: Transport) -> str:
+    """Return the verdict on a transport, or why there is none."""
+    if transport.verdict is not None:
+        return str(transport.verdict)
+    why = why_unjudgeable(transport.provenance)
+    return NOT_JUDGED if why is None else f"not judged: it {why}"
 
 
 def _describe_exact(path: Path) -> str:

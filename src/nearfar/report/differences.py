@@ -19,7 +19,7 @@ def difference_gain(differences: Iterable[Floats]) -> int:
     Parameters
     ----------
     differences : iterable of ndarray
-        What is shown, at full scale 1; the sign does not matter.
+        Full scale is 1; signs are ignored.
 
     Returns
     -------

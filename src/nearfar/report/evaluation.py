@@ -50,7 +50,7 @@ def evaluation_page(
     rows : Rows, optional
         SNR of each row; given if the true transport is known.
     faults : sequence of str
-        What is wrong with what was compared, a sentence each.
+        Faults of the pictures that were compared, a sentence each.
     command : str, optional
         As `nearfar.report.page.page` takes it.
     """

@@ -7,6 +7,7 @@ from nearfar.arrays import Size
 from nearfar.plan import Plan
 from nearfar.release import version
 from nearfar.report.about import PAPER, Methods, software_reference
+from nearfar.report.plan import describe_window
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.check import ModelCheck
@@ -83,7 +84,7 @@ def reconstruction_methods(
         f"{', '.join(purposes)}.",
         OFFSETS[plan.offset],
         _correspondence(plan, given=correspondence_given),
-        _estimate(transport.provenance, plan.window, plan.far),
+        _estimate(transport.provenance, describe_window(plan.window, plan.pitch), plan.far),
     ]
     return _methods([*sentences, checked])
 
@@ -112,11 +113,11 @@ def _correspondence(plan: Plan, *, given: bool) -> str:
     return f"{which} was found {how}."
 
 
-def _estimate(provenance: Mapping[str, Any], window: int, far: Size) -> str:
+def _estimate(provenance: Mapping[str, Any], window: str, far: Size) -> str:
     method = provenance["method"]
     parts = (
         f"Light was taken to be the sum of direct light, near-range light from a window of "
-        f"{window} x {window} projector pixels about it, and far-range light in a band of {far} "
+        f"{window} about it, and far-range light in a band of {far} "
         f"frequencies"
     )
     parts += " and at the others that were measured. " if method == "joint" else ". "
@@ -144,7 +145,11 @@ def evaluation_methods(provenance: Mapping[str, Any], lights: int, *, by_truth: 
         sentences = [
             f"The light transport was measured from {plan['photos']} photos by frequency-space "
             f"decomposition [1].",
-            _estimate(provenance, plan["window"], Size(*plan["far"])),
+            _estimate(
+                provenance,
+                describe_window(plan["window"], plan.get("pitch", 1)),
+                Size(*plan["far"]),
+            ),
         ]
     known = "those of the known transport" if by_truth else "photos that no estimate used"
     sentences.append(

@@ -148,7 +148,7 @@ def colour_map(
 
 
 def figure_caption(caption: str, reading: str) -> str:
-    """Return what a figure shows, and how to read it."""
+    """Return the <figcaption> of a figure: its title, and how to read it."""
     first = f"<b>{escape(caption[:1].upper() + caption[1:])}.</b> " if caption else ""
     return f"<figcaption>{first}{escape(reading)}</figcaption>" if caption or reading else ""
 
@@ -178,7 +178,7 @@ def gallery(columns: list[str], rows: list[tuple[str, list[str]]]) -> str:
 
 
 def facts(pairs: list[tuple[str, str]]) -> str:
-    """Return cards, each with a figure and what it means."""
+    """Return cards of numbers, each with its meaning."""
     cards = "".join(
         f'<div class="fact"><b>{escape(value)}</b><span>{escape(name)}</span></div>'
         for value, name in pairs

@@ -4,6 +4,7 @@ from nearfar.plan import Plan
 from nearfar.plan.choose import MOST_LISTED, photos_of_every_frequency
 from nearfar.plan.expect import ExpectedRange
 from nearfar.plan.look import Look
+from nearfar.plan.window import largest_window
 
 
 def describe_plan(plan: Plan) -> str:
@@ -22,6 +23,7 @@ def describe_plan(plan: Plan) -> str:
         [
             f"projector {plan.projector}, W = {plan.window}, far band {plan.far}, "
             f"near frequencies dropped {plan.dropped}, offset {plan.offset}",
+            *([] if plan.pitch == 1 else [_describe_pitch(plan)]),
             f"{len(plan.patterns)} photos: {counts}",
             f"{_against(plan)}; counting the {plan.transport_photos} of transport alone, "
             f"{plan.savings:.2f} times fewer",
@@ -29,14 +31,34 @@ def describe_plan(plan: Plan) -> str:
     )
 
 
+def _describe_pitch(plan: Plan) -> str:
+    """Describe the window of a plan at a pitch, and tell what plans of blocks are for."""
+    side = largest_window(plan.projector)
+    reach = plan.window // 2 * plan.pitch
+    return (
+        f"for every projector pixel: the window's functions are {plan.pitch} projector pixels "
+        f"apart, and hold near-range light up to {reach} pixels from q, {reach / side:.0%} of the "
+        f"screen's shorter side. In dim light, or from few photos, plan for blocks of pixels: a "
+        f"smaller projector, whose patterns are enlarged for the screen"
+    )
+
+
+def describe_window(window: int, pitch: int) -> str:
+    """Return the size of a window in a few words, such as "11 x 11 projector pixels"."""
+    size = f"{window} x {window}"
+    if pitch == 1:
+        return f"{size} projector pixels"
+    return f"{size} functions {pitch} projector pixels apart"
+
+
 def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
-    """Return what relighting is expected to reach, and for which scenes, in a sentence.
+    """Return a sentence on the expected SNR_b of relighting and the scenes that it holds for.
 
     Parameters
     ----------
     expected : ExpectedRange
     is_looked_at : bool
-        Whether it follows from a first estimate of the scene, not from typical scenes.
+        Whether a first estimate of the scene gave the priors, and not typical scenes.
     """
     ranges = " and ".join(
         f"{low:.0f} to {high:.0f} dB under {light}"
@@ -51,7 +73,7 @@ def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
 
 
 def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
-    """Return what a plan takes from a first estimate of the scene, and by what it was decided.
+    """Return a sentence on how a first estimate of the scene decided the window of a plan.
 
     Parameters
     ----------
@@ -77,7 +99,8 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
     if look.reach is None:
         return f"the look shows hardly any near-range light: planned with W = {plan.window}"
     more = " or more" if look.reach >= look.window else ""
-    falls = f"near-range light falls by a factor e in {look.reach:.1f}{more} projector pixels"
+    reach = look.reach * plan.pitch
+    falls = f"near-range light falls by a factor e in {reach:.1f}{more} projector pixels"
     if photos_for_window is None:
         return f"{falls} in the look: planned with W = {plan.window}"
     wanted = ", as asked"

@@ -19,6 +19,7 @@ from nearfar.report.maps import TITLES, Map, maps_of
 from nearfar.report.methods import checked_by_photos, counted, reconstruction_methods
 from nearfar.report.misfit import misfit_section
 from nearfar.report.page import colour_map, facts, gallery, listed, page, plot, verdict_box
+from nearfar.report.plan import describe_window
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps
@@ -252,7 +253,7 @@ def _histogram(each: Map) -> Figure:
 def _plan_table(plan: Plan) -> str:
     rows = [[PURPOSES[name], str(count)] for name, count in plan.counts.items() if count]
     rows.append(["all photos", str(len(plan.patterns))])
-    rows.append(["window of near-range light", f"{plan.window} x {plan.window}"])
+    rows.append(["window of near-range light", describe_window(plan.window, plan.pitch)])
     rows.append(["far band", str(plan.far)])
     return numbers(["photos", "number"], rows)
 

@@ -22,14 +22,19 @@ from nearfar.checks import (
     finite_numbers,
 )
 from nearfar.errors import InputError
+from nearfar.illumination.near_basis import NearBasis, basis_of
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.adjoint import AdjointTransport
+from nearfar.transport.blurred import blurred_adjoint, blurred_pictures
+from nearfar.transport.boxes import box_places
+from nearfar.transport.gains import as_gains, with_gains
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior
+from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.quality import Quality
 from nearfar.transport.verdict import KeptVerdict
 
@@ -64,12 +69,19 @@ class Transport(NoArray):
     direct : ndarray, shape (Cy, Cx, channels), float32
         d, spread over the 2 x 2 projector pixels around q.
     near : ndarray, shape (Cy, Cx, channels, W, W), float32
-        n over the window around the rounded q; 0 beyond the projector's border.
+        n over the window around the rounded q; 0 beyond the projector's border. Where `pitch` is
+        over 1, (Cy, Cx, channels, J): light under white of each function of `near_basis`.
     far : ndarray, shape (Cy, Cx, channels, M), float32
         Responses of F to the cosines and sines of `far_basis`.
     far_basis : RealBasis
         Frequencies of F: of a joint estimate, those of the far band and all others that were
         measured on the DFT grid of the projector.
+    pitch : int
+        Projector pixels between the coarsest functions that near-range light is made of, a power of
+        two; 1 for single pixels.
+    footprint : ndarray, shape (Cy, Cx, 2), float32, or None
+        Where `pitch` is over 1, height and width of the box of projector pixels about q over which
+        d is spread.
     black : ndarray, shape (Cy, Cx, channels), float32
         The photo under black: ambient light and black level.
     noise : ndarray, shape (Cy, Cx, channels), float32
@@ -109,6 +121,8 @@ class Transport(NoArray):
     black: Floats
     noise: Floats
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    pitch: int = 1
+    footprint: Floats | None = None
     posterior: Posterior | None = None
     quality: Quality | None = None
     verdict: KeptVerdict | None = None
@@ -126,7 +140,24 @@ class Transport(NoArray):
     @property
     def window(self) -> int:
         """W."""
-        return int(self.near.shape[-1])
+        return self.near_basis.window
+
+    @cached_property
+    def near_basis(self) -> NearBasis:
+        """The functions that near-range light is made of."""
+        return basis_of(self.near.shape[3:], self.pitch)
+
+    @cached_property
+    def pyramid(self) -> Pyramid:
+        """Where functions of several projector pixels read blurred lights."""
+        return Pyramid(self.near_basis, self.projector)
+
+    @property
+    def boxes(self) -> Floats:
+        """Heights and widths of direct light's footprints, shape (C, 2); see `footprint`."""
+        if self.footprint is None:
+            return np.zeros((self.camera.pixels, 2), dtype=np.float32)
+        return self.footprint.reshape(-1, 2)
 
     @property
     def lit(self) -> Booleans:
@@ -135,7 +166,9 @@ class Transport(NoArray):
 
     @cached_property
     def _footprint(self) -> footprints.Footprint:
-        return footprints.footprint(self.correspondence, self.projector)
+        if self.pitch == 1:
+            return footprints.footprint(self.correspondence, self.projector)
+        return box_places(self.correspondence, self.boxes, self.projector)
 
     @cached_property
     def _centres(self) -> NDArray[np.int64]:
@@ -238,6 +271,8 @@ class Transport(NoArray):
     ) -> "Transport":
         """Return the transport with its components scaled, without error bars or a verdict.
 
+        Its provenance has, as ``gains``, what the components were multiplied by in all.
+
         Parameters
         ----------
         direct, near, far : float
@@ -251,14 +286,15 @@ class Transport(NoArray):
         InputError
             If a gain is not a finite number.
         """
-        direct, near, far = as_gains(direct, near, far)
+        gains = as_gains(direct, near, far)
         return replace(
             self,
+            provenance=with_gains(self.provenance, gains),
             posterior=None,
             verdict=None,
-            direct=self.direct * np.float32(direct),
-            near=self.near * np.float32(near),
-            far=self.far * np.float32(far),
+            direct=self.direct * np.float32(gains.direct),
+            near=self.near * np.float32(gains.near),
+            far=self.far * np.float32(gains.far),
         )
 
     def pictures(self, lights: Floats) -> Floats:
@@ -330,6 +366,8 @@ class Transport(NoArray):
     def component_rows(self, pixels: slice) -> Components:
         """Return dense rows of D, N and F of chosen camera pixels; see `rows`."""
         pixels = as_pixels(pixels, self.camera.pixels)
+        if self.pitch > 1:
+            return self._blurred_rows(pixels)
         flat_far = self.far.reshape(-1, self.channels, self.far_basis.count)[pixels]
         f = self.far_basis.synthesise(flat_far).astype(np.float32, copy=False)
         number = np.arange(len(f))[:, None]
@@ -349,6 +387,27 @@ class Transport(NoArray):
             np.add.at(d[:, i], (number, corners), weights * direct_values[:, i, None])
             n[number, i, flat] = near_values[:, i]
         return Components(d, n[..., :beyond], f)
+
+    def _blurred_rows(self, pixels: slice) -> Components:
+        selected = range(*pixels.indices(self.camera.pixels))
+        count, channels = self.camera.pixels, self.channels
+        direct, near = self.direct.reshape(count, channels), self.near.reshape(count, channels, -1)
+        f = self.far_basis.synthesise(self.far.reshape(count, channels, -1)[pixels])
+        d, n = (np.zeros(f.shape, dtype=np.float32) for _ in range(2))
+        for number, c in enumerate(selected):
+            one = slice(c, c + 1)
+            where = footprints.Footprint(self._footprint.pixels[one], self._footprint.weights[one])
+            for i in range(channels):
+                nothing = np.zeros_like(near[one, i])
+                for out, own_direct, own_near in (
+                    (d, direct[one, i], nothing),
+                    (n, np.zeros_like(direct[one, i]), near[one, i]),
+                ):
+                    back = blurred_adjoint(
+                        own_direct, own_near, self.pyramid, self._centres[one], where
+                    )
+                    out[number, i] = back.ravel()
+        return Components(d, n, f.astype(np.float32, copy=False))
 
     def dense(self) -> Floats:
         """Return all of T, shape (C, channels, P), float32: for small transports."""
@@ -438,36 +497,33 @@ class Transport(NoArray):
     def _components(self, lights: Floats) -> Components:
         """Return pictures (L, C, channels) under lights (L, 1 or channels, P)."""
         count, channels = self.camera.pixels, self.channels
+        direct, near = self.direct.reshape(count, channels), self.near.reshape(count, channels, -1)
+        far = far_pictures(self.far.reshape(count, channels, -1), self.far_basis, lights)
+        if self.pitch > 1:
+            return Components(
+                *blurred_pictures(
+                    direct, near, self.pyramid, self._centres, self._footprint, lights
+                ),
+                far,
+            )
         return Components(
-            direct_pictures(self.direct.reshape(count, channels), self._footprint, lights),
-            near_pictures(
-                self.near.reshape(count, channels, -1), self._centres, self.projector, lights
-            ),
-            far_pictures(self.far.reshape(count, channels, -1), self.far_basis, lights),
+            direct_pictures(direct, self._footprint, lights),
+            near_pictures(near, self._centres, self.projector, lights),
+            far,
         )
 
     def _adjoint_channel(self, image: Floats, channel: int) -> Floats:
         d = self.direct.reshape(-1, self.channels)[:, channel]
-        n = self.near.reshape(-1, self.channels, self.window**2)[:, channel]
+        n = self.near.reshape(self.camera.pixels, self.channels, -1)[:, channel]
         f = self.far.reshape(-1, self.channels, self.far_basis.count)[:, channel]
+        if self.pitch > 1:
+            back = blurred_adjoint(
+                d * image, n * image[:, None], self.pyramid, self._centres, self._footprint
+            )
+            return back + self.far_basis.synthesise(image @ f).reshape(self.projector)
         back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
         back = back + self.far_basis.synthesise(image @ f).reshape(self.projector)
         for batch in blocks(self.camera.pixels, BATCH_PIXELS):
             values = n[batch] * image[batch, None]
             back += windows.spread(values, self._centres[batch], self.window, self.projector)
         return np.asarray(back)
-
-
-def as_gains(direct: float, near: float, far: float) -> tuple[float, float, float]:
-    """Return the gains of the components as floats.
-
-    Raises
-    ------
-    InputError
-        If one is not a finite number.
-    """
-    return (
-        as_number(direct, "the gain of direct"),
-        as_number(near, "the gain of near"),
-        as_number(far, "the gain of far"),
-    )

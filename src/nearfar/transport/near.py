@@ -7,8 +7,8 @@ Index convention: c runs over camera pixels, w over the W x W offsets of
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Size, beside
-from nearfar.illumination.centred_basis import window_offsets
+from nearfar.arrays import Booleans, Floats, Size, beside, namespace
+from nearfar.illumination.near_basis import NearBasis, window_offsets
 
 
 def centre(correspondence: Floats, projector: Size) -> NDArray[np.int64]:
@@ -32,6 +32,17 @@ def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans
     columns_in = (columns >= 0) & (columns < projector.width)
     both: Booleans = rows_in[:, :, None] & columns_in[:, None, :]
     return both.reshape((len(centres), window**2))
+
+
+def inside_basis(centres: NDArray[np.int64], basis: NearBasis, projector: Size) -> Booleans:
+    """Return whether the middle of each function of a basis lies on the projector, (C, J)."""
+    if basis.pitch == 1:
+        return inside(centres, basis.window, projector)
+    xp = namespace(centres)
+    places = centres[:, None, :] + beside(basis.offsets, centres)
+    on = (places >= 0) & (places < beside(np.array(projector), centres))
+    found: Booleans = xp.all(on, axis=-1)
+    return found
 
 
 def window_pixels(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:

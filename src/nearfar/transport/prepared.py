@@ -19,10 +19,14 @@ from array_api_compat import is_array_api_obj, is_numpy_array
 from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace
 from nearfar.checks import NoArray, as_light, as_lights, require_instance
 from nearfar.devices import Device, mover
+from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import near as windows
-from nearfar.transport.direct import footprint
+from nearfar.transport.boxes import box_places, summed_area
+from nearfar.transport.direct import Footprint, footprint
+from nearfar.transport.gains import as_gains
 from nearfar.transport.half import rounding_over_noise
-from nearfar.transport.model import Transport, as_gains
+from nearfar.transport.model import Transport
+from nearfar.transport.pyramid import Pyramid
 
 # Values gathered at once: on a processor as many as its cache holds, on an accelerator enough to
 # outweigh the time that a call takes.
@@ -46,8 +50,14 @@ class PreparedTransport(NoArray):
     entries : array of int, shape (C, W^2)
         Projector pixels of the window entries; P for those beyond the border.
     far : array, shape (C, channels, M)
-    patterns : array, shape (M, P)
-        The far basis, times its weights.
+    far_basis : RealBasis
+    patterns : array, shape (M, P), or None
+        The far basis, times its weights; None with a pyramid, whose lights are analysed on the
+        processor.
+    pyramid : Pyramid or None
+        Where near-range light is made of functions of several projector pixels, lights are blurred
+        and summed on the processor first; `entries` are places in flat levels, and `corners`
+        (C, 16) in summed-area tables.
     held : int
         How many values are gathered at once.
     """
@@ -63,14 +73,17 @@ class PreparedTransport(NoArray):
     near: Floats
     entries: Integers
     far: Floats
-    patterns: Floats
+    far_basis: RealBasis
+    patterns: Floats | None
+    pyramid: Pyramid | None
     held: int
 
     @property
     def nbytes(self) -> int:
         """Bytes that the prepared transport takes on its device."""
         arrays = (self.direct, self.corners, self.shares, self.near, self.entries, self.far)
-        return sum(int(a.nbytes) for a in (*arrays, self.patterns))
+        patterns = () if self.patterns is None else (self.patterns,)
+        return sum(int(a.nbytes) for a in (*arrays, *patterns))
 
     def pictures(
         self, lights: Any, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
@@ -98,10 +111,13 @@ class PreparedTransport(NoArray):
         xp, count = namespace(lights), len(lights)
         light_channels = lights.shape[3] if lights.ndim == 4 else 1
         flat = lights.reshape((count, self.projector.pixels, light_channels))
-        overlaps = xp.permute_dims(self.patterns @ flat, (1, 0, 2))
-        padded = xp.permute_dims(flat, (1, 0, 2))
-        dark = xp.zeros((1, *padded.shape[1:]), dtype=xp.float32, device=device_of(lights))
-        padded = xp.concat([padded, dark], axis=0)
+        if self.pyramid is None:
+            overlaps = xp.permute_dims(self.patterns @ flat, (1, 0, 2))
+            padded = xp.permute_dims(flat, (1, 0, 2))
+            dark = xp.zeros((1, *padded.shape[1:]), dtype=xp.float32, device=device_of(lights))
+            padded = at_direct = xp.concat([padded, dark], axis=0)
+        else:
+            overlaps, padded, at_direct = self._blurred(flat, self.pyramid)
         found = xp.empty(
             (self.camera.pixels, self.channels, count),
             dtype=xp.float32,
@@ -109,13 +125,29 @@ class PreparedTransport(NoArray):
         )
         length = self.held // max(1, self.entries.shape[1] * count * light_channels)
         for batch in blocks(self.camera.pixels, length):
-            at_q = padded[self.corners[batch]] * self.shares[batch][..., None, None]
+            at_q = at_direct[self.corners[batch]] * self.shares[batch][..., None, None]
             lit = xp.permute_dims(xp.sum(at_q, axis=1), (0, 2, 1))
             part = direct * self.direct[batch][..., None] * lit
             part = part + near * _weighted_sums(self.near[batch], padded[self.entries[batch]])
             part = part + far * _weighted_sums(self.far[batch], overlaps)
             found[batch] = part
         return xp.permute_dims(found, (2, 0, 1)).reshape((count, *self.camera, self.channels))
+
+    def _blurred(self, lights: Any, pyramid: Pyramid) -> tuple[Any, Any, Any]:
+        """Return overlaps with the far basis, levels and summed-area tables of lights.
+
+        Lights are (L, P, 1 or channels), the others (M, ...), (levels, ...) and (table, ...) times
+        L times 1 or channels. The tables are float64, as their values are large.
+        """
+        host = np.moveaxis(fetch(lights), 2, 1)
+        overlaps = np.moveaxis(self.far_basis.analyse(host), (0, 1, 2), (1, 2, 0))
+        apart = [[own.reshape(self.projector) for own in light] for light in host]
+        levels, tables = (
+            np.moveaxis(np.array([[of(own) for own in light] for light in apart]), 2, 0)
+            for of in (pyramid.levels, summed_area)
+        )
+        prepared = (overlaps.astype(np.float32), levels, tables)
+        return tuple(beside(np.ascontiguousarray(part), lights) for part in prepared)
 
     def __matmul__(self, light: Any) -> Floats:
         """Relight under one light, (Py, Px) or (Py, Px, channels), as `Transport` does."""
@@ -176,15 +208,11 @@ def prepare_transport(
         half = device == "cuda" and rounding_over_noise(transport) < NEGLIGIBLE_ROUNDING
     dtype = np.float16 if half else np.float32
     count, channels = transport.camera.pixels, transport.channels
-    where = footprint(transport.correspondence, transport.projector)
-    centres = windows.centre(transport.correspondence, transport.projector)
-    entries = np.where(
-        windows.inside(centres, transport.window, transport.projector),
-        windows.window_pixels(centres, transport.window, transport.projector),
-        transport.projector.pixels,
-    )
+    where, entries, pyramid = _places(transport)
     basis = transport.far_basis
-    weighted = basis.patterns * basis.weights[:, None].astype(np.float32)
+    patterns = None
+    if pyramid is None:
+        patterns = move(basis.patterns * basis.weights[:, None].astype(np.float32))
     return PreparedTransport(
         projector=transport.projector,
         camera=transport.camera,
@@ -195,6 +223,23 @@ def prepare_transport(
         near=move(transport.near.reshape(count, channels, -1).astype(dtype, copy=False)),
         entries=move(entries.astype(np.int32)),
         far=move(transport.far.reshape(count, channels, -1).astype(dtype, copy=False)),
-        patterns=move(weighted),
+        far_basis=basis,
+        patterns=patterns,
+        pyramid=pyramid,
         held=GATHERED_VALUES[device],
     )
+
+
+def _places(transport: Transport) -> tuple[Footprint, Integers, Pyramid | None]:
+    """Return where direct and near-range light read a light: its pixels, or those of a pyramid."""
+    projector = transport.projector
+    centres = windows.centre(transport.correspondence, projector)
+    if transport.pitch == 1:
+        where = footprint(transport.correspondence, projector)
+        inside = windows.inside(centres, transport.window, projector)
+        pixels = windows.window_pixels(centres, transport.window, projector)
+        return where, np.where(inside, pixels, projector.pixels), None
+    pyramid = transport.pyramid
+    entries = pyramid.places(centres)[:, None] + pyramid.steps
+    where = box_places(transport.correspondence, transport.boxes, projector)
+    return where, entries, pyramid

@@ -11,6 +11,8 @@ from nearfar.transport.model import Transport
 
 # Attributes of a transport with a value for each camera pixel.
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
+# The same, of transports whose functions of near-range light are of several projector pixels.
+OPTIONAL_FACTORS = ("footprint",)
 POSTERIOR_FIELDS = (
     "prior_component",
     "prior_scale",
@@ -56,13 +58,18 @@ def of_pixels(transport: Transport, rows: Integers, columns: Integers) -> Transp
 
 
 def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:
-    changes = {name: choose(getattr(transport, name)) for name in FACTORS}
-    for part, names in OPTIONAL_PARTS.items():
+    names = [*FACTORS, *_present(transport)]
+    changes = {name: choose(getattr(transport, name)) for name in names}
+    for part, fields in OPTIONAL_PARTS.items():
         owner: Any = getattr(transport, part)
         if owner is not None:
-            own = {name: choose(getattr(owner, name)) for name in names}
+            own = {name: choose(getattr(owner, name)) for name in fields}
             changes[part] = replace(owner, **own)
     return replace(transport, **changes)
+
+
+def _present(transport: Transport) -> list[str]:
+    return [name for name in OPTIONAL_FACTORS if getattr(transport, name) is not None]
 
 
 def stacked(parts: Sequence[Transport]) -> Transport:
@@ -73,7 +80,7 @@ def stacked(parts: Sequence[Transport]) -> Transport:
     def joined(owners: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:
         return {name: np.concatenate([getattr(one, name) for one in owners]) for name in names}
 
-    changes = joined(parts, FACTORS)
+    changes = joined(parts, (*FACTORS, *_present(parts[-1])))
     for name, names in OPTIONAL_PARTS.items():
         owners: list[Any] = [getattr(part, name) for part in parts]
         if owners[-1] is not None:

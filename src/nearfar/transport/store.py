@@ -23,14 +23,17 @@ from nearfar.files.stores import (
     read_selection,
 )
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
+from nearfar.illumination.near_basis import basis_of
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent
+from nearfar.transport.gains import gains_of
 from nearfar.transport.matrix_store import rows_of_chunk
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import (
     FACTORS,
+    OPTIONAL_FACTORS,
     OPTIONAL_PARTS,
     POSTERIOR_FIELDS,
     QUALITY_FIELDS,
@@ -40,7 +43,11 @@ from nearfar.transport.rows import (
 from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to_json
 
 KIND = "nearfar transport"
-FORMAT_VERSION = 1
+# Version 2 added functions of near-range light that are of several projector pixels, and
+# footprints. Transports of single pixels are still written as version 1, which older versions of
+# nearfar read.
+VERSION_OF_PIXELS, VERSION_OF_HATS = 1, 2
+READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS)
 
 # Of a projector or a camera in a file, in pixels.
 LARGEST_SIDE = 2**20
@@ -137,13 +144,15 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
     height : int
         Rows of the whole camera.
     """
-    values = {name: _as_stored(getattr(part, name)) for name in FACTORS}
+    factors = [*FACTORS, *(name for name in OPTIONAL_FACTORS if getattr(part, name) is not None)]
+    values = {name: _as_stored(getattr(part, name)) for name in factors}
     for optional, names in OPTIONAL_PARTS.items():
         owner = getattr(part, optional)
         if owner is not None:
             part_name = STORED_PARTS[optional]
             values |= {_array_name(part_name, name): getattr(owner, name) for name in names}
-    group = add_to_store(folder, KIND, FORMAT_VERSION, _attributes(part))
+    version = VERSION_OF_PIXELS if part.pitch == 1 else VERSION_OF_HATS
+    group = add_to_store(folder, KIND, version, _attributes(part))
     for name, one in values.items():
         # The chunks of a single block need not divide it.
         most = min(height, rows_of_chunk(one))
@@ -163,7 +172,7 @@ def _as_stored(values: Floats) -> Floats:
 
 def write_provenance(folder: Path, provenance: Mapping[str, Any]) -> None:
     """Write how a transport was made, once all of its rows are written."""
-    group = add_to_store(folder, KIND, FORMAT_VERSION)
+    group = add_to_store(folder, KIND, VERSION_OF_PIXELS)
     group.attrs["provenance"] = json.loads(json.dumps(dict(provenance)))
 
 
@@ -178,6 +187,8 @@ def _attributes(transport: Transport) -> dict[str, Any]:
         "projector": list(transport.projector),
         "far_frequencies": [frequency_to_text(k) for k in transport.far_basis.frequencies],
     }
+    if transport.pitch > 1:
+        attributes["pitch"] = transport.pitch
     if transport.posterior is not None:
         attributes[POSTERIOR] = _described(transport.posterior)
     if transport.quality is not None:
@@ -215,6 +226,8 @@ class StoredTransport:
     channels : int
     verdict : KeptVerdict or None
         Whether it can be trusted; None if it was not judged.
+    pitch : int
+        Projector pixels between the functions of near-range light.
     """
 
     path: Path
@@ -224,6 +237,7 @@ class StoredTransport:
     provenance: Mapping[str, Any]
     channels: int
     verdict: KeptVerdict | None
+    pitch: int
     _arrays: Mapping[str, Any]
     _posterior: Mapping[str, Any] | None
 
@@ -260,6 +274,7 @@ class StoredTransport:
             posterior=posterior,
             quality=Quality(**quality_fields) if quality_fields else None,
             verdict=self.verdict,
+            pitch=self.pitch,
             **read,
         )
 
@@ -297,13 +312,15 @@ def open_transport(path: AnyPath) -> StoredTransport:
         If it is not there, damaged, of another kind or of another version.
     """
     path = Path(path)
-    group = open_store(path, KIND, FORMAT_VERSION)
+    group = open_store(path, KIND, *READABLE_VERSIONS)
     arrays = {name: open_array(group, name) for name in FACTORS}
     posterior = verdict = None
     try:
+        near_basis = basis_of(tuple(arrays["near"].shape[3:]), stored_pitch(group.attrs))
         projector = stored_size(group.attrs["projector"])
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
+        gains_of(provenance)
         if POSTERIOR in group.attrs:
             posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
         if VERDICT in group.attrs:
@@ -315,14 +332,16 @@ def open_transport(path: AnyPath) -> StoredTransport:
         ) from None
     basis = real_basis(frequencies, projector)
     each = tuple(int(side) for side in arrays["direct"].shape)
-    window = arrays["near"].shape[-1] if arrays["near"].ndim else 0
     shapes = {
         "correspondence": (*each[:2], 2),
-        "near": (*each, window, window),
+        "near": (*each, *near_basis.shape),
         "far": (*each, basis.count),
         "black": each,
         "noise": each,
     }
+    if near_basis.pitch > 1:
+        arrays |= {name: open_array(group, name) for name in OPTIONAL_FACTORS}
+        shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 2))
     for name, shape in shapes.items():
         if len(each) != 3 or arrays[name].shape != shape:
             raise UnreadableFileError(
@@ -355,6 +374,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
         provenance,
         each[2],
         verdict,
+        near_basis.pitch,
         arrays,
         posterior,
     )
@@ -427,6 +447,14 @@ def stored_size(value: Any) -> Size:
     if max(size) > LARGEST_SIDE:
         raise ValueError(f"a side is over {LARGEST_SIDE}")
     return size
+
+
+def stored_pitch(attributes: Any) -> int:
+    """Return the pitch of a transport from its attributes; ValueError if it is none."""
+    pitch = attributes.get("pitch", 1)
+    if not isinstance(pitch, int) or not 1 <= pitch <= LARGEST_SIDE:
+        raise ValueError(f"{pitch!r} is no pitch")
+    return pitch
 
 
 def _prior_component(value: Any) -> PriorComponent:

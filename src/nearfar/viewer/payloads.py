@@ -12,6 +12,7 @@ from nearfar.files.codecs import encode_exr
 from nearfar.markup import MARK, SCALE
 from nearfar.release import version
 from nearfar.report.maps import TITLES, Map, map_named
+from nearfar.transport.gains import why_unjudgeable
 from nearfar.viewer.decoding import decode_in_process
 from nearfar.viewer.interactive import InteractiveTransport, to_float16
 from nearfar.viewer.messages import WHITE_LEVEL, Gains, Light, pack
@@ -30,6 +31,7 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
             "summary": verdict.summary,
             "reasons": list(verdict.sentences),
         },
+        "unjudgeable": why_unjudgeable(stored.provenance),
         "nearfar": version(),
         "projector": list(stored.projector),
         "camera": list(stored.camera),

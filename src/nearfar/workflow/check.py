@@ -22,7 +22,7 @@ from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band, default_dropped
 from nearfar.illumination.pictures import standard_lights
 from nearfar.plan import paper_plan
-from nearfar.plan.model import largest_window
+from nearfar.plan.window import largest_window
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.transport.exact import ExactTransport

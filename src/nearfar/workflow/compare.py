@@ -16,7 +16,8 @@ from nearfar.arrays import Floats, Size
 from nearfar.callbacks import Report
 from nearfar.errors import InputError, NearfarError, PlanError
 from nearfar.illumination.pictures import standard_lights
-from nearfar.plan.choose import FEWEST_PHOTOS, default_window
+from nearfar.plan.choose import FEWEST_PHOTOS
+from nearfar.plan.window import default_window, pitch_of
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.opening import choose_exposure
 from nearfar.transport.exact import ExactTransport
@@ -175,10 +176,11 @@ def compare(
     lights = standard_lights(scene.projector)
     gain = choose_exposure(None, scene, scene.name)
     truth = {name: np.float32(gain) * (scene @ light) for name, light in lights.items()}
+    pitch = pitch_of(scene.projector)
     bench = Bench(
         scene,
         camera or SimulatedCamera(),
-        default_window(scene.projector) if window is None else window,
+        default_window(scene.projector, pitch) if window is None else window,
         gain,
         note=note or (lambda _sentence: None),
     )

@@ -7,8 +7,8 @@ import numpy as np
 from nearfar.arrays import AnySize, Floats, as_size
 from nearfar.checks import as_count
 from nearfar.errors import InputError
-from nearfar.illumination.centred_basis import window_offsets
 from nearfar.illumination.frequencies import as_array, near_frequencies, representatives
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.transport import near
 
 # Eigenvectors with eigenvalues below this share of the largest are seen by no pattern.

@@ -38,7 +38,7 @@ Value = TypeVar("Value")
 
 
 class Pair(NamedTuple):
-    """A relit picture beside what it should be.
+    """A relit picture beside the true one.
 
     Attributes
     ----------
@@ -121,12 +121,12 @@ def judge_by_truth(
 
 
 def white_last(of_lights: Mapping[str, Value]) -> dict[str, Value]:
-    """Return what there is of each light, white at the end: it is measured, not relit."""
+    """Return the values of lights with white's at the end: white is measured, not relit."""
     return dict(sorted(of_lights.items(), key=lambda item: item[0] == "white"))
 
 
 def describe_units(judgement: Mapping[str, Any]) -> list[str]:
-    """Return sentences on a fitted exposure, and on what was left out as it holds no light."""
+    """Return sentences on a fitted exposure, and on dark camera pixels and photos left out."""
     said = []
     if judgement.get("exposure_is_fitted"):
         said.append(

@@ -15,7 +15,7 @@ from nearfar.errors import InputError
 from nearfar.faults.of_capture import find_saturation
 from nearfar.files import encode_png, new_output, write_picture
 from nearfar.illumination.frames import FrameLayout, draw_frame, fit_frame
-from nearfar.plan.choose import default_window
+from nearfar.plan.window import default_window
 from nearfar.release import version
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.known import KnownTransport

@@ -21,7 +21,7 @@ from nearfar.illumination.frequencies import default_dropped
 from nearfar.parallel import single_threaded_products
 from nearfar.photometry.measure import measure as measure_photos
 from nearfar.photometry.measurements import Measurements
-from nearfar.plan.model import largest_window
+from nearfar.plan.window import largest_window
 from nearfar.progress import Report, counting, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.workflow.reconstruction.sources import brightest_white, photos_without_drift
@@ -122,6 +122,7 @@ def estimate_transport(
     window: int,
     far: AnySize,
     *,
+    pitch: int = 1,
     method: str = "joint",
     dropped: AnySize | None = None,
     device: Device = "cpu",
@@ -134,9 +135,12 @@ def estimate_transport(
     measurements : Measurements
     correspondence : Correspondence
     window : int
-        W: near-range light comes from a window of W x W projector pixels around q.
+        W: near-range light comes from a window of W x W functions around q.
     far : Size or (height, width)
         Far band, in DFT frequencies of the pattern grid.
+    pitch : int
+        Projector pixels between the functions of the window, a power of two: 1, the default, for a
+        window of single pixels.
     method : str
         Estimator: ``"joint"`` estimates all three components in one model, ``"paper"`` one after
         another as in the paper; or an estimator that another package adds.
@@ -168,8 +172,11 @@ def estimate_transport(
     require_instance(correspondence, Correspondence, "correspondence", "nearfar.correspond")
     report, far = progress or ignore_progress, as_size(far, "far")
     window, projector = as_count(window, "window", 1), measurements.projector
+    pitch = as_count(pitch, "pitch", 1)
+    if pitch & (pitch - 1):
+        raise InputError(f"a pitch of {pitch} is no power of two: choose 1, 2, 4 or a larger one.")
     if (
-        window > largest_window(projector)
+        window > largest_window(projector, pitch)
         or far.height > projector.height
         or far.width > projector.width
     ):
@@ -191,7 +198,7 @@ def estimate_transport(
         if dropped is None
         else as_size(dropped, "dropped")
     )
-    estimator, model = ESTIMATORS[method], Model(window, far, left_out)
+    estimator, model = ESTIMATORS[method], Model(window, far, left_out, pitch)
     with single_threaded_products():
         return estimator.estimate(
             measurements, correspondence.q, model, device=device, progress=done

@@ -1,5 +1,7 @@
 """Rows drawn from a prior component, measured, and solved by dense algebra."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from nearfar.arrays import Size
@@ -7,8 +9,9 @@ from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_
 from nearfar.estimate.joint.clipped import solve_clipped
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
+from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose import choose_frequencies
@@ -28,8 +31,8 @@ def chosen_frequencies(photos=70):
 
 def centred_on_all(frequencies):
     basis = real_basis(frequencies, PROJECTOR)
-    plain = centred_basis(basis, window_offsets(WINDOW))
-    return CentredBasis(basis, np.arange(1, basis.count + 1), plain.on_window, plain.on_footprint)
+    plain = centred_basis(basis, NearBasis(WINDOW))
+    return replace(plain, response_indices=np.arange(1, basis.count + 1))
 
 
 def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=None, offset=0.0):
@@ -79,6 +82,7 @@ def batch_of(measurements, centres, centred):
         offset_noise=offset_noise(measurements),
         white=white_scale(measurements),
         spike_expected=np.zeros((count, WINDOW**2), dtype=bool),
+        footprint=np.zeros(count, dtype=np.float32),
     )
     return gather(pixels, slice(None), centred, PROJECTOR)
 
@@ -113,7 +117,7 @@ def dense(measurements, batch, centred, scale, component=COMPONENT):
         patterns = centred.on_window * batch.inside[c]
         s = (scale * white) ** 2
         design = amplitude_responses(batch, centred)[c].T.astype(np.float64)
-        precision = prior_precision(batch)[c, 0]
+        precision = prior_precision(batch, NearBasis(WINDOW))[c, 0]
         covariance = (
             s * (patterns @ window @ patterns.T + np.diag(variance))
             + design @ np.diag(1 / precision) @ design.T

@@ -10,9 +10,9 @@ from nearfar.errors import InputError
 from nearfar.estimate.fit import fit_model
 from nearfar.estimate.joint import error_bars, estimate_jointly
 from nearfar.estimate.joint.error_bars import ErrorBars
-from nearfar.estimate.joint.nuisance import common_precision
-from nearfar.illumination.centred_basis import centred_basis, window_offsets
+from nearfar.estimate.joint.nuisance import SHIFT_DEVIATION, common_precision
 from nearfar.illumination.frequencies import DC, far_frequencies
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.pictures import standard_lights
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
@@ -71,7 +71,7 @@ def _transport(centres, lit=True):
 
 def _prior_variance():
     """Prior variance of o, d and the shifts of q."""
-    return 1.0 / common_precision(np.array([[WHITE]]), np.array([[OFFSET]]))[0, 0]
+    return 1.0 / common_precision(np.array([[WHITE]]), np.array([[OFFSET]]), SHIFT_DEVIATION)[0, 0]
 
 
 def _dense(transport, c, ask):
@@ -82,12 +82,12 @@ def _dense(transport, c, ask):
     posterior = transport.posterior
     basis = real_basis(posterior.frequencies, PROJECTOR)
     centre = transport.correspondence[0, c].astype(int)
-    centred = centred_basis(basis, window_offsets(WINDOW) + centre)
+    on_window = basis.patterns_at(window_offsets(WINDOW) + centre)
     s = SCALE * WHITE
     ones = np.ones((basis.count, 1))
     direct = basis.patterns[:, [centre[0] * PROJECTOR.width + centre[1]]]
     responses = np.concatenate(
-        [ones, 0 * ones, direct, centred.on_window, np.eye(basis.count)], axis=1
+        [ones, 0 * ones, direct, on_window, np.eye(basis.count)], axis=1
     ).astype(np.float64)
     prior = np.zeros((responses.shape[1], responses.shape[1]))
     prior[0, 0] = OFFSET**2
@@ -251,9 +251,9 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     basis = real_basis(posterior.frequencies, PROJECTOR)
     at = 6 * PROJECTOR.width + 8
     one, other = basis.patterns[:, at], basis.patterns[:, at + 1]
-    centred = centred_basis(basis, window_offsets(WINDOW) + np.array([6, 8]))
+    on_window = basis.patterns_at(window_offsets(WINDOW) + np.array([6, 8]))
     own = np.stack([np.ones(basis.count), (1 - part) * one + part * other, other - one], axis=1)
-    responses = np.concatenate([own, centred.on_window, np.eye(basis.count)], axis=1).astype(float)
+    responses = np.concatenate([own, on_window, np.eye(basis.count)], axis=1).astype(float)
     end = 3 + WINDOW**2
     s = SCALE * WHITE
     prior = np.zeros((responses.shape[1], responses.shape[1]))

@@ -12,6 +12,7 @@ from nearfar.estimate.joint.clipped import solve_clipped
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole
 from nearfar.estimate.joint.spikes import with_spike
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.patterns import exponential
 from nearfar.illumination.real_basis import real_basis
 from nearfar.priors.component import PriorComponent
@@ -105,7 +106,7 @@ def test_clipped_windows_of_every_component_are_those_of_dense_algebra(component
         direct = amplitude_responses(batch, centred)[c, 0].astype(np.float64)
         covariance = squared * (clipped @ window @ clipped.T + np.diag(power))
         covariance += float(batch.noise[c, 0]) ** 2 * spread
-        covariance += np.outer(direct, direct) / prior_precision(batch)[c, 0, 0]
+        covariance += np.outer(direct, direct) / prior_precision(batch, NearBasis(WINDOW))[c, 0, 0]
         x = np.linalg.solve(covariance, batch.responses[c, 0].astype(np.float64))
         for got, exact in (
             (found.near[c, 0], squared * (window @ clipped.T @ x) * batch.inside[c]),

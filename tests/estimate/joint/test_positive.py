@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.positive import raise_to
-from nearfar.illumination.centred_basis import window_offsets
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.transport import near
 from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
 from tests.worlds import model_transport

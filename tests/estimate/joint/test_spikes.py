@@ -5,6 +5,7 @@ import numpy as np
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.spikes import expected_spikes
+from nearfar.illumination.near_basis import NearBasis
 from tests.estimate.joint.draws import (
     FAR,
     PROJECTOR,
@@ -33,7 +34,7 @@ def test_less_evidence_will_do_where_a_neighbour_sees_the_second_surface():
     q = np.zeros((3, 10, 2))
     q[..., 0] = 8.0
     q[..., 1] = np.where(np.arange(10) < 5, 6.0, 10.0)
-    spike_expected = expected_spikes(q, 9).reshape(3, 10, 9, 9)
+    spike_expected = expected_spikes(q, NearBasis(9)).reshape(3, 10, 9, 9)
     assert not spike_expected[:, :4].any()
     assert not spike_expected[:, 6:].any()
     around = np.zeros((9, 9), dtype=bool)
@@ -42,9 +43,9 @@ def test_less_evidence_will_do_where_a_neighbour_sees_the_second_surface():
     np.testing.assert_array_equal(spike_expected[1, 5], around[:, ::-1])
     # Too far for the window, or of camera pixels without direct light: nothing.
     q[:, 5:, 1] = 15.0
-    assert not expected_spikes(q, 9).any()
+    assert not expected_spikes(q, NearBasis(9)).any()
     q[:, 5:] = np.nan
-    assert not expected_spikes(q, 9).any()
+    assert not expected_spikes(q, NearBasis(9)).any()
 
 
 def test_a_faint_second_surface_is_accepted_beside_its_edge_alone():
@@ -68,4 +69,4 @@ def test_a_faint_second_surface_is_accepted_beside_its_edge_alone():
 
 def test_steps_of_a_camera_that_is_as_fine_are_no_other_surface():
     y, x = np.meshgrid(np.arange(6.0), np.arange(7.0), indexing="ij")
-    assert not expected_spikes(np.stack([y, x], axis=-1), 5).any()
+    assert not expected_spikes(np.stack([y, x], axis=-1), NearBasis(5)).any()

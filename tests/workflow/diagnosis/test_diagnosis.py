@@ -10,10 +10,14 @@ from benchmarks.spoils import SPOILS, shoot
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
 from nearfar.faults.of_photos import ShowsOtherPattern
+from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.plan import Sinusoid
+from nearfar.plan.checks import is_reference
 from nearfar.progress import ignore_progress
 from nearfar.transport.store import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.sample import PATCH, sample_camera, sampled_lines
+from nearfar.workflow.diagnosis.single_photos import TURNS_OF_LEAVING
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 
 
@@ -24,13 +28,13 @@ def shot():
 
 @pytest.fixture(scope="module")
 def diagnosed(shot, tmp_path_factory):
-    def diagnose(photos):
+    def diagnose(photos, **options):
         folder = tmp_path_factory.mktemp("spoilt")
         capture = write_capture(
             shot.plan, folder / "c.zarr", list(photos), full_scale=shot.full_scale
         )
         reconstruct_to_file(capture, folder / "t.zarr")
-        return find_what_spoils(open_transport(folder / "t.zarr"), capture)
+        return find_what_spoils(open_transport(folder / "t.zarr"), capture, **options)
 
     return diagnose
 
@@ -80,6 +84,23 @@ def test_photos_that_are_swapped_explain_each_other(shot, spoilt_by):
     assert "are swapped" in str(found)
 
 
+def test_each_photo_but_white_and_black_is_left_out_in_one_turn(shot, diagnosed, monkeypatch):
+    only, kept = PhotosWithoutDrift.only, []
+
+    def recorded(self, numbers):
+        kept.append(set(numbers.tolist()))
+        return only(self, numbers)
+
+    monkeypatch.setattr(PhotosWithoutDrift, "only", recorded)
+    assert diagnosed(shot.photos, suspected=True) == []
+    own = {n for n, p in enumerate(shot.plan.patterns) if isinstance(p, Sinusoid)}
+    references = {n for n in own if is_reference(shot.plan.patterns[n])}
+    left_out = [own - each for each in kept]
+    assert sorted(n for each in left_out for n in each) == sorted(own - references)
+    assert len(left_out) == TURNS_OF_LEAVING
+    assert all(left_out)
+
+
 def test_the_moment_of_a_motion_is_named(shot, spoilt_by):
     found, *_ = spoilt_by("camera moved, pixels", 0.3)
     assert found.photo == pytest.approx(shot.half, abs=3)
@@ -105,9 +126,8 @@ def test_a_sample_of_saturated_camera_pixels_tells_nothing(shot, diagnosed):
     photos = shot.photos.repeat(4, axis=1).repeat(4, axis=2)
     rows, columns = sampled_lines(Size(64, 64))
     assert len(rows) < 64
-    sampled = np.ix_(range(len(photos)), rows, columns)
-    bright = 10.0 * photos[sampled]
-    photos[sampled] = np.minimum(bright, shot.full_scale).astype(photos.dtype)
+    lit = np.array([shot.plan.draw(number).any() for number in range(len(photos))])
+    photos[np.ix_(lit, rows, columns)] = shot.full_scale
     assert diagnosed(photos) == []
 
 

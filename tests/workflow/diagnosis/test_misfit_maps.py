@@ -85,16 +85,20 @@ def test_a_bad_photo_stands_out_at_its_frequency_and_a_bad_part_on_the_map(compa
     assert "at the bottom left of the picture (misfit " in describe_worst(misfit)
 
 
-def test_saturated_camera_pixels_tell_nothing(compare, world):
-    dim = replace(
-        world,
-        direct=1.6 * world.direct,
-        near=1.6 * world.near,
-        far=1.6 * world.far,
-        quality=Quality(np.ones(CAMERA, np.float32), np.zeros(CAMERA, dtype=bool)),
-    )
-    _, misfit = compare(dim, exposure=1.6)
-    assert 0 < misfit.saturated.mean() < 1
+@pytest.fixture
+def bright(world):
+    """The transport of photos whose exposure of 1.6 saturates some camera pixels."""
+    quality = Quality(np.ones(CAMERA, np.float32), np.zeros(CAMERA, dtype=bool))
+    return replace(1.6 * world, provenance=world.provenance, quality=quality)
+
+
+def test_saturated_camera_pixels_tell_nothing(compare, world, bright):
+    _, misfit = compare(bright, exposure=1.6)
+    camera = SimulatedCamera()
+    shown = 1.6 * (world @ np.ones(PROJECTOR)) + camera.ambient + camera.black_level
+    of_channels = shown >= 1
+    assert np.mean(of_channels.any(axis=-1) & ~of_channels.all(axis=-1)) > 0.1
+    assert np.mean(misfit.saturated == of_channels.any(axis=-1)) > 0.95
     assert np.nanmean(misfit.of_camera) < 1.2
     assert np.isfinite(misfit.of_camera[~misfit.saturated]).all()
     assert describe_worst(misfit) == ""
@@ -114,6 +118,21 @@ def test_bands_make_no_difference_and_a_large_camera_is_in_cells(compare, monkey
     assert large.of_camera.shape == (4, 6)
     cells = whole.of_camera.reshape(4, 3, 6, 3)[:, 1].mean(axis=-1)
     np.testing.assert_allclose(large.of_camera, cells, rtol=0.1)
+
+
+def test_a_cell_is_saturated_where_most_of_its_line_is(compare, bright, monkeypatch):
+    _, whole = compare(bright, exposure=1.6)
+    monkeypatch.setattr(misfit_maps, "CAMERA_PIXELS", CAMERA.pixels // 2)
+    monkeypatch.setattr(misfit_maps, "LINES_OF_LARGE_CAMERA", 4)
+    _, large = compare(bright, exposure=1.6)
+    most = whole.saturated.reshape(4, 3, 6, 3)[:, 1].mean(axis=-1) > 1 / 2
+    assert most.any()
+    assert not most.all()
+    np.testing.assert_array_equal(large.saturated, most)
+
+
+def test_a_camera_that_is_all_saturated_does_not_tell(compare):
+    assert compare(exposure=50.0)[1] is None
 
 
 def test_plans_of_pairs_and_square_transports_do_not_tell(compare, world):

@@ -24,7 +24,7 @@ INFORMATION = 500.0
 
 
 def found(cause, sizes, *, regions=slice(None), information=INFORMATION, misfit=None):
-    """Return what is found where photos differ by an effect of these sizes, and nothing else."""
+    """Return the changes found in photos whose only difference is one cause, of these sizes."""
     every = REGIONS_A_SIDE**2
     effects = np.zeros((PHOTOS, every, CAUSES))
     effects[:, regions, cause] = np.reshape(sizes, (PHOTOS, 1))

@@ -9,6 +9,8 @@ from benchmarks.spoils import SPOILS, shoot_plan
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
+from nearfar.illumination.frequencies import DC
+from nearfar.photometry.by_inverse import find_pairs
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.transport.store import open_transport
@@ -112,6 +114,43 @@ def test_repeats_tell_the_noise_of_a_capture_without_checks(reconstructed, offse
     assert f"{found.white_snr:.1f} dB over its noise" in str(judge_reconstruction(stored, capture))
 
 
+@pytest.mark.parametrize("offset", ["inverse", None])
+def test_repeats_tell_the_noise_of_what_is_not_saturated(reconstructed, tmp_path, offset):
+    shot, _, stored = reconstructed(offset, "phase")
+    photos = shot.counts(1.3 * shot.photos.astype(np.float64))
+    bright = write_capture(shot.plan, tmp_path / "c.zarr", list(photos), full_scale=shot.full_scale)
+    found = measure_repeats(bright, stored.provenance)
+    white = np.asarray(shot.truth @ np.ones(PROJECTOR))
+    white *= 0.9 / white.max()
+    usable = ~(photos == photos.max()).any(axis=0).reshape(white.shape)
+    assert 0.5 < usable.mean() < 0.9
+    camera = SimulatedCamera()
+    electrons = camera.full_well * (white + camera.ambient) + camera.read_noise**2
+    noise = electrons / camera.full_well**2
+    expected = decibels(np.sum(white[usable] ** 2), np.sum(noise[usable]))
+    assert found.white_snr == pytest.approx(expected, abs=0.5)
+    assert found.scatter == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("count", "tells"), [(1, False), (2, True)])
+def test_a_single_pair_does_not_tell_that_the_light_changed(reconstructed, tmp_path, count, tells):
+    shot, _, stored = reconstructed("inverse", "phase")
+    pairs = find_pairs(shot.plan)
+    white = [pair for pair in pairs if pair.frequency == DC]
+    others = [pair for pair in pairs if not pair.frequency.is_own_negative][:count]
+    numbers = [n for pair in (*white, *others) for n in (pair.photo, pair.inverse)]
+    patterns = tuple(shot.plan.patterns[number] for number in numbers)
+    capture = write_capture(
+        shot.plan.model_copy(update={"patterns": patterns}),
+        tmp_path / "c.zarr",
+        list(shot.photos[numbers]),
+        full_scale=shot.full_scale,
+    )
+    found = measure_repeats(capture, stored.provenance)
+    assert (found.lamp is not None) == tells
+    assert ("the light changed by" in str(found)) == tells
+
+
 def test_pairs_tell_that_the_response_is_not_linear(reconstructed):
     _, capture, stored = reconstructed("inverse", "phase", "joint", "gamma", 1.1)
     assert measure_repeats(capture, stored.provenance).excess < -0.01
@@ -167,14 +206,38 @@ def test_few_pairs_tell_of_no_motion(reconstructed):
     assert find_motion_by_pairs(replace(sample, plan=few, photos=sample.photos[:2])) == []
 
 
+def _with_rows(monkeypatch, stored, change):
+    """Change what is read of a stored transport."""
+    rows = type(stored).rows
+    monkeypatch.setattr(type(stored), "rows", lambda self, *which: change(rows(self, *which)))
+
+
+def test_what_saturated_camera_pixels_hold_does_not_matter(reconstructed, monkeypatch):
+    _, capture, stored = reconstructed("reference", "gray")
+    found = []
+    for factor in (1, 5):
+
+        def change(block, factor=factor):
+            saturated = np.arange(block.camera.pixels).reshape(block.camera) % 3 == 0
+            direct = np.where(saturated[..., None], factor, 1) * block.direct
+            quality = replace(block.quality, saturated=saturated)
+            return replace(block, direct=direct, quality=quality)
+
+        with monkeypatch.context() as patched:
+            _with_rows(patched, stored, change)
+            found.append(measure_by_correspondence(stored, capture))
+    assert found[0] == found[1]
+    assert found[0] != measure_by_correspondence(stored, capture)
+
+
 def test_a_camera_of_saturated_pixels_checks_nothing(reconstructed, monkeypatch):
     _, capture, stored = reconstructed("reference", "gray")
-    rows = type(stored).rows
 
-    def saturated(self, *which):
-        block = rows(self, *which)
+    def saturated(block):
         every = np.ones_like(block.quality.saturated)
         return replace(block, quality=replace(block.quality, saturated=every))
 
-    monkeypatch.setattr(type(stored), "rows", saturated)
+    _with_rows(monkeypatch, stored, saturated)
     assert measure_by_correspondence(stored, capture) is None
+    (reason,) = judge_reconstruction(stored, capture).reasons
+    assert reason.sentence.startswith("nothing was checked: every camera pixel is saturated.")

@@ -1,5 +1,7 @@
 """The error of a transport, from two photos that are noisier than it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,33 @@ def test_a_bent_response_does_not_add_up_to_white(bend):
     pair = _compare(error=0.0, noise=0.001, bend=bend)
     # Both are off by the same at every share of white, a sixth of white on average.
     assert pair.excess_share == pytest.approx(-2 * bend / 6, rel=0.05)
+
+
+@pytest.mark.parametrize(("error", "of_inverse"), [(0.02, 0.01), (0.01, 0.02)])
+def test_white_may_be_off_and_the_inverse_more_or_less_than_the_pattern(error, of_inverse):
+    generator, white, _ = _pictures(0)
+    known = white * generator.uniform(0, 0.4, VALUES)
+    errors = [size * generator.normal(size=VALUES) for size in (error, of_inverse)]
+    taken = [picture + 0.03 * generator.normal(size=VALUES) for picture in (known, white - known)]
+    pair = compare_pair(
+        *taken,
+        known + errors[0],
+        white=white + errors[0] + errors[1],
+        noise=1.0,
+        error_of_white=error**2 + of_inverse**2,
+        share_of_pattern=2 * error**2 / (error**2 + of_inverse**2),
+    )
+    assert pair.signal == pytest.approx(np.mean(known**2) + 0.03**2, rel=0.02)
+    assert pair.photo_noise == pytest.approx(0.03**2, rel=0.05)
+    assert pair.error == pytest.approx(error**2, rel=0.1)
+    whole = replace(pair, share_of_pattern=1.0)
+    assert pair.error_deviation / whole.error_deviation == pytest.approx(pair.share_of_pattern)
+
+
+def test_a_camera_without_light_shows_no_excess():
+    dark = np.zeros(VALUES)
+    pair = compare_pair(dark, dark + 1e-3, dark, white=dark, noise=0.0, error_of_white=0.0)
+    assert pair.excess_share == 0.0
 
 
 def test_parts_of_a_camera_count_as_the_whole():

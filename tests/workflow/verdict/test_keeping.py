@@ -12,7 +12,7 @@ from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.transport.store import load_transport, open_transport, write_verdict
+from nearfar.transport.store import load_transport, open_transport, save_transport, write_verdict
 from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
@@ -90,3 +90,32 @@ def test_what_cannot_be_judged_gets_a_sentence(made, stored, tmp_path):
     change_attributes(stored, provenance={})
     with pytest.raises(InputError, match="does not say how it was made"):
         judge_transport(stored, capture)
+
+
+def test_what_gains_changed_is_not_judged_by_the_photos(made, tmp_path):
+    capture, before = open_capture(made / "capture.zarr"), load_transport(made / "t.zarr")
+    path = tmp_path / "changed.zarr"
+    for changed, gains in (
+        (2 * before, "direct 2, near 2 and far 2"),
+        (before.with_gains(near=3, far=0), "direct 1, near 3 and far 0"),
+    ):
+        save_transport(changed, path, force=True)
+        assert load_transport(path).provenance == changed.provenance
+        with pytest.raises(InputError, match=f"multiplied by the gains {gains} .* as it was"):
+            judge_transport(path, capture)
+        assert load_transport(path).verdict is None
+        said = check_done(run_nearfar("info", path)).out
+        assert said.startswith(f"not judged: it was multiplied by the gains {gains} ")
+        check_sentence(run_nearfar("info", path, "--capture", made / "capture.zarr"), path)
+
+
+def test_gains_that_cancel_leave_a_transport_to_judge(made, stored, tmp_path):
+    capture, path = open_capture(made / "capture.zarr"), tmp_path / "same.zarr"
+    save_transport(0.5 * (2 * load_transport(stored)), path)
+    verdict, same = (judge_transport(each, capture) for each in (stored, path))
+    # Gains drop the error bars.
+    assert same.kept.expected_snr is None
+    mine, theirs = (
+        [light.pair.difference for light in each.held_out.lights] for each in (same, verdict)
+    )
+    assert mine == theirs

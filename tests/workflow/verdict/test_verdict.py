@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.correspondence import Correspondence
 from nearfar.plan import paper_plan
 from nearfar.plan.checks import check_lights
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -21,7 +22,9 @@ from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
-from nearfar.workflow.verdict.held_out import CAMERA_PIXELS, bands, measure_held_out
+from nearfar.workflow.verdict import bands as bands_of_cameras
+from nearfar.workflow.verdict.bands import CAMERA_PIXELS, bands, taller_bands
+from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
 from tests.plans import chosen_plan
@@ -125,6 +128,19 @@ def test_inverse_pairs_alone_and_square_transports_are_not_checked(box, tmp_path
         assert says in reason.sentence
 
 
+@pytest.mark.parametrize(("offset", "photos"), [("reference", 5), ("inverse", 4)])
+def test_a_handful_of_photos_is_judged(box, tmp_path, offset, photos):
+    plan = paper_plan(PROJECTOR, 1, (1, 1), offset=offset, correspondence="none")
+    assert len(plan.patterns) == photos
+    rig = SimulatedRig(box, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    capture = acquire(plan, tmp_path / "c.zarr", rig)
+    q = box.correspondence.astype(np.float32)
+    known = Correspondence(q, np.ones(q.shape[:2], dtype=np.float32))
+    reconstruct_to_file(capture, tmp_path / "t.zarr", known)
+    verdict = judge_reconstruction(open_transport(tmp_path / "t.zarr"), capture)
+    assert (verdict.grade, verdict.causes) == ("doubtful", ("unchecked",))
+
+
 def test_the_command_ends_with_the_verdict(reconstructed, tmp_path):
     capture, _ = reconstructed()
     said = run_nearfar("reconstruct", capture.path, tmp_path / "t.zarr")
@@ -148,6 +164,40 @@ def test_bands_are_spread_and_few(camera):
     assert count <= max(2 * CAMERA_PIXELS, 8 * camera.width)
     if camera.pixels <= CAMERA_PIXELS:
         assert count == camera.pixels
+    assert {row for rows in taller_bands(camera) for row in range(*rows.indices(10**6))} == {
+        row for rows in found for row in range(*rows.indices(10**6))
+    }
+    assert len(taller_bands(camera)) <= len(found)
+
+
+def test_bands_of_any_height_are_the_whole_camera(reconstructed, monkeypatch):
+    capture, stored = reconstructed()
+    found = []
+    for rows in (5, 24):
+        monkeypatch.setattr(bands_of_cameras, "ROWS_PER_BAND", rows)
+        found.append(measure_held_out(stored, capture))
+    assert stored.camera == Size(24, 24)
+    for one, other in zip(*(each.lights for each in found), strict=True):
+        # How the error is shared with the inverse is a ratio in each band.
+        mine, theirs = (vars(each.pair) | {"share_of_pattern": 1.0} for each in (one, other))
+        assert mine == pytest.approx(theirs, rel=1e-5)
+        assert one.expected_error == pytest.approx(other.expected_error, rel=1e-5)
+        assert one.unmeasured_error == pytest.approx(other.unmeasured_error, rel=1e-5)
+
+
+def test_what_saturated_camera_pixels_hold_does_not_matter(reconstructed, tmp_path):
+    capture, stored = reconstructed()
+    transport = stored.rows()
+    saturated = np.arange(transport.camera.pixels).reshape(transport.camera) % 3 == 0
+    held_out = []
+    for factor in (1, 5):
+        direct = np.where(saturated[..., None], factor, 1) * transport.direct
+        quality = replace(transport.quality, saturated=saturated)
+        path = tmp_path / f"{factor}.zarr"
+        save_transport(replace(transport, direct=direct, quality=quality), path)
+        held_out.append(measure_held_out(open_transport(path), capture))
+    assert held_out[0] == held_out[1]
+    assert held_out[0] != measure_held_out(stored, capture)
 
 
 def test_rows_that_are_all_saturated_are_left_out(reconstructed, tmp_path):

@@ -20,31 +20,13 @@ from nearfar.transport.store import open_transport
 from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to_json
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
-from nearfar.workflow.verdict.check_pairs import CheckPair
-from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight, measure_held_out
+from nearfar.workflow.verdict.by_check_photos import measure_held_out
+from nearfar.workflow.verdict.held_out import HeldOut
 from nearfar.workflow.verdict.verdict import Verdict
 from nearfar.workflow.verdict.widening import widening_of
+from tests.workflow.verdict.lights import held_out_light
 
 PROJECTOR = Size(16, 16)
-SIGNAL = 0.1
-VALUES = 10_000
-
-
-def _light(error, expected, noise=1e-6):
-    """Return what is held out under a pattern: the power of its error, and what is expected."""
-    noise_of_photo = noise * np.sqrt(VALUES)
-    pair = CheckPair(
-        VALUES,
-        signal=SIGNAL,
-        difference=error + noise_of_photo,
-        of_sum=2 * noise_of_photo,
-        excess=0.0,
-        white=0.5,
-        noise=noise_of_photo,
-        error_of_white=0.0,
-        share_of_pattern=1.0,
-    )
-    return HeldOutLight("a picture", False, pair, expected, expected)
 
 
 @pytest.mark.parametrize(
@@ -60,28 +42,28 @@ def _light(error, expected, noise=1e-6):
     ],
 )
 def test_bars_are_widened_by_what_is_no_chance(ratios, expected):
-    held_out = HeldOut(tuple(_light(ratio * 1e-3, 1e-3) for ratio in ratios))
+    held_out = HeldOut(tuple(held_out_light(ratio * 1e-3, 1e-3) for ratio in ratios))
     assert widening_of(held_out) == pytest.approx(expected, rel=1e-3)
 
 
 def test_noise_that_hides_the_error_widens_nothing():
-    held_out = HeldOut((_light(2e-3, 1e-3, noise=2e-3),))
+    held_out = HeldOut((held_out_light(2e-3, 1e-3, noise=2e-3),))
     assert held_out.error_ratio > 1.9
     assert widening_of(held_out) == 1.0
 
 
 def test_without_error_bars_or_usable_pixels_nothing_is_widened():
-    assert widening_of(HeldOut((_light(1.0, None),))) == 1.0
-    assert widening_of(HeldOut((_light(np.nan, np.nan),))) == 1.0
+    assert widening_of(HeldOut((held_out_light(1.0, None),))) == 1.0
+    assert widening_of(HeldOut((held_out_light(np.nan, np.nan),))) == 1.0
 
 
 def test_whatever_is_found_can_be_kept():
     # As of photos without noise, of which hardly any error is expected.
     for expected in (1e-300, 1e-60, 0.0):
-        verdict = Verdict("wrong", HeldOut((_light(0.1, expected),)), ()).kept
+        verdict = Verdict("wrong", HeldOut((held_out_light(0.1, expected),)), ()).kept
         assert verdict.widening > 1
         assert verdict_from_json(json.loads(json.dumps(verdict_to_json(verdict)))) == verdict
-    unusable = Verdict("wrong", HeldOut((_light(np.nan, np.nan),)), ()).kept
+    unusable = Verdict("wrong", HeldOut((held_out_light(np.nan, np.nan),)), ()).kept
     assert verdict_from_json(json.loads(json.dumps(verdict_to_json(unusable)))) == unusable
 
 

@@ -7,16 +7,18 @@ import numpy as np
 
 from nearfar.arrays import Floats, Size, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import dc_index
+from nearfar.estimate.joint.cut import share_on_projector
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
 from nearfar.estimate.joint.spikes import away_from_q
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency, far_frequencies
 from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.transport import near
+from nearfar.transport.boxes import share_of_boxes
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
@@ -51,12 +53,17 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     )
     rows = _without_negative_direct(problem, rows)
     direct = rows.amplitudes[..., 1] * pixels.lit[:, None]
-    rest = white - share * rows.amplitudes[..., 0] - direct - xp.sum(rows.near, axis=-1)
+    rest = white - share * rows.amplitudes[..., 0] - _under_white(problem, direct, rows.near)
     far_range = xp.concat([rest[..., None], rows.far[..., far_indices]], axis=-1)
-    of_far = centred_basis(basis, window_offsets(problem.window))
+    of_far = centred_basis(basis, problem.near_basis)
     of_far = of_far.put(lambda one: beside(one, rows.near))
-    windows = _positive(problem, rows.near, far_range, of_far)
+    windows = rows.near
+    if problem.near_basis.pitch == 1:
+        windows = _positive(problem, rows.near, far_range, of_far)
     shape = (*measurements.camera, measurements.channels)
+    footprint = None
+    if problem.near_basis.pitch > 1:
+        footprint = fetch(pixels.footprint).reshape(*measurements.camera, 2)
     # Later sweeps estimate small differences from a mean that a camera pixel's own photos are part
     # of: the first sweep's prior component and scale fit the error (docs/decisions/0011).
     first = rows.choices[0]
@@ -66,9 +73,11 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
         .reshape(*measurements.camera, 2)
         .astype(np.float32),
         direct=fetch(direct).reshape(shape),
-        near=fetch(windows).reshape(*shape, problem.window, problem.window),
+        near=fetch(windows).reshape(*shape, *problem.near_basis.shape),
         far=fetch(far_range).reshape(*shape, -1),
         far_basis=basis,
+        pitch=problem.near_basis.pitch,
+        footprint=footprint,
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
         posterior=Posterior(
@@ -87,15 +96,30 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     )
 
 
+def _under_white(problem: Problem, direct: Floats, coefficients: Floats) -> Floats:
+    """Return direct and near-range light under white, (C, channels)."""
+    xp, near_basis, pixels = namespace(coefficients), problem.near_basis, problem.pixels
+    if near_basis.pitch == 1:
+        whole: Floats = direct + xp.sum(coefficients, axis=-1)
+        return whole
+    projector = problem.measurements.projector
+    shares = share_on_projector(pixels.centres, near_basis.offsets, near_basis.pitches, projector)
+    of_direct = share_of_boxes(pixels.correspondence, pixels.footprint, projector)
+    return np.asarray(direct * of_direct[:, None] + np.einsum("cij,cj->ci", coefficients, shares))
+
+
 def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     """Raise d to 0 where it is negative, and lower the window's entries at q by as much light."""
-    xp, window = namespace(rows.near), problem.window
+    xp, window = namespace(rows.near), problem.near_basis.window
     negative = xp.clip(rows.amplitudes[..., 1], max=0.0) * problem.pixels.lit[:, None]
     amplitudes = xp.asarray(rows.amplitudes, copy=True)
     amplitudes[..., 1] -= negative
     if window < FOOTPRINT_SIDE:
         return rows._replace(amplitudes=amplitudes)
     windows = xp.asarray(rows.near, copy=True)
+    if problem.near_basis.pitch > 1:
+        windows[..., window**2 // 2] += negative
+        return rows._replace(amplitudes=amplitudes, near=windows)
     weights = direct_weights(problem.pixels.correspondence, problem.pixels.centres)[:, 0]
     around = np.flatnonzero(~away_from_q(window**2))
     windows[..., beside(around, windows)] += negative[..., None] * weights[:, None]
@@ -113,8 +137,10 @@ def _positive(
     problem: Problem, windows: Floats, far_range: Floats, centred: CentredBasis
 ) -> Floats:
     """Return windows with n + f not negative and the same response to white."""
-    away = away_from_q(problem.window**2)
-    inside = near.inside(problem.pixels.centres, problem.window, problem.measurements.projector)
+    away = away_from_q(problem.near_basis.count)
+    inside = near.inside(
+        problem.pixels.centres, problem.near_basis.window, problem.measurements.projector
+    )
     xp = namespace(windows)
     free = inside & beside(away, windows) & problem.pixels.lit[:, None]
     found: Floats = xp.empty_like(windows)

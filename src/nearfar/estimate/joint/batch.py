@@ -11,11 +11,12 @@ from array_api_compat import device
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Size, namespace
+from nearfar.estimate.joint.footprint import footprint_weights
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.direct import direct_weights, footprint, look_up
+from nearfar.transport.direct import footprint, look_up
 
 # A camera pixel darker than this share of the brightest is scaled as if it had as much light.
 WHITE_FLOOR = 1e-3
@@ -135,6 +136,9 @@ class AllPixels(NamedTuple):
         As in `PixelBatch`.
     spike_expected : ndarray of bool, shape (C, W^2)
         As in `PixelBatch`.
+    footprint : ndarray, shape (C, 2), float32
+        Height and width of direct light's footprint, projector pixels, where the functions of
+        near-range light are of several.
     """
 
     responses: Floats
@@ -145,6 +149,7 @@ class AllPixels(NamedTuple):
     offset_noise: Floats
     white: Floats
     spike_expected: Booleans
+    footprint: Floats
 
 
 def gather(
@@ -168,7 +173,7 @@ def gather(
     """
     some = AllPixels._make(values[selected] for values in pixels)
     responses = some.responses if known is None else some.responses - known
-    weights = direct_weights(some.correspondence, some.centres)
+    weights = footprint_weights(some.correspondence, some.centres, some.footprint, centred)
     xp = namespace(some.responses)
     if not bool(xp.any(weights[:, 1:] != 0)):
         weights = weights[:, :1]
@@ -177,7 +182,7 @@ def gather(
     return PixelBatch(
         centres=some.centres,
         lit=some.lit,
-        inside=near.inside(some.centres, round(some.spike_expected.shape[1] ** 0.5), projector),
+        inside=near.inside_basis(some.centres, centred.near_basis, projector),
         responses=centred.recentre(responses, some.centres),
         direct_weights=weights,
         of_offset=centred.recentre(ones, some.centres),

@@ -19,14 +19,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from array_api_compat import device
+from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, beside, fetch, namespace, product
+from nearfar.arrays import Booleans, Floats, Integers, Size, beside, fetch, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
+from nearfar.illumination.near_basis import NearBasis, reachable
 from nearfar.priors.covariance import CORRELATION_LENGTH, smooth_covariance
 from nearfar.priors.responses import VARIANCE_RATIOS, ResponsePrior
+from nearfar.transport import near
+
+
+def is_clipped(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
+    """Return whether the border cuts into the window about each rounded q, shape (C,)."""
+    xp = namespace(centres)
+    if near_basis.pitch == 1:
+        never_inside = beside(~reachable(near_basis.window, projector), centres)
+        inside = near.inside(centres, near_basis.window, projector)
+        found: Booleans = ~xp.all(inside | never_inside, axis=1)
+        return found
+    last = beside(np.array(projector) - 1, centres)
+    is_cut: Booleans = xp.any(xp.minimum(centres, last - centres) < near_basis.reach, axis=1)
+    return is_cut
 
 
 def rounded_ratio(ratio: Floats) -> Floats:
@@ -49,7 +65,7 @@ def solve_clipped(
         beside(values, batch.responses) for values in (prior.far_variance, prior.factors.deviation)
     )
     per_amplitude = nuisance.amplitude_responses(batch, centred)
-    precision = nuisance.prior_precision(batch)
+    precision = nuisance.prior_precision(batch, centred.near_basis)
     patterns = xp.astype(centred.on_window, xp.float64) * deviation
     clippings = _clippings(fetch(batch.inside))
 
@@ -57,7 +73,7 @@ def solve_clipped(
         return xp.empty(shape, dtype=dtype or xp.float32, device=device(batch.responses))
 
     amplitudes = empty(*precision.shape, dtype=xp.float64)
-    near = empty(number, channels, len(deviation))
+    windows = empty(number, channels, len(deviation))
     far, residual = empty(number, channels, count), empty(number, channels, count)
     ratio_of_pair = fetch(ratio)
     for value in np.unique(ratio_of_pair):
@@ -79,12 +95,12 @@ def solve_clipped(
         factors = xp.concat([xp.ones_like(amplitudes[c, i][:, :1]), -amplitudes[c, i]], axis=1)
         window = (factors[:, None] @ solved)[:, 0]
         rest = ((factors[:, None] @ y)[:, 0] - window @ patterns.T) * weight
-        near[c, i] = xp.astype(window * deviation, xp.float32)
+        windows[c, i] = xp.astype(window * deviation, xp.float32)
         far[c, i] = xp.astype(rest * (float(value) * far_variance), xp.float32)
         residual[c, i] = xp.astype(rest / variance, xp.float32)
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),
-        near=near,
+        near=windows,
         far=far,
         near_noise=near_noise(batch, prior, ratio),
         score=product(residual, centred.on_window),

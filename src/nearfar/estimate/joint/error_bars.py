@@ -8,26 +8,38 @@ Index convention: arrays are (n, channels, ...), n camera pixels or functionals 
 runs over real responses, w over window entries, i over eigenvectors, g over o, d and shifts of q.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.arrays import Floats, Integers, Size, blocks
 from nearfar.errors import InputError
 from nearfar.estimate.joint import nuisance
-from nearfar.estimate.joint.batch import RELATIVE_NOISE_FLOOR, responses_of_direct
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
-from nearfar.illumination.frequencies import DC
+from nearfar.estimate.joint.batch import (
+    DIFFERENCE_STEP,
+    RELATIVE_NOISE_FLOOR,
+    responses_of_direct,
+)
+from nearfar.estimate.joint.cut import share_on_projector
+from nearfar.estimate.joint.footprint import footprint_weights
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis
+from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
+from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import spectral_density
 from nearfar.priors.responses import ResponsePrior, response_prior
 from nearfar.transport import near
-from nearfar.transport.direct import direct_weights, footprint
+from nearfar.transport.boxes import box_places, spread_summed_area, summed_area
+from nearfar.transport.direct import footprint, look_up
 from nearfar.transport.model import Components, Transport
 from nearfar.transport.posterior import Posterior
 
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
+# Smaller shares of a footprint are rounding.
+SHARE_FLOOR = 1e-9
 # Entries of a row whose variance is computed at once.
 ENTRIES_AT_ONCE = 2**14
 
@@ -108,9 +120,13 @@ class ErrorBars:
             )
         self._transport = transport
         self._posterior: Posterior = transport.posterior
+        self._white = np.ones(transport.projector.pixels, dtype=np.float32)
+        self._levels: tuple[Floats, Floats, Floats] | None = None
         self._widening = transport.verdict.widening if transport.verdict is not None else 1.0
-        basis = real_basis(self._posterior.frequencies, transport.projector)
-        self._centred: CentredBasis = centred_basis(basis, window_offsets(transport.window))
+        self._centred: CentredBasis = _centred_on(
+            self._posterior.frequencies, transport.projector, transport.near_basis
+        )
+        basis = self._centred.basis
         self._priors: dict[int, ResponsePrior] = {}
         self._where = footprint(transport.correspondence, transport.projector)
         self._centres = near.centre(transport.correspondence, transport.projector)
@@ -218,49 +234,82 @@ class ErrorBars:
         transport, one = self._transport, slice(c, c + 1)
         width = transport.projector.width
         first, last = lines.start * width, lines.stop * width
-        inside = near.inside(self._centres[one], transport.window, transport.projector)[0]
         d = np.zeros((transport.channels, last - first), dtype=np.float32)
         if self._unknown[c]:
             return Components(*(np.full_like(d, np.inf) for _ in Components._fields))
         n, f = np.zeros_like(d), np.empty_like(d)
         if transport.lit.ravel()[c]:
             deviation = np.sqrt(self._variance(one, self._of_direct(1)))[0]
-            corners, weights = self._where.pixels[c], self._where.weights[c]
+            corners, weights = self._direct_pixels(c)
             here = (corners >= first) & (corners < last)
             np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
-            pixels = near.window_pixels(self._centres[one], transport.window, transport.projector)[
-                0
-            ]
-            entries = np.flatnonzero(inside & (pixels >= first) & (pixels < last))
-            variance = self._variance(one, self._of_entries(entries))
-            n[:, pixels[entries] - first] = np.sqrt(variance).T
+            pixels, values = self._window_pixels(c, first, last)
+            variance = self._variance(one, self._of_entries(values))
+            n[:, pixels - first] = np.sqrt(variance).T
+        inside = self._seen(one, self._white)[1]
         for some in blocks(lines.stop - lines.start, max(1, ENTRIES_AT_ONCE // width)):
             on_grid = slice(lines.start + some.start, lines.start + some.stop)
-            variance = self._variance(one, self._of_far(one, inside, on_grid))
+            variance = self._variance(one, self._of_far(one, inside[0], on_grid))
             f[:, some.start * width : some.stop * width] = np.sqrt(variance).T
         return Components(d, n, f)
+
+    def _direct_pixels(self, c: int) -> tuple[Integers, Floats]:
+        """Return the projector pixels of one camera pixel's footprint, and their shares."""
+        transport, one = self._transport, slice(c, c + 1)
+        if transport.pitch == 1:
+            return self._where.pixels[c], self._where.weights[c]
+        q = transport.correspondence.reshape(-1, 2)[one]
+        places = box_places(q, transport.boxes[one], transport.projector)
+        table = np.zeros((transport.projector.height + 1) * (transport.projector.width + 1))
+        np.add.at(table, places.pixels, places.weights)
+        shares = spread_summed_area(table, transport.projector).ravel()
+        pixels = np.flatnonzero(shares > SHARE_FLOOR)
+        return pixels, shares[pixels].astype(np.float32)
+
+    def _window_pixels(self, c: int, first: int, last: int) -> tuple[Integers, Floats]:
+        """Return the projector pixels of a camera pixel's window from `first` to before `last`.
+
+        And the value of each function on each of them, (n, J).
+        """
+        transport, projector = self._transport, self._transport.projector
+        centre = self._centres[c : c + 1]
+        if transport.pitch == 1:
+            inside = near.inside(centre, transport.window, projector)[0]
+            pixels = near.window_pixels(centre, transport.window, projector)[0]
+            entries = np.flatnonzero(inside & (pixels >= first) & (pixels < last))
+            return pixels[entries], np.eye(transport.window**2, dtype=np.float32)[entries]
+        reach = transport.near_basis.reach
+        sides = [
+            np.arange(max(at - reach, 0), min(at + reach + 1, side))
+            for at, side in zip(centre[0].tolist(), projector, strict=True)
+        ]
+        rows = sides[0]
+        rows = rows[(rows >= first // projector.width) & (rows < -(-last // projector.width))]
+        y, x = (axis.ravel() for axis in np.meshgrid(rows, sides[1], indexing="ij"))
+        values = transport.near_basis.values_at(np.stack([y, x], axis=1) - centre)
+        return y * projector.width + x, values.astype(np.float32)
 
     def _of_direct(self, number: int) -> _Functionals:
         """Return the functional d of so many camera pixels."""
         return _Functionals(
             np.zeros(number),
             np.broadcast_to([1.0, 0.0, 0.0], (number, 3)),
-            np.zeros((number, self._transport.window**2), dtype=np.float32),
+            np.zeros((number, self._transport.near_basis.count), dtype=np.float32),
             np.zeros((number, self._centred.basis.count), dtype=np.float32),
             np.zeros(len(self._posterior.prior_components)),
         )
 
-    def _of_entries(self, entries: Integers) -> _Functionals:
-        """Return the functionals that are window entries of one camera pixel."""
+    def _of_entries(self, values: Floats) -> _Functionals:
+        """Return the functionals that are sums of one camera pixel's near-range functions."""
         return _Functionals(
-            np.zeros(len(entries)),
-            np.zeros((len(entries), 3)),
-            np.eye(self._transport.window**2, dtype=np.float32)[entries],
-            np.zeros((len(entries), self._centred.basis.count), dtype=np.float32),
+            np.zeros(len(values)),
+            np.zeros((len(values), 3)),
+            values,
+            np.zeros((len(values), self._centred.basis.count), dtype=np.float32),
             np.zeros(len(self._posterior.prior_components)),
         )
 
-    def _of_far(self, one: slice, inside: Booleans, lines: slice) -> _Functionals:
+    def _of_far(self, one: slice, inside: Floats, lines: slice) -> _Functionals:
         """Return the entries of one camera pixel's row of F on some rows of the projector."""
         centred, total = self._centred, self._transport.projector.pixels
         lit = float(self._transport.lit.ravel()[one][0])
@@ -271,7 +320,7 @@ class ErrorBars:
         return _Functionals(
             np.full(number, 1.0 / total),
             np.broadcast_to([-lit / total, 0.0, 0.0], (number, 3)),
-            -lit / total * inside[None].astype(np.float32),
+            (-lit / total * inside[None]).astype(np.float32),
             centred.recentre(patterns[:, None], centre)[:, 0],
             np.zeros(len(self._posterior.prior_components)),
         )
@@ -282,15 +331,13 @@ class ErrorBars:
         """Return the functional that is the picture under a light (P,)."""
         transport, centred = self._transport, self._centred
         gain_direct, gain_near, gain_far = gains
-        projector, centres = transport.projector, self._centres[batch]
-        q = transport.correspondence.reshape(-1, 2)[batch]
+        centres = self._centres[batch]
         mean = gain_far * float(light.mean())
-        in_window = near.look_up(light.reshape(projector), centres, transport.window, projector)
-        inside = near.inside(centres, transport.window, projector)
+        in_window, inside, direct = self._seen(batch, light)
         overlap = (gain_far * centred.basis.analyse(light) * self._is_held).astype(np.float32)
         overlaps = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
         lit = transport.lit.ravel()[batch]
-        direct = gain_direct * responses_of_direct(q, light[None], projector)[..., 0]
+        direct = gain_direct * direct
         direct[:, 0] -= mean * lit
         return _Functionals(
             np.full(len(centres), mean),
@@ -298,6 +345,43 @@ class ErrorBars:
             (lit[:, None] * (gain_near * in_window - mean * inside)).astype(np.float32),
             centred.recentre(overlaps, centres)[:, 0],
             truncated,
+        )
+
+    def _seen(self, batch: slice, light: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return what unit near-range and direct light answer to a light (P,), and to white.
+
+        Returns
+        -------
+        in_window : ndarray, shape (n, J)
+        inside : ndarray, shape (n, J)
+            Share of each function that lies on the projector.
+        direct : ndarray, shape (n, 3)
+            Direct light, and its derivatives by q.
+        """
+        transport, projector = self._transport, self._transport.projector
+        centres, q = self._centres[batch], transport.correspondence.reshape(-1, 2)[batch]
+        if transport.pitch == 1:
+            return (
+                near.look_up(light.reshape(projector), centres, transport.window, projector),
+                near.inside(centres, transport.window, projector).astype(np.float32),
+                responses_of_direct(q, light[None], projector)[..., 0],
+            )
+        pyramid, basis = transport.pyramid, transport.near_basis
+        if self._levels is None or self._levels[0] is not light:
+            square = light.reshape(projector).astype(np.float32)
+            self._levels = (light, pyramid.levels(square), summed_area(square))
+        _, levels, summed = self._levels
+        boxes = transport.boxes[batch]
+
+        def at(places: Floats) -> Floats:
+            return look_up(summed, box_places(places, boxes, projector))
+
+        steps = DIFFERENCE_STEP * np.eye(2)
+        derivatives = [(at(q + step) - at(q - step)) / (2 * DIFFERENCE_STEP) for step in steps]
+        return (
+            levels[pyramid.places(centres)[:, None] + pyramid.steps],
+            share_on_projector(centres, basis.offsets, basis.pitches, projector),
+            np.stack([at(q), *derivatives], axis=-1),
         )
 
     def _truncated(self, light: Floats) -> Floats:
@@ -315,6 +399,9 @@ class ErrorBars:
             spectrum[-y % projector.height, -x % projector.width] = 0.0
         cycles = [np.fft.fftfreq(side) * side for side in projector]
         radius = np.hypot(cycles[0][:, None], cycles[1])
+        # Far-range light has no detail that is finer than the coarsest functions.
+        sampled = [np.abs(one) <= 0.5 / transport.pitch for one in map(np.fft.fftfreq, projector)]
+        spectrum *= sampled[0][:, None] & sampled[1]
         total = [
             np.sum(spectral_density(radius, one) * spectrum)
             for one in self._posterior.prior_components
@@ -328,7 +415,8 @@ class ErrorBars:
         white = posterior.white.reshape(-1, channels)[batch]
         centres = self._centres[batch]
         q = transport.correspondence.reshape(-1, 2)[batch]
-        direct = direct_weights(q, centres) @ centred.on_footprint.T
+        boxes = transport.boxes[batch]
+        direct = footprint_weights(q, centres, boxes, centred) @ centred.on_footprint.T
         ones = centred.recentre(np.ones_like(direct[:, :1]), centres)
         offset_noise = posterior.offset_noise.reshape(-1, channels)[batch]
         share_of_white = posterior.share_of_white.reshape(-1, channels)[batch]
@@ -336,7 +424,9 @@ class ErrorBars:
         noise = transport.noise.reshape(-1, channels)[batch]
         return _PixelState(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
-            nuisance.common_precision(white, offset_noise),
+            nuisance.common_precision(
+                white, offset_noise, nuisance.shift_deviation(transport.near_basis)
+            ),
             np.maximum(noise, RELATIVE_NOISE_FLOOR * white),
             posterior.prior_scale.ravel()[batch, None] * white,
             np.maximum(light_noise**2 - (share_of_white * offset_noise) ** 2, 0.0),
@@ -362,12 +452,35 @@ class ErrorBars:
 
     def _prior(self, place: int) -> ResponsePrior:
         if place not in self._priors:
-            self._priors[place] = response_prior(
-                self._posterior.prior_components[place],
-                self._centred,
-                self._posterior.multiplicity,
+            posterior = self._posterior
+            self._priors[place] = _prior_of(
+                posterior.prior_components[place],
+                posterior.frequencies,
+                self._transport.projector,
+                self._transport.near_basis,
+                tuple(posterior.multiplicity.tolist()),
             )
         return self._priors[place]
+
+
+# Those of the blocks of camera rows of one transport are the same.
+@lru_cache(maxsize=4)
+def _centred_on(
+    frequencies: tuple[Frequency, ...], projector: Size, near_basis: NearBasis
+) -> CentredBasis:
+    return centred_basis(real_basis(frequencies, projector), near_basis)
+
+
+@lru_cache(maxsize=64)
+def _prior_of(
+    prior_component: PriorComponent,
+    frequencies: tuple[Frequency, ...],
+    projector: Size,
+    near_basis: NearBasis,
+    multiplicity: tuple[float, ...],
+) -> ResponsePrior:
+    centred = _centred_on(frequencies, projector, near_basis)
+    return response_prior(prior_component, centred, np.array(multiplicity, dtype=np.float32))
 
 
 def _posterior_variance(

@@ -10,14 +10,18 @@ from itertools import zip_longest
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Size, beside, namespace
+from nearfar.arrays import Booleans, Floats, Size, beside, fetch, namespace
 from nearfar.devices import Device
+from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
+from nearfar.estimate.joint.footprint import footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.sweep import sweep_once
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS
+from nearfar.transport import near
 from nearfar.transport.model import Transport
 
 # Prior components and scales of camera pixels, one choice for each sweep.
@@ -36,6 +40,7 @@ def estimate_jointly(
     window: int,
     far: Size,
     *,
+    pitch: int = 1,
     sweeps: int = SWEEPS,
     chosen: Choices = (),
     device: Device = "cpu",
@@ -72,10 +77,11 @@ def estimate_jointly(
     Raises
     ------
     InputError
-        If white or everything but white was not measured, or the device is not there.
+        If white or everything but white was not measured, or the device is not there, or is not
+        "cpu" at a pitch over 1.
     """
     report = progress or (lambda _share: None)
-    problem = lay_out(measurements, correspondence, window, device)
+    problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     return assemble(*_sweep(problem, sweeps, chosen, report), far)
 
 
@@ -84,6 +90,7 @@ def choose_components(
     correspondence: Floats,
     window: int,
     *,
+    pitch: int = 1,
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Choices:
@@ -97,9 +104,22 @@ def choose_components(
         One for each sweep.
     """
     report = progress or (lambda _share: None)
-    problem = lay_out(measurements, correspondence, window, device)
+    problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     _, rows = _sweep(problem, SWEEPS, (), report)
     return rows.choices
+
+
+def _laid_out(
+    measurements: Measurements, correspondence: Floats, near_basis: NearBasis, device: Device
+) -> Problem:
+    """Lay out a problem, with the footprints that q and the highest frequencies show."""
+    if near_basis.pitch > 1 and device != "cpu":
+        raise InputError(
+            f"a plan for every projector pixel, at a pitch of {near_basis.pitch}, is estimated on "
+            f"the processor alone: leave out `device`."
+        )
+    boxes = footprint_boxes(measurements, correspondence, near_basis)
+    return lay_out(measurements, correspondence, near_basis, device, boxes)
 
 
 def _sweep(
@@ -114,16 +134,33 @@ def _sweep(
 
         rows = sweep_once(problem, rows, report, choice)
         lit = rows.choices[-1].prior_component < len(LIT_COMPONENTS)
-        pixels = problem.pixels._replace(lit=lit, correspondence=_moved(problem, rows, lit))
+        pixels = problem.pixels._replace(
+            lit=lit, correspondence=_moved(problem, rows, lit, is_last=number == sweeps - 1)
+        )
         problem = problem._replace(pixels=pixels)
+        if problem.near_basis.pitch > 1 and number < sweeps - 1:
+            problem = _about_new_q(problem)
     assert rows is not None
     return problem, rows
 
 
-def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans) -> Floats:
-    """Shift q by its estimated error, at most to where it would round to another pixel.
+def _about_new_q(problem: Problem) -> Problem:
+    """Return the problem about the q that its last sweep found, with the footprints of these q."""
+    pixels, measurements = problem.pixels, problem.measurements
+    q = fetch(pixels.correspondence).reshape(*measurements.camera, 2)
+    changes = (
+        near.centre(q, measurements.projector),
+        footprint_boxes(measurements, q, problem.near_basis),
+    )
+    centres, boxes = (beside(np.asarray(values), pixels.white) for values in changes)
+    return problem._replace(pixels=pixels._replace(centres=centres, footprint=boxes))
 
-    It is NaN where the photos turned out to show no direct light.
+
+def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: bool) -> Floats:
+    """Shift q by its estimated error.
+
+    At most to where it would round to another pixel, unless windows are placed anew about it. It is
+    NaN where the photos turned out to show no direct light.
     """
     xp = namespace(rows.amplitudes)
     amplitudes = xp.astype(rows.amplitudes, xp.float64)
@@ -135,8 +172,9 @@ def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans) -> Floats:
     off = xp.where((xp.sum(direct, axis=1) > 0)[:, None], within, 0.0)
     pixels, centres = problem.pixels, xp.astype(problem.pixels.centres, xp.float64)
     last = beside(np.array(problem.measurements.projector) - 1.0, amplitudes)
-    lowest = xp.clip(centres - LARGEST_FROM_CENTRE, min=0.0)
-    highest = xp.minimum(centres + LARGEST_FROM_CENTRE, last)
+    most = LARGEST_FROM_CENTRE if is_last or problem.near_basis.pitch == 1 else np.inf
+    lowest = xp.clip(centres - most, min=0.0)
+    highest = xp.minimum(centres + most, last)
     moved: Floats = xp.maximum(xp.minimum(pixels.correspondence + off, highest), lowest)
     seen: Floats = xp.where(lit[:, None], moved, xp.nan)
     return seen

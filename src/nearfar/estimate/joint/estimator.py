@@ -7,6 +7,8 @@ from nearfar.arrays import Floats
 from nearfar.devices import Device
 from nearfar.estimate.base import Estimator, Memory, Model
 from nearfar.estimate.joint.estimate import SWEEPS, Choices, estimate_jointly
+from nearfar.estimate.joint.footprint import VOTING_ROWS
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measured_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
@@ -37,6 +39,10 @@ class JointEstimator(Estimator):
         """Each sweep but the first reads the neighbours, and the first reads their q."""
         return SWEEPS
 
+    def rows_beside(self, plan: Plan) -> int:
+        """Return the halo; at a pitch of several pixels, neighbours also vote for footprints."""
+        return SWEEPS * (1 + VOTING_ROWS) if plan.pitch > 1 else self.halo
+
     def require(self, plan: Plan) -> None:
         """Refuse a plan of complex patterns."""
         plan.require_real("reconstruct")
@@ -45,7 +51,7 @@ class JointEstimator(Estimator):
     def memory(self, plan: Plan, channels: int) -> Memory:
         """Count the matrices of every prior component, and each camera pixel's responses."""
         responses = 2 * len(measured_frequencies(plan))
-        entries = plan.window**2
+        entries = NearBasis(plan.window, plan.pitch).count
         components = len(LIT_COMPONENTS) + len(UNLIT_COMPONENTS)
         component = (
             2 * responses**2
@@ -77,6 +83,7 @@ class JointEstimator(Estimator):
             q,
             model.window,
             model.far,
+            pitch=model.pitch,
             chosen=self.choices,
             device=device,
             progress=progress,

@@ -20,8 +20,9 @@ from nearfar.estimate.joint.batch import (
 )
 from nearfar.estimate.joint.evidence import PriorSet, prior_set
 from nearfar.estimate.joint.spikes import expected_spikes
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis, window_offsets
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.component import PriorComponent
@@ -80,10 +81,12 @@ class Problem(NamedTuple):
     measurements: Measurements
     model: Model
     pixels: AllPixels
-    window: int
+    near_basis: NearBasis
 
 
-def build_model(measured: RealBasis, multiplicity: Floats, window: int, device: Device) -> Model:
+def build_model(
+    measured: RealBasis, multiplicity: Floats, near_basis: NearBasis, device: Device
+) -> Model:
     """Build the priors for the measured frequencies; the last few are cached for other tiles.
 
     Parameters
@@ -92,7 +95,7 @@ def build_model(measured: RealBasis, multiplicity: Floats, window: int, device: 
         DC among it.
     multiplicity : ndarray, shape (R,)
         How often each response is measured.
-    window : int
+    near_basis : NearBasis
     device : {"cpu", "cuda", "torch"}
 
     Raises
@@ -111,9 +114,14 @@ def build_model(measured: RealBasis, multiplicity: Floats, window: int, device: 
     frequencies = sorted(frequencies, key=lambda k: k.is_own_negative)
     indices = measured.response_indices(frequencies)
     centred = replace(
-        _centred(tuple(frequencies), measured.projector, window), response_indices=indices
+        _centred(tuple(frequencies), measured.projector, near_basis), response_indices=indices
     )
-    key = (tuple(frequencies), measured.projector, window, tuple(multiplicity[indices].tolist()))
+    key = (
+        tuple(frequencies),
+        measured.projector,
+        near_basis,
+        tuple(multiplicity[indices].tolist()),
+    )
     return Model(
         centred.put(move),
         move(multiplicity[indices]),
@@ -123,7 +131,11 @@ def build_model(measured: RealBasis, multiplicity: Floats, window: int, device: 
 
 
 def lay_out(
-    measurements: Measurements, correspondence: Floats, window: int, device: Device
+    measurements: Measurements,
+    correspondence: Floats,
+    near_basis: NearBasis,
+    device: Device,
+    footprint: Floats | None = None,
 ) -> Problem:
     """Prepare measurements for the joint estimate.
 
@@ -131,20 +143,24 @@ def lay_out(
     ----------
     measurements : Measurements
     correspondence : ndarray, shape (Cy, Cx, 2)
-    window : int
+    near_basis : NearBasis
     device : {"cpu", "cuda", "torch"}
         Device of all arrays but those of `measurements`.
+    footprint : ndarray, shape (C, 2), optional
+        Heights and widths of footprints, as `footprint_boxes` gives them.
 
     Raises
     ------
     InputError
         As `build_model`.
     """
-    rounded = np.rint(correspondence)
-    close = np.abs(correspondence - rounded) < WHOLE_PIXEL_DISTANCE
-    correspondence = np.where(close, rounded, correspondence).astype(np.float64)
+    correspondence = correspondence.astype(np.float64)
+    if near_basis.pitch == 1:
+        rounded = np.rint(correspondence)
+        close = np.abs(correspondence - rounded) < WHOLE_PIXEL_DISTANCE
+        correspondence = np.where(close, rounded, correspondence)
     lit = np.isfinite(correspondence).all(axis=-1).ravel()
-    model = build_model(measurements.basis, measurements.multiplicity, window, device)
+    model = build_model(measurements.basis, measurements.multiplicity, near_basis, device)
     white = white_scale(measurements)
     pixels = AllPixels(
         responses=measurements.responses[..., model.centred.response_indices],
@@ -154,16 +170,19 @@ def lay_out(
         noise=np.maximum(measurements.noise, RELATIVE_NOISE_FLOOR * white),
         offset_noise=offset_noise(measurements),
         white=white,
-        spike_expected=expected_spikes(correspondence, window),
+        spike_expected=expected_spikes(correspondence, near_basis),
+        footprint=np.zeros((len(lit), 2), dtype=np.float32) if footprint is None else footprint,
     )
     pixels = AllPixels._make(map(mover(device), pixels))
-    return Problem(measurements, model, pixels, window)
+    return Problem(measurements, model, pixels, near_basis)
 
 
 # Tiles of camera rows share it, and the phases that it computes once.
 @lru_cache(maxsize=4)
-def _centred(frequencies: tuple[Frequency, ...], projector: Size, window: int) -> CentredBasis:
-    return centred_basis(real_basis(frequencies, projector), window_offsets(window))
+def _centred(
+    frequencies: tuple[Frequency, ...], projector: Size, near_basis: NearBasis
+) -> CentredBasis:
+    return centred_basis(real_basis(frequencies, projector), near_basis)
 
 
 # Tiles of camera rows share them: those of lit and of unlit camera pixels, for the first photos of
@@ -173,12 +192,12 @@ def _prior_set(
     prior_components: tuple[PriorComponent, ...],
     frequencies: tuple[Frequency, ...],
     projector: Size,
-    window: int,
+    near_basis: NearBasis,
     multiplicity: tuple[float, ...],
     device: Device,
 ) -> PriorSet:
     """Build the priors for a set of measured frequencies and how often each was measured."""
-    centred = _centred(frequencies, projector, window)
+    centred = _centred(frequencies, projector, near_basis)
     measured = np.array(multiplicity, dtype=np.float32)
     priors = tuple(response_prior(one, centred, measured) for one in prior_components)
     return prior_set(priors, centred, measured).put(mover(device))

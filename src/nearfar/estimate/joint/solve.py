@@ -63,7 +63,7 @@ def near_noise(batch: PixelBatch, prior: ResponsePrior, ratio: Floats) -> Floats
 
 
 def solve_whole(
-    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, _centred: CentredBasis
+    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, centred: CentredBasis
 ) -> PosteriorMean:
     """Estimate camera pixels of one prior component.
 
@@ -89,7 +89,7 @@ def solve_whole(
     solved = nuisance.solve(
         xp.astype(xp.stack(normal, axis=1), xp.float64),
         xp.astype(xp.stack(right, axis=1), xp.float64),
-        nuisance.prior_precision(batch),
+        nuisance.prior_precision(batch, centred.near_basis),
     )
     amplitudes = xp.astype(solved, xp.float32)
     y -= amplitudes @ per_amplitude

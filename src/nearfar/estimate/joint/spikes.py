@@ -16,7 +16,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats, Integers, beside, namespace
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.solve import PosteriorMean
-from nearfar.illumination.centred_basis import window_offsets
+from nearfar.illumination.near_basis import NearBasis, window_offsets
 from nearfar.priors.responses import ResponsePrior
 
 # A second surface's footprint is up to four entries.
@@ -67,21 +67,24 @@ def away_from_q(entries: int) -> Booleans:
     return np.asarray(np.abs(window_offsets(round(np.sqrt(entries)))).max(axis=1) > 1)
 
 
-def expected_spikes(correspondence: Floats, window: int) -> Booleans:
+def expected_spikes(correspondence: Floats, near_basis: NearBasis) -> Booleans:
     """Return the window entries at which neighbours see direct light of another surface.
 
     Parameters
     ----------
     correspondence : ndarray, shape (Cy, Cx, 2)
-    window : int
-        W.
+    near_basis : NearBasis
 
     Returns
     -------
     ndarray of bool, shape (C, W^2)
-        Entries within one of the q of a neighbour, where that is on another surface.
+        Entries within one of the q of a neighbour, where that is on another surface. No entries
+        where functions are of several projector pixels.
     """
     height, width = correspondence.shape[:2]
+    if near_basis.pitch > 1:
+        return np.zeros((height * width, 0), dtype=bool)
+    window = near_basis.window
     reach = window // 2
     padded = np.pad(correspondence, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
     # With a border of one entry, which is dropped in the end.

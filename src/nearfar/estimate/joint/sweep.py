@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import AllPixels, PixelBatch, gather
-from nearfar.estimate.joint.clipped import rounded_ratio, solve_clipped
+from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
+from nearfar.estimate.joint.cut import near_responses, solve_cut
 from nearfar.estimate.joint.evidence import most_probable
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
@@ -28,7 +29,7 @@ from nearfar.estimate.joint.spikes import (
     likeliest_spike,
     with_spike,
 )
-from nearfar.illumination.centred_basis import CentredBasis, reachable
+from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.parallel import side_by_side
 from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.priors.responses import ResponsePrior
@@ -76,9 +77,7 @@ def sweep_once(
     start = None
     if before is not None:
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
-    never_inside = beside(~reachable(problem.window, projector), pixels.responses)
-    inside = near.inside(pixels.centres, problem.window, projector)
-    clipped = pixels.lit & ~xp.all(inside | never_inside, axis=1)
+    clipped = pixels.lit & is_clipped(pixels.centres, problem.near_basis, projector)
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
@@ -108,13 +107,15 @@ def sweep_once(
         done[0] += selected.stop - selected.start
         report(done[0] / count)
 
+    solve = solve_clipped if centred.near_basis.pitch == 1 else solve_cut
+
     def estimate_clipped(part: NDArray[np.int64]) -> None:
         """Estimate camera pixels of one prior component whose windows the border clips."""
         selected = beside(part, pixels.responses)
         batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
         prior = model.lit.priors[int(choice.prior_component[selected[0]])]
         ratio = rounded_ratio(variance_ratio(batch, choice.prior_scale[selected]))
-        put(selected, batch, _with_spikes(batch, prior, ratio, solve_clipped, centred))
+        put(selected, batch, _with_spikes(batch, prior, ratio, solve, centred))
 
     side_by_side(choose, blocks(count, BATCH_PIXELS))
     clipped = clipped & (choice.prior_component < len(LIT_COMPONENTS))
@@ -131,8 +132,12 @@ def _explained(
     if start is None:
         return None
     centred = problem.model.centred
-    responses = product(start.expected.near[selected], centred.on_window.T)
-    responses = centred.uncentre(responses, problem.pixels.centres[selected])
+    centres = problem.pixels.centres[selected]
+    if centred.near_basis.pitch == 1:
+        responses = product(start.expected.near[selected], centred.on_window.T)
+    else:
+        responses = near_responses(start.expected.near[selected], centres, centred)
+    responses = centred.uncentre(responses, centres)
     responses += start.expected.far[selected]
     direct = start.before.amplitudes[selected, :, 1, None]
     responses += direct * start.of_quantisation(selected)[:, None]
@@ -149,7 +154,7 @@ def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows
 
     return EstimatedRows(
         zeros(number, channels, COMMON_AMPLITUDES),
-        zeros(number, channels, problem.window**2),
+        zeros(number, channels, problem.near_basis.count),
         zeros(number, channels, count),
         zeros(number, channels),
         (
@@ -227,6 +232,8 @@ def _clipped_alike(
 
 def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
+    if problem.measurements.quantisation_error.shape[-1] == 0:
+        return lambda selected: problem.pixels.responses[selected, 0] * np.float32(0.0)
     # A row for each projector pixel, so that a camera pixel reads contiguous memory.
     errors = problem.measurements.quantisation_error[problem.model.centred.response_indices]
     where = footprint(fetch(problem.pixels.correspondence), problem.measurements.projector)
@@ -250,7 +257,9 @@ def _with_spikes(
     xp, here = namespace(mean.near), device(mean.near)
     number = xp.arange(len(ratio), device=here)
     found = mean
-    for _ in range(MAXIMUM_SPIKES if bool(xp.any(batch.lit)) else 0):
+    # A function of several projector pixels is no spike.
+    has_spikes = centred.near_basis.pitch == 1 and bool(xp.any(batch.lit))
+    for _ in range(MAXIMUM_SPIKES if has_spikes else 0):
         entry, gain = likeliest_spike(batch, prior, ratio, found)
         (accepted,) = xp.nonzero(gain > LEAST_GAIN)
         if not len(accepted):
@@ -291,7 +300,7 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
         rows.near_noise.reshape(shape) / white[..., 0] ** 2,
         pixels.lit.reshape(camera),
     )
-    inside = near.inside(pixels.centres, problem.window, measurements.projector)
+    inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
     windows *= white
     far *= white
     return rows._replace(

@@ -27,7 +27,8 @@ from nearfar.transport.mediated import DenseBetween, Mediated
 # Sub-rays of the camera, about, and the most along each side of its pixels.
 CAMERA_RAYS = 10_000_000
 CAMERA_SAMPLES = 4
-# Sub-rays of the projector along the shorter side, at least, and in all where its pixels are fewer.
+# Sub-rays of the projector along the shorter side, at least; and the most where it has fewer
+# pixels.
 PROJECTOR_RAYS_ALONG = 256
 PROJECTOR_RAYS = 4_000_000
 

@@ -1,1 +1,1 @@
-"""What spoils the photos of a capture, by how they fit the transport that was made of them."""
+"""Diagnosis of spoilt photos, by their fit to the transport that was estimated from them."""

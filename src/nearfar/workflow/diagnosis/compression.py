@@ -94,9 +94,10 @@ def _in_levels(photos: Floats) -> Floats | None:
 
 
 def _nearness(luminance: Floats) -> tuple[float, float]:
-    """Return how near transforms of blocks are to whole numbers, and how many are near 0.
+    """Return how near the blocks' transforms are to whole numbers, and the share that is near 0.
 
-    The first is 1 if all are whole, and 0 by chance. Not a number if all blocks are flat.
+    The first is 1 if all are whole, and 0 on average if they are arbitrary. NaN if all blocks are
+    flat.
     """
     count, height, width = luminance.shape
     down, across = height // BLOCK, width // BLOCK

@@ -1,4 +1,4 @@
-"""What spoils the photos of a capture, by all checks."""
+"""Diagnosis of the photos of a capture, by all checks."""
 
 import numpy as np
 

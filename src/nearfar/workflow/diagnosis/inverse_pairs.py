@@ -1,8 +1,8 @@
-"""What moved during a capture of inverse pairs, by what the pairs sum to.
+"""Motion during a capture of inverse pairs, by the sums of the pairs.
 
 Every pair sums to white and black. So the sums are photos of white throughout the capture, though
-white itself was photographed once. They are compared with their own mean, so that a response that
-is not linear, of which they also tell, is no motion.
+white itself was photographed once. They are compared with their own mean: a response that is not
+linear changes all of them alike, and is not taken for motion.
 """
 
 from dataclasses import replace
@@ -23,7 +23,7 @@ WHITE = Sinusoid(kind="cosine", frequency=DC, purpose="reference")
 
 
 def find_motion_by_pairs(sample: CameraSample) -> list[Moved]:
-    """Find what moved, and before which photo.
+    """Find whether camera or scene moved, and before which photo.
 
     Parameters
     ----------

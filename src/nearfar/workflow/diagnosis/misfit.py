@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.illumination.frequencies import DC
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.plan import Plan, Sinusoid
@@ -30,9 +30,11 @@ from nearfar.workflow.diagnosis.sample import PATCH, CameraSample
 # Error of the model that counts as noise, as a share of the camera pixel's white and of the mean's.
 MODEL_ERROR = 0.002
 MODEL_ERROR_OF_MEAN = 0.0005
-# Smallest change of exposure, and of ambient light as a share of white, that is one: what the model
-# does not hold of a scene may look like less than this.
+# Smallest change of exposure, and of ambient light as a share of white, that is reported: errors of
+# the model may look like smaller ones.
 SMALLEST_CHANGE = 0.01
+# Values of patterns that are drawn at a time.
+MOST_DRAWN = 2**26
 # The picture is divided into as many regions down and across.
 REGIONS_A_SIDE = 3
 
@@ -53,7 +55,7 @@ CAUSES = 9
 
 @dataclass(frozen=True, eq=False)
 class Fits:
-    """Photos of a sample beside what they should be.
+    """Photos of a sample beside their relit pictures.
 
     Attributes
     ----------
@@ -72,13 +74,13 @@ class Fits:
 
     @property
     def misfit(self) -> Floats:
-        """Of each photo, (photos,)."""
+        """Misfit of each photo, (photos,)."""
         return np.asarray(((self.photos - self.relit) ** 2 / self.variance).mean(axis=(1, 2, 3)))
 
 
 @dataclass(frozen=True, eq=False)
 class PhotoFits(Fits):
-    """Photos of a sample beside relit pictures.
+    """Photos of a sample beside their relit pictures, with the plan of the photos.
 
     Attributes
     ----------
@@ -97,8 +99,9 @@ class PhotoFits(Fits):
 def fit_photos(photos: PhotosWithoutDrift, transport: Transport, start: int = 0) -> PhotoFits:
     """Relight a sample, or some rows of a camera, under every pattern of its plan.
 
-    What is saturated under white counts for nothing. Nor do stripes and Gray code: no response is
-    estimated from them, so that they differ from their relit pictures by more than noise.
+    Camera pixels that are saturated under white have infinite variance. So have photos of stripes
+    and Gray code: no response is estimated from them, so that they differ from their relit pictures
+    by more than noise.
 
     Parameters
     ----------
@@ -142,23 +145,29 @@ def model_variance(white: Floats) -> Floats:
 
 
 def relight(plan: Plan, transport: Transport, numbers: Iterable[int]) -> Floats:
-    """Return what some photos of a plan should show, (n, rows, columns, channels)."""
-    lights = np.stack([plan.draw(number) / np.float32(255) for number in numbers])
-    relit = transport.pictures(lights)
-    relit += transport.black
-    return relit
+    """Relight under some patterns of a plan and add black, (n, rows, columns, channels)."""
+    wanted = list(numbers)
+    relit = [
+        transport.pictures(
+            np.stack([plan.draw(number) / np.float32(255) for number in wanted[together]])
+        )
+        for together in blocks(len(wanted), MOST_DRAWN // plan.projector.pixels)
+    ]
+    found = relit[0] if len(relit) == 1 else np.concatenate(relit)
+    found += transport.black
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Of the weighted regression of each photo's difference on the causes, in each region.
+    """Normal equations of the regression of each photo's difference on the causes, by region.
 
     Attributes
     ----------
     matrix : ndarray, shape (photos, regions, causes, causes)
     vector : ndarray, shape (photos, regions, causes)
     values : int
-        Values of a photo: what its misfit is the mean of.
+        Values of a photo, over which its misfit is the mean.
     """
 
     matrix: NDArray[np.float64]
@@ -167,7 +176,7 @@ class NormalEquations:
 
     @property
     def whole(self) -> "NormalEquations":
-        """Of the whole picture: one region."""
+        """Normal equations of the whole picture as one region."""
         return NormalEquations(
             self.matrix.sum(axis=1, keepdims=True),
             self.vector.sum(axis=1, keepdims=True),
@@ -175,7 +184,7 @@ class NormalEquations:
         )
 
     def without(self, photos: Booleans) -> "NormalEquations":
-        """Return the equations to which some photos, (photos,), add nothing."""
+        """Return the equations with those of some photos, (photos,), set to zero."""
         matrix, vector = self.matrix.copy(), self.vector.copy()
         matrix[photos] = vector[photos] = 0.0
         return NormalEquations(matrix, vector, self.values)

@@ -153,6 +153,8 @@ def _compared(
         photos = photos_without_drift(capture, progress)
         assert isinstance(photos, PhotosWithoutDrift)
         return photos, transport.rows
+    # Single lines, one through each row of cells of the map, and no bands as for an estimate, which
+    # uses neighbours.
     rows = np.arange(pitch // 2, camera.height, pitch)
     step = max(1, len(rows) * camera.width * capture.channels // VALUES_OF_LARGE_CAMERA)
     columns = np.arange(step // 2, camera.width, step)

@@ -115,6 +115,8 @@ def sampled_lines(camera: Size) -> tuple[Integers, Integers]:
 
     Turned upside down, or mirrored, the same are chosen.
     """
+    # To recognise turned photos, these lines must fall on one another when a photo is turned; those
+    # of `bands` and `choose_rows` do not.
     if camera.pixels <= 1.5 * CAMERA_PIXELS:
         return np.arange(camera.height), np.arange(camera.width)
     share = np.sqrt(CAMERA_PIXELS / camera.pixels)

@@ -3,7 +3,8 @@
 A photo that spoils an estimate hides in it, because the estimate bends to it. So photos with large
 misfits are left out, the transport is estimated again without them, and they are compared with its
 pictures: under their own pattern, turned, under the patterns of other photos, in part under those,
-with other colours, or brighter or darker. What fits well without having been used is taken back.
+with other colours, or brighter or darker. Photos that fit well though they were left out are taken
+back.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -72,7 +73,7 @@ TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a photo would be, and the misfit that remains.
+    """A hypothesis on how a photo was spoilt, and the misfit that it leaves.
 
     Attributes
     ----------
@@ -126,8 +127,8 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
     known : ndarray, shape (rows, columns, 2)
         q as it was found from all photos.
     suspected : bool or None
-        Whether there is reason to search where no photo has a large misfit: a photo that alone
-        tells of its frequency fits itself. If False, misfits of check photos are no reason either.
+        Whether to search even if no photo has a large misfit, since the only photo of a frequency
+        always fits the estimate. If False, large misfits of check photos are no reason to search.
     """
     plan = fits.plan
     fixed = is_white_or_black(plan) | serves(plan, "correspondence")

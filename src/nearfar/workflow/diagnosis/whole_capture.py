@@ -1,4 +1,4 @@
-"""What spoils a capture as a whole: motion, focus, flicker, a response that is not linear.
+"""Faults of a capture as a whole: motion, focus, flicker, a response that is not linear.
 
 How much of the photos' misfits each of them explains is read off the normal equations of
 `nearfar.workflow.diagnosis.misfit`, in misfits summed over photos: 1 is a photo's noise.
@@ -37,15 +37,15 @@ from nearfar.workflow.diagnosis.misfit import (
 )
 from nearfar.workflow.diagnosis.sample import CameraSample
 
-# What a cause has to explain at least.
+# Misfit that a cause has to explain at least.
 LEAST_EXPLAINED = 1.0
-# Share of the misfits beyond 1 for each photo that a change at one moment has to explain.
+# Share of the photos' misfits beyond 1, summed, that a change at one moment has to explain.
 LEAST_SHARE = 0.05
 # A change at one moment lies at least so many photos from both ends.
 FROM_THE_ENDS = 4
-# Of what a size of its own in each photo explains, one change has to explain at least this share.
+# One change has to explain this share of what effects of a size of their own in each photo do.
 LEAST_OF_EACH = 0.3
-# And of the photos of white alone, where it is camera or scene that moved.
+# Misfit of the photos of white that has to be explained where camera or scene moved.
 LEAST_OF_WHITE = 0.3
 # A bend of the response has to explain at least this, and this share of the misfits beyond 1.
 LEAST_BEND = 0.5
@@ -56,7 +56,8 @@ EXPOSURE_OVER_BEND = 7.0
 FLICKER = 8.0
 # Of the photos, the share in which it does.
 FLICKER_SHARE = 0.2
-# Encodings of light, each with its inverse, and what of the sums' excess is left if it is one.
+# Decoders of light by the name of the encoding; if it is the photos', at most this share of the
+# excess of their sums is left.
 DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
     "sRGB": lambda values: from_srgb(np.clip(values, 0.0, 1.0)),
     "a gamma of 2.2": lambda values: np.maximum(values, 0.0) ** 2.2,
@@ -85,7 +86,7 @@ class Step(NamedTuple):
 
 
 def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -> list[Spoilt]:
-    """Find what changed while photos were taken, at one moment or all the time.
+    """Find the changes of rig and scene while photos were taken, at one moment or all the time.
 
     Parameters
     ----------
@@ -234,8 +235,8 @@ def _best_step(
 ) -> Step:
     """Return the change that explains most, before one of some photos.
 
-    What an effect that never changes explains is no change: estimates that a prior pulls towards 0
-    look out of focus in all photos.
+    A constant effect is no change, so that the misfit it explains is subtracted: estimates that a
+    prior pulls towards 0 look out of focus in all photos.
     """
     matrix, vector = matrix.cumsum(axis=0), vector.cumsum(axis=0)
     unchanged = float(_solved(matrix[-1], vector[-1]) @ vector[-1])

@@ -23,6 +23,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import Choices, choose_components
 from nearfar.estimate.joint.estimator import JOINT, JointEstimator
 from nearfar.estimate.joint.problem import build_model
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.parallel import single_threaded_products
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.measure import measure, measured_basis
@@ -198,7 +199,9 @@ class EstimateObserver:
         room = PhotosInMemory(self._plan, np.broadcast_to(photo[:1, :1], shape), self._full_scale)
 
         def fits(memory: int) -> bool:
-            tiling = tile_rows(self._plan, room.camera, room.channels, JOINT, JOINT.halo, memory)
+            tiling = tile_rows(
+                self._plan, room.camera, room.channels, JOINT, JOINT.rows_beside(self._plan), memory
+            )
             return tiling.rows == room.camera.height
 
         # A choice from the first photos has matrices of its own for every prior component.
@@ -253,11 +256,17 @@ class EstimateObserver:
         except InputError:
             return None
         components = choose_components(
-            measurements, q, plan.window, device=self._options.device, progress=self._stop_if_ended
+            measurements,
+            q,
+            plan.window,
+            pitch=plan.pitch,
+            device=self._options.device,
+            progress=self._stop_if_ended,
         )
         # The estimate from all photos finds its matrices in the cache.
         basis, multiplicity = measured_basis(self._plan)
-        build_model(basis, multiplicity, plan.window, self._options.device)
+        near_basis = NearBasis(plan.window, plan.pitch)
+        build_model(basis, multiplicity, near_basis, self._options.device)
         return _EarlyChoice(taken, components, time.monotonic() - start)
 
     def _stop_if_ended(self, _done: float) -> None:

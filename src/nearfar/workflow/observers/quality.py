@@ -24,7 +24,9 @@ from nearfar.photometry.measure import measure
 from nearfar.plan import Plan
 from nearfar.plan.checks import check_lights, ends
 from nearfar.workflow.evaluate import HIGHEST
-from nearfar.workflow.verdict.held_out import HeldOut, bars_of, compare_light
+from nearfar.workflow.verdict.bars import bars_of
+from nearfar.workflow.verdict.by_check_photos import compare_light
+from nearfar.workflow.verdict.held_out import HeldOut
 
 # The chosen rows of the camera come in bands of this many, because the estimate of a camera pixel
 # uses its neighbours.
@@ -158,6 +160,8 @@ class QualityObserver:
 
 def choose_rows(height: int, width: int) -> Integers:
     """Choose rows of a camera in bands, spread evenly, about `CAMERA_PIXELS` in all."""
+    # Far fewer than the `bands` of a finished capture: these rows of all photos are kept in memory,
+    # and are estimated again and again between photos.
     wanted = min(height, max(ROWS_PER_BAND, CAMERA_PIXELS // width))
     bands = max(1, wanted // ROWS_PER_BAND)
     if wanted == height:

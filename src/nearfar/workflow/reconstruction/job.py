@@ -80,7 +80,9 @@ def tiling_of(capture: Capture, options: ReconstructionOptions, *, given: bool) 
     estimator, plan = options.estimator, capture.plan
     estimator.require(plan)
     found_in_tiles = not (given or options.square)
-    halo = estimator.halo + (method_of(plan).rows_beside if found_in_tiles else 0)
+    halo = estimator.rows_beside(plan) + (
+        method_of(plan).rows_needed(plan) if found_in_tiles else 0
+    )
     rows = plan.projector if options.square else capture.camera
     return tile_rows(
         plan, rows, capture.channels, estimator, halo, options.memory, options.tiles_at_once

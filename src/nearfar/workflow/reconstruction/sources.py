@@ -185,7 +185,7 @@ def _find_correspondence(
 ) -> Correspondence:
     """Find the correspondence of the whole camera, tile by tile where the method allows it."""
     method = method_of(photos.plan)
-    if method.rows_beside:
+    if method.rows_needed(photos.plan):
         return method.find(photos, slice(0, photos.camera.height), lambda: join(measured))
     measured_of = {tile.start: part for tile, part in zip(tiles, measured, strict=True)}
     return joined(

@@ -55,7 +55,7 @@ def provenance_of(
 
 
 def description_of(capture: Capture) -> dict[str, Any]:
-    """Return what the provenance of a transport holds of its capture, by which it is known again.
+    """Return the part of a transport's provenance that identifies its capture: plan, photos, rig.
 
     ``taken`` is when the last photo was taken, in seconds since the epoch.
     """
@@ -63,6 +63,8 @@ def description_of(capture: Capture) -> dict[str, Any]:
     return {
         "plan": {
             "window": plan.window,
+            # Left out at 1, as before there was a pitch, so that captures are known again.
+            **({} if plan.pitch == 1 else {"pitch": plan.pitch}),
             "far": list(plan.far),
             "dropped": list(plan.dropped),
             "offset": plan.offset,

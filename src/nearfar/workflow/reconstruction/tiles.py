@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Size, blocks
+from nearfar.correspondence.methods import method_of
 from nearfar.errors import InputError
 from nearfar.estimate.base import Estimator
 from nearfar.plan import Plan
@@ -78,7 +79,7 @@ def tile_rows(
         If not even one row fits.
     """
     shared, row = _shared_and_row(plan, camera, channels, estimator)
-    halo_rows = _halo_rows(estimator)
+    halo_rows = _halo_rows(plan, estimator)
     rows = int((memory // tiles_at_once - shared) / row) - halo_rows
     if rows + halo_rows >= camera.height:
         return Tiling(camera.height, camera.height, halo)
@@ -99,7 +100,7 @@ def memory_of_tile(
 ) -> float:
     """Return the memory in bytes in which a tile of `rows` rows is reconstructed."""
     shared, row = _shared_and_row(plan, camera, channels, estimator)
-    return shared + row * (rows + _halo_rows(estimator))
+    return shared + row * (rows + _halo_rows(plan, estimator))
 
 
 def rows_to_measure(
@@ -124,7 +125,9 @@ def _shared_and_row(
     return shared, TEMPORARY_FACTOR * pixel * camera.width
 
 
-def _halo_rows(estimator: Estimator) -> int:
+def _halo_rows(plan: Plan, estimator: Estimator) -> int:
     """Return the rows that are measured besides those of a tile."""
-    # One more on each side for correspondence by phase.
-    return 2 * (estimator.halo + 1) if estimator.halo else 0
+    beside = max(1, method_of(plan).rows_needed(plan))
+    # A single one for correspondence is not counted where the estimator needs none.
+    halo = estimator.rows_beside(plan)
+    return 2 * (halo + beside) if halo or beside > 1 else 0

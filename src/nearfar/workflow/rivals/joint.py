@@ -24,7 +24,9 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
     photos = len(plan.patterns)
     measurements = measure(acquire_in_memory(plan, bench.rig(budget.exposure(photos))))
     q = correspond_by_phase(measurements).q
-    yield Attempt(photos, estimate_jointly(measurements, q, plan.window, plan.far))
+    yield Attempt(
+        photos, estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+    )
 
 
 JOINT = Rival(

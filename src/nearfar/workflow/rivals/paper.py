@@ -10,7 +10,7 @@ from nearfar.errors import PlanError
 from nearfar.estimate.paper import estimate
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, paper_plan
-from nearfar.plan.choose import default_window
+from nearfar.plan.window import default_window
 from nearfar.workflow.acquire import acquire_in_memory
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.rival import Attempt, Budget, Rival

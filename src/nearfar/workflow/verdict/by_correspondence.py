@@ -9,16 +9,10 @@ from nearfar.photometry.photos import PhotosWithNoise, in_batches, mean_photo
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
+from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
+from nearfar.workflow.verdict.bars import Bars, mean_square
 from nearfar.workflow.verdict.correspondence_lights import WeighedLight, correspondence_lights
-from nearfar.workflow.verdict.held_out import (
-    Bars,
-    HeldOut,
-    HeldOutLight,
-    bands,
-    bars_of,
-    joined,
-    mean_square,
-)
+from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 from nearfar.workflow.verdict.repeats import photos_with_noise
 from nearfar.workflow.verdict.weighed_photos import compare_weighed
 
@@ -55,20 +49,18 @@ def measure_by_correspondence(
     if all(light.is_fine for light in lights):
         return None
     photos = photos_with_noise(capture, progress)
-    found: list[HeldOutLight | None] = [None] * len(lights)
-    for rows in bands(transport.camera):
-        block = transport.rows(rows)
-        if block.quality is not None and block.quality.saturated.all():
-            continue
-        compared = _compare(block, bars_of(block), photos, lights, rows)
-        found = [joined(*both) for both in zip(found, compared, strict=True)]
-        progress("photos for correspondence", rows.stop / transport.camera.height)
-    beside = list(zip(lights, found, strict=True))
+    compared = compare_in_bands(
+        transport,
+        lambda block, bars, rows: _compare(block, bars, photos, lights, rows),
+        lambda share: progress("photos for correspondence", share),
+    )
+    if not compared:
+        return None
     coarse, fine = (
-        tuple(one for light, one in beside if one is not None and light.is_fine == is_fine)
+        tuple(one for light, one in zip(lights, compared, strict=True) if light.is_fine == is_fine)
         for is_fine in (False, True)
     )
-    return HeldOut(coarse, fine, COARSE) if coarse else None
+    return HeldOut(coarse, fine, COARSE)
 
 
 def _compare(
@@ -80,9 +72,7 @@ def _compare(
 ) -> list[HeldOutLight]:
     """Compare the camera pixels of a block of rows that are not saturated."""
     size = (block.camera.pixels, block.channels)
-    usable = np.ones(block.camera.pixels, dtype=bool)
-    if block.quality is not None:
-        usable &= ~block.quality.saturated.ravel()
+    usable = usable_pixels(block)
     ones = np.ones(block.projector, dtype=np.float32)
     drawn = [light.light - np.float32(light.level) for light in lights]
     relit = block.pictures(np.stack([ones, *drawn])).reshape(-1, *size)[:, usable]

@@ -1,8 +1,9 @@
 """The error of relighting under a pattern, by one photo of it and one of its inverse.
 
-The two photos sum to white, which is photographed many times. So what the two differ from their
-relit pictures by sums to noise, and what the differences hold besides it is the transport's error.
-No model of the noise is as good: the error may be a twentieth of it.
+The two photos sum to white, which is photographed many times. The error of a transport has opposite
+signs in the two photos less their relit pictures, so that the sum of these two differences is noise
+alone. What the differences hold beyond that noise is the error. A model of the noise would not do:
+the power of the error may be a twentieth of the noise's.
 
 Index convention: pictures are (..., channels), any camera pixels.
 """
@@ -21,7 +22,7 @@ LARGEST_NOISE_RATIO = 1.2
 
 @dataclass(frozen=True)
 class CheckPair:
-    """What the photos of a check pattern and of its inverse say of a transport.
+    """Photos of a check pattern and of its inverse, compared with their relit pictures.
 
     Mean squares over camera pixels and channels, in photo units.
 
@@ -32,11 +33,11 @@ class CheckPair:
     signal : float
         The pattern's photo without black.
     difference : float
-        A photo less the relit picture, the mean of both photos.
+        A photo less its relit picture, mean over the two photos.
     of_sum : float
-        The two differences' sum.
+        Sum of the two differences.
     excess : float
-        Mean, not mean square: the two differences' sum.
+        Sum of the two differences; its mean, not its mean square.
     white : float
         Mean of the picture relit under white.
     noise : float
@@ -60,7 +61,7 @@ class CheckPair:
     @property
     def photo_noise(self) -> float:
         """Mean variance of one photo's noise."""
-        # The differences sum to the noise of both photos, and to the error of white.
+        # The sum of the differences is the noise of both photos and the error of white.
         shown = max(self.of_sum - self.error_of_white, 0.0) / 2
         return min(shown, self.noise) if shown > LARGEST_NOISE_RATIO * self.noise else shown
 
@@ -76,7 +77,7 @@ class CheckPair:
 
     @property
     def excess_share(self) -> float:
-        """What the pattern and its inverse show beyond white, as a share of white."""
+        """Sum of the pattern's and the inverse's photo less white, as a share of white."""
         return self.excess / self.white if self.white > 0 else 0.0
 
 

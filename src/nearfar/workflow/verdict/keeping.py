@@ -11,6 +11,7 @@ from nearfar.errors import InputError
 from nearfar.files.kinds import METADATA
 from nearfar.files.output import require_writable, storage_faults
 from nearfar.progress import Report, ignore_progress
+from nearfar.transport.gains import why_unjudgeable
 from nearfar.transport.store import StoredTransport, open_transport, write_verdict
 from nearfar.workflow.reconstruction.summary import LARGEST_OF_TILES, description_of
 from nearfar.workflow.verdict.verdict import Verdict, judge_reconstruction
@@ -43,7 +44,8 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     Raises
     ------
     InputError
-        If the transport was reconstructed from another capture, or does not say how it was made.
+        If the transport was reconstructed from another capture, was multiplied by gains since, or
+        does not say how it was made.
     MissingFileError, UnreadableFileError
         If the transport or the capture is not there, or damaged.
     StorageError
@@ -75,6 +77,8 @@ def _require_origin(stored: StoredTransport, capture: Capture) -> None:
             f"{stored.path} does not say how it was made, so that it cannot be judged: reconstruct "
             f"the capture again."
         )
+    if why := why_unjudgeable(stored.provenance):
+        raise InputError(f"{stored.path} {why}")
     of_transport: dict[str, Any] = {
         "projector": stored.projector,
         "channels": stored.channels,
@@ -96,7 +100,7 @@ def _require_origin(stored: StoredTransport, capture: Capture) -> None:
 
 
 def _differ(kept: Any, found: Any) -> bool:
-    """Return whether what is kept of a capture is of another; older transports keep less."""
+    """Return whether entries of both differ; older transports keep fewer of their capture."""
     if isinstance(kept, Mapping) and isinstance(found, Mapping):
         return any(kept[name] != found[name] for name in kept.keys() & found.keys())
     return kept is not None and kept != found

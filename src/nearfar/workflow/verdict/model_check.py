@@ -32,7 +32,7 @@ class CheckVerdict:
     says : str
         What the grade means for this scene, a sentence.
     causes : tuple of str
-        What does not keep to the model, and what to do, a sentence each, the largest first.
+        Departures from the model, and what to do about each, a sentence each, the largest first.
     """
 
     grade: Grade

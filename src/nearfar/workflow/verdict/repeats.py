@@ -1,7 +1,7 @@
-"""What photos of one and the same light tell of a capture that nothing was checked of.
+"""Noise, drift and linearity of a capture without check photos, by photos of the same light.
 
 A plan by reference shows white and black again and again. Every inverse pair sums to white and
-black, so that pairs also tell whether the response is linear.
+black where the response is linear.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from nearfar.plan.checks import is_reference
 from nearfar.progress import Report, ignore_progress
 from nearfar.workflow.evaluate import decibels
 from nearfar.workflow.reconstruction.sources import photos_without_drift
-from nearfar.workflow.verdict.held_out import bands
+from nearfar.workflow.verdict.bands import taller_bands
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class Repeats:
     white_snr : float
         One photo of white over its noise, dB.
     scatter : float
-        Variance of what should be the same, over that which the model of shot and read noise
-        expects.
+        Variance of photos of the same light, over the variance that the model of shot and read
+        noise expects.
     lamp, ambient : float
-        Largest less smallest lamp, and ambient light, as shares of white; of pairs, which do not
-        tell them apart, both together as the lamp. None if a single pair tells of light.
+        Largest less smallest lamp, and ambient light, as shares of white. Inverse pairs do not tell
+        them apart: `lamp` is both together, and None if only one pair shows it.
     excess : float or None
-        What inverse pairs show beyond white and black, as a share of white; None without pairs.
+        Sum of inverse pairs less white and black, as a share of white; None without pairs.
     """
 
     white_snr: float
@@ -68,10 +68,10 @@ class Repeats:
 def measure_repeats(
     capture: Capture, provenance: Mapping[str, Any], progress: Report = ignore_progress
 ) -> Repeats:
-    """Measure what photos of one and the same light tell of a capture.
+    """Measure noise, drift and linearity of a capture by photos of the same light.
 
-    Of a large camera, evenly spaced rows are looked at. What is saturated under white counts for
-    nothing.
+    Of a large camera, evenly spaced rows are measured. Camera pixels that are saturated under white
+    are left out.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def measure_repeats(
     photos = photos_with_noise(capture, progress)
     shown = [_numbers(capture.plan, inverse=inverse) for inverse in (False, True)]
     signal = noise = scattered = expected = 0.0
-    for rows in bands(photos.camera):
+    for rows in taller_bands(photos.camera):
         white, black = (mean_photo(photos, numbers, rows) for numbers in shown)
         usable = below_full_scale(photos, shown[0], rows)
         signal += float(np.sum((white - black)[usable] ** 2))
@@ -124,7 +124,9 @@ def photos_with_noise(
     photos = photos_without_drift(capture, progress)
     if isinstance(photos, PhotosWithoutDrift):
         return photos
-    return sum_pairs(photos, bands(capture.camera), lambda share: progress("inverse pairs", share))
+    return sum_pairs(
+        photos, taller_bands(capture.camera), lambda share: progress("inverse pairs", share)
+    )
 
 
 def _numbers(plan: Plan, *, inverse: bool) -> list[int]:

@@ -18,9 +18,10 @@ from nearfar.transport.store import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
+from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.by_correspondence import measure_by_correspondence
 from nearfar.workflow.verdict.correspondence_lights import correspondence_lights
-from nearfar.workflow.verdict.held_out import HeldOut, measure_held_out
+from nearfar.workflow.verdict.held_out import HeldOut
 from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
 
@@ -36,7 +37,8 @@ DOUBTFUL_ERROR_RATIO = 2.0
 # The same of fine lights, which error bars expect less well.
 DOUBTFUL_FINE_ERROR_RATIO = 10.0
 WRONG_ERROR_RATIO = 20.0
-# Held-out SNR_b in dB above which no error, however unexpected, makes a transport doubtful.
+# Held-out SNR_b in dB above which a transport is neither doubtful nor wrong for an error that the
+# error bars do not expect.
 GOOD_DECIBELS = 40.0
 # Held-out SNR_b in dB below which a transport is doubtful, or wrong, whatever was expected.
 DOUBTFUL_DECIBELS = 25.0
@@ -81,7 +83,7 @@ SENTENCES: Mapping[Cause, str] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What check photos, and faults of the others, say of a transport.
+    """The grade of a transport, the reasons for it, and the comparison with held-out photos.
 
     Attributes
     ----------
@@ -101,7 +103,7 @@ class Verdict:
 
     @property
     def kept(self) -> KeptVerdict:
-        """What is kept of it with the transport."""
+        """The part of the verdict that is stored with the transport."""
         checked = self.held_out
         if checked is None:
             return KeptVerdict(self.grade, self.reasons)
@@ -211,9 +213,9 @@ def judge(
     faults : sequence of Fault
         Of the capture.
     spoilt : sequence of Spoilt
-        What spoils its photos.
+        Causes that spoil its photos.
     repeats : Repeats, optional
-        What is known where nothing was checked.
+        Noise, drift and linearity of the capture, where nothing was checked.
     unchecked : str
         Why nothing was checked, if it was not.
     """
@@ -242,7 +244,6 @@ def judge(
             add("not-linear")
         elif abs(held_out.lamp_excess) > LARGEST_EXCESS and not reasons:
             add("lamp")
-    ratio = held_out.error_ratio
     surprises = _surprises(held_out, DOUBTFUL_ERROR_RATIO) or (
         held_out.fine and _surprises(HeldOut(held_out.fine), DOUBTFUL_FINE_ERROR_RATIO)
     )
@@ -252,7 +253,7 @@ def judge(
         add(_what_limits(held_out))
     wrong = (
         held_out.snr < WRONG_DECIBELS
-        or (ratio is not None and ratio > WRONG_ERROR_RATIO)
+        or _surprises(held_out, WRONG_ERROR_RATIO)
         or any(reason.cause in WRONG_PHOTOS for reason in reasons)
     )
     return Verdict(

@@ -1,8 +1,8 @@
 """The error of relighting under a light that a weighted sum of photos shows.
 
-Where the photos are of a light and of its inverse, what they sum to beyond white is noise, as for
-pairs of check photos. Otherwise the noise is what the model of it expects, and an error far below
-that is not told.
+Where the photos are of a light and of its inverse, their sum less white is noise, as for pairs of
+check photos. Otherwise the variance of the noise is that of its model, and an error far below it
+cannot be measured.
 
 A lamp that is brighter in one photo than in another adds a share of white to the weighted sum, the
 more the more photos are weighed. So the part of each difference that is proportional to white is
@@ -24,7 +24,7 @@ NOISE_MODEL_ERROR = 0.1
 
 @dataclass(frozen=True)
 class WeighedPhotos:
-    """What a weighted sum of photos says of a transport.
+    """A weighted sum of photos, compared with the relit picture of its light.
 
     Mean squares and products over camera pixels and channels, in photo units.
 
@@ -88,7 +88,7 @@ class WeighedPhotos:
 
     @property
     def excess_share(self) -> float:
-        """What a light and its inverse show beyond white, as a share of white."""
+        """Sum of the light's and the inverse's photo less white, as a share of white."""
         if self.mean_by_white is None or self.white <= 0:
             return 0.0
         return 2 * self.mean_by_white / self.white

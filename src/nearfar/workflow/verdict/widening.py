@@ -1,30 +1,29 @@
-"""How much wider error bars must be to hold where check photos contradict them."""
+"""The factor by which error bars are widened where check photos contradict them."""
 
 import numpy as np
 
 from nearfar.transport.verdict import LARGEST_WIDENING
 from nearfar.workflow.verdict.held_out import HeldOut
 
-# Under one check pattern the power of the errors over that which the error bars expect is 1 but for
-# this much, a standard deviation, as good captures of simulated scenes show: the errors of
-# neighbouring camera pixels are of one kind, so that a pattern counts as one value.
+# Standard deviation of the error ratio (power of the errors over the expected one) of one check
+# pattern about 1, as measured on good captures of simulated scenes. Errors of neighbouring camera
+# pixels are alike, so that a pattern counts as one value.
 SPREAD = 0.3
-# As many standard deviations above 1 are no chance.
+# An error ratio that is this many standard deviations above 1 is significant.
 SURE_DEVIATIONS = 2.0
 
 
 def widening_of(held_out: HeldOut) -> float:
-    """Return what the error bars are to be multiplied by, at least 1.
+    """Return the factor by which the error bars of a transport are widened, at least 1.
 
-    It is the root of `HeldOut.error_ratio` where that is above 1 by more than chance. Error bars
-    are never narrowed.
+    It is the square root of `HeldOut.error_ratio` where that is significantly above 1, else 1.
 
     Parameters
     ----------
     held_out : HeldOut
     """
     ratio = held_out.error_ratio
-    # What is no number, as where no camera pixel is usable, widens nothing.
+    # Written so that NaN, as where no camera pixel is usable, widens nothing.
     if ratio is None or not ratio > 1 + SURE_DEVIATIONS * _deviation(held_out):
         return 1.0
     return min(float(np.sqrt(ratio)), LARGEST_WIDENING)

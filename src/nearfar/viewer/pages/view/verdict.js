@@ -13,12 +13,12 @@ const NOT_JUDGED = {
   meaning: 'Judge it by the capture that it was reconstructed from: nearfar info TRANSPORT.zarr --capture CAPTURE.zarr',
 };
 
-export function showVerdict({ verdict }) {
+export function showVerdict({ verdict, unjudgeable }) {
   const box = get('verdict'), { grade, summary, reasons } = verdict ?? { grade: 'not judged', reasons: [] };
   // What was not checked has no summary, but always a reason.
   get('grade').textContent = `${grade[0].toUpperCase()}${grade.slice(1)}.`;
   get('off-by').textContent = verdict ? summary || reasons[0] || '' : NOT_JUDGED.summary;
-  get('meaning').textContent = verdict ? MEANINGS[grade] : NOT_JUDGED.meaning;
+  get('meaning').textContent = verdict ? MEANINGS[grade] : unjudgeable ? `It ${unjudgeable}` : NOT_JUDGED.meaning;
   get('reasons').replaceChildren(...reasons.map(reason => {
     const item = document.createElement('li');
     item.textContent = reason;

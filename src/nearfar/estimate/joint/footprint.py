@@ -1,0 +1,182 @@
+"""Direct light's footprint on a fine projector: how large it is, and what it answers to patterns.
+
+A camera pixel sees a part of a projector pixel or several of them: as many as q moves from one
+camera pixel to the next, and more through the blur of the projector. The first follows from q. The
+second is the blur under which direct light's responses to the highest frequencies, where near- and
+far-range light have faded, are most like the measured ones. Neighbours vote for it together.
+
+Index convention: arrays are (n, channels, ...); r runs over real responses, s over blurs.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.illumination.centred_basis import CentredBasis, centred_basis
+from nearfar.illumination.near_basis import NearBasis
+from nearfar.illumination.real_basis import real_basis
+from nearfar.parallel import side_by_side
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport import near
+from nearfar.transport.boxes import box_overlaps
+from nearfar.transport.direct import direct_weights
+
+# Least frequency, in cycles per cell of the coarsest pitch: near-range light has faded there.
+LEAST_CYCLES = 0.45
+# Widths of boxes, in projector pixels, that stand for the projector's blur.
+BLURS = np.array([0.0, 0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0])
+# Side of the square of camera pixels that vote.
+VOTERS = 7
+# q moves from one camera pixel to the next by the median over a square of this side.
+MEDIAN_SIDE = 3
+# Rows of the camera on either side of a camera pixel that its footprint depends on.
+VOTING_ROWS = VOTERS // 2 + MEDIAN_SIDE // 2 + 1
+# Step of the differences by which direct light's derivatives are taken, in projector pixels.
+STEP = 0.05
+# A farther move, in projector pixels, leads to another surface.
+LARGEST_MOVE = 24.0
+BATCH_PIXELS = 4096
+
+
+def footprint_weights(
+    correspondence: Floats, centres: NDArray[np.int64], boxes: Floats, centred: CentredBasis
+) -> Floats:
+    """Return unit direct light and its derivatives by q, as weights of ``centred.on_footprint``.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (n, 2)
+    centres : ndarray of int, shape (n, 2)
+        q rounded.
+    boxes : ndarray, shape (n, 2)
+        Heights and widths of footprints; not used where the footprint is bilinear.
+    centred : CentredBasis
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 9) or (n, 3, R), float32
+        0 without direct light.
+    """
+    if centred.near_basis.pitch == 1:
+        return direct_weights(correspondence, centres)
+    lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
+    offsets = np.where(lit[:, None], correspondence - centres, 0.0)
+    reach = int(np.ceil(0.5 * boxes.max(initial=0.0) + 0.5 + STEP)) + 1
+    waves, slopes = zip(
+        *(_along_axis(offsets[:, axis], boxes[:, axis], axis, reach, centred) for axis in (0, 1)),
+        strict=True,
+    )
+    index, sines = centred.basis.index, centred.basis.is_sine
+    found = np.empty((len(offsets), 3, centred.basis.count), dtype=np.float32)
+    parts = (waves[0] * waves[1], slopes[0] * waves[1], waves[0] * slopes[1])
+    for place, part in enumerate(parts):
+        found[:, place] = np.where(sines, part.imag[:, index], part.real[:, index])
+    found[~lit] = 0.0
+    return found
+
+
+def _along_axis(
+    offsets: Floats, widths: Floats, axis: int, reach: int, centred: CentredBasis
+) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
+    """Return conjugate responses of boxes along one axis, and their derivatives by q, (n, K)."""
+    pixels = np.arange(-reach, reach + 1)
+    cycles, which = np.unique(centred.basis.cycles[:, axis], return_inverse=True)
+    waves = np.exp(2j * np.pi * np.outer(pixels, cycles)).astype(np.complex64)
+    at, before, after = (
+        box_overlaps(offsets + step, widths, reach).astype(np.float32) for step in (0, -STEP, STEP)
+    )
+    slope = (after - before) / np.float32(2 * STEP)
+    return (at @ waves)[:, which.ravel()], (slope @ waves)[:, which.ravel()]
+
+
+def footprint_boxes(
+    measurements: Measurements, correspondence: Floats, near_basis: NearBasis
+) -> Floats | None:
+    """Return height and width of each camera pixel's footprint.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    correspondence : ndarray, shape (Cy, Cx, 2)
+    near_basis : NearBasis
+
+    Returns
+    -------
+    ndarray, shape (C, 2), float32
+        Projector pixels; 0 without direct light. None where functions are of single pixels, and
+        the footprint is bilinear.
+    """
+    if near_basis.pitch == 1:
+        return None
+    basis, camera = measurements.basis, measurements.camera
+    spread = seen_of_projector(correspondence)
+    high = [
+        k
+        for k, cycles in zip(basis.frequencies, basis.cycles, strict=True)
+        if np.hypot(*cycles) * near_basis.pitch >= LEAST_CYCLES
+    ]
+    if not high:
+        return spread
+    indices = measurements.response_indices(high)
+    centred = centred_basis(real_basis(high, measurements.projector), near_basis)
+    number, blurs = camera.pixels, BLURS[near_basis.pitch >= BLURS]
+    q = correspondence.reshape(-1, 2).astype(np.float64)
+    lit: Booleans = np.asarray(np.isfinite(q).all(axis=1))
+    centres = near.centre(correspondence, measurements.projector)
+    weight = measurements.multiplicity[indices]
+    explained = np.zeros((number, len(blurs)), dtype=np.float32)
+
+    def work(batch: slice) -> None:
+        responses = centred.recentre(measurements.responses[batch][..., indices], centres[batch])
+        noise = np.maximum(measurements.noise[batch] ** 2, 1e-12)
+        for place, blur in enumerate(blurs):
+            boxes = np.hypot(spread[batch], blur)
+            direct = footprint_weights(q[batch], centres[batch], boxes, centred)[:, 0]
+            along = np.maximum(np.einsum("nir,nr->ni", responses * weight, direct), 0.0)
+            squared = np.maximum(np.einsum("nr,nr->n", direct * weight, direct), 1e-12)
+            explained[batch, place] = np.sum(along**2 / noise, axis=1) / squared
+
+    side_by_side(work, blocks(number, BATCH_PIXELS))
+    explained *= lit[:, None]
+    voted = ndimage.uniform_filter(
+        explained.reshape(*camera, -1), (VOTERS, VOTERS, 0), mode="nearest"
+    ).reshape(number, -1)
+    blur = blurs[np.argmax(voted, axis=1)]
+    return np.asarray(np.hypot(spread, blur[:, None]) * lit[:, None], dtype=np.float32)
+
+
+def seen_of_projector(correspondence: Floats) -> Floats:
+    """Return the height and width of what each camera pixel sees of the projector, (C, 2), float32.
+
+    A parallelogram whose sides are how far q moves from one camera pixel to the next has the same
+    spread along each axis as a box of the root of the sum of their squares.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (Cy, Cx, 2)
+        q.
+    """
+    camera = Size(*correspondence.shape[:2])
+    squared = np.zeros((*camera, 2))
+    for axis in (0, 1):
+        move = np.abs(np.diff(correspondence, axis=axis))
+        move[~(move.max(axis=-1) <= LARGEST_MOVE)] = np.nan
+        padding = [(0, 0)] * 3
+        padding[axis] = (1, 1)
+        padded = np.pad(move, padding, constant_values=np.nan)
+        both = (np.delete(padded, 0, axis=axis), np.delete(padded, -1, axis=axis))
+        # The smaller of the moves to both sides: the other may lead to another surface.
+        least = np.fmin(*both)
+        known = np.nan_to_num(least, nan=0.0)
+        squared += (
+            np.stack(
+                [
+                    ndimage.median_filter(known[..., part], MEDIAN_SIDE, mode="nearest")
+                    for part in (0, 1)
+                ],
+                axis=-1,
+            )
+            ** 2
+        )
+    return np.sqrt(squared).reshape(-1, 2).astype(np.float32)

@@ -1,0 +1,63 @@
+"""The window of near-range light: how far apart its functions stand, and how many there are.
+
+The window is described by W x W hat functions that stand `pitch` projector pixels apart; at a pitch
+of 1 these are the paper's single pixels. The photos that a scene takes do not grow with the
+projector's resolution, so that a plan for a fine projector is that for a grid of cells, each of
+pitch x pitch projector pixels.
+"""
+
+from nearfar.arrays import Size
+
+# Shorter side of the largest projector whose windows are of single pixels.
+LARGEST_OF_SINGLE_PIXELS = 128
+# Cells on the shorter side of a larger one: at least half as many, and no more than these.
+MOST_CELLS = 80
+# Largest W that is chosen where nothing is known: of single pixels, and at a larger pitch, where a
+# window of eleven functions reaches as far over the screen.
+LARGEST_DEFAULT, LARGEST_DEFAULT_AT_PITCH = 25, 11
+
+
+def pitch_of(projector: Size) -> int:
+    """Return the pitch at which windows are planned for a projector.
+
+    Parameters
+    ----------
+    projector : Size
+
+    Returns
+    -------
+    int
+        Projector pixels between neighbouring functions of the window: 1 up to a shorter side of
+        128, beyond that the power of two that leaves 41 to 80 cells on it. Of a single row or
+        column, the longer side counts.
+    """
+    pitch, side = 1, _shorter(projector)
+    if side <= LARGEST_OF_SINGLE_PIXELS:
+        return pitch
+    while pitch * MOST_CELLS < side:
+        pitch *= 2
+    return pitch
+
+
+def largest_window(projector: Size, pitch: int = 1) -> int:
+    """Return the largest W: as many functions as stand on the shorter side.
+
+    On a projector of one row or column the longer side counts: a window is the part of its middle
+    row or column that lies on the projector.
+    """
+    return (_shorter(projector) - 1) // pitch + 1
+
+
+def default_window(projector: Size, pitch: int = 1) -> int:
+    """W where nothing is known: a sixth of the shorter side's cells, odd, between 5 and 25.
+
+    At a pitch over 1 it is at most 11. On a projector of one row or column it is a sixth of the
+    longer side.
+    """
+    most = LARGEST_DEFAULT if pitch == 1 else LARGEST_DEFAULT_AT_PITCH
+    wanted = round(_shorter(projector) / (6 * pitch))
+    return int(min(2 * (min(most, max(5, wanted)) // 2) + 1, largest_window(projector, pitch)))
+
+
+def _shorter(projector: Size) -> int:
+    return min(projector) if min(projector) > 1 else max(projector)

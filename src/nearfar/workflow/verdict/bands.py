@@ -1,0 +1,97 @@
+"""Comparison of a transport with photos in bands of camera rows."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Size, blocks
+from nearfar.transport.model import Transport
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.verdict.bars import Bars, bars_of
+from nearfar.workflow.verdict.held_out import HeldOutLight, joined
+
+# Camera pixels that are compared, about, in bands of this many rows.
+CAMERA_PIXELS = 2**17
+ROWS_PER_BAND = 8
+# The same at a pitch of several projector pixels, where lights are blurred anew for every band.
+CAMERA_PIXELS_AT_PITCH, BANDS_AT_PITCH = 2**15, 8
+PIXELS_PER_TALLER_BAND = 2**14
+
+
+def bands(camera: Size, pitch: int = 1) -> list[slice]:
+    """Return bands of rows of a camera, spread evenly, about `CAMERA_PIXELS` in all.
+
+    Parameters
+    ----------
+    camera : Size
+    pitch : int
+        Of the transport; see `nearfar.Transport`.
+    """
+    if pitch > 1:
+        every = list(blocks(camera.height, -(-camera.height // BANDS_AT_PITCH)))
+        most = max(1, CAMERA_PIXELS_AT_PITCH // (camera.width * len(every)))
+        middles = [(rows.start + rows.stop) // 2 for rows in every]
+        firsts = [max(0, middle - most // 2) for middle in middles]
+        return [
+            slice(max(first, rows.start), min(first + most, rows.stop))
+            for first, rows in zip(firsts, every, strict=True)
+        ]
+    # Whole rows, which files are read by. Nothing is estimated and no photo is kept, so that there
+    # may be many more of them than `choose_rows` and `sampled_lines` choose.
+    every = list(blocks(camera.height, ROWS_PER_BAND))
+    step = max(1, round(camera.pixels / CAMERA_PIXELS))
+    return every[step // 2 :: step] or every[:1]
+
+
+def taller_bands(camera: Size) -> list[slice]:
+    """Return the rows of `bands` in fewer bands, where they are all rows of the camera.
+
+    For what is done to each camera pixel by itself. A photo of a small camera is one chunk, which
+    every band reads again.
+    """
+    found = bands(camera)
+    if sum(rows.stop - rows.start for rows in found) < camera.height:
+        return found
+    return list(blocks(camera.height, max(ROWS_PER_BAND, PIXELS_PER_TALLER_BAND // camera.width)))
+
+
+def usable_pixels(block: Transport) -> Booleans:
+    """Return which camera pixels of a block of rows are not saturated, shape (C,)."""
+    if block.quality is None:
+        return np.ones(block.camera.pixels, dtype=bool)
+    return ~block.quality.saturated.ravel()
+
+
+def compare_in_bands(
+    transport: StoredTransport,
+    compare: Callable[[Transport, Bars | None, slice], Sequence[HeldOutLight]],
+    progress: Callable[[float], None],
+) -> tuple[HeldOutLight, ...]:
+    """Compare a transport with photos under some lights, in the bands of its camera.
+
+    Bands whose camera pixels are all saturated are skipped.
+
+    Parameters
+    ----------
+    transport : StoredTransport
+        Of the camera's pixels, not a square T.
+    compare : callable
+        Called with the transport of a band, its error bars and its rows. Returns the comparison
+        under each light, in the same order for every band.
+    progress : callable
+        Called with the share of the camera that is done.
+
+    Returns
+    -------
+    tuple of HeldOutLight
+        Of each light, over all bands; empty if every camera pixel is saturated.
+    """
+    found: Sequence[HeldOutLight] = ()
+    for rows in bands(transport.camera, transport.pitch):
+        block = transport.rows(rows)
+        if not usable_pixels(block).any():
+            continue
+        compared = compare(block, bars_of(block), rows)
+        found = [joined(*both) for both in zip(found, compared, strict=True)] if found else compared
+        progress(rows.stop / transport.camera.height)
+    return tuple(found)

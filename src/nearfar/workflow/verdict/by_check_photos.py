@@ -1,0 +1,122 @@
+"""Held-out SNR_b of a capture with check photos."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers
+from nearfar.capture import Capture
+from nearfar.photometry.drift import find_references
+from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.plan.checks import CheckLight, check_lights
+from nearfar.plan.patterns import HalfScreen
+from nearfar.progress import Report, ignore_progress
+from nearfar.transport.model import Transport
+from nearfar.transport.store import StoredTransport
+from nearfar.workflow.reconstruction.sources import photos_without_drift
+from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
+from nearfar.workflow.verdict.bars import Bars, mean_square
+from nearfar.workflow.verdict.check_pairs import compare_pair
+from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
+
+
+def measure_held_out(
+    transport: StoredTransport, capture: Capture, progress: Report = ignore_progress
+) -> HeldOut | None:
+    """Compare a transport with the check photos of the capture that it was reconstructed from.
+
+    Of a large camera, evenly spaced rows are compared.
+
+    Parameters
+    ----------
+    transport : StoredTransport
+        Of the camera's pixels, not a square T.
+    capture : Capture
+    progress : callable
+        Called with the step and the share of it that is done.
+
+    Returns
+    -------
+    HeldOut or None
+        None if the plan has no check patterns with their inverses, or every camera pixel is
+        saturated.
+
+    Raises
+    ------
+    UnreadableFileError
+        If the transport or the capture is damaged.
+    """
+    lights = [light for light in check_lights(capture.plan) if light.photos and light.inverses]
+    if not lights:
+        return None
+    photos = photos_without_drift(capture, progress)
+    if not isinstance(photos, PhotosWithoutDrift):
+        return None
+    compared = compare_in_bands(
+        transport,
+        lambda block, bars, rows: [
+            compare_light(block, bars, photos, light, rows) for light in lights
+        ],
+        lambda share: progress("check photos", share),
+    )
+    return HeldOut(compared) if compared else None
+
+
+def compare_light(
+    block: Transport,
+    bars: Bars | None,
+    photos: PhotosWithoutDrift,
+    light: CheckLight,
+    rows: slice,
+) -> HeldOutLight:
+    """Compare the camera pixels of a block of rows that are not saturated.
+
+    Parameters
+    ----------
+    block : Transport
+        Of these rows.
+    bars : Bars, optional
+        Of the block.
+    photos : PhotosWithoutDrift
+    light : CheckLight
+        Of the plan of the photos; with its inverse.
+    rows : slice
+    """
+    size = (block.camera.pixels, block.channels)
+    usable = usable_pixels(block)
+    pattern = light.pattern.draw(block.projector) / np.float32(255)
+    relit, white = (
+        np.asarray(block @ shown).reshape(size)[usable]
+        for shown in (pattern, np.ones_like(pattern))
+    )
+    black = block.black.reshape(size)[usable]
+    means = [
+        photos.read(numbers, rows).reshape(len(numbers), *size).mean(axis=0)[usable]
+        for numbers in (light.photos, light.inverses)
+    ]
+    whites, blacks = find_references(photos.plan)
+    of_white = _noise(photos, white + black, whites) + _noise(photos, black, blacks)
+    expected = unmeasured = None
+    share_of_pattern = 1.0
+    if bars is not None:
+        of_white = mean_square(bars.of_all, np.ones_like(pattern), usable)
+        expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
+        of_inverse = mean_square(bars.of_all, 1 - pattern, usable)
+        share_of_pattern = 2 * expected / max(expected + of_inverse, 1e-300)
+    pair = compare_pair(
+        means[0] - black,
+        means[1] - black,
+        relit,
+        white=white,
+        noise=(_noise(photos, means[0], light.photos) + _noise(photos, means[1], light.inverses))
+        / 2,
+        error_of_white=of_white,
+        share_of_pattern=share_of_pattern,
+    )
+    is_binary = isinstance(light.pattern, HalfScreen)
+    return HeldOutLight(light.pattern.description, is_binary, pair, expected, unmeasured)
+
+
+def _noise(photos: PhotosWithoutDrift, mean: Floats, numbers: Sequence[int] | Integers) -> float:
+    """Return the mean variance of the mean of some photos of a pattern."""
+    return float(photos.variance(mean).mean()) / len(numbers)

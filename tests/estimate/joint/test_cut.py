@@ -1,0 +1,217 @@
+"""Functions of several projector pixels: the posterior mean, cut by the border and whole."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_scale
+from nearfar.estimate.joint.cut import (
+    border_distances,
+    cut_responses,
+    near_responses,
+    share_on_projector,
+    solve_cut,
+)
+from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights, seen_of_projector
+from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
+from nearfar.estimate.joint.solve import solve_whole, variance_ratio
+from nearfar.illumination.centred_basis import centred_basis
+from nearfar.illumination.frequencies import DC, far_frequencies, representatives, wrap
+from nearfar.illumination.near_basis import NearBasis
+from nearfar.illumination.real_basis import real_basis
+from nearfar.photometry.measurements import Measurements
+from nearfar.priors.component import PriorComponent
+from nearfar.priors.covariance import covariance_of_coefficients, far_variance
+from nearfar.priors.responses import response_prior
+
+PROJECTOR = Size(70, 90)
+BASIS = NearBasis(5, 4)
+COMPONENT = PriorComponent(1.5, 8.0, 2.0, roughness=0.2)
+FREQUENCIES = [k for k in representatives(far_frequencies(Size(11, 11), PROJECTOR)) if k != DC]
+NOISE, WHITE = 1e-3, 0.5
+
+
+def _centred():
+    centred = centred_basis(real_basis(FREQUENCIES, PROJECTOR), BASIS)
+    return replace(centred, response_indices=np.arange(1, centred.basis.count + 1))
+
+
+def _measured(centres, *, channels=2):
+    """Measure light that is nothing but noise: the posterior mean is linear."""
+    basis = real_basis([DC, *FREQUENCIES], PROJECTOR)
+    draw = np.random.default_rng(4)
+    shape = (len(centres), channels)
+    responses = draw.normal(size=(*shape, basis.count)).astype(np.float32)
+    responses[..., 0] = WHITE
+    level = np.full(shape, NOISE, dtype=np.float32)
+    return Measurements(
+        camera=Size(1, len(centres)),
+        basis=basis,
+        responses=responses,
+        noise=level,
+        black=np.zeros_like(level),
+        quantisation_error=np.empty((basis.count, 0), dtype=np.float32),
+        white_noise=level,
+        black_noise=level,
+    )
+
+
+def _batch(centres, centred):
+    measurements = _measured(centres)
+    pixels = AllPixels(
+        responses=measurements.responses[..., centred.response_indices],
+        correspondence=centres + np.array([0.25, 0.0]),
+        centres=centres,
+        lit=np.ones(len(centres), dtype=bool),
+        noise=measurements.noise,
+        offset_noise=offset_noise(measurements),
+        white=white_scale(measurements),
+        spike_expected=np.zeros((len(centres), 0), dtype=bool),
+        footprint=np.full((len(centres), 2), 1.4, dtype=np.float32),
+    )
+    return gather(pixels, slice(None), centred, PROJECTOR)
+
+
+def _by_hand(centred, centre):
+    """Responses of the functions to patterns drawn about q, summed over the projector alone."""
+    places = np.stack(np.meshgrid(*map(np.arange, PROJECTOR), indexing="ij"), axis=-1)
+    offsets = places.reshape(-1, 2) - centre
+    patterns = centred.basis.patterns_at(offsets).astype(np.float64)
+    return patterns @ BASIS.values_at(offsets)
+
+
+CORNERS = np.array([[0, 0], [69, 3], [4, 40], [33, 88], [8, 80], [35, 45], [0, 89]])
+
+
+def test_a_cut_function_answers_by_what_is_left_of_it():
+    centred = _centred()
+    for centre in CORNERS:
+        (distances,) = border_distances(centre[None], centred).tolist()
+        found = cut_responses(centred, tuple(distances))
+        np.testing.assert_allclose(found, _by_hand(centred, centre), atol=1e-5)
+    shares = share_on_projector(CORNERS, BASIS.offsets, BASIS.pitches, PROJECTOR)
+    white = centred_basis(real_basis([DC], PROJECTOR), BASIS)
+    by_hand = np.stack([_by_hand(white, centre)[0] for centre in CORNERS])
+    np.testing.assert_allclose(shares, by_hand, atol=1e-6)
+    coefficients = np.random.default_rng(1).normal(size=(len(CORNERS), 2, BASIS.count))
+    expected = [c @ _by_hand(centred, at).T for c, at in zip(coefficients, CORNERS, strict=True)]
+    np.testing.assert_allclose(near_responses(coefficients, CORNERS, centred), expected, atol=1e-4)
+
+
+def test_the_mean_is_that_of_dense_algebra():
+    centred = _centred()
+    batch = _batch(CORNERS, centred)
+    multiplicity = np.linspace(1.0, 2.0, centred.basis.count).astype(np.float32)
+    prior = response_prior(COMPONENT, centred, multiplicity)
+    scale = np.full(len(CORNERS), 2.0**-5 * NOISE / WHITE * 2**8)
+    ratio = variance_ratio(batch, scale)
+    found = solve_cut(batch, prior, ratio, centred)
+    covariance = covariance_of_coefficients(COMPONENT, BASIS, PROJECTOR)
+    amplitudes = amplitude_responses(batch, centred).astype(np.float64)
+    precision = prior_precision(batch, BASIS)
+    for c, centre in enumerate(CORNERS):
+        squared = (scale[c] * WHITE) ** 2
+        responses = np.concatenate(
+            [amplitudes[c].T, _by_hand(centred, centre), np.eye(centred.basis.count)], axis=1
+        )
+        count, each = amplitudes.shape[1], BASIS.count
+        for i in range(2):
+            before = np.zeros((responses.shape[1],) * 2)
+            before[:count, :count] = np.diag(1 / precision[c, i])
+            before[count : count + each, count : count + each] = squared * covariance
+            before[count + each :, count + each :] = squared * np.diag(
+                far_variance(centred.basis, COMPONENT)
+            )
+            noise = np.diag(NOISE**2 / multiplicity.astype(float))
+            seen = responses @ before @ responses.T + noise
+            mean = before @ responses.T @ np.linalg.solve(seen, batch.responses[c, i])
+            size = np.abs(mean[count : count + each]).max()
+            np.testing.assert_allclose(
+                found.near[c, i], mean[count : count + each], rtol=0, atol=2e-3 * size
+            )
+            np.testing.assert_allclose(
+                found.far[c, i],
+                mean[count + each :],
+                rtol=0,
+                atol=2e-3 * np.abs(mean[count + each :]).max(),
+            )
+
+
+def test_whole_and_cut_agree_where_nothing_is_cut():
+    centred = _centred()
+    batch = _batch(np.array([[35, 45], [33, 40]]), centred)
+    prior = response_prior(COMPONENT, centred, np.ones(centred.basis.count, dtype=np.float32))
+    ratio = variance_ratio(batch, np.full(2, 0.016))
+    by_whole, by_cut = (solve(batch, prior, ratio, centred) for solve in (solve_whole, solve_cut))
+    for name in ("amplitudes", "near", "far"):
+        one, other = getattr(by_whole, name), getattr(by_cut, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=2e-3 * np.abs(one).max())
+
+
+HIGH = [
+    wrap(Fraction(y, 70), Fraction(x, 90))
+    for y, x in ((9, 4), (2, 14), (12, -9), (17, 3), (5, 22), (20, -18), (26, 8), (3, 33))
+]
+
+
+def test_footprints_answer_by_the_pixels_that_they_cover():
+    draw = np.random.default_rng(3)
+    q = 20 + 30 * draw.random((6, 2))
+    q[4] = np.nan
+    boxes = np.array([[0.0, 0.4], [1.0, 1.0], [1.6, 3.3], [7.5, 0.8], [1.0, 1.0], [2.0, 5.0]])
+    centres = np.nan_to_num(np.rint(q), nan=0.0).astype(np.int64)
+    centred = centred_basis(real_basis(HIGH, PROJECTOR), BASIS)
+    found = footprint_weights(q, centres, boxes, centred)[:, 0]
+    assert not found[4].any()
+    # Boxes of many points, each of which lights the pixel that it is on.
+    points = (np.arange(400) + 0.5) / 400 - 0.5
+    for c in (0, 1, 2, 3, 5):
+        sides = [np.rint(q[c, axis] + boxes[c, axis] * points).astype(np.int64) for axis in (0, 1)]
+        places = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+        offsets, counts = np.unique(places - centres[c], axis=0, return_counts=True)
+        brute = centred.basis.patterns_at(offsets) @ (counts / counts.sum())
+        np.testing.assert_allclose(found[c], brute, atol=0.01)
+
+
+def test_a_camera_pixel_sees_as_much_as_q_moves_to_the_next():
+    y, x = np.meshgrid(np.arange(12.0), np.arange(15.0), indexing="ij")
+    q = np.stack([5 + 1.5 * y + 0.4 * x, 9 + 2.0 * x], axis=-1)
+    # Another surface, and a shadow.
+    q[:, 8:] += 30.0
+    q[3:5, 2:4] = np.nan
+    seen = seen_of_projector(q).reshape(12, 15, 2)
+    lit = np.isfinite(q[..., 0])
+    np.testing.assert_allclose(
+        seen[lit], np.hypot([1.5, 0.0], [0.4, 2.0]) * np.ones((lit.sum(), 2)), rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("blur", [0.0, 2.0, 4.0])
+def test_the_highest_frequencies_show_the_blur_of_the_projector(blur):
+    draw = np.random.default_rng(7)
+    camera = Size(12, 13)
+    y, x = np.meshgrid(np.arange(12.0), np.arange(13.0), indexing="ij")
+    q = np.stack([20 + 1.3 * y, 30 + 1.7 * x], axis=-1)
+    q[2, 3] = np.nan
+    centres = np.nan_to_num(np.rint(q), nan=0.0).astype(np.int64).reshape(-1, 2)
+    centred = centred_basis(real_basis(HIGH, PROJECTOR), BASIS)
+    boxes = np.broadcast_to(np.hypot([1.3, 1.7], blur), (camera.pixels, 2))
+    direct = 0.4 * footprint_weights(q.reshape(-1, 2), centres, boxes, centred)[:, :1]
+    white = np.full((camera.pixels, 1, 1), 0.5)
+    responses = np.concatenate(
+        [white, centred.uncentre(direct, centres)], axis=-1, dtype=np.float32
+    )
+    responses += 0.003 * draw.normal(size=responses.shape).astype(np.float32)
+    level = np.full((camera.pixels, 1), 0.003, dtype=np.float32)
+    basis = real_basis([DC, *HIGH], PROJECTOR)
+    measurements = Measurements(
+        camera, basis, responses, level, level, np.empty((basis.count, 0), dtype=np.float32)
+    )
+    found = footprint_boxes(measurements, q, BASIS).reshape(*camera, 2)
+    assert not found[2, 3].any()
+    lit = np.isfinite(q[..., 0])
+    np.testing.assert_allclose(found[lit], boxes.reshape(*camera, 2)[lit], rtol=0.02)
+    assert footprint_boxes(measurements, q, NearBasis(5)) is None

@@ -1,0 +1,57 @@
+"""Boxes of projector pixels: sums by summed-area tables, and what lies beyond the border."""
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.transport.boxes import (
+    box_overlaps,
+    box_places,
+    share_of_boxes,
+    spread_summed_area,
+    summed_area,
+)
+from nearfar.transport.direct import look_up
+
+PROJECTOR = Size(9, 14)
+
+
+def test_a_summed_area_table_has_an_adjoint():
+    draw = np.random.default_rng(0)
+    light = draw.random(PROJECTOR)
+    table = draw.random((PROJECTOR.height + 1) * (PROJECTOR.width + 1))
+    assert np.vdot(summed_area(light), table) == pytest.approx(
+        np.vdot(light, spread_summed_area(table, PROJECTOR))
+    )
+
+
+@pytest.mark.parametrize("sides", [(1.0, 1.0), (0.3, 2.6), (7.0, 5.5), (1e-9, 0.0)])
+def test_the_mean_of_a_box_is_that_of_the_pixels_under_it(sides):
+    draw = np.random.default_rng(1)
+    light = draw.random(PROJECTOR)
+    q = draw.random((40, 2)) * (np.array(PROJECTOR) - 1)
+    q[:4] = [[0, 0], [8, 13], [0, 13], [4, 6]]
+    q[4] = np.nan
+    boxes = np.broadcast_to(sides, q.shape)
+    found = look_up(summed_area(light), box_places(q, boxes, PROJECTOR))
+    reach = 8
+    padded = np.pad(light, reach + 1)
+    for c in range(len(q)):
+        if np.isnan(q[c, 0]):
+            assert found[c] == 0
+            continue
+        at = np.rint(q[c]).astype(int)
+        down, across = (
+            box_overlaps((q[c] - at)[axis : axis + 1], boxes[c, axis : axis + 1], reach)[0]
+            for axis in (0, 1)
+        )
+        y, x = at + 1
+        around = padded[y : y + 2 * reach + 1, x : x + 2 * reach + 1]
+        assert found[c] == pytest.approx(down @ around @ across, abs=1e-6)
+    white = look_up(summed_area(np.ones(PROJECTOR)), box_places(q, boxes, PROJECTOR))
+    np.testing.assert_allclose(white, share_of_boxes(q, boxes, PROJECTOR), atol=1e-6)
+
+
+def test_a_box_of_one_pixel_is_the_bilinear_footprint():
+    overlaps = box_overlaps(np.array([-0.4, 0.0, 0.3]), np.ones(3), 1)
+    np.testing.assert_allclose(overlaps, [[0.4, 0.6, 0], [0, 1, 0], [0, 0.7, 0.3]], atol=1e-12)

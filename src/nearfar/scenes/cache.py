@@ -29,6 +29,9 @@ PIXELS_PER_CELL = 8
 FORM_FACTORS_AT_ONCE = 2.5
 # Matrices of a scene that take more memory than this while they are computed are too large.
 LARGEST_MATRICES = 16 * 10**9
+# And of projectors with more pixels than this on the shorter side: the radiosity of as many patches
+# takes minutes (seven for 136x150), and plans for these are for every projector pixel.
+LARGEST_SIDE_OF_MATRICES = 128
 # Of an operator, for each pixel of projector and camera: measured.
 BYTES_PER_PIXEL = 220
 
@@ -203,7 +206,8 @@ def needs_operator(name: str, projector: Size | None = None, camera: Size | None
     projector, camera = sizes(name, projector, camera)
     if not isinstance(SCENES[name].compute, ByRadiosity):
         return False
-    return _memory_of_matrices(projector, camera).peak > LARGEST_MATRICES
+    too_many = min(projector) > LARGEST_SIDE_OF_MATRICES
+    return too_many or _memory_of_matrices(projector, camera).peak > LARGEST_MATRICES
 
 
 def _kept(

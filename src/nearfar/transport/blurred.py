@@ -91,3 +91,29 @@ def blurred_adjoint(
     back: Floats = pyramid.spread(spread)
     back += spread_summed_area(table, pyramid.projector)
     return back
+
+
+def blurred_rows(
+    direct: Floats,
+    near: Floats,
+    pyramid: Pyramid,
+    centres: NDArray[np.int64],
+    where: Footprint,
+) -> tuple[Floats, Floats]:
+    """Return dense rows of D and of N of some camera pixels, each (n, channels, P), float32.
+
+    Parameters
+    ----------
+    direct, near, pyramid, centres, where
+        As `blurred_pictures` takes them, of these camera pixels.
+    """
+    d, n = (np.zeros((*direct.shape, pyramid.projector.pixels), dtype=np.float32) for _ in range(2))
+    for c, i in np.ndindex(direct.shape):
+        one = slice(c, c + 1)
+        its = Footprint(where.pixels[one], where.weights[one])
+        for rows, own_direct, own_near in (
+            (d, direct[one, i], np.zeros_like(near[one, i])),
+            (n, np.zeros_like(direct[one, i]), near[one, i]),
+        ):
+            rows[c, i] = blurred_adjoint(own_direct, own_near, pyramid, centres[one], its).ravel()
+    return d, n

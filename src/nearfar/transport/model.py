@@ -28,7 +28,7 @@ from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.adjoint import AdjointTransport
-from nearfar.transport.blurred import blurred_adjoint, blurred_pictures
+from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
 from nearfar.transport.boxes import box_places
 from nearfar.transport.gains import as_gains, with_gains
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
@@ -367,7 +367,19 @@ class Transport(NoArray):
         """Return dense rows of D, N and F of chosen camera pixels; see `rows`."""
         pixels = as_pixels(pixels, self.camera.pixels)
         if self.pitch > 1:
-            return self._blurred_rows(pixels)
+            count, channels = self.camera.pixels, self.channels
+            where = footprints.Footprint(
+                self._footprint.pixels[pixels], self._footprint.weights[pixels]
+            )
+            d, n = blurred_rows(
+                self.direct.reshape(count, channels)[pixels],
+                self.near.reshape(count, channels, -1)[pixels],
+                self.pyramid,
+                self._centres[pixels],
+                where,
+            )
+            low = self.far.reshape(count, channels, -1)[pixels]
+            return Components(d, n, self.far_basis.synthesise(low).astype(np.float32, copy=False))
         flat_far = self.far.reshape(-1, self.channels, self.far_basis.count)[pixels]
         f = self.far_basis.synthesise(flat_far).astype(np.float32, copy=False)
         number = np.arange(len(f))[:, None]
@@ -387,27 +399,6 @@ class Transport(NoArray):
             np.add.at(d[:, i], (number, corners), weights * direct_values[:, i, None])
             n[number, i, flat] = near_values[:, i]
         return Components(d, n[..., :beyond], f)
-
-    def _blurred_rows(self, pixels: slice) -> Components:
-        selected = range(*pixels.indices(self.camera.pixels))
-        count, channels = self.camera.pixels, self.channels
-        direct, near = self.direct.reshape(count, channels), self.near.reshape(count, channels, -1)
-        f = self.far_basis.synthesise(self.far.reshape(count, channels, -1)[pixels])
-        d, n = (np.zeros(f.shape, dtype=np.float32) for _ in range(2))
-        for number, c in enumerate(selected):
-            one = slice(c, c + 1)
-            where = footprints.Footprint(self._footprint.pixels[one], self._footprint.weights[one])
-            for i in range(channels):
-                nothing = np.zeros_like(near[one, i])
-                for out, own_direct, own_near in (
-                    (d, direct[one, i], nothing),
-                    (n, np.zeros_like(direct[one, i]), near[one, i]),
-                ):
-                    back = blurred_adjoint(
-                        own_direct, own_near, self.pyramid, self._centres[one], where
-                    )
-                    out[number, i] = back.ravel()
-        return Components(d, n, f.astype(np.float32, copy=False))
 
     def dense(self) -> Floats:
         """Return all of T, shape (C, channels, P), float32: for small transports."""

@@ -5,6 +5,7 @@ Index convention: c runs over camera pixels, w over the W x W offsets of
 """
 
 import numpy as np
+from array_api_compat import device
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Size, beside, namespace
@@ -35,14 +36,16 @@ def inside(centres: NDArray[np.int64], window: int, projector: Size) -> Booleans
 
 
 def inside_basis(centres: NDArray[np.int64], basis: NearBasis, projector: Size) -> Booleans:
-    """Return whether the middle of each function of a basis lies on the projector, (C, J)."""
+    """Return whether each function of a basis is one that a camera pixel has, (C, J).
+
+    Those of single pixels are left out beyond the border. Others are cut by it, and none is left
+    out: (C, 1).
+    """
     if basis.pitch == 1:
         return inside(centres, basis.window, projector)
     xp = namespace(centres)
-    places = centres[:, None, :] + beside(basis.offsets, centres)
-    on = (places >= 0) & (places < beside(np.array(projector), centres))
-    found: Booleans = xp.all(on, axis=-1)
-    return found
+    all_of_them: Booleans = xp.ones((len(centres), 1), dtype=xp.bool, device=device(centres))
+    return all_of_them
 
 
 def window_pixels(centres: NDArray[np.int64], window: int, projector: Size) -> NDArray[np.int64]:

@@ -69,7 +69,8 @@ def transport_row(transport: Transport, x: int) -> TransportRow:
     header: dict[str, Any] = {
         "q": [float(side) for side in q] if np.isfinite(q).all() else None,
         "line": line,
-        "window": transport.window,
+        # In projector pixels.
+        "window": transport.window * transport.pitch,
         "no_errors": _why_no_errors(transport, saturated=saturated),
         "confidence": None if quality is None else float(quality.confidence[0, x]),
         "saturated": saturated,

@@ -15,7 +15,12 @@ from nearfar.estimate.joint.cut import (
     share_on_projector,
     solve_cut,
 )
-from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights, seen_of_projector
+from nearfar.estimate.joint.footprint import (
+    box_centres,
+    footprint_boxes,
+    footprint_weights,
+    seen_of_projector,
+)
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.solve import solve_whole, variance_ratio
 from nearfar.illumination.centred_basis import centred_basis
@@ -26,6 +31,7 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import covariance_of_coefficients, far_variance
 from nearfar.priors.responses import response_prior
+from nearfar.transport.boxes import box_overlaps
 
 PROJECTOR = Size(70, 90)
 BASIS = NearBasis(5, 4)
@@ -83,7 +89,8 @@ def _by_hand(centred, centre):
     return patterns @ BASIS.values_at(offsets)
 
 
-CORNERS = np.array([[0, 0], [69, 3], [4, 40], [33, 88], [8, 80], [35, 45], [0, 89]])
+# Even distances from the border, to which distances are rounded at a pitch of four.
+CORNERS = np.array([[0, 0], [69, 2], [4, 40], [35, 87], [8, 81], [35, 45], [0, 89]])
 
 
 def test_a_cut_function_answers_by_what_is_left_of_it():
@@ -187,6 +194,34 @@ def test_a_camera_pixel_sees_as_much_as_q_moves_to_the_next():
     np.testing.assert_allclose(
         seen[lit], np.hypot([1.5, 0.0], [0.4, 2.0]) * np.ones((lit.sum(), 2)), rtol=1e-5
     )
+
+
+@pytest.mark.parametrize("moves", [(0.6, 0.8), (1.0, 1.0), (1.6, 2.3), (5.2, 0.9)])
+def test_the_middle_of_a_box_follows_from_its_centroid_on_whole_pixels(moves):
+    y, x = np.meshgrid(np.arange(11.0), np.arange(9.0), indexing="ij")
+    middles = np.stack([3.2 + moves[0] * y, 6.1 + moves[1] * x], axis=-1)
+    rounded = np.rint(middles)
+    pixels = np.arange(-6, 7)
+    centroids = np.stack(
+        [
+            rounded[..., axis]
+            + (
+                box_overlaps((middles - rounded)[..., axis].ravel(), np.full(99, moves[axis]), 6)
+                @ pixels
+            ).reshape(11, 9)
+            for axis in (0, 1)
+        ],
+        axis=-1,
+    )
+    centroids[4, 4] = np.nan
+    found = box_centres(centroids)
+    assert np.isnan(found[4, 4]).all()
+    # Boxes are of the mean move nearby; within one pixel every middle has the same centroid.
+    off = np.abs(found - middles)[np.isfinite(centroids)]
+    assert np.median(off) < 0.02
+    assert off.max() <= max(0.5 * (1.0 - min(moves)), 0.0) + 0.12
+    before = np.abs(centroids - middles)[np.isfinite(centroids)]
+    assert off.mean() <= before.mean()
 
 
 @pytest.mark.parametrize("blur", [0.0, 2.0, 4.0])

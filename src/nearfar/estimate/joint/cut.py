@@ -31,7 +31,7 @@ from nearfar.illumination.near_basis import NearBasis
 from nearfar.priors.responses import ResponsePrior
 
 # Distances from the border are rounded to this share of the pitch.
-DISTANCE_STEP = 0.25
+DISTANCE_STEP = 0.5
 # Directions of the covariance with less than this share of the largest variance are left out.
 LEAST_VARIANCE = 1e-9
 

@@ -9,7 +9,6 @@ runs over real responses, w over window entries, i over eigenvectors, g over o, 
 """
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +22,11 @@ from nearfar.estimate.joint.batch import (
 )
 from nearfar.estimate.joint.cut import share_on_projector
 from nearfar.estimate.joint.footprint import footprint_weights
+from nearfar.estimate.joint.posterior_variance import (
+    Functionals,
+    PixelState,
+    posterior_variance,
+)
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.near_basis import NearBasis
@@ -42,46 +46,6 @@ BATCH_PIXELS = 2048
 SHARE_FLOOR = 1e-9
 # Entries of a row whose variance is computed at once.
 ENTRIES_AT_ONCE = 2**14
-
-
-class _Functionals(NamedTuple):
-    """Linear functionals of rows: one of each camera pixel, or all of one camera pixel.
-
-    Attributes
-    ----------
-    white : ndarray, shape (n,)
-        Weight h of white.
-    direct : ndarray, shape (n, 3)
-        h of d, and of d times what q is off down and across.
-    near : ndarray, shape (n, W^2) or (1, W^2)
-        One for all of them where they are of one camera pixel.
-    far : ndarray, shape (n, R)
-        Re-centred.
-    truncated : ndarray, shape (components,) or (components, n)
-        Variance of the part of f that the transport does not hold, at unit prior scale, for each
-        prior component.
-    """
-
-    white: Floats
-    direct: Floats
-    near: Floats
-    far: Floats
-    truncated: Floats
-
-
-class _PixelState(NamedTuple):
-    """The posterior's state at camera pixels, the transport's own units."""
-
-    amplitude_responses: Floats  # (n, R, 4), to unit o, d and shifts
-    precision: Floats  # (n, channels, 4), of the same before any photo
-    noise: Floats  # (n, channels)
-    scale: Floats  # prior scale s in photo units, (n, channels)
-    white_variance: Floats  # of white's error given o, (n, channels)
-    share_of_white: Floats  # (n, channels)
-    prior_component: Integers  # (n,)
-
-    def only(self, selected: Integers) -> "_PixelState":
-        return _PixelState._make(values[selected] for values in self)
 
 
 class ErrorBars:
@@ -289,9 +253,9 @@ class ErrorBars:
         values = transport.near_basis.values_at(np.stack([y, x], axis=1) - centre)
         return y * projector.width + x, values.astype(np.float32)
 
-    def _of_direct(self, number: int) -> _Functionals:
+    def _of_direct(self, number: int) -> Functionals:
         """Return the functional d of so many camera pixels."""
-        return _Functionals(
+        return Functionals(
             np.zeros(number),
             np.broadcast_to([1.0, 0.0, 0.0], (number, 3)),
             np.zeros((number, self._transport.near_basis.count), dtype=np.float32),
@@ -299,9 +263,9 @@ class ErrorBars:
             np.zeros(len(self._posterior.prior_components)),
         )
 
-    def _of_entries(self, values: Floats) -> _Functionals:
+    def _of_entries(self, values: Floats) -> Functionals:
         """Return the functionals that are sums of one camera pixel's near-range functions."""
-        return _Functionals(
+        return Functionals(
             np.zeros(len(values)),
             np.zeros((len(values), 3)),
             values,
@@ -309,7 +273,7 @@ class ErrorBars:
             np.zeros(len(self._posterior.prior_components)),
         )
 
-    def _of_far(self, one: slice, inside: Floats, lines: slice) -> _Functionals:
+    def _of_far(self, one: slice, inside: Floats, lines: slice) -> Functionals:
         """Return the entries of one camera pixel's row of F on some rows of the projector."""
         centred, total = self._centred, self._transport.projector.pixels
         lit = float(self._transport.lit.ravel()[one][0])
@@ -317,7 +281,7 @@ class ErrorBars:
         patterns = (drawn * centred.basis.weights * self._is_held).astype(np.float32)
         number = len(patterns)
         centre = np.broadcast_to(self._centres[one], (number, 2))
-        return _Functionals(
+        return Functionals(
             np.full(number, 1.0 / total),
             np.broadcast_to([-lit / total, 0.0, 0.0], (number, 3)),
             (-lit / total * inside[None]).astype(np.float32),
@@ -327,7 +291,7 @@ class ErrorBars:
 
     def _of_light(
         self, batch: slice, light: Floats, truncated: Floats, gains: tuple[float, float, float]
-    ) -> _Functionals:
+    ) -> Functionals:
         """Return the functional that is the picture under a light (P,)."""
         transport, centred = self._transport, self._centred
         gain_direct, gain_near, gain_far = gains
@@ -339,7 +303,7 @@ class ErrorBars:
         lit = transport.lit.ravel()[batch]
         direct = gain_direct * direct
         direct[:, 0] -= mean * lit
-        return _Functionals(
+        return Functionals(
             np.full(len(centres), mean),
             direct,
             (lit[:, None] * (gain_near * in_window - mean * inside)).astype(np.float32),
@@ -408,7 +372,7 @@ class ErrorBars:
         ]
         return np.array(total) / projector.pixels**2
 
-    def _state(self, batch: slice) -> _PixelState:
+    def _state(self, batch: slice) -> PixelState:
         """Gather the posterior's state at camera pixels."""
         transport, posterior, centred = self._transport, self._posterior, self._centred
         channels = transport.channels
@@ -422,7 +386,7 @@ class ErrorBars:
         share_of_white = posterior.share_of_white.reshape(-1, channels)[batch]
         light_noise = posterior.light_noise.reshape(-1, channels)[batch]
         noise = transport.noise.reshape(-1, channels)[batch]
-        return _PixelState(
+        return PixelState(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
             nuisance.common_precision(
                 white, offset_noise, nuisance.shift_deviation(transport.near_basis)
@@ -434,20 +398,20 @@ class ErrorBars:
             posterior.prior_component.ravel()[batch].astype(np.int64),
         )
 
-    def _variance(self, batch: slice, functionals: _Functionals) -> Floats:
+    def _variance(self, batch: slice, functionals: Functionals) -> Floats:
         """Return posterior variances, (n, channels), of each pixel's or of one pixel's many."""
         state, widening = self._state(batch), self._widening**2
         if len(state.prior_component) == 1:
             (place,) = state.prior_component
             its = functionals._replace(truncated=functionals.truncated[place])
-            return widening * _posterior_variance(self._prior(int(place)), state, its)
+            return widening * posterior_variance(self._prior(int(place)), state, its)
         found = np.empty((len(functionals.white), self._transport.channels))
         for place in np.unique(state.prior_component):
             rows = np.flatnonzero(state.prior_component == place)
-            theirs = _Functionals._make(
+            theirs = Functionals._make(
                 (*(part[rows] for part in functionals[:-1]), functionals.truncated[place])
             )
-            found[rows] = _posterior_variance(self._prior(int(place)), state.only(rows), theirs)
+            found[rows] = posterior_variance(self._prior(int(place)), state.only(rows), theirs)
         return widening * found
 
     def _prior(self, place: int) -> ResponsePrior:
@@ -481,47 +445,3 @@ def _prior_of(
 ) -> ResponsePrior:
     centred = _centred_on(frequencies, projector, near_basis)
     return response_prior(prior_component, centred, np.array(multiplicity, dtype=np.float32))
-
-
-def _posterior_variance(
-    prior: ResponsePrior, state: _PixelState, functionals: _Functionals
-) -> Floats:
-    """Return posterior variances for one prior component, (n, channels).
-
-    The state is of one camera pixel for each functional, or of one for all of them.
-    """
-    squared = (state.scale.astype(np.float64) ** 2)[..., None]
-    weight = 1.0 / (squared * prior.eigenvalues + state.noise.astype(np.float64)[..., None] ** 2)
-    covariance = functionals.near @ prior.to_near.T + functionals.far @ prior.to_far.T
-    # Of each functional with the eigenvectors' weights, at unit prior scale.
-    covariance = covariance[:, None]
-    before = (
-        np.einsum("nw,nw->n", functionals.near @ prior.covariance, functionals.near)
-        + functionals.far.astype(np.float64) ** 2 @ prior.far_variance
-        + functionals.truncated
-    )
-    given = squared[..., 0] * (before[:, None] - np.sum(squared * weight * covariance**2, axis=-1))
-    per_amplitude = np.matmul(state.amplitude_responses.transpose(0, 2, 1), prior.eigenvectors)[
-        :, None
-    ]
-    weighted = per_amplitude * weight[:, :, None]
-    normal = np.matmul(weighted, per_amplitude.transpose(0, 1, 3, 2))
-    # Weights of o through white's error, of d and the shifts through direct light.
-    shape = given.shape
-    own = np.stack(
-        [
-            -state.share_of_white * functionals.white[:, None],
-            *(np.broadcast_to(functionals.direct[:, None, part], shape) for part in range(3)),
-        ],
-        axis=-1,
-    )
-    # Less those through n and f, whose means depend on o, d and q.
-    gradient = own - np.matmul(weighted, (squared * covariance)[..., None])[..., 0]
-    solved = nuisance.solve(
-        np.broadcast_to(normal, (*gradient.shape, nuisance.COMMON_AMPLITUDES)),
-        gradient,
-        np.broadcast_to(state.precision, gradient.shape),
-    )
-    variance = given + np.sum(gradient * solved, axis=-1)
-    variance += functionals.white[:, None] ** 2 * state.white_variance
-    return np.asarray(np.maximum(variance, 0.0))

@@ -14,7 +14,7 @@ from nearfar.arrays import Booleans, Floats, Size, beside, fetch, namespace
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
-from nearfar.estimate.joint.footprint import footprint_boxes
+from nearfar.estimate.joint.footprint import box_centres, footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.sweep import sweep_once
@@ -118,6 +118,8 @@ def _laid_out(
             f"a plan for every projector pixel, at a pitch of {near_basis.pitch}, is estimated on "
             f"the processor alone: leave out `device`."
         )
+    if near_basis.pitch > 1:
+        correspondence = box_centres(correspondence)
     boxes = footprint_boxes(measurements, correspondence, near_basis)
     return lay_out(measurements, correspondence, near_basis, device, boxes)
 

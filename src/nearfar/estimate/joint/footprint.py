@@ -36,6 +36,11 @@ VOTING_ROWS = VOTERS // 2 + MEDIAN_SIDE // 2 + 1
 STEP = 0.05
 # A farther move, in projector pixels, leads to another surface.
 LARGEST_MOVE = 24.0
+# Moves to both sides stay on one surface if the larger is at most as many times the smaller, plus
+# as many projector pixels.
+LARGEST_RATIO, LARGEST_DIFFERENCE = 1.5, 0.5
+# Steps by which the middles of boxes are found from their centroids.
+CENTRE_STEPS = 12
 BATCH_PIXELS = 4096
 
 
@@ -62,32 +67,44 @@ def footprint_weights(
         return direct_weights(correspondence, centres)
     lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
     offsets = np.where(lit[:, None], correspondence - centres, 0.0)
-    reach = int(np.ceil(0.5 * boxes.max(initial=0.0) + 0.5 + STEP)) + 1
-    waves, slopes = zip(
-        *(_along_axis(offsets[:, axis], boxes[:, axis], axis, reach, centred) for axis in (0, 1)),
-        strict=True,
+    reach = _reach(boxes)
+    overlaps, slopes = [], []
+    for axis in (0, 1):
+        at, before, after = (
+            box_overlaps(offsets[:, axis] + step, boxes[:, axis], reach)
+            for step in (0.0, -STEP, STEP)
+        )
+        overlaps.append(at)
+        slopes.append((after - before) / (2 * STEP))
+    waves, steep = (
+        [_waves(values, axis, centred) for axis, values in enumerate(of_axes)]
+        for of_axes in (overlaps, slopes)
     )
-    index, sines = centred.basis.index, centred.basis.is_sine
     found = np.empty((len(offsets), 3, centred.basis.count), dtype=np.float32)
-    parts = (waves[0] * waves[1], slopes[0] * waves[1], waves[0] * slopes[1])
-    for place, part in enumerate(parts):
-        found[:, place] = np.where(sines, part.imag[:, index], part.real[:, index])
+    parts = ((waves[0], waves[1]), (steep[0], waves[1]), (waves[0], steep[1]))
+    for place, (down, across) in enumerate(parts):
+        found[:, place] = _real(down * across, centred)
     found[~lit] = 0.0
     return found
 
 
-def _along_axis(
-    offsets: Floats, widths: Floats, axis: int, reach: int, centred: CentredBasis
-) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
-    """Return conjugate responses of boxes along one axis, and their derivatives by q, (n, K)."""
-    pixels = np.arange(-reach, reach + 1)
+def _reach(boxes: Floats) -> int:
+    """Return the projector pixels from the rounded q that boxes may touch."""
+    return int(np.ceil(0.5 * boxes.max(initial=0.0) + 0.5 + STEP)) + 1
+
+
+def _waves(overlaps: Floats, axis: int, centred: CentredBasis) -> NDArray[np.complex64]:
+    """Return conjugate responses of shares of pixels (n, 2 reach + 1) along one axis, (n, K)."""
+    pixels = np.arange(overlaps.shape[1]) - overlaps.shape[1] // 2
     cycles, which = np.unique(centred.basis.cycles[:, axis], return_inverse=True)
     waves = np.exp(2j * np.pi * np.outer(pixels, cycles)).astype(np.complex64)
-    at, before, after = (
-        box_overlaps(offsets + step, widths, reach).astype(np.float32) for step in (0, -STEP, STEP)
-    )
-    slope = (after - before) / np.float32(2 * STEP)
-    return (at @ waves)[:, which.ravel()], (slope @ waves)[:, which.ravel()]
+    return np.asarray((overlaps.astype(np.float32) @ waves)[:, which.ravel()])
+
+
+def _real(waves: NDArray[np.complex64], centred: CentredBasis) -> Floats:
+    """Return the responses to cosines and sines, (n, R), of conjugate responses (n, K)."""
+    index, sines = centred.basis.index, centred.basis.is_sine
+    return np.where(sines, waves.imag[:, index], waves.real[:, index])
 
 
 def footprint_boxes(
@@ -130,9 +147,15 @@ def footprint_boxes(
     def work(batch: slice) -> None:
         responses = centred.recentre(measurements.responses[batch][..., indices], centres[batch])
         noise = np.maximum(measurements.noise[batch] ** 2, 1e-12)
+        offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0)
         for place, blur in enumerate(blurs):
             boxes = np.hypot(spread[batch], blur)
-            direct = footprint_weights(q[batch], centres[batch], boxes, centred)[:, 0]
+            reach = _reach(boxes)
+            down, across = (
+                _waves(box_overlaps(offsets[:, axis], boxes[:, axis], reach), axis, centred)
+                for axis in (0, 1)
+            )
+            direct = _real(down * across, centred)
             along = np.maximum(np.einsum("nir,nr->ni", responses * weight, direct), 0.0)
             squared = np.maximum(np.einsum("nr,nr->n", direct * weight, direct), 1e-12)
             explained[batch, place] = np.sum(along**2 / noise, axis=1) / squared
@@ -144,6 +167,36 @@ def footprint_boxes(
     ).reshape(number, -1)
     blur = blurs[np.argmax(voted, axis=1)]
     return np.asarray(np.hypot(spread, blur[:, None]) * lit[:, None], dtype=np.float32)
+
+
+def box_centres(correspondence: Floats) -> Floats:
+    """Return the middles of the boxes whose centroids on the pixels are q, (Cy, Cx, 2).
+
+    The centroid of the shares of a box in whole pixels is not its middle: that of a box within one
+    pixel is the pixel's.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (Cy, Cx, 2)
+        q as correspondence finds it, a centroid.
+    """
+    q = correspondence.reshape(-1, 2).astype(np.float64)
+    boxes = seen_of_projector(correspondence)
+    found = np.nan_to_num(q, nan=0.0)
+    for batch in blocks(len(q), BATCH_PIXELS):
+        rounded = np.rint(found[batch])
+        wanted, widths = found[batch] - rounded, boxes[batch]
+        reach = _reach(widths)
+        pixels = np.arange(-reach, reach + 1)
+        middles = wanted.copy()
+        for _ in range(CENTRE_STEPS):
+            for axis in (0, 1):
+                overlaps = box_overlaps(middles[:, axis], widths[:, axis], reach)
+                # A centroid moves by at most 1 / width times as much as the middle.
+                off = wanted[:, axis] - overlaps @ pixels
+                middles[:, axis] += off * np.clip(widths[:, axis], 0.0, 1.0)
+        found[batch] = rounded + middles
+    return np.where(np.isnan(q), np.nan, found).reshape(correspondence.shape)
 
 
 def seen_of_projector(correspondence: Floats) -> Floats:
@@ -166,9 +219,10 @@ def seen_of_projector(correspondence: Floats) -> Floats:
         padding[axis] = (1, 1)
         padded = np.pad(move, padding, constant_values=np.nan)
         both = (np.delete(padded, 0, axis=axis), np.delete(padded, -1, axis=axis))
-        # The smaller of the moves to both sides: the other may lead to another surface.
-        least = np.fmin(*both)
-        known = np.nan_to_num(least, nan=0.0)
+        # The mean of the moves to both sides, or the smaller if one leads to another surface.
+        least, most = np.fmin(*both), np.fmax(*both)
+        alike = most.max(axis=-1) <= LARGEST_RATIO * least.max(axis=-1) + LARGEST_DIFFERENCE
+        known = np.nan_to_num(np.where(alike[..., None], (least + most) / 2, least), nan=0.0)
         squared += (
             np.stack(
                 [

@@ -75,8 +75,8 @@ def _wait_for_no_disk(config: pytest.Config) -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Run a process more than there are processors: many tests wait for cameras and browsers."""
-    return len(os.sched_getaffinity(0)) + 1
+    """Run two processes more than there are processors, as many tests wait for others."""
+    return len(os.sched_getaffinity(0)) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

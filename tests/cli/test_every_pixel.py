@@ -69,6 +69,7 @@ def test_a_light_of_another_size_is_resized_only_when_asked(job):
     assert "--resize" in refused.err
     done = run_nearfar(*arguments, "--resize")
     assert done.status == 0, done.err
+    assert "68x75 was resized to 136x150" in done.out
     light = np.load(job / "small.npy").repeat(2, axis=0).repeat(2, axis=1)
     expected = nearfar.load_transport(job / "transport.zarr") @ light
     np.testing.assert_allclose(np.load(job / "relit.npy"), expected, rtol=1e-5, atol=1e-6)

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.errors import InputError
-from nearfar.files import read_light
 from nearfar.files.resizing import resize_light
 
 
@@ -24,15 +22,3 @@ def test_blocks_go_there_and_back():
     blocks = light.repeat(3, axis=0).repeat(2, axis=1)
     np.testing.assert_allclose(resize_light(light, Size(15, 14)), blocks, rtol=1e-5)
     np.testing.assert_allclose(resize_light(blocks, Size(5, 7)), light, rtol=1e-5)
-
-
-def test_a_light_of_another_size_is_resized_only_when_asked(tmp_path):
-    path = tmp_path / "light.npy"
-    light = np.random.default_rng(2).random((8, 8)).astype(np.float32)
-    np.save(path, light)
-    with pytest.raises(InputError, match="8x8 but the projector is 4x4"):
-        read_light(path, Size(4, 4))
-    np.testing.assert_array_equal(
-        read_light(path, Size(4, 4), resize=True), resize_light(light, Size(4, 4))
-    )
-    np.testing.assert_array_equal(read_light(path, Size(8, 8), resize=True), light)

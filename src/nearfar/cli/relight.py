@@ -2,13 +2,18 @@
 
 from math import isfinite
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nearfar.arrays import Size
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.errors import InputError
 from nearfar.progress import progress_bar
+
+if TYPE_CHECKING:
+    from nearfar.arrays import Floats
 
 COMPONENTS = ("direct", "near", "far")
 
@@ -30,6 +35,24 @@ def _gains(texts: list[str]) -> dict[str, float]:
             )
         gains[name] = number
     return gains
+
+
+def _of_size(light: "Floats", path: Path, projector: Size) -> "Floats":
+    """Return a light of the projector's size, and refuse another one."""
+    size = Size(*light.shape[:2])
+    if size != projector:
+        raise InputError(
+            f"{path} is {size} but the projector is {projector} (height x width): give a light of "
+            f"{projector}, or add --resize."
+        )
+    return light
+
+
+def _resized(light: "Floats", _path: Path, projector: Size) -> "Floats":
+    """Return a light resized to the projector's size, where it has another one."""
+    from nearfar.files.resizing import resize_light
+
+    return light if light.shape[:2] == projector else resize_light(light, projector)
 
 
 def relight(
@@ -64,7 +87,12 @@ def relight(
 
     Example: nearfar relight transport.zarr light.png relit.exr --srgb --gain near=2
     """
-    from nearfar.files import check_output, check_picture_ending, read_light, write_picture
+    from nearfar.files import (
+        check_output,
+        check_picture_ending,
+        read_light_of_any_size,
+        write_picture,
+    )
     from nearfar.transport.colour import as_channels_see
     from nearfar.transport.store import open_transport
     from nearfar.workflow.relight import error_bars_of_stored, relight_stored
@@ -77,10 +105,14 @@ def relight(
         require_reconstructed(transport)
         opened = open_transport(transport)
         warn_if_wrong(transport, opened.verdict)
-        projected = read_light(light, opened.projector, srgb=srgb, resize=resize)
+        projected = read_light_of_any_size(light, srgb=srgb)
+        given = Size(*projected.shape[:2])
+        projected = (_resized if resize else _of_size)(projected, light, opened.projector)
         projected = as_channels_see(projected, opened.channels, opened.provenance)
         make = error_bars_of_stored if error_bars else relight_stored
         picture = make(opened, projected, gains)
         write_picture(output, picture, force=force, may_be_infinite=error_bars)
+    if given != opened.projector:
+        say(f"{light} of {given} was resized to {opened.projector}", quiet=quiet)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"
     say(f"{what} of {opened.camera} written to {output}", quiet=quiet)

@@ -13,7 +13,6 @@ from nearfar.files import codecs
 from nearfar.files.colour import from_srgb, to_srgb
 from nearfar.files.output import new_output
 from nearfar.files.raw import decode_raw
-from nearfar.files.resizing import resize_light
 from nearfar.files.unsupported import UnsupportedPictureError
 
 PICTURE_ENDINGS = (".png", ".tif", ".tiff", ".bmp", ".exr", ".npy")
@@ -172,20 +171,16 @@ def read_linear(path: Path, *, full_scale: float | None = None) -> NDArray[np.fl
     return np.asarray(pixels.astype(np.float32) / np.float32(scale))
 
 
-def read_light(
-    path: Path, projector: Size, *, srgb: bool = False, resize: bool = False
-) -> NDArray[np.float32]:
+def read_light(path: Path, projector: Size, *, srgb: bool = False) -> NDArray[np.float32]:
     """Read a light: what the projector shows, linear, full white = 1.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
     projector : Size
         Size that the light must have.
     srgb : bool
         The file is an ordinary sRGB picture of 8 or 16 bits.
-    resize : bool
-        Resize a light of another size, in linear light, instead of refusing it.
 
     Returns
     -------
@@ -197,18 +192,29 @@ def read_light(
     MissingFileError, UnreadableFileError, InputError
         As `read_picture`; also if the size is not the projector's, or floats are called sRGB.
     """
-    pixels = read_picture(path)
-    size = Size(*pixels.shape[:2])
-    if size != projector and not resize:
+    light = read_light_of_any_size(path, srgb=srgb)
+    size = Size(*light.shape[:2])
+    if size != projector:
         raise InputError(
             f"{path} is {size} but the projector is {projector} (height x width): "
-            f"give a light of {projector}, or choose `resize`."
+            f"resize it to {projector}."
         )
+    return light
+
+
+def read_light_of_any_size(path: Path, *, srgb: bool = False) -> NDArray[np.float32]:
+    """Read a light that may have another size than the projector; see `read_light`.
+
+    Returns
+    -------
+    array
+        float32, shape (height, width) or (height, width, 3).
+    """
+    pixels = read_picture(path)
     if srgb and pixels.dtype.kind == "f":
         raise InputError(f"{path} holds floats, which are linear light: leave out `srgb`.")
     light = pixels.astype(np.float32) / np.float32(full_scale_of(pixels.dtype))
-    light = from_srgb(light) if srgb else light
-    return light if size == projector else resize_light(light, projector)
+    return from_srgb(light) if srgb else light
 
 
 def check_picture_ending(path: Path) -> None:

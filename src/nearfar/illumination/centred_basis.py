@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Complexes, Floats
+from nearfar.arrays import Complexes, Floats, product
 from nearfar.illumination.near_basis import NearBasis, hat_response, window_offsets
 from nearfar.illumination.real_basis import RealBasis
 
@@ -58,6 +58,10 @@ class CentredBasis:
     def put(self, move: Callable[[Any], Any]) -> "CentredBasis":
         """Put the patterns onto a device."""
         return replace(self, on_window=move(self.on_window), on_footprint=move(self.on_footprint))
+
+    def of_direct(self, weights: Floats) -> Floats:
+        """Return re-centred responses (n, ..., R) of direct light, as weights of `on_footprint`."""
+        return weights if self.near_basis.pitch > 1 else product(weights, self.on_footprint.T)
 
     def recentre(self, responses: Floats, centres: NDArray[np.int64]) -> Floats:
         """Shift responses (n, channels, R) to centres (n, 2); see `RealBasis.recentre`."""

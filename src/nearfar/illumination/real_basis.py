@@ -138,10 +138,23 @@ class RealBasis:
         real, imaginary = xp.real(phase)[:, None], xp.imag(phase)[:, None]
         shifted: Floats = xp.empty_like(responses)
         own, pairs = self._layout
+        is_contiguous = (
+            isinstance(responses, np.ndarray)
+            and responses.dtype == np.float32
+            and responses.strides[-1] == shifted.strides[-1] == responses.itemsize
+        )
         # A frequency that is its own negative has no sine: its phase is 1 or -1.
         single, alone = (beside(indices, responses) for indices in own)
         shifted[..., single] = responses[..., single] * real[..., alone]
         for run, (start, stop) in pairs:
+            if is_contiguous:
+                # A cosine and its sine are a complex number: one pass instead of six.
+                turned = phase[:, None, run].conj() if sign > 0 else phase[:, None, run]
+                before, after = (
+                    v[..., start:stop].view(np.complex64) for v in (responses, shifted)
+                )
+                np.multiply(before, turned, out=after)
+                continue
             c = real[..., run]
             s = sign * imaginary[..., run]
             even, odd = responses[..., start:stop:2], responses[..., start + 1 : stop : 2]

@@ -83,12 +83,14 @@ def box_overlaps(offsets: Floats, widths: Floats, reach: int) -> Floats:
     Returns
     -------
     ndarray, shape (n, 2 reach + 1)
+        Of the dtype of the offsets.
     """
-    pixels = np.arange(-reach, reach + 1)
-    half = 0.5 * np.maximum(widths, LEAST_WIDTH)[:, None]
+    pixels = np.arange(-reach, reach + 1, dtype=offsets.dtype)
+    half = 0.5 * np.maximum(widths, LEAST_WIDTH).astype(offsets.dtype)[:, None]
     high = np.minimum(offsets[:, None] + half, pixels + 0.5)
     low = np.maximum(offsets[:, None] - half, pixels - 0.5)
-    return np.asarray(np.maximum(high - low, 0.0) / (2 * half))
+    high -= low
+    return np.asarray(np.maximum(high, 0.0, out=high) / (2 * half))
 
 
 def share_of_boxes(correspondence: Floats, widths: Floats, projector: Size) -> Floats:

@@ -11,6 +11,7 @@ from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_
 from nearfar.estimate.joint.cut import (
     border_distances,
     cut_responses,
+    is_cut,
     near_responses,
     share_on_projector,
     solve_cut,
@@ -96,7 +97,7 @@ CORNERS = np.array([[0, 0], [69, 2], [4, 40], [35, 87], [8, 81], [35, 45], [0, 8
 def test_a_cut_function_answers_by_what_is_left_of_it():
     centred = _centred()
     for centre in CORNERS:
-        (distances,) = border_distances(centre[None], centred).tolist()
+        (distances,) = border_distances(centre[None], BASIS, PROJECTOR).tolist()
         found = cut_responses(centred, tuple(distances))
         np.testing.assert_allclose(found, _by_hand(centred, centre), atol=1e-5)
     shares = share_on_projector(CORNERS, BASIS.offsets, BASIS.pitches, PROJECTOR)
@@ -106,6 +107,20 @@ def test_a_cut_function_answers_by_what_is_left_of_it():
     coefficients = np.random.default_rng(1).normal(size=(len(CORNERS), 2, BASIS.count))
     expected = [c @ _by_hand(centred, at).T for c, at in zip(coefficients, CORNERS, strict=True)]
     np.testing.assert_allclose(near_responses(coefficients, CORNERS, centred), expected, atol=1e-4)
+
+
+def test_distances_are_rounded_by_a_fifth_at_most_and_never_past_the_reach():
+    centres = np.stack([np.arange(70), np.full(70, 45)], axis=1)
+    above, below, left, right = border_distances(centres, BASIS, PROJECTOR).T
+    exact = np.minimum(np.arange(70), BASIS.reach)
+    assert np.all(np.abs(above - exact) <= 0.2 * exact)
+    assert np.array_equal(below, above[::-1])
+    assert np.all(left == BASIS.reach)
+    assert np.all(right == BASIS.reach)
+    # What counts as whole is not cut at all, or only at the very end.
+    whole = ~is_cut(centres, BASIS, PROJECTOR)
+    assert np.array_equal(whole, np.minimum(above, below) == BASIS.reach)
+    assert whole[exact == BASIS.reach][:20].all()
 
 
 def test_the_mean_is_that_of_dense_algebra():

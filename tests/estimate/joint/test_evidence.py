@@ -66,6 +66,15 @@ def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():
         batch, prior_set(priors, centred, measurements.multiplicity[centred.response_indices])
     )
     assert np.mean(component == 0) > 0.95
+    # Among fewer, it keeps the numbers that they had among all.
+    numbered = prior_set(
+        priors, centred, measurements.multiplicity[centred.response_indices], (7, 3)
+    )
+    again, its_scale, _ = most_probable(batch, numbered)
+    np.testing.assert_array_equal(again, np.array([7, 3])[component])
+    np.testing.assert_array_equal(its_scale, scale)
+    only, _, _ = most_probable(batch, numbered.only((3,)))
+    assert np.all(only == 3)
     # 0.02 in photo units, of a white that is 0.5 and a little.
     white = batch.white[:, 0]
     assert np.median(scale * white) == pytest.approx(0.02, rel=0.5)

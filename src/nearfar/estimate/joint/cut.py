@@ -1,14 +1,13 @@
 """The posterior mean where the projector's border cuts hats of several projector pixels.
 
 What is cut off a hat sends no light, so its responses depend on how far q is from the border. With
-n = L z, C = L L^T its covariance at unit prior scale, z has the precision
+C = L L^T the hats' covariance at unit prior scale, B their responses as the border cuts them, S the
+variance of f and m how often each response was measured, responses have the covariance
 
-    Lambda = I / ratio + (B L)^T D^-1 B L
+    sigma^2 K,  K = ratio (B L L^T B^T + S) + 1 / m,  ratio = (s / sigma)^2
 
-where f and noise together have the covariance s^2 S + sigma^2 / m = sigma^2 D,
-ratio = (s / sigma)^2 and B the responses of the hats as the border cuts them. Camera pixels share a
-factor of Lambda where their distances from the border are nearly the same, and so are prior
-component and ratio.
+Camera pixels share B L L^T B^T + S where their distances from the border are nearly the same and so
+is the prior component, and a factor of K where the ratio is the same as well.
 
 Index convention: arrays are (n, channels, ...); r runs over real responses, w over functions, g
 over y and the amplitudes of `nuisance`.
@@ -20,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy.linalg import lapack
 
-from nearfar.arrays import Floats, Integers, Size
+from nearfar.arrays import Booleans, Floats, Integers, Size, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
@@ -30,34 +29,52 @@ from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.priors.responses import ResponsePrior
 
-# Distances from the border are rounded to this share of the pitch.
-DISTANCE_STEP = 0.5
 # Directions of the covariance with less than this share of the largest variance are left out.
 LEAST_VARIANCE = 1e-9
 
 
-def border_distances(centres: NDArray[np.int64], centred: CentredBasis) -> NDArray[np.int64]:
+def is_cut(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
+    """Return whether the border cuts functions about each rounded q, shape (C,)."""
+    distances = border_distances(centres, near_basis, projector)
+    return np.asarray((distances < near_basis.reach).any(axis=1))
+
+
+def border_distances(
+    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size
+) -> NDArray[np.int64]:
     """Return projector pixels from the rounded q to each border, at most the reach, (C, 4).
 
-    Above, below, to the left and to the right, each rounded.
+    Above, below, to the left and to the right, each rounded to one of those that `_rounded` lists.
     """
-    projector, basis = centred.basis.projector, centred.near_basis
     last = np.array(projector) - 1 - centres
     distances = np.stack([centres[:, 0], last[:, 0], centres[:, 1], last[:, 1]], axis=1)
-    step = max(1, round(DISTANCE_STEP * basis.pitch))
-    rounded = np.rint(distances / step).astype(np.int64) * step
-    return np.minimum(np.where(distances >= basis.reach, basis.reach, rounded), basis.reach)
+    return _rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)]
+
+
+@lru_cache(maxsize=16)
+def _rounded(reach: int) -> NDArray[np.int64]:
+    """Return what each distance up to the reach is rounded to.
+
+    To the nearest of 0, 1, 2, 3, 4, 6, 8, 12, ... and the reach: near-range light fades with
+    distance, so that a sixth of the distance is as good far away as half a pixel is close by.
+    """
+    steps = [0, *(step for k in range(reach.bit_length()) for step in (2**k, 3 * 2**k // 2))]
+    kept = np.array(sorted({step for step in steps if step < reach} | {reach}))
+    return np.asarray(kept[np.abs(np.arange(reach + 1)[:, None] - kept).argmin(axis=1)])
 
 
 def cut_alike(
     centres: NDArray[np.int64], centred: CentredBasis
 ) -> Iterator[tuple[Integers, tuple[int, int, int, int]]]:
     """Yield camera pixels whose functions are cut alike, and their distances from the border."""
-    found, group = np.unique(border_distances(centres, centred), axis=0, return_inverse=True)
+    if not len(centres):
+        return
+    distances = border_distances(centres, centred.near_basis, centred.basis.projector)
+    found, group = np.unique(distances, axis=0, return_inverse=True)
     order = np.argsort(group.ravel(), kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(group.ravel()[order])) + 1)
-    for part, distances in zip(parts, found.tolist(), strict=True):
-        yield part, (distances[0], distances[1], distances[2], distances[3])
+    for part, at in zip(parts, found.tolist(), strict=True):
+        yield part, (at[0], at[1], at[2], at[3])
 
 
 def cut_responses(centred: CentredBasis, distances: tuple[int, int, int, int]) -> Floats:
@@ -161,10 +178,11 @@ def near_responses(
     coefficients: Floats, centres: NDArray[np.int64], centred: CentredBasis
 ) -> Floats:
     """Return re-centred responses of near-range light, as the border cuts it, (n, channels, R)."""
-    found = np.empty((*coefficients.shape[:2], centred.basis.count), dtype=np.float32)
-    for part, distances in cut_alike(centres, centred):
+    found = product(coefficients, centred.on_window.T)
+    (cut,) = np.nonzero(is_cut(centres, centred.near_basis, centred.basis.projector))
+    for part, distances in cut_alike(centres[cut], centred):
         responses = cut_responses(centred, distances).T.astype(np.float32)
-        found[part] = coefficients[part] @ responses
+        found[cut[part]] = coefficients[cut[part]] @ responses
     return found
 
 
@@ -181,45 +199,55 @@ def solve_cut(
 ) -> PosteriorMean:
     """Estimate camera pixels of one prior component and rounded ratios; see `solve_whole`."""
     number, channels, count = batch.responses.shape
-    multiplicity = np.sum(prior.eigenvectors.astype(np.float64) ** 2, axis=1)
     per_amplitude = nuisance.amplitude_responses(batch, centred)
-    precision = nuisance.prior_precision(batch, centred.near_basis)
-    amplitudes = np.empty(precision.shape)
-    near = np.zeros((number, channels, centred.near_basis.count), dtype=np.float32)
-    far = np.empty((number, channels, count), dtype=np.float32)
+    y = np.empty((number, channels, 1 + per_amplitude.shape[1], count))
+    y[:, :, 0], y[:, :, 1:] = batch.responses, per_amplitude[:, None]
+    solved = np.empty_like(y)
     root = _root(prior)
-    for part, distances in cut_alike(batch.centres, centred):
-        patterns = cut_responses(centred, distances) @ root
-        of, channel = np.nonzero(np.ones_like(ratio[part], dtype=bool))
-        of_pair = ratio[part][of, channel]
-        for value in np.unique(of_pair).tolist():
-            mine = of_pair == value
-            c, i = part[of[mine]], channel[mine]
-            weight = 1.0 / (value * prior.far_variance + 1.0 / multiplicity)
-            information = (patterns.T * weight) @ patterns
-            information[np.diag_indices_from(information)] += 1.0 / value
-            y = np.concatenate(
-                [batch.responses[c, i, None], per_amplitude[c]], axis=1, dtype=np.float64
-            )
-            weighted = y * weight
-            right = weighted @ patterns
-            factor = linalg.cho_factor(information, check_finite=False)
-            flat = right.reshape(-1, right.shape[-1]).T
-            solved = linalg.cho_solve(factor, flat, check_finite=False).T.reshape(right.shape)
-            products = y @ weighted.transpose(0, 2, 1) - right @ solved.transpose(0, 2, 1)
-            variance = batch.noise[c, i].astype(np.float64)[:, None] ** 2
-            products /= variance[..., None]
-            found = nuisance.solve(products[:, 1:, 1:], products[:, 1:, 0], precision[c, i])
-            amplitudes[c, i] = found
-            factors = np.concatenate([np.ones_like(found[:, :1]), -found], axis=1)
-            z = (factors[:, None] @ solved)[:, 0]
-            rest = ((factors[:, None] @ y)[:, 0] - z @ patterns.T) * weight
-            near[c, i] = z @ root.T
-            far[c, i] = rest * (value * prior.far_variance)
+    noise_variance = 1.0 / np.sum(prior.eigenvectors.astype(np.float64) ** 2, axis=1)
+    alike = [
+        (part, cut_responses(centred, at) @ root) for part, at in cut_alike(batch.centres, centred)
+    ]
+    for part, patterns in alike:
+        covariance = patterns @ patterns.T
+        covariance[np.diag_indices(count)] += prior.far_variance
+        for value, of, channel in _of_one_ratio(ratio[part]):
+            at = part[of], channel
+            solved[at] = _solve(value * covariance, noise_variance, y[at])
+    variance = batch.noise.astype(np.float64)[..., None, None] ** 2
+    products = y @ np.swapaxes(solved, -1, -2) / variance
+    precision = nuisance.prior_precision(batch, centred.near_basis)
+    amplitudes = nuisance.solve(products[..., 1:, 1:], products[..., 1:, 0], precision)
+    # K^-1 times the responses less those to the amplitudes.
+    rest = solved[:, :, 0] - np.einsum("nig,nigr->nir", amplitudes, solved[:, :, 1:])
+    rest *= ratio[..., None]
+    near = np.empty((number, channels, centred.near_basis.count), dtype=np.float32)
+    for part, patterns in alike:
+        near[part] = rest[part] @ patterns @ root.T
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),
         near=near,
-        far=far,
+        far=(rest * prior.far_variance).astype(np.float32),
         near_noise=near_noise(batch, prior, ratio),
         score=np.zeros((number, channels, 0), dtype=np.float32),
     )
+
+
+def _of_one_ratio(ratio: Floats) -> Iterator[tuple[float, Integers, Integers]]:
+    """Yield each variance ratio that occurs, with its camera pixels and channels."""
+    flat = ratio.ravel()
+    order = np.argsort(flat, kind="stable")
+    ends = np.flatnonzero(np.diff(flat[order])) + 1
+    for places in np.split(order, ends):
+        yield float(flat[places[0]]), *np.divmod(places, ratio.shape[1])
+
+
+def _solve(covariance: Floats, noise_variance: Floats, y: Floats) -> Floats:
+    """Return (covariance + diag(noise_variance))^-1 y, y (..., R); overwrite the covariance."""
+    covariance[np.diag_indices_from(covariance)] += noise_variance
+    # Symmetric, and so the same in Fortran's order.
+    factor, failed = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1, clean=0)
+    if failed:
+        raise np.linalg.LinAlgError("the covariance of responses is not positive definite")
+    solved, _ = lapack.dpotrs(factor, y.reshape(-1, y.shape[-1]).T, lower=1)
+    return np.asarray(solved.T.reshape(y.shape))

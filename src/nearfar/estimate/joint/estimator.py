@@ -12,7 +12,7 @@ from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measured_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
-from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
+from nearfar.priors.fitted import LIT_AT_PITCH, LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.priors.responses import VARIANCE_RATIOS
 from nearfar.transport.model import Transport
 
@@ -52,7 +52,8 @@ class JointEstimator(Estimator):
         """Count the matrices of every prior component, and each camera pixel's responses."""
         responses = 2 * len(measured_frequencies(plan))
         entries = NearBasis(plan.window, plan.pitch).count
-        components = len(LIT_COMPONENTS) + len(UNLIT_COMPONENTS)
+        lit = LIT_COMPONENTS if plan.pitch == 1 else LIT_AT_PITCH
+        components = len(lit) + len(UNLIT_COMPONENTS)
         component = (
             2 * responses**2
             + 2 * responses * entries

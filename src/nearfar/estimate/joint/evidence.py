@@ -45,11 +45,22 @@ class PriorSet(NamedTuple):
         screen.
     screening : ndarray of int
         Indices of the screening responses.
+    numbers : tuple of int
+        Number of each, among those of all sweeps.
     """
 
     priors: tuple[ResponsePrior, ...]
     screens: tuple[Eigenbasis, ...]
     screening: Integers
+    numbers: tuple[int, ...]
+
+    def only(self, numbers: tuple[int, ...]) -> "PriorSet":
+        """Return those of some numbers, in their order."""
+        places = [self.numbers.index(number) for number in numbers]
+        priors = tuple(self.priors[place] for place in places)
+        screens = tuple(self.screens[place] for place in places)
+        is_screened = self.screens is not self.priors
+        return PriorSet(priors, screens if is_screened else priors, self.screening, numbers)
 
     def put(self, move: Callable[[Any], Any]) -> "PriorSet":
         """Put the arrays that every camera pixel is multiplied with onto a device."""
@@ -62,16 +73,23 @@ class PriorSet(NamedTuple):
 
 
 def prior_set(
-    priors: tuple[ResponsePrior, ...], centred: CentredBasis, multiplicity: Floats
+    priors: tuple[ResponsePrior, ...],
+    centred: CentredBasis,
+    multiplicity: Floats,
+    numbers: tuple[int, ...] | None = None,
 ) -> PriorSet:
-    """Choose screening responses: those of evenly spaced frequencies, in their order."""
+    """Choose screening responses: those of evenly spaced frequencies, in their order.
+
+    Numbers count from 0 unless they are given.
+    """
+    numbers = tuple(range(len(priors))) if numbers is None else numbers
     frequencies = len(centred.basis.frequencies)
     if centred.basis.count <= 2 * SCREENING_RESPONSES:
-        return PriorSet(priors, priors, np.arange(centred.basis.count))
+        return PriorSet(priors, priors, np.arange(centred.basis.count), numbers)
     spaced = np.linspace(0, frequencies - 1, SCREENING_RESPONSES // 2).round().astype(np.int64)
     screening = np.flatnonzero(np.isin(centred.basis.index, spaced))
     screens = tuple(prior.of_responses(screening, centred, multiplicity) for prior in priors)
-    return PriorSet(priors, screens, screening)
+    return PriorSet(priors, screens, screening, numbers)
 
 
 def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Floats, Floats]:
@@ -85,7 +103,7 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
     Returns
     -------
     prior_component : ndarray of int, shape (n,)
-        Index of a candidate.
+        Number of a candidate.
     prior_scale : ndarray, shape (n,)
         s as a share of white.
     evidence : ndarray, shape (n,)
@@ -112,7 +130,8 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
                 values[index, mine] = xp.max(by_all, axis=1)
     best = xp.argmax(values, axis=0)
     step = xp.take_along_axis(steps, best[None, :], axis=0)[0, :]
-    return best, beside(np.array(PRIOR_SCALES), values)[step], xp.max(values, axis=0)
+    number = beside(np.array(candidates.numbers), values)[best]
+    return number, beside(np.array(PRIOR_SCALES), values)[step], xp.max(values, axis=0)
 
 
 class WhitenedResponses(NamedTuple):

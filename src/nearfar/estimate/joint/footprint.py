@@ -66,12 +66,12 @@ def footprint_weights(
     if centred.near_basis.pitch == 1:
         return direct_weights(correspondence, centres)
     lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
-    offsets = np.where(lit[:, None], correspondence - centres, 0.0)
+    offsets = np.where(lit[:, None], correspondence - centres, 0.0).astype(np.float32)
     reach = _reach(boxes)
     overlaps, slopes = [], []
     for axis in (0, 1):
         at, before, after = (
-            box_overlaps(offsets[:, axis] + step, boxes[:, axis], reach)
+            box_overlaps(offsets[:, axis] + np.float32(step), boxes[:, axis], reach)
             for step in (0.0, -STEP, STEP)
         )
         overlaps.append(at)
@@ -98,13 +98,14 @@ def _waves(overlaps: Floats, axis: int, centred: CentredBasis) -> NDArray[np.com
     pixels = np.arange(overlaps.shape[1]) - overlaps.shape[1] // 2
     cycles, which = np.unique(centred.basis.cycles[:, axis], return_inverse=True)
     waves = np.exp(2j * np.pi * np.outer(pixels, cycles)).astype(np.complex64)
-    return np.asarray((overlaps.astype(np.float32) @ waves)[:, which.ravel()])
+    return np.take(overlaps.astype(np.float32) @ waves, which.ravel(), axis=1)
 
 
 def _real(waves: NDArray[np.complex64], centred: CentredBasis) -> Floats:
     """Return the responses to cosines and sines, (n, R), of conjugate responses (n, K)."""
-    index, sines = centred.basis.index, centred.basis.is_sine
-    return np.where(sines, waves.imag[:, index], waves.real[:, index])
+    basis = centred.basis
+    # The parts of a complex number are its cosine and its sine, where a frequency has both.
+    return np.asarray(waves.view(np.float32)[:, 2 * basis.index + basis.is_sine])
 
 
 def footprint_boxes(
@@ -147,7 +148,7 @@ def footprint_boxes(
     def work(batch: slice) -> None:
         responses = centred.recentre(measurements.responses[batch][..., indices], centres[batch])
         noise = np.maximum(measurements.noise[batch] ** 2, 1e-12)
-        offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0)
+        offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0).astype(np.float32)
         for place, blur in enumerate(blurs):
             boxes = np.hypot(spread[batch], blur)
             reach = _reach(boxes)

@@ -42,7 +42,7 @@ def amplitude_responses(batch: PixelBatch, centred: CentredBasis) -> Floats:
     return _side_by_side(
         [
             batch.of_offset,
-            product(batch.direct_weights, centred.on_footprint.T),
+            centred.of_direct(batch.direct_weights),
             centred.on_window.T[batch.spikes],
         ]
     )

@@ -25,15 +25,20 @@ from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.photometry.measurements import Measurements
-from nearfar.priors.component import PriorComponent
-from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
-from nearfar.priors.responses import response_prior
+from nearfar.priors.fitted import (
+    LIT_AT_PITCH,
+    LIT_COMPONENTS,
+    LIT_DIFFERENCES_AT_PITCH,
+    UNLIT_COMPONENTS,
+)
+from nearfar.priors.responses import ResponsePrior, response_prior
 from nearfar.transport import near
 
 # q this close to a whole projector pixel is rounded to it. Noise moves q by as much, and a
 # footprint with 10 % of its weight on the wrong pixel costs 1.5 dB under a random light. Prior
 # components with spread represent direct light that really lies beside q.
 WHOLE_PIXEL_DISTANCE = 0.1
+EVERY_COMPONENT = (*LIT_COMPONENTS, *UNLIT_COMPONENTS)
 
 
 class ComponentChoice(NamedTuple):
@@ -50,7 +55,7 @@ class ComponentChoice(NamedTuple):
     prior_component: Integers
     prior_scale: Floats
 
-    def of(self, selected: slice) -> "ComponentChoice":
+    def of(self, selected: Integers) -> "ComponentChoice":
         """Return those of some camera pixels, as a copy."""
         xp = namespace(self.prior_scale)
         return ComponentChoice(*(xp.asarray(values[selected], copy=True) for values in self))
@@ -67,12 +72,30 @@ class EstimatedRows(NamedTuple):
 
 
 class Model(NamedTuple):
-    """Priors for a set of measured frequencies."""
+    """Priors for a set of measured frequencies.
+
+    Attributes
+    ----------
+    centred : CentredBasis
+    multiplicity : ndarray, shape (R,)
+        How often each response was measured.
+    lit, unlit : PriorSet
+        Of camera pixels with and without direct light.
+    lit_differences : PriorSet
+        Those of `lit` that sweeps after the first choose from.
+    """
 
     centred: CentredBasis
     multiplicity: Floats
     lit: PriorSet
+    lit_differences: PriorSet
     unlit: PriorSet
+
+    @property
+    def priors(self) -> dict[int, ResponsePrior]:
+        """Each prior component by its index into LIT_COMPONENTS + UNLIT_COMPONENTS."""
+        sets = (self.lit, self.unlit)
+        return {n: one for each in sets for n, one in zip(each.numbers, each.priors, strict=True)}
 
 
 class Problem(NamedTuple):
@@ -122,11 +145,15 @@ def build_model(
         near_basis,
         tuple(multiplicity[indices].tolist()),
     )
+    every = tuple(range(len(LIT_COMPONENTS)))
+    is_fine = near_basis.pitch == 1
+    lit = _prior_set(every if is_fine else LIT_AT_PITCH, *key, device)
     return Model(
         centred.put(move),
         move(multiplicity[indices]),
-        _prior_set(LIT_COMPONENTS, *key, device),
-        _prior_set(UNLIT_COMPONENTS, *key, device),
+        lit,
+        lit if is_fine else lit.only(LIT_DIFFERENCES_AT_PITCH),
+        _prior_set(tuple(range(len(every), len(EVERY_COMPONENT))), *key, device),
     )
 
 
@@ -189,15 +216,15 @@ def _centred(
 # a capture that goes on and for all of them.
 @lru_cache(maxsize=4)
 def _prior_set(
-    prior_components: tuple[PriorComponent, ...],
+    numbers: tuple[int, ...],
     frequencies: tuple[Frequency, ...],
     projector: Size,
     near_basis: NearBasis,
     multiplicity: tuple[float, ...],
     device: Device,
 ) -> PriorSet:
-    """Build the priors for a set of measured frequencies and how often each was measured."""
+    """Build some priors for a set of measured frequencies and how often each was measured."""
     centred = _centred(frequencies, projector, near_basis)
     measured = np.array(multiplicity, dtype=np.float32)
-    priors = tuple(response_prior(one, centred, measured) for one in prior_components)
-    return prior_set(priors, centred, measured).put(mover(device))
+    priors = tuple(response_prior(EVERY_COMPONENT[n], centred, measured) for n in numbers)
+    return prior_set(priors, centred, measured, numbers).put(mover(device))

@@ -94,7 +94,9 @@ def solve_whole(
     amplitudes = xp.astype(solved, xp.float32)
     y -= amplitudes @ per_amplitude
     y *= weight
-    score = product(y, prior.of_window.T)
+    # Spikes are looked for among single projector pixels alone.
+    is_fine = centred.near_basis.pitch == 1
+    score = product(y, prior.of_window.T) if is_fine else y[..., :0]
     y *= prior_variance
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),

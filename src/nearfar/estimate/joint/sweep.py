@@ -14,10 +14,10 @@ import numpy as np
 from array_api_compat import device
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
-from nearfar.estimate.joint.batch import AllPixels, PixelBatch, gather
+from nearfar.arrays import Booleans, Floats, beside, blocks, fetch, namespace, product
+from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
-from nearfar.estimate.joint.cut import near_responses, solve_cut
+from nearfar.estimate.joint.cut import border_distances, near_responses, solve_cut
 from nearfar.estimate.joint.evidence import most_probable
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
@@ -38,9 +38,8 @@ from nearfar.transport.direct import footprint, look_up_each
 
 # Where direct light explains this share of the power of the responses, it is there.
 CERTAIN_SHARE = 0.5
-# Camera pixels of a batch; and of one whose windows the border clips.
+# Camera pixels of a batch.
 BATCH_PIXELS = 2048
-CLIPPED_BATCH_PIXELS = 512
 
 
 class _Start(NamedTuple):
@@ -77,7 +76,6 @@ def sweep_once(
     start = None
     if before is not None:
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
-    clipped = pixels.lit & is_clipped(pixels.centres, problem.near_basis, projector)
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
@@ -86,9 +84,13 @@ def sweep_once(
         rows.near_noise[selected] = found.near_noise
 
     done = [0]
+    solve_lit = {False: solve_whole, True: solve_clipped}
+    if problem.near_basis.pitch > 1:
+        solve_lit[True] = solve_cut
 
-    def choose(selected: slice) -> None:
-        """Choose prior components, and estimate the camera pixels whose windows are whole."""
+    def estimate(part: tuple[NDArray[np.int64], bool]) -> None:
+        """Choose prior components, and estimate camera pixels whose windows are whole or not."""
+        selected, clips = beside(part[0], pixels.responses), part[1]
         batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
         given = chosen and chosen.of(selected)
         component, scale = _choose(batch, model, given, is_first=start is None)
@@ -96,30 +98,19 @@ def sweep_once(
         seen = component < len(LIT_COMPONENTS)
         weights = batch.direct_weights * seen[:, None, None]
         batch = batch._replace(lit=seen, direct_weights=weights)
-        whole = ~clipped[selected] | ~seen
-        priors = model.lit.priors + model.unlit.priors
-        for place in np.unique(fetch(component[whole])).tolist():
-            (alike,) = xp.nonzero(whole & (component == place))
+        priors = model.priors
+        for place in np.unique(fetch(component)).tolist():
+            (alike,) = xp.nonzero(component == place)
             some = batch.only(alike)
             ratio = variance_ratio(some, scale[alike])
-            found = _with_spikes(some, priors[place], ratio, solve_whole, centred)
-            put(selected.start + alike, some, found)
-        done[0] += selected.stop - selected.start
+            cut = clips and place < len(LIT_COMPONENTS)
+            ratio = rounded_ratio(ratio) if cut else ratio
+            found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
+            put(selected[alike], some, found)
+        done[0] += len(part[0])
         report(done[0] / count)
 
-    solve = solve_clipped if centred.near_basis.pitch == 1 else solve_cut
-
-    def estimate_clipped(part: NDArray[np.int64]) -> None:
-        """Estimate camera pixels of one prior component whose windows the border clips."""
-        selected = beside(part, pixels.responses)
-        batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
-        prior = model.lit.priors[int(choice.prior_component[selected[0]])]
-        ratio = rounded_ratio(variance_ratio(batch, choice.prior_scale[selected]))
-        put(selected, batch, _with_spikes(batch, prior, ratio, solve, centred))
-
-    side_by_side(choose, blocks(count, BATCH_PIXELS))
-    clipped = clipped & (choice.prior_component < len(LIT_COMPONENTS))
-    side_by_side(estimate_clipped, _clipped_alike(pixels, choice.prior_component, clipped))
+    side_by_side(estimate, _parts(problem))
     if start is None:
         return rows
     return rows._replace(near=rows.near + start.expected.near, far=rows.far + start.expected.far)
@@ -173,41 +164,44 @@ def _choose(
     """
     xp = namespace(batch.white)
     if given is None:
-        (left,) = xp.nonzero(xp.ones_like(batch.lit))
-        given = ComponentChoice(xp.zeros_like(left), xp.zeros_like(batch.white[:, 0]))
+        left = xp.ones_like(batch.lit)
+        number = xp.zeros(left.shape, dtype=xp.int64, device=device(left))
+        given = ComponentChoice(number, xp.zeros_like(batch.white[:, 0]))
     else:
         # Chosen when the camera pixel was lit and is not now, or the reverse.
-        (left,) = xp.nonzero(batch.lit != (given.prior_component < len(LIT_COMPONENTS)))
-    some = batch.only(left)
-    (lit,), (dark,) = xp.nonzero(some.lit), xp.nonzero(~some.lit)
-    for mine, candidates, first in (
-        (lit, model.lit, 0),
-        (dark, model.unlit, len(LIT_COMPONENTS)),
+        left = batch.lit != (given.prior_component < len(LIT_COMPONENTS))
+    # No shift of q has a say; nor has, among functions of several projector pixels, the references'
+    # error, which takes a third of the time and changes no choice that matters.
+    batch = batch._replace(direct_weights=batch.direct_weights[:, :1])
+    if model.centred.near_basis.pitch > 1:
+        batch = batch._replace(of_offset=batch.of_offset[:, :0])
+    for selected, candidates in (
+        (left & batch.lit, model.lit if is_first else model.lit_differences),
+        (left & ~batch.lit, model.unlit),
     ):
+        (mine,) = xp.nonzero(selected)
         if not len(mine):
             continue
-        of_mine = some.only(mine)
+        of_mine = batch if len(mine) == len(left) else batch.only(mine)
         component, scale, evidence = most_probable(of_mine, candidates)
-        component = component + first
-        if is_first and first == 0:
+        if is_first and candidates is model.lit:
             (doubted,) = xp.nonzero(_is_doubtful(of_mine, model.centred))
             if len(doubted):
                 dark_ones = _without_direct(of_mine.only(doubted))
-                other, its_scale, without = most_probable(dark_ones, model.unlit)
+                unlit, its_scale, without = most_probable(dark_ones, model.unlit)
                 # q was chosen among all projector pixels.
                 none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
-                unlit = other + len(LIT_COMPONENTS)
                 component[doubted] = xp.where(none, unlit, component[doubted])
                 scale[doubted] = xp.where(none, its_scale, scale[doubted])
-        given.prior_component[left[mine]] = component
-        given.prior_scale[left[mine]] = xp.astype(scale, xp.float32)
+        given.prior_component[mine] = component
+        given.prior_scale[mine] = xp.astype(scale, xp.float32)
     return given
 
 
 def _is_doubtful(batch: PixelBatch, centred: CentredBasis) -> Booleans:
     """Return at which camera pixels direct light explains little of the responses, shape (n,)."""
     xp = namespace(batch.responses)
-    direct = product(batch.direct_weights[:, :1], centred.on_footprint.T)
+    direct = centred.of_direct(batch.direct_weights[:, :1])
     along = xp.sum(batch.responses * direct, axis=-1) ** 2
     power = xp.sum(batch.responses**2, axis=-1) * xp.sum(direct**2, axis=-1)
     doubtful: Booleans = xp.sum(along, axis=1) < CERTAIN_SHARE * xp.sum(power, axis=1)
@@ -218,16 +212,22 @@ def _without_direct(batch: PixelBatch) -> PixelBatch:
     return batch._replace(direct_weights=batch.direct_weights[:, :1] * 0.0)
 
 
-def _clipped_alike(
-    pixels: AllPixels, component: Integers, clipped: Booleans
-) -> Iterator[NDArray[np.int64]]:
-    """Yield batches of one prior component, windows clipped alike next to each other."""
-    (selected,) = np.nonzero(fetch(clipped))
-    centres, component = fetch(pixels.centres)[selected], fetch(component)
-    order = selected[np.lexsort((centres[:, 1], centres[:, 0], component[selected]))]
-    for group in np.split(order, np.flatnonzero(np.diff(component[order])) + 1):
-        for part in blocks(len(group), CLIPPED_BATCH_PIXELS):
-            yield group[part]
+def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
+    """Yield batches of camera pixels, and whether the border clips their windows.
+
+    Windows clipped alike are next to each other.
+    """
+    pixels, near_basis = problem.pixels, problem.near_basis
+    projector = problem.measurements.projector
+    clipped = fetch(pixels.lit & is_clipped(pixels.centres, near_basis, projector))
+    (selected,) = np.nonzero(clipped)
+    places = fetch(pixels.centres)[selected]
+    if near_basis.pitch > 1:
+        places = border_distances(places, near_basis, projector)
+    ordered = selected[np.lexsort(places.T[::-1])]
+    for part, clips in ((np.flatnonzero(~clipped), False), (ordered, True)):
+        for batch in blocks(len(part), BATCH_PIXELS):
+            yield part[batch], clips
 
 
 def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:

@@ -12,6 +12,8 @@ from nearfar.transport.store import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 
+pytestmark = pytest.mark.slow
+
 PLAN = paper_plan(Size(16, 16), 5, (5, 5), correspondence="phase")
 
 

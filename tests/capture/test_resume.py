@@ -279,6 +279,18 @@ def test_a_full_disk_costs_no_photo(rig, undisturbed, tmp_path, monkeypatch):
     _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 
+def test_a_capture_that_an_earlier_nearfar_began_is_gone_on_with(rig, undisturbed, tmp_path):
+    earlier = PLAN.model_copy(update={"expected_snr": None})
+    _stopped(rig, tmp_path / "c.zarr", 20, earlier)
+    kept = json.loads(earlier.to_json()) | {"version": 5}
+    assert kept.pop("expected_snr") is None
+    change_attributes(tmp_path / "c.zarr.unfinished", plan=kept)
+    told = []
+    capture = acquire(earlier, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
+    assert told[0] >= 20
+    np.testing.assert_array_equal(capture.photos[:], undisturbed.photos[:])
+
+
 def test_another_plan_or_rig_is_refused_and_nothing_is_lost(rig, undisturbed, tmp_path):
     _stopped(rig, tmp_path / "c.zarr", 12)
     other = choose_plan(PROJECTOR, 40, window=5)[0]

@@ -23,7 +23,7 @@ SEPARATE = ("separate", "--projector", "16x20")
 
 
 def _version(text: str) -> str:
-    return text.replace('"version": 5', '"version": 7')
+    return text.replace('"version": 6', '"version": 7')
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ PROJECTOR = Size(8, 8)
 GAIN, FLOOR = 1e-4, 4e-6
 
 
-def _photos(drift=0.0):
+def _photos(drift=0.0, window=5, black_level=0.0):
     """Photograph a diagonal T of 40 x 30 camera pixels with shot and read noise."""
-    plan = paper_plan(PROJECTOR, 5, (3, 3), correspondence="none")
+    plan = paper_plan(PROJECTOR, window, (3, 3), correspondence="none")
     generator = np.random.default_rng(0)
     white = generator.uniform(0.2, 0.8, (40, 30))
     seen = generator.integers(0, PROJECTOR.pixels, white.shape)
@@ -23,7 +23,7 @@ def _photos(drift=0.0):
     lamp = 1 + drift * np.linspace(-0.5, 0.5, count)[:, None, None]
     clean = 0.05 + lamp * white * patterns[:, seen]
     photos = clean + np.sqrt(GAIN * clean + FLOOR) * generator.normal(size=clean.shape)
-    return PhotosInMemory(plan, photos[..., None].astype(np.float32), 1.0)
+    return PhotosInMemory(plan, (photos + black_level)[..., None].astype(np.float32), 1.0)
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.05])
@@ -35,6 +35,25 @@ def test_noise_is_told_apart_from_drift(drift, bands):
     np.testing.assert_allclose(found.variance(levels), expected, rtol=0.15)
     assert found.scatter == pytest.approx(1.0, abs=0.1)
     assert np.ptp(found.light) == pytest.approx(0.9 * drift, abs=0.005)
+
+
+def test_the_variance_of_few_pairs_is_not_too_small():
+    photos = _photos(window=2)
+    pairs = len(photos.plan.patterns) // 2
+    assert pairs < 13
+    found = sum_pairs(photos, [slice(0, 40)])
+    levels = photos.photos.mean(axis=0).reshape(-1, 1)
+    # The model and what the sums scatter beyond it are together what they scatter.
+    shown = found.scatter * found.variance(levels).mean()
+    deviation = np.sqrt(2 / ((pairs - 1) * len(levels)))
+    assert shown == pytest.approx((GAIN * levels + FLOOR).mean(), rel=4 * deviation)
+    assert 4 * deviation < 1 / pairs
+
+
+def test_a_black_level_has_no_shot_noise():
+    found = sum_pairs(_photos(black_level=0.1), [slice(0, 40)])
+    levels = np.array([[0.2], [0.5], [0.9]])
+    np.testing.assert_allclose(found.variance(levels), GAIN * (levels - 0.1) + FLOOR, rtol=0.15)
 
 
 def test_a_dark_pair_and_dark_rows_do_no_harm():

@@ -230,3 +230,13 @@ def test_the_typical_scenes_are_whole():
     assert np.all(shares >= 0)
     assert np.all((shares.sum(axis=1) > 0.8) & (shares.sum(axis=1) <= 1.001))
     assert shares.shape == (len(weights), len(components))
+
+
+def test_what_a_plan_was_chosen_for_is_kept_in_its_file():
+    plan, expected = choose_plan(Size(16, 16), 40)
+    assert parse_plan(plan.to_json()) == plan
+    for light in ("pictures", "random"):
+        low, high = getattr(plan.expected_snr, light)
+        assert low < getattr(expected, light) < high
+    assert plan.first(40).expected_snr == plan.expected_snr
+    assert plan.first(39).expected_snr is None

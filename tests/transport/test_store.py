@@ -203,7 +203,10 @@ def test_nothing_is_overwritten_without_force(stored, generator):
     np.testing.assert_allclose(load_transport(stored).near, 2 * before.near)
 
 
-@pytest.mark.parametrize("verdict", [DOUBTS, KeptVerdict("good")])
+@pytest.mark.parametrize(
+    "verdict",
+    [DOUBTS, KeptVerdict("good"), replace(DOUBTS, noise_snr=38.0, planned_snr=(33.0, 41.0))],
+)
 def test_a_verdict_is_kept_with_the_transport(stored, tmp_path, verdict):
     assert open_transport(stored).verdict is None
     assert load_transport(stored).verdict is None
@@ -235,6 +238,19 @@ def test_a_verdict_in_words():
         "expected); error bars are made 1.5 times as wide, to hold."
     )
     assert str(KeptVerdict("good")) == "good:"
+    beside = replace(DOUBTS, widening=1.0, noise_snr=38.25, planned_snr=(33.0, 41.0))
+    assert str(beside).endswith(
+        "(held-out SNR_b 31.5 dB, 35.0 dB expected, planned for 33 to 41 dB under pictures, noise "
+        "alone allows 38.2 dB)."
+    )
+    planned = KeptVerdict("good", planned_snr=(33.0, 41.0))
+    assert str(planned) == "good: The plan was chosen for 33 to 41 dB under pictures."
+
+
+def test_a_verdict_of_an_earlier_nearfar_is_read(stored):
+    earlier = {name: VERDICT[name] for name in VERDICT if name not in ("noise_dB", "planned_dB")}
+    change_attributes(stored, verdict=earlier)
+    assert load_transport(stored).verdict == DOUBTS
 
 
 @pytest.mark.parametrize(
@@ -265,6 +281,9 @@ def test_a_verdict_in_words():
         ({"verdict": VERDICT | {"reasons": [{"cause": 1, "sentence": ""}]}}, "is no text"),
         ({"verdict": VERDICT | {"held_out_dB": float("nan")}}, "no number from -1000"),
         ({"verdict": VERDICT | {"expected_dB": "x"}}, "no number from -1000"),
+        ({"verdict": VERDICT | {"noise_dB": 2000.0}}, "no number from -1000"),
+        ({"verdict": VERDICT | {"planned_dB": [30.0]}}, "does not describe a transport"),
+        ({"verdict": VERDICT | {"planned_dB": [30.0, "x"]}}, "no number from -1000"),
         ({"verdict": VERDICT | {"error_ratio": -1.0}}, "no number from 0"),
         ({"verdict": VERDICT | {"widening": 0.5}}, "no number from 1"),
         ({"verdict": VERDICT | {"widening": 10**400}}, "does not describe a transport"),

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 from nearfar.arrays import AnyPath
 from nearfar.capture.store import FORMAT_VERSION, KIND, is_positive
-from nearfar.errors import InputError
+from nearfar.errors import InputError, UnreadableFileError
 from nearfar.files import UNFINISHED, ResumableKind
 from nearfar.files.stores import open_store
+from nearfar.plan.model import parse_plan
 
 # A line for each photo that is on the disk; gone once the capture is whole.
 LOG_NAME = "photos.jsonl"
@@ -74,6 +75,17 @@ def unfinished_capture(path: AnyPath) -> UnfinishedCapture:
         return UnfinishedCapture(0, None)
     exposure = open_store(folder, KIND, FORMAT_VERSION).attrs.get("exposure")
     return UnfinishedCapture(count_photos(folder), exposure if is_positive(exposure) else None)
+
+
+def plan_as_now(kept: object) -> object:
+    """Return the JSON of a plan that an earlier nearfar kept as this one writes it.
+
+    What is no plan is returned as it is.
+    """
+    try:
+        return json.loads(parse_plan(json.dumps(kept)).to_json())
+    except UnreadableFileError:
+        return kept
 
 
 def other_plan(folder: Path, before: object, now: Mapping[str, Any]) -> str:

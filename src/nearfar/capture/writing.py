@@ -29,7 +29,7 @@ from nearfar.capture.store import (
     open_capture,
     white_and_black,
 )
-from nearfar.capture.unfinished import LOG_NAME, Taken, other_plan, require_same_rig
+from nearfar.capture.unfinished import LOG_NAME, Taken, other_plan, plan_as_now, require_same_rig
 from nearfar.checks import require_instance
 from nearfar.deprecation import path_after_content
 from nearfar.errors import InputError, UnreadableFileError, UselessPhotosError
@@ -149,8 +149,10 @@ class CaptureWriter:
     def ended(self) -> bool:
         """Whether all photos are there, or the capture has ended before all were."""
         count = len(self._plan.patterns)
-        known = self._group.attrs.get("plan") if self._group is not None else None
-        return self.taken == count or known == json.loads(self._plan.first(self.taken).to_json())
+        if self.taken == count or self._group is None:
+            return self.taken == count
+        ended: object = json.loads(self._plan.first(self.taken).to_json())
+        return plan_as_now(self._group.attrs.get("plan")) == ended
 
     def read(self, number: int) -> NDArray[Any]:
         """Read a photo that is there, raw."""
@@ -257,8 +259,9 @@ class CaptureWriter:
         now = json.loads(json.dumps(self._attributes))
         # A capture that ended early has the plan of its photos.
         ended = json.loads(self._plan.first(self.taken).to_json())
-        if before.get("plan") not in (now["plan"], ended):
-            raise InputError(other_plan(folder, before.get("plan"), now["plan"]))
+        known = plan_as_now(before.get("plan"))
+        if known not in (now["plan"], ended):
+            raise InputError(other_plan(folder, known, now["plan"]))
         require_same_rig(folder, before.get("rig"), now["rig"], "start anew with `force=True`")
         photos, scale = open_array(group, "photos"), before.get("full_scale")
         many = self.taken > min(photos.shape[0], len(self._plan.patterns))

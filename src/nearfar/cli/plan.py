@@ -15,7 +15,6 @@ from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.plan import Plan
-    from nearfar.plan.expect import ExpectedRange
     from nearfar.plan.look import Look
     from nearfar.plan.paper import Offset
     from nearfar.progress import Report
@@ -154,10 +153,9 @@ def _on_blocks(projector: Size) -> str:
 
 
 class _Chosen(NamedTuple):
-    """A plan that was chosen, its expected SNR_b, and the look that it was chosen by."""
+    """A plan that was chosen, and the look that it was chosen by."""
 
     plan: "Plan"
-    expected: "ExpectedRange"
     look: "Look | None"
     photos_for_window: int | None
 
@@ -168,7 +166,9 @@ class _Chosen(NamedTuple):
         found = []
         if self.look is not None:
             found.append(describe_look(self.look, self.plan, self.photos_for_window))
-        found.append(describe_expected(self.expected, is_looked_at=self.look is not None))
+        if self.plan.expected_snr is not None:
+            is_looked_at = self.look is not None
+            found.append(describe_expected(self.plan.expected_snr, is_looked_at=is_looked_at))
         return found
 
 
@@ -183,7 +183,8 @@ def _numbers(chosen: _Chosen | None) -> dict[str, Any]:
         "free_share": chosen.look.free_share,
         "model_holds": chosen.look.model_holds,
     }
-    return {"expected_dB": chosen.expected._asdict(), "look": look}
+    expected = chosen.plan.expected_snr
+    return {"expected_dB": expected and expected.model_dump(mode="json"), "look": look}
 
 
 def _choose(
@@ -198,18 +199,16 @@ def _choose(
     """Choose a plan, for the scene of a look if there is one."""
     from nearfar.plan import choose_plan
     from nearfar.plan.choose import MOST_LISTED, NOISE
-    from nearfar.plan.expect import expected_range
     from nearfar.plan.look import photos_for_window
-    from nearfar.priors.fitted import TYPICAL_SCENES
 
     seen = None if look is None else _looked_at(look, projector)
     if window is None and seen is not None:
         window = seen.wanted_window if seen.model_holds else seen.window
-    plan, expected = choose_plan(
+    plan, _ = choose_plan(
         projector,
         photos,
         window=window,
-        typical=TYPICAL_SCENES if seen is None else seen.typical,
+        typical=None if seen is None else seen.typical,
         noise=NOISE if seen is None else seen.noise,
         checks=None if checks else 0,
         every_frequency=(
@@ -220,7 +219,7 @@ def _choose(
     needed = None
     if seen is not None and seen.model_holds and plan.window > seen.window:
         needed = photos_for_window(seen, projector, photos, plan.window)
-    return _Chosen(plan, expected_range(expected, is_looked_at=seen is not None), seen, needed)
+    return _Chosen(plan, seen, needed)
 
 
 def _looked_at(look: Path, projector: Size) -> "Look":

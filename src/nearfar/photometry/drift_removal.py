@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.errors import InputError
 from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, find_references, follow_drift
 from nearfar.photometry.in_memory import PhotosInMemory
@@ -37,6 +37,11 @@ class PhotosWithoutDrift(PhotosWithNoise):
     """
 
     drift: Drift
+
+    @property
+    def unsaturated(self) -> Booleans:
+        """Where no photo of white is saturated, (Cy, Cx, channels)."""
+        return self.drift.unsaturated
 
     def read(self, indices: Sequence[int], rows: slice) -> Floats:
         """Photos `indices` as float32, (n, len(rows), Cx, channels), without drift."""

@@ -87,10 +87,8 @@ def sum_pairs(
 
 
 def below_full_scale(photos: Photos, white: Sequence[int], rows: slice) -> Booleans:
-    """Return where no photo of white is saturated, (C, channels)."""
+    """Return where no photo of white is saturated, (C, channels); everywhere without any."""
     shape = (len(range(*rows.indices(photos.camera.height))) * photos.camera.width, photos.channels)
-    if not white:
-        return np.ones(shape, dtype=bool)
     return np.asarray((photos.read(white, rows) < 1.0).all(axis=0).reshape(shape))
 
 

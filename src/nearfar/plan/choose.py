@@ -31,6 +31,7 @@ from nearfar.plan.expect import (
     errors_of_none_measured,
     errors_of_place,
     expected_of,
+    expected_range,
 )
 from nearfar.plan.low_rank import ErrorsLowRank
 from nearfar.plan.model import LARGEST_SIDE, Plan
@@ -103,7 +104,7 @@ def choose_plan(
         W, an upper bound of how far near-range light reaches, in functions that stand `pitch_of`
         the projector apart; `default_window` if left out.
     typical : TypicalScenes
-        Scenes to plan for: typical simulated ones, or the one of a first estimate.
+        Scenes to plan for: typical simulated ones, or, if given, the one of a first estimate.
     noise : float
         Standard deviation of the response to a sinusoid, as a share of white.
     checks : int, optional
@@ -120,8 +121,8 @@ def choose_plan(
     -------
     plan : Plan
     expected : Expected
-        SNR_b expected of relighting the typical scenes; `nearfar.plan.expect.expected_range` says
-        how far others differ.
+        SNR_b expected of relighting the typical scenes; the ``expected_snr`` of the plan says how
+        far others differ.
 
     Raises
     ------
@@ -212,6 +213,7 @@ def choose_plan(
         dropped=Size(1, 1),
         offset="reference",
         correspondence="phase",
+        expected_snr=expected_range(choice.expected, is_looked_at=typical is not None),
         patterns=with_references(
             spread_checks(patterns, check_patterns(checks, projector)),
             choice.references,

@@ -24,6 +24,7 @@ from nearfar.arrays import Floats, Size
 from nearfar.illumination.frequencies import Frequency, as_array
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.real_basis import real_basis
+from nearfar.plan.expected_range import ExpectedRange
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.priors.typical import TypicalScenes
@@ -58,15 +59,10 @@ class Expected(NamedTuple):
     random: float
 
 
-class ExpectedRange(NamedTuple):
-    """SNR_b in dB, from the lowest to the highest, under pictures and under a random light."""
-
-    pictures: tuple[float, float]
-    random: tuple[float, float]
-
-
 def expected_range(expected: Expected, *, is_looked_at: bool = False) -> ExpectedRange:
     """Return the range in which the SNR_b of scenes of direct, near- and far-range light lies.
+
+    Its limits are rounded to hundredths, so that plans do not depend on rounding errors.
 
     Parameters
     ----------
@@ -77,9 +73,12 @@ def expected_range(expected: Expected, *, is_looked_at: bool = False) -> Expecte
     pictures = OFF_PICTURES_LOOKED_AT if is_looked_at else OFF_PICTURES
     random = OFF_RANDOM_LOOKED_AT if is_looked_at else OFF_RANDOM
     return ExpectedRange(
-        (expected.pictures + pictures[0], expected.pictures + pictures[1]),
-        (expected.random + random[0], expected.random + random[1]),
+        pictures=_around(expected.pictures, pictures), random=_around(expected.random, random)
     )
+
+
+def _around(expected: float, off: tuple[float, float]) -> tuple[float, float]:
+    return round(expected + off[0], 2), round(expected + off[1], 2)
 
 
 class ExpectedErrors(Protocol):

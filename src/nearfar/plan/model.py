@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 from nearfar.arrays import AnyPath, Floats, Size, as_size
 from nearfar.errors import MissingFileError, PlanError, UnreadableFileError
 from nearfar.plan.correspondence import CORRESPONDENCE_METHODS, pattern_types_of
+from nearfar.plan.expected_range import ExpectedRange
 from nearfar.plan.patterns import (
     OWN_PATTERNS,
     Exponential,
@@ -34,10 +35,10 @@ from nearfar.plan.patterns import (
 )
 
 # Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
-# 3 Gray code, version 4 half-screens and inverse pictures, version 5 the pitch. A plan of an
-# earlier version is one of the next as well.
-FORMAT_VERSION = 5
-READABLE_VERSIONS = (1, 2, 3, 4, 5)
+# 3 Gray code, version 4 half-screens and inverse pictures, version 5 the pitch, version 6 the
+# expected SNR_b. A plan of an earlier version is one of the next as well.
+FORMAT_VERSION = 6
+READABLE_VERSIONS = (1, 2, 3, 4, 5, 6)
 
 # Characters of a message that are quoted from a plan.
 MAXIMUM_REASON = 200
@@ -83,6 +84,8 @@ class Plan(Frozen):
         Name of a method of `nearfar.plan.correspondence.CORRESPONDENCE_METHODS`: photos of
         "stripes" or of "gray" code, the "phase" of the transport's own photos, "none" at all, or
         a method that another package adds.
+    expected_snr : ExpectedRange or None
+        SNR_b in dB that the plan was chosen for; None if it was not chosen for any.
     patterns : tuple of Pattern
 
     Examples
@@ -96,7 +99,7 @@ class Plan(Frozen):
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[5] = 5
+    version: Literal[6] = 6
     projector: SizeField
     window: int = Field(ge=1, strict=True)
     pitch: int = Field(default=1, ge=1, le=LARGEST_SIDE, strict=True)
@@ -104,6 +107,7 @@ class Plan(Frozen):
     dropped: SizeField
     offset: Literal["inverse", "reference", "none"]
     correspondence: str
+    expected_snr: ExpectedRange | None = None
     patterns: tuple[SerializeAsAny[Pattern], ...]
 
     @field_validator("correspondence")
@@ -194,8 +198,10 @@ class Plan(Frozen):
         }
 
     def first(self, count: int) -> "Plan":
-        """Return the plan of the first photos alone."""
-        return self.model_copy(update={"patterns": self.patterns[:count]})
+        """Return the plan of the first photos alone; what all were expected to reach is dropped."""
+        if count >= len(self.patterns):
+            return self
+        return self.model_copy(update={"patterns": self.patterns[:count], "expected_snr": None})
 
     def require_real(self, what: str) -> None:
         """Refuse a plan of complex patterns, which are for simulation without noise only.

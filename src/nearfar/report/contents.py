@@ -10,8 +10,8 @@ from nearfar.capture import KIND as CAPTURE_KIND
 from nearfar.capture import Capture, open_capture
 from nearfar.errors import MissingFileError, UnreadableFileError
 from nearfar.files import kind_of_store, list_pictures, read_arrays, read_picture
-from nearfar.plan import read_plan
-from nearfar.report.plan import describe_plan
+from nearfar.plan import Plan, read_plan
+from nearfar.report.plan import describe_plan, describe_range
 from nearfar.rigs.tables import read_rig_table
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.transport.exact_store import KIND as EXACT_KIND
@@ -53,7 +53,7 @@ def describe(path: Path) -> str:
 def _describe_file(path: Path) -> str:
     match path.suffix.lower():
         case ".json":
-            return "nearfar plan\n" + describe_plan(read_plan(path))
+            return "nearfar plan\n" + _describe_plan(read_plan(path))
         case ".toml":
             return f"rig: {json.dumps(read_rig_table(path).model_dump())}"
         case ".npy" | ".npz":
@@ -107,6 +107,14 @@ def _describe_folder(path: Path) -> str:
     return f"folder of {len(pictures)} pictures, {pictures[0].name} to {pictures[-1].name}"
 
 
+def _describe_plan(plan: Plan) -> str:
+    """Describe a plan and the SNR_b that it was chosen for, if it was."""
+    expected = [] if plan.expected_snr is None else [describe_range(plan.expected_snr)]
+    return "\n".join(
+        [describe_plan(plan), *(f"expected of relighting: {each}" for each in expected)]
+    )
+
+
 def _describe_capture(path: Path) -> str:
     capture = open_capture(path)
     return "\n".join(
@@ -114,7 +122,7 @@ def _describe_capture(path: Path) -> str:
             f"{CAPTURE_KIND}: photos of {capture.camera}, {_channels(capture.channels)}, "
             f"{capture.photos.dtype}, full scale {capture.full_scale:g}, "
             f"{capture.saturated_share:.3%} saturated",
-            describe_plan(capture.plan),
+            _describe_plan(capture.plan),
             f"rig: {json.dumps(capture.rig)}",
             *_describe_acquisition(capture),
         ]

@@ -2,7 +2,7 @@
 
 from nearfar.plan import Plan
 from nearfar.plan.choose import MOST_LISTED, photos_of_every_frequency
-from nearfar.plan.expect import ExpectedRange
+from nearfar.plan.expected_range import ExpectedRange
 from nearfar.plan.look import Look
 from nearfar.plan.window import largest_window
 
@@ -60,15 +60,20 @@ def describe_expected(expected: ExpectedRange, *, is_looked_at: bool) -> str:
     is_looked_at : bool
         Whether a first estimate of the scene gave the priors, and not typical scenes.
     """
-    ranges = " and ".join(
-        f"{low:.0f} to {high:.0f} dB under {light}"
-        for (low, high), light in zip(expected, ("pictures", "a random light"), strict=True)
-    )
+    ranges = describe_range(expected)
     if is_looked_at:
         return f"expected of relighting this scene: {ranges}"
     return (
         f"expected of relighting scenes of direct, near-range and far-range light: {ranges}; "
         f"others, such as mirrors, glass and hair, come out worse, by 20 dB and more"
+    )
+
+
+def describe_range(expected: ExpectedRange) -> str:
+    """Return the ranges of an expected SNR_b in words."""
+    ranges = (expected.pictures, "pictures"), (expected.random, "a random light")
+    return " and ".join(
+        f"{low:.0f} to {high:.0f} dB under {light}" for (low, high), light in ranges
     )
 
 

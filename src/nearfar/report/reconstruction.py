@@ -141,6 +141,8 @@ def _relit_pictures(verdict: Verdict) -> list[tuple[str, str]]:
         return []
     expected = verdict.held_out.expected_snr
     beside = "" if expected is None else f"; {expected:.1f} dB expected"
+    if verdict.planned_snr is not None:
+        beside += "; planned for {:.0f} to {:.0f} dB".format(*verdict.planned_snr)
     least = "at least " if verdict.held_out.is_least else ""
     lights = f"{verdict.held_out.called} no estimate saw"
     return [(f"{least}{verdict.held_out.snr:.1f} dB", f"held-out SNR_b: {lights}{beside}")]
@@ -168,11 +170,12 @@ def _held_out(verdict: Verdict) -> str:
             light.description.removesuffix(" to check by") + ", fine" * (light in fine),
             written(light.snr),
             written(light.expected_snr),
+            written(light.noise_snr),
             written(light.photo_snr),
         ]
         for light in (*verdict.held_out.lights, *fine)
     ]
-    head = ["light", "held-out SNR_b", "expected", "one photo over its noise"]
+    head = ["light", "held-out SNR_b", "expected", "noise alone allows", "one photo over its noise"]
     return f"""<h2>Checked</h2>
 <p>The transport was relit under patterns from whose photos no response was estimated, and compared
 with these photos; all in dB. Where it is much worse than expected, the scene or the photos break an

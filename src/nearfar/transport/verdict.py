@@ -55,6 +55,12 @@ class KeptVerdict:
         The lights that the estimate never saw, in words.
     is_least : bool
         Whether the true SNR_b may be higher: noise hides all errors.
+    noise_snr : float or None
+        The SNR_b that the noise of the photos alone allows, dB: that of the part of the error that
+        the error bars expect from noise. None as `expected_snr`.
+    planned_snr : tuple of float or None
+        Lowest and highest SNR_b under pictures that the plan was chosen for, dB; None if it was not
+        chosen for any.
     """
 
     grade: Grade
@@ -65,6 +71,8 @@ class KeptVerdict:
     widening: float = 1.0
     checked_by: str = "pictures"
     is_least: bool = False
+    noise_snr: float | None = None
+    planned_snr: tuple[float, float] | None = None
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -73,17 +81,29 @@ class KeptVerdict:
 
     @property
     def summary(self) -> str:
-        """What held-out photos say of what is relit, a sentence; empty if nothing was checked."""
+        """What held-out photos say of what is relit, and what was expected, a sentence.
+
+        It is empty if nothing was checked and nothing expected.
+        """
+        planned = ""
+        if self.planned_snr is not None:
+            lowest, highest = self.planned_snr
+            planned = f"{lowest:.0f} to {highest:.0f} dB under pictures"
         if self.held_out_snr is None:
-            return ""
-        beside = "" if self.expected_snr is None else f", {self.expected_snr:.1f} dB expected"
+            return f"The plan was chosen for {planned}." if planned else ""
+        beside = [
+            *([] if self.expected_snr is None else [f"{self.expected_snr:.1f} dB expected"]),
+            *([f"planned for {planned}"] if planned else []),
+            *([] if self.noise_snr is None else [f"noise alone allows {self.noise_snr:.1f} dB"]),
+        ]
         widened = ""
         if self.widening > 1:
             widened = f"; error bars are made {self.widening:.2g} times as wide, to hold"
         least = "at least " if self.is_least else ""
+        held_out = ", ".join([f"{least}{self.held_out_snr:.1f} dB", *beside])
         return (
             f"Relit {self.checked_by} are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % "
-            f"(held-out SNR_b {least}{self.held_out_snr:.1f} dB{beside}){widened}."
+            f"(held-out SNR_b {held_out}){widened}."
         )
 
     @property
@@ -106,11 +126,15 @@ def verdict_to_json(verdict: KeptVerdict) -> dict[str, Any]:
         "widening": verdict.widening,
         "checked_by": verdict.checked_by,
         "is_least": verdict.is_least,
+        "noise_dB": verdict.noise_snr,
+        "planned_dB": None if verdict.planned_snr is None else list(verdict.planned_snr),
     }
 
 
 def verdict_from_json(kept: Mapping[str, Any]) -> KeptVerdict:
     """Read a verdict from a transport's file.
+
+    Earlier versions kept neither what noise allows nor what was planned for.
 
     Raises
     ------
@@ -123,25 +147,32 @@ def verdict_from_json(kept: Mapping[str, Any]) -> KeptVerdict:
     reasons = tuple(
         Reason(_text(each["cause"]), _text(each["sentence"])) for each in kept["reasons"]
     )
-    held_out, expected, ratio = (
-        None if kept[name] is None else _number(kept[name], least, largest)
-        for name, least, largest in (
-            ("held_out_dB", -LARGEST_DECIBELS, LARGEST_DECIBELS),
-            ("expected_dB", -LARGEST_DECIBELS, LARGEST_DECIBELS),
-            ("error_ratio", 0.0, LARGEST_RATIO),
-        )
+    held_out, expected, noise = (
+        None if value is None else _decibels(value)
+        for value in (kept["held_out_dB"], kept["expected_dB"], kept.get("noise_dB"))
     )
+    ratio = kept["error_ratio"]
+    planned = kept.get("planned_dB")
+    if planned is not None:
+        lowest, highest = map(_decibels, planned)
+        planned = lowest, highest
     widening = _number(kept["widening"], 1.0, LARGEST_WIDENING)
     return KeptVerdict(
         grade,
         reasons,
         held_out,
         expected,
-        ratio,
+        None if ratio is None else _number(ratio, 0.0, LARGEST_RATIO),
         widening,
         _text(kept["checked_by"]),
         kept["is_least"] is True,
+        noise,
+        planned,
     )
+
+
+def _decibels(value: Any) -> float:
+    return _number(value, -LARGEST_DECIBELS, LARGEST_DECIBELS)
 
 
 def _text(value: Any) -> str:

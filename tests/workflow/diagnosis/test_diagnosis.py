@@ -15,6 +15,7 @@ from nearfar.plan import Sinusoid
 from nearfar.plan.checks import is_reference
 from nearfar.progress import ignore_progress
 from nearfar.transport.store import open_transport
+from nearfar.workflow.diagnosis import single_photos
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.sample import PATCH, sample_camera, sampled_lines
 from nearfar.workflow.diagnosis.single_photos import TURNS_OF_LEAVING
@@ -85,13 +86,19 @@ def test_photos_that_are_swapped_explain_each_other(shot, spoilt_by):
 
 
 def test_each_photo_but_white_and_black_is_left_out_in_one_turn(shot, diagnosed, monkeypatch):
-    only, kept = PhotosWithoutDrift.only, []
+    only, relight = PhotosWithoutDrift.only, single_photos.relight
+    kept, relit = [], []
 
     def recorded(self, numbers):
         kept.append(set(numbers.tolist()))
         return only(self, numbers)
 
+    def recorded_pictures(plan, transport, numbers):
+        relit.append(set(numbers))
+        return relight(plan, transport, numbers)
+
     monkeypatch.setattr(PhotosWithoutDrift, "only", recorded)
+    monkeypatch.setattr(single_photos, "relight", recorded_pictures)
     assert diagnosed(shot.photos, suspected=True) == []
     own = {n for n, p in enumerate(shot.plan.patterns) if isinstance(p, Sinusoid)}
     references = {n for n in own if is_reference(shot.plan.patterns[n])}
@@ -99,6 +106,8 @@ def test_each_photo_but_white_and_black_is_left_out_in_one_turn(shot, diagnosed,
     assert sorted(n for each in left_out for n in each) == sorted(own - references)
     assert len(left_out) == TURNS_OF_LEAVING
     assert all(left_out)
+    # Check photos are in no estimate anyway: leaving others out would only relight them worse.
+    assert relit == left_out
 
 
 def test_the_moment_of_a_motion_is_named(shot, spoilt_by):

@@ -1,6 +1,7 @@
 """The error of a transport, from two photos that are noisier than it."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -90,6 +91,33 @@ def test_a_camera_without_light_shows_no_excess():
     dark = np.zeros(VALUES)
     pair = compare_pair(dark, dark + 1e-3, dark, white=dark, noise=0.0, error_of_white=0.0)
     assert pair.excess_share == 0.0
+
+
+def test_sums_over_a_large_camera_lose_no_digits():
+    # Pictures in steps of 1 / 65536, whose differences are exact in float32.
+    generator = np.random.default_rng(0)
+    white = generator.integers(20_000, 60_000, VALUES)
+    known = generator.integers(0, white)
+    relit = known + generator.integers(-300, 300, VALUES)
+    shown, inverse = (
+        picture + generator.integers(-2000, 2000, VALUES) for picture in (known, white - known)
+    )
+    pair = compare_pair(
+        *(np.float32(picture / 65536) for picture in (shown, inverse, relit)),
+        white=np.float32(white / 65536),
+        noise=1.0,
+        error_of_white=0.0,
+    )
+    first, second = shown - relit, inverse - (white - relit)
+    of_sum = Fraction(int(np.sum((first + second) ** 2)), VALUES * 65536**2)
+    both = Fraction(int(np.sum(first**2) + np.sum(second**2)), 2 * VALUES * 65536**2)
+    assert pair.error == pytest.approx(float(both - of_sum / 2), rel=1e-11)
+    assert pair.excess == pytest.approx(
+        float(Fraction(int(np.sum(first + second)), VALUES * 65536)), rel=1e-11
+    )
+    assert pair.signal == pytest.approx(
+        float(Fraction(int(np.sum(shown**2)), VALUES * 65536**2)), rel=1e-11
+    )
 
 
 def test_parts_of_a_camera_count_as_the_whole():

@@ -75,6 +75,21 @@ def test_held_out_snr_is_the_true_one(box, reconstructed, made):
     assert judge_reconstruction(stored, capture).grade == "good"
 
 
+def test_noise_allows_what_photos_without_it_reach_beyond(reconstructed):
+    noisy, quiet = (
+        measure_held_out(*reconstructed(full_well=electrons)[::-1]) for electrons in (3000.0, 1e6)
+    )
+
+    def mean(errors):
+        return np.mean([error / light.pair.signal for error, light in errors])
+
+    caused = mean((light.pair.error, light) for light in noisy.lights)
+    caused -= mean((light.pair.error, light) for light in quiet.lights)
+    said = np.mean([10 ** (-light.noise_snr / 10) for light in noisy.lights])
+    assert decibels(said, caused) == pytest.approx(0.0, abs=2.0)
+    assert noisy.expected_snr < noisy.noise_snr < quiet.noise_snr - 10
+
+
 def test_photos_as_far_off_as_expected_are_not_searched(reconstructed, monkeypatch):
     # One check photo fits badly, by the error of the estimate.
     capture, stored = reconstructed()
@@ -107,8 +122,11 @@ def test_without_check_photos_nothing_was_checked(reconstructed):
         "verdict": "doubtful",
         "held_out_dB": None,
         "expected_dB": None,
+        "planned_dB": list(capture.plan.expected_snr.pictures),
+        "noise_dB": None,
         "causes": ["unchecked"],
     }
+    assert str(verdict).endswith(" dB under pictures.")
     assert reason.startswith("nothing was checked: the plan has neither check photos, ")
     assert ". Known is this: one photo of white is " in reason
 
@@ -148,7 +166,21 @@ def test_the_command_ends_with_the_verdict(reconstructed, tmp_path):
     assert said.out.splitlines()[-1].startswith("good: Relit pictures are off by ")
     said = run_nearfar("reconstruct", capture.path, tmp_path / "t.zarr", "--force", "--json")
     found = json.loads(said.out)
-    assert list(found) == ["verdict", "held_out_dB", "expected_dB", "causes", "reasons"]
+    assert list(found) == [
+        "verdict",
+        "held_out_dB",
+        "expected_dB",
+        "planned_dB",
+        "noise_dB",
+        "causes",
+        "reasons",
+    ]
+    low, high = found["planned_dB"]
+    assert low < found["held_out_dB"] < high
+    assert f", planned for {low:.0f} to {high:.0f} dB under pictures, " in str(
+        open_transport(tmp_path / "t.zarr").verdict
+    )
+    assert found["noise_dB"] > found["expected_dB"]
     assert found["verdict"] == "good"
     assert abs(found["held_out_dB"] - found["expected_dB"]) < 3
     assert found["causes"] == []

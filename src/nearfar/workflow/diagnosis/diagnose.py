@@ -1,5 +1,7 @@
 """Diagnosis of the photos of a capture, by all checks."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from nearfar.capture import Capture
@@ -8,17 +10,24 @@ from nearfar.estimate.joint import estimate_jointly
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
+from nearfar.transport.model import Transport
 from nearfar.transport.store import StoredTransport
 from nearfar.workflow.diagnosis.compression import find_compression
-from nearfar.workflow.diagnosis.inverse_pairs import find_motion_by_pairs
+from nearfar.workflow.diagnosis.inverse_pairs import (
+    are_linear,
+    find_motion_by_pairs,
+    has_odd_pairs,
+    steady_pairs,
+)
 from nearfar.workflow.diagnosis.misfit import (
+    SteadyPhotos,
     fit_photos,
     is_white_or_black,
     normal_equations,
     serves,
 )
-from nearfar.workflow.diagnosis.sample import sample_camera
-from nearfar.workflow.diagnosis.single_photos import SWEEPS, find_spoilt_photos
+from nearfar.workflow.diagnosis.sample import CameraSample, sample_camera
+from nearfar.workflow.diagnosis.single_photos import SWEEPS, SpoiltPhotos, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
     find_changes,
     find_clipped_black,
@@ -54,8 +63,8 @@ def find_what_spoils(
     -------
     list of Spoilt
         The worst first; empty if all is well, or if the photos cannot tell: those by reference of
-        a square T. Inverse pairs tell of motion and JPEG alone; that their
-        response is not linear is a fault of the capture.
+        a square T. Inverse pairs tell of motion, JPEG and single photos alone; that their response
+        is not linear is a fault of the capture.
 
     Raises
     ------
@@ -70,19 +79,15 @@ def find_what_spoils(
     sample = sample_camera(capture, lambda share: progress(step, share / 2))
     compressed = find_compression(capture, ~is_white_or_black(plan))
     if by_pairs:
-        moved = find_motion_by_pairs(sample)
+        found = _what_spoils_pairs(transport, sample, compressed)
         progress(step, 1.0)
-        return [*compressed, *moved]
+        return found
     try:
         photos = sample.without_drift()
     except InputError:
         # Nothing but saturated camera pixels were sampled.
         return []
-    sampled = sample.of_transport(transport)
-    if transport.provenance["method"] != "joint":
-        # Other estimates differ from the photos by far more than noise.
-        q = sampled.correspondence
-        sampled = estimate_jointly(measure(photos), q, plan.window, plan.far, sweeps=SWEEPS)
+    sampled = _estimate_of(transport, sample, photos)
     fits = fit_photos(photos, sampled)
     progress(step, 3 / 4)
     single = find_spoilt_photos(fits, sampled.correspondence, suspected=suspected)
@@ -103,3 +108,45 @@ def find_what_spoils(
     if response:
         found = [each for each in found if not isinstance(each, OF_RESPONSE)]
     return [*response, *found]
+
+
+def _estimate_of(
+    transport: StoredTransport, sample: CameraSample, photos: SteadyPhotos
+) -> Transport:
+    """Return the joint estimate at the sampled camera pixels, made now if it is another's."""
+    sampled = sample.of_transport(transport)
+    if transport.provenance["method"] == "joint":
+        return sampled
+    # Other estimates differ from the photos by far more than noise.
+    plan, q = sample.plan, sampled.correspondence
+    return estimate_jointly(measure(photos), q, plan.window, plan.far, sweeps=SWEEPS)
+
+
+def _what_spoils_pairs(
+    transport: StoredTransport, sample: CameraSample, compressed: Sequence[Spoilt]
+) -> list[Spoilt]:
+    """Find what spoils the photos of inverse pairs; the worst first."""
+    moved = find_motion_by_pairs(sample)
+    if transport.provenance["square"]:
+        return [*compressed, *moved]
+    single = _single_photos_of_pairs(transport, sample)
+    if single.certain:
+        return [*single.certain, *single.probable]
+    return [*compressed, *moved, *([] if moved else single.probable)]
+
+
+def _single_photos_of_pairs(transport: StoredTransport, sample: CameraSample) -> SpoiltPhotos:
+    """Find photos of inverse pairs that do not fit the others.
+
+    A pair that sums to something else than the others has a spoilt photo, however well both fit.
+    """
+    photos = steady_pairs(sample)
+    if not photos.unsaturated.any():
+        return SpoiltPhotos([], [])
+    estimate = _estimate_of(transport, sample, photos)
+    suspected = True if has_odd_pairs(photos) else None
+    found = find_spoilt_photos(
+        fit_photos(photos, estimate), estimate.correspondence, suspected=suspected
+    )
+    # A bent response makes photos darker or brighter, too.
+    return found if are_linear(photos) else found._replace(probable=[])

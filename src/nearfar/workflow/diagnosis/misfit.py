@@ -15,13 +15,14 @@ are (photos, regions, causes, causes) and (photos, regions, causes).
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.illumination.frequencies import DC
-from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.photometry.photos import Photos
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import is_reference
 from nearfar.transport.model import Transport
@@ -51,6 +52,23 @@ REGIONS_A_SIDE = 3
     BEND,
 ) = range(9)
 CAUSES = 9
+
+
+class SteadyPhotos(Photos, Protocol):
+    """Photos of a plan without the drift of the lamp, with a model of their noise."""
+
+    @property
+    def unsaturated(self) -> Booleans:
+        """Where no photo of white is saturated, (Cy, Cx, channels)."""
+        ...
+
+    def variance(self, photo: Floats) -> Floats:
+        """Variance of one photo that reads `photo`, (C, channels)."""
+        ...
+
+    def only(self, numbers: Integers) -> "SteadyPhotos":
+        """Return some of the photos, in order, in memory."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +102,11 @@ class PhotoFits(Fits):
 
     Attributes
     ----------
-    without_drift : PhotosWithoutDrift
+    without_drift : SteadyPhotos
         The photos of the sample.
     """
 
-    without_drift: PhotosWithoutDrift
+    without_drift: SteadyPhotos
 
     @property
     def plan(self) -> Plan:
@@ -96,7 +114,7 @@ class PhotoFits(Fits):
         return self.without_drift.plan
 
 
-def fit_photos(photos: PhotosWithoutDrift, transport: Transport, start: int = 0) -> PhotoFits:
+def fit_photos(photos: SteadyPhotos, transport: Transport, start: int = 0) -> PhotoFits:
     """Relight a sample, or some rows of a camera, under every pattern of its plan.
 
     Camera pixels that are saturated under white have infinite variance. So have photos of stripes
@@ -105,7 +123,7 @@ def fit_photos(photos: PhotosWithoutDrift, transport: Transport, start: int = 0)
 
     Parameters
     ----------
-    photos : PhotosWithoutDrift
+    photos : SteadyPhotos
         All photos.
     transport : Transport
         Of the sample's camera pixels, or of the rows.
@@ -127,7 +145,7 @@ def fit_photos(photos: PhotosWithoutDrift, transport: Transport, start: int = 0)
         ]
     )
     variance += model_variance(white)
-    variance[:, ~photos.drift.unsaturated[rows]] = np.inf
+    variance[:, ~photos.unsaturated[rows]] = np.inf
     variance[serves(photos.plan, "correspondence")] = np.inf
     return PhotoFits(
         photos=taken,

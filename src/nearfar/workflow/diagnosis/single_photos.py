@@ -27,6 +27,7 @@ from nearfar.faults.of_photos import (
     ShowsOtherPattern,
     Spoilt,
 )
+from nearfar.photometry.by_inverse import find_pairs
 from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, Sinusoid
 from nearfar.transport.model import Transport
@@ -221,7 +222,9 @@ def _estimate_without(
     plan = fits.plan
     keep = good & ~serves(plan, *HELD_OUT)
     keep[left_out] = False
-    # A cosine is nothing without its sine.
+    # A photo is nothing without its inverse, where all come in pairs; a cosine without its sine.
+    for pair in find_pairs(plan) if plan.offset == "inverse" else []:
+        keep[[pair.photo, pair.inverse]] = keep[pair.photo] and keep[pair.inverse]
     kept = {
         (p.frequency, p.kind)
         for p, is_kept in zip(plan.patterns, keep, strict=True)

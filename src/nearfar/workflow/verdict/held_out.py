@@ -63,6 +63,13 @@ class HeldOutLight:
             return None
         return decibels(self.pair.signal, self.expected_error)
 
+    @property
+    def noise_snr(self) -> float | None:
+        """SNR_b that the noise of the photos alone allows, dB; None without error bars."""
+        if self.expected_error is None or self.unmeasured_error is None:
+            return None
+        return decibels(self.pair.signal, max(self.expected_error - self.unmeasured_error, 0.0))
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -146,13 +153,22 @@ class HeldOut:
     @property
     def expected_snr(self) -> float | None:
         """SNR_b that the error bars expect, dB: the mean; None without error bars."""
-        values = [light.expected_snr for light in self.lights if light.expected_snr is not None]
-        return float(np.mean(values)) if values else None
+        return _mean_known(light.expected_snr for light in self.lights)
+
+    @property
+    def noise_snr(self) -> float | None:
+        """SNR_b that the noise of the photos alone allows, dB: the mean; None as `expected_snr`."""
+        return _mean_known(light.noise_snr for light in self.lights)
 
 
 def _mean(values: Iterable[float]) -> float:
     listed = list(values)
     return float(np.mean(listed)) if listed else 0.0
+
+
+def _mean_known(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
 
 
 def joined(one: HeldOutLight, other: HeldOutLight) -> HeldOutLight:

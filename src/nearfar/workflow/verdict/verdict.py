@@ -94,19 +94,23 @@ class Verdict:
         Why the transport is not good, the most probable first.
     misfit : MisfitMaps or None
         Where photos do not fit, if it was measured.
+    planned_snr : tuple of float or None
+        Lowest and highest SNR_b under pictures that the plan was chosen for, dB; None if it was not
+        chosen for any.
     """
 
     grade: Grade
     held_out: HeldOut | None
     reasons: tuple[Reason, ...]
     misfit: MisfitMaps | None = field(default=None, compare=False)
+    planned_snr: tuple[float, float] | None = None
 
     @property
     def kept(self) -> KeptVerdict:
         """The part of the verdict that is stored with the transport."""
         checked = self.held_out
         if checked is None:
-            return KeptVerdict(self.grade, self.reasons)
+            return KeptVerdict(self.grade, self.reasons, planned_snr=self.planned_snr)
         return KeptVerdict(
             self.grade,
             self.reasons,
@@ -116,6 +120,8 @@ class Verdict:
             widening_of(checked),
             checked.called,
             checked.is_least,
+            _finite(checked.noise_snr),
+            self.planned_snr,
         )
 
     @property
@@ -130,6 +136,8 @@ class Verdict:
             "verdict": self.grade,
             "held_out_dB": kept.held_out_snr,
             "expected_dB": kept.expected_snr,
+            "planned_dB": None if kept.planned_snr is None else list(kept.planned_snr),
+            "noise_dB": kept.noise_snr,
             "causes": list(kept.causes),
             "reasons": [reason.sentence for reason in self.reasons],
         }
@@ -177,6 +185,8 @@ def judge_reconstruction(
         repeats,
         _why_unchecked(transport, capture.plan),
     )
+    if (planned := capture.plan.expected_snr) is not None:
+        verdict = replace(verdict, planned_snr=planned.pictures)
     if "model" not in verdict.causes:
         return verdict
     misfit = measure_misfit(transport, capture, progress)

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.parallel import side_by_side
-from nearfar.transport import near as windows
 from nearfar.transport.boxes import BoxAxes, spread_summed_area, summed_area
 from nearfar.transport.pictures import DENSE_SHARE
-from nearfar.transport.pyramid import Pyramid
+from nearfar.transport.pyramid import Pyramid, bounds
 
 # Camera pixels of a batch, whose values stay in the processor's cache.
 BATCH_PIXELS = 1024
@@ -80,13 +79,14 @@ def blurred_pictures(
 
 
 def _reached(square: Floats, centres: NDArray[np.int64], pyramid: Pyramid) -> Booleans | None:
-    """Return which camera pixels' functions a light reaches, (C,); None if it is no small one."""
-    lit: Booleans = np.asarray(square != 0)
-    if np.count_nonzero(lit) >= DENSE_SHARE * lit.size:
-        return None
-    side = 2 * pyramid.margin + 1
-    padded: Booleans = np.pad(lit, side)
-    return windows.reached(padded, centres, side)
+    """Return which camera pixels a light may reach by n, (C,); None if it may reach all."""
+    reached: Booleans | None = None
+    for side, length, places in zip(bounds(square), pyramid.projector, centres.T, strict=True):
+        reach = pyramid.basis.reach
+        if side.start > reach or side.stop < length - reach:
+            near = (places >= side.start - reach) & (places < side.stop + reach)
+            reached = near if reached is None else reached & near
+    return reached
 
 
 def blurred_adjoint(

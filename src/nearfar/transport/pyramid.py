@@ -60,7 +60,7 @@ class Pyramid:
     def levels(self, light: Floats) -> Floats:
         """Blur a light (Py, Px) by the hat of each pitch, flat; dark beyond the border."""
         levels = np.zeros(self.shape, dtype=light.dtype)
-        lit = _bounds(light)
+        lit = bounds(light)
 
         def work(number: int) -> None:
             # No farther than the hat carries light, which is next to nothing for a small spot.
@@ -115,7 +115,7 @@ class Pyramid:
             levels[first : first + length] += columns @ image
 
 
-def _bounds(light: Floats) -> tuple[slice, slice]:
+def bounds(light: Floats) -> tuple[slice, slice]:
     """Return the rows and columns between the first and the last lit pixel."""
     found = []
     for axis in (1, 0):

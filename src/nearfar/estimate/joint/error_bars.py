@@ -364,11 +364,14 @@ class ErrorBars:
             y, x = (round(part * side) for part, side in zip(k, projector, strict=True))
             spectrum[y % projector.height, x % projector.width] = 0.0
             spectrum[-y % projector.height, -x % projector.width] = 0.0
-        cycles = [np.fft.fftfreq(side) * side for side in projector]
-        radius = np.hypot(cycles[0][:, None], cycles[1])
         # Far-range light has no detail that is finer than the coarsest functions.
-        sampled = [np.abs(one) <= 0.5 / transport.pitch for one in map(np.fft.fftfreq, projector)]
-        spectrum *= sampled[0][:, None] & sampled[1]
+        cycles = [np.fft.fftfreq(side) for side in projector]
+        sampled = [np.flatnonzero(np.abs(one) <= 0.5 / transport.pitch) for one in cycles]
+        spectrum = spectrum[np.ix_(*sampled)]
+        down, across = (
+            side * one[kept] for side, one, kept in zip(projector, cycles, sampled, strict=True)
+        )
+        radius = np.hypot(down[:, None], across)
         total = [
             np.sum(spectral_density(radius, one) * spectrum)
             for one in self._posterior.prior_components

@@ -43,6 +43,19 @@ def test_a_transport_that_obeys_the_model_is_recovered_exactly(projector, window
     assert _snr(world.far, found.far) > 80
 
 
+def test_quantisation_errors_may_be_left_out():
+    projector, window, far = Size(24, 24), 8, Size(5, 5)
+    dropped = default_dropped(window, far, projector)
+    world = model_transport(projector, Size(8, 9), window=window, far=far)
+    measurements = ideal_measurements(world, window, far, dropped)
+    without = replace(measurements, quantisation_error=measurements.quantisation_error[:, :0])
+    found, expected = (
+        estimate(each, world.correspondence, window, far, dropped)
+        for each in (without, measurements)
+    )
+    np.testing.assert_array_equal(found.dense(), expected.dense())
+
+
 def test_the_leak_matters_where_the_window_does_not_divide_the_projector():
     projector, window, far = Size(32, 32), 11, Size(5, 5)
     dropped = default_dropped(window, far, projector)

@@ -7,6 +7,8 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError, PlanError
 from nearfar.estimate.paper import estimate
 from nearfar.illumination.patterns import exponential
+from nearfar.illumination.real_basis import RealBasis
+from nearfar.photometry import theory
 from nearfar.photometry.theory import measure_in_theory
 from nearfar.plan import paper_plan
 from tests.worlds import model_transport
@@ -30,6 +32,30 @@ def test_the_responses_are_those_of_the_complex_patterns():
         np.testing.assert_allclose(-shown, expected.imag, atol=1e-6)
     shot = {pattern.frequency for pattern in plan.patterns}
     assert all(k in shot or -k in shot for k in measured.basis.frequencies)
+
+
+def test_measuring_in_small_blocks_changes_nothing(monkeypatch):
+    world = model_transport(Size(12, 20), Size(3, 4), window=5, far=Size(3, 4), channels=2)
+    plan = paper_plan(
+        world.projector, 5, Size(3, 4), dropped=Size(1, 1), offset="none", correspondence="none"
+    )
+    whole = measure_in_theory(plan, world)
+    largest = []
+    rows, patterns_on = type(world).rows, RealBasis.patterns_on
+
+    def told(values):
+        largest.append(values.size)
+        return values
+
+    monkeypatch.setattr(type(world), "rows", lambda self, pixels: told(rows(self, pixels)))
+    monkeypatch.setattr(
+        RealBasis, "patterns_on", lambda self, lines: told(patterns_on(self, lines))
+    )
+    monkeypatch.setattr(theory, "VALUES_AT_ONCE", 1000)
+    parts = measure_in_theory(plan, world)
+    np.testing.assert_allclose(parts.responses, whole.responses, atol=1e-6)
+    assert max(largest) <= 1000
+    assert len(largest) > 12
 
 
 def test_a_transport_that_obeys_the_model_is_recovered():

@@ -88,6 +88,35 @@ def test_coloured_light_goes_channel_by_channel(transport):
     np.testing.assert_allclose(transport @ light, _by_hand(transport, light), atol=1e-6)
 
 
+def test_several_lights_are_relit_as_one_by_one(transport):
+    lights = np.random.default_rng(2).random((11, *PROJECTOR)).astype(np.float32)
+    coloured = np.repeat(lights[..., None], transport.channels, axis=-1)
+    for several in (lights, coloured):
+        pictures = transport.pictures(several)
+        for light, picture in zip(several, pictures, strict=True):
+            relit = (transport @ light).reshape(picture.shape)
+            np.testing.assert_allclose(picture, relit, atol=2e-6)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (36, 51), (18, 20), (36, 7)])
+def test_a_light_that_few_camera_pixels_see_is_relit_as_any_other(transport, place):
+    light = np.zeros(PROJECTOR)
+    light[place] = 0.7
+    np.testing.assert_allclose(transport @ light, _by_hand(transport, light), atol=1e-6)
+    assert not np.any(transport @ np.zeros(PROJECTOR))
+
+
+def test_functions_are_drawn_as_their_values_say():
+    draw = np.random.default_rng(9)
+    for basis in (BASIS, NearBasis(3, 2), NearBasis(11, 16), NearBasis(4, 8)):
+        coefficients = draw.normal(size=(2, basis.count))
+        side = np.arange(-basis.reach, basis.reach + 1)
+        offsets = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+        expected = coefficients @ basis.values_at(offsets).T
+        drawn = basis.drawn(coefficients).reshape(2, -1)
+        np.testing.assert_allclose(drawn, expected, atol=1e-12)
+
+
 def test_the_adjoint_is_one(transport):
     draw = np.random.default_rng(3)
     light = draw.random((*PROJECTOR, transport.channels))

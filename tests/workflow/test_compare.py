@@ -23,7 +23,7 @@ from nearfar.report.comparison import (
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.scenes.cache import cached_scene
+from nearfar.scenes.cache import cached_operator, cached_scene
 from nearfar.transport.exact import ExactTransport
 from nearfar.workflow.compare import Comparison, Trial, compare, default_budgets
 from nearfar.workflow.rivals import RIVALS
@@ -154,6 +154,16 @@ def test_the_default_budgets_end_with_the_papers_photos():
 def test_what_cannot_be_compared_is_said(scene, budgets, methods, said):
     with pytest.raises(InputError, match=said):
         compare(scene, budgets, methods=methods)
+
+
+def test_methods_that_need_matrices_are_named_where_there_are_none():
+    world = cached_operator("corner", Size(20, 20), Size(18, 15))
+    found = compare(world, [60], methods=["CLT", "joint", "Hadamard", "brute force"])
+    assert {trial.method for trial in found.equal_photos} == {"joint"}
+    assert found.equal_photos[0].pictures > 25
+    assert {failure.method for failure in found.failures} == {"CLT", "Hadamard", "brute force"}
+    assert all("corner" in failure.reason for failure in found.failures)
+    assert all("`projector`" in failure.reason for failure in found.failures)
 
 
 def test_the_page_holds_every_trial(found, tmp_path):

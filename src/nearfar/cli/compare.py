@@ -28,7 +28,7 @@ from nearfar.scenes import SCENES
 from nearfar.workflow.rivals import RIVALS
 
 if TYPE_CHECKING:
-    from nearfar.transport.exact import ExactTransport
+    from nearfar.transport.known import KnownTransport
     from nearfar.workflow.compare import Comparison
 
 
@@ -190,15 +190,15 @@ class _Outputs:
 
 def _load(
     scene: str, projector: Size | None, camera: Size | None, report: Report, *, quiet: bool
-) -> "ExactTransport":
+) -> "KnownTransport":
     """Compute a scene, or load a transport."""
-    from nearfar.scenes.cache import cached_scene
-    from nearfar.transport.exact_store import load_matrices
+    from nearfar.scenes.cache import cached_known
+    from nearfar.transport.exact_store import load_exact
 
     if scene in SCENES:
         say_memory(scene, projector, camera, quiet=quiet)
-        return cached_scene(scene, projector, camera, progress=report)
-    return load_matrices(Path(scene), projector=projector, camera=camera)
+        return cached_known(scene, projector, camera, progress=report)
+    return load_exact(Path(scene), projector=projector, camera=camera)
 
 
 def _budgets(text: str | None) -> list[int] | None:

@@ -290,7 +290,12 @@ def _gather(
     responses = measurements.responses[selected]
 
     def of_error(error: Floats) -> Floats:
-        """Return responses (n, 1, R) of unit direct light to quantisation errors."""
+        """Return responses (n, 1, R) of unit direct light to quantisation errors.
+
+        0 where there are so many projector pixels that footprints average them.
+        """
+        if len(error) == 0:
+            return np.zeros((len(centres), 1, error.shape[1]), dtype=np.float32)
         return look_up_each(error, where.pixels, where.weights)[:, None]
 
     def of_direct(centred: CentredBasis) -> Floats:

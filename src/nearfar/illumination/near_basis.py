@@ -100,6 +100,31 @@ class NearBasis:
         hats = np.maximum(0.0, 1.0 - apart / self.pitches[:, None])
         return np.asarray(np.prod(hats / self.pitches[:, None], axis=-1))
 
+    def drawn(self, coefficients: Floats) -> Floats:
+        """Return sums of the functions, (n, J), over the pixels up to `reach` about q, (n, R, R).
+
+        The same as products with `values_at`, by the hats of each axis.
+        """
+        coarse = coefficients[:, : self.window**2].reshape(-1, self.window, self.window)
+        hats = self._hats(np.arange(self.window) - self.window // 2, self.pitch)
+        found = hats @ coarse @ hats.T
+        first = self.window**2
+        for pitch in self.finer_pitches:
+            around = np.zeros((len(coefficients), 9), dtype=coefficients.dtype)
+            around[:, np.arange(9) != 4] = coefficients[:, first : first + len(AROUND_Q)]
+            hats = self._hats(np.arange(-1, 2), pitch)
+            touched = np.flatnonzero(hats.any(axis=1))
+            some = slice(touched[0], touched[-1] + 1)
+            found[:, some, some] += hats[some] @ around.reshape(-1, 3, 3) @ hats[some].T
+            first += len(AROUND_Q)
+        return np.asarray(found)
+
+    def _hats(self, places: NDArray[np.int64], pitch: int) -> Floats:
+        """Return hats at places, in pitches, over the pixels along an axis, (R, places)."""
+        pixels = np.arange(-self.reach, self.reach + 1)
+        apart = np.abs(pixels[:, None] - places * pitch)
+        return np.asarray(np.maximum(0.0, 1.0 - apart / pitch) / pitch)
+
     @cached_property
     def from_densities(self) -> Floats:
         """Coefficients from light per cell of the coarsest pitch at the hats' middles, (J, J).

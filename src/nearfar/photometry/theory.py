@@ -18,6 +18,8 @@ from nearfar.plan.patterns import Exponential
 
 # Camera pixels at once.
 PIXELS_AT_ONCE = 512
+# Values of rows, and of patterns, at once: those of every projector pixel are many.
+VALUES_AT_ONCE = 2**25
 
 
 class Known(Protocol):
@@ -77,17 +79,22 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
             f"{transport.projector}: make the plan with `projector={tuple(transport.projector)}`."
         )
     basis = real_basis(representatives(frequencies), plan.projector)
-    # Sums over thousands of pixels: in float64, so that exact recovery stays exact.
-    patterns = np.ascontiguousarray(basis.patterns.T, dtype=np.float64)
     pixels, channels = transport.camera.pixels, transport.channels
-    responses = np.empty((pixels, channels, basis.count), dtype=np.float32)
-    for block in blocks(pixels, PIXELS_AT_ONCE):
-        responses[block] = product(transport.rows(block).astype(np.float64), patterns)
+    height, width = plan.projector
+    # Sums over thousands of pixels: in float64, so that exact recovery stays exact.
+    responses = np.zeros((pixels, channels, basis.count))
+    at_once = max(1, min(PIXELS_AT_ONCE, VALUES_AT_ONCE // (channels * height * width)))
+    for lines in blocks(height, max(1, VALUES_AT_ONCE // (width * basis.count))):
+        patterns = np.ascontiguousarray(basis.patterns_on(lines).T, dtype=np.float64)
+        on_lines = slice(lines.start * width, lines.stop * width)
+        for block in blocks(pixels, at_once):
+            rows = transport.rows(block)[..., on_lines].astype(np.float64)
+            responses[block] += product(rows, patterns)
     nothing = np.zeros((pixels, channels), dtype=np.float32)
     return Measurements(
         camera=transport.camera,
         basis=basis,
-        responses=responses,
+        responses=responses.astype(np.float32),
         noise=nothing,
         black=nothing,
         quantisation_error=np.zeros((basis.count, plan.projector.pixels), dtype=np.float32),

@@ -149,8 +149,8 @@ def _describe_transport(path: Path) -> str:
         [
             _verdict_of(transport),
             f"{TRANSPORT_KIND}: projector {transport.projector}, camera {transport.camera}, "
-            f"{_channels(transport.channels)}, W = {transport.window}, "
-            f"{transport.far_basis.count} far coefficients",
+            f"{_channels(transport.channels)}, W = {transport.window}"
+            f"{_pitch(transport.pitch)}, {transport.far_basis.count} far coefficients",
             f"{transport.lit.mean():.1%} of the camera pixels directly lit",
             f"floodlit: {shares or 'black'}",
             f"provenance: {json.dumps(dict(transport.provenance))}",
@@ -172,6 +172,10 @@ def _describe_exact(path: Path) -> str:
         f"{kind_of_store(path)}: {exact.name}, projector {exact.projector}, camera {exact.camera}, "
         f"{_channels(exact.channels)}, components {'apart' if exact.is_apart else 'together'}"
     )
+
+
+def _pitch(pitch: int) -> str:
+    return "" if pitch == 1 else f" functions {pitch} projector pixels apart"
 
 
 def _channels(count: int) -> str:

@@ -7,14 +7,20 @@ lights are (L, 1, P) for all channels, or (L, channels, P); pictures are (L, C, 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.parallel import side_by_side
-from nearfar.transport.boxes import spread_summed_area, summed_area
-from nearfar.transport.direct import Footprint, look_up
-from nearfar.transport.pyramid import Pyramid
+from nearfar.transport.boxes import BoxAxes, spread_summed_area, summed_area
+from nearfar.transport.pictures import DENSE_SHARE
+from nearfar.transport.pyramid import Pyramid, bounds
 
-# Camera pixels of a batch.
-BATCH_PIXELS = 2048
+# Camera pixels of a batch, whose values stay in the processor's cache.
+BATCH_PIXELS = 1024
+# The same where what they send back is summed: the projector pixels around them are gone through
+# once for each batch.
+BATCH_PIXELS_BACK = 2**14
+# A fixed number, so that a sum does not depend on the number of processors. Each has levels of its
+# own.
+PARTS_BACK = 2
 
 
 def blurred_pictures(
@@ -22,7 +28,7 @@ def blurred_pictures(
     near: Floats,
     pyramid: Pyramid,
     centres: NDArray[np.int64],
-    where: Footprint,
+    where: BoxAxes,
     lights: Floats,
 ) -> tuple[Floats, Floats]:
     """Return the pictures of d and of n.
@@ -34,63 +40,95 @@ def blurred_pictures(
     pyramid : Pyramid
     centres : ndarray of int, shape (C, 2)
         q rounded.
-    where : Footprint
-        What `nearfar.transport.boxes.box_places` gives.
+    where : BoxAxes
     lights : ndarray
     """
     shape = (len(lights), *direct.shape)
-    dtype = np.result_type(lights, near)
-    of_direct, of_near = np.empty(shape, dtype=dtype), np.empty(shape, dtype=dtype)
+    dtype = np.result_type(lights, near, np.float32)
+    of_direct, of_near = np.empty(shape, dtype=dtype), np.zeros(shape, dtype=dtype)
     places = pyramid.places(centres)
+    own_lights = lights.shape[1] > 1
     for number, light in enumerate(lights):
-        squares = [own.reshape(pyramid.projector) for own in light]
-        levels = [pyramid.levels(own) for own in squares]
-        summed = [summed_area(own) for own in squares]
+        for place, one in enumerate(light.reshape(-1, *pyramid.projector)):
+            own = slice(place, place + 1) if own_lights else slice(None)
+            table, levels = summed_area(one), pyramid.levels(one)
+            reached = _reached(one, centres, pyramid)
 
-        def work(
-            batch: slice,
-            number: int = number,
-            levels: list[Floats] = levels,
-            summed: list[Floats] = summed,
-        ) -> None:
-            here = Footprint(where.pixels[batch], where.weights[batch])
-            entries = places[batch, None] + pyramid.steps
-            for i in range(shape[2]):
-                own = i if len(levels) > 1 else 0
-                if i == 0 or len(levels) > 1:
-                    at_q, seen = look_up(summed[own], here), levels[own][entries]
-                of_direct[number, batch, i] = direct[batch, i] * at_q
-                np.einsum("cw,cw->c", near[batch, i], seen, out=of_near[number, batch, i])
+            def work(
+                batch: slice,
+                number: int = number,
+                own: slice = own,
+                table: Floats = table,
+                levels: Floats = levels,
+                reached: Booleans | None = reached,
+            ) -> None:
+                at_q = where.of(batch).means(table, pyramid.projector)
+                of_direct[number, batch, own] = direct[batch, own] * at_q[:, None]
+                chosen: slice | Integers = batch
+                if reached is not None and np.count_nonzero(reached[batch]) < DENSE_SHARE * len(
+                    at_q
+                ):
+                    # A small light: what most camera pixels see is dark.
+                    chosen = batch.start + np.flatnonzero(reached[batch])
+                seen = np.take(levels, places[chosen, None] + pyramid.steps)
+                for i in range(*own.indices(shape[2])):
+                    of_near[number, chosen, i] = np.einsum("cw,cw->c", near[chosen, i], seen)
 
-        side_by_side(work, blocks(shape[1], BATCH_PIXELS))
+            side_by_side(work, blocks(shape[1], BATCH_PIXELS))
     return of_direct, of_near
+
+
+def _reached(square: Floats, centres: NDArray[np.int64], pyramid: Pyramid) -> Booleans | None:
+    """Return which camera pixels a light may reach by n, (C,); None if it may reach all."""
+    reached: Booleans | None = None
+    for side, length, places in zip(bounds(square), pyramid.projector, centres.T, strict=True):
+        reach = pyramid.basis.reach
+        if side.start > reach or side.stop < length - reach:
+            near = (places >= side.start - reach) & (places < side.stop + reach)
+            reached = near if reached is None else reached & near
+    return reached
 
 
 def blurred_adjoint(
     direct: Floats,
     near: Floats,
+    image: Floats,
     pyramid: Pyramid,
     centres: NDArray[np.int64],
-    where: Footprint,
+    where: BoxAxes,
 ) -> Floats:
-    """Scatter d (n,) and n (n, J) of some camera pixels over the projector, (Py, Px)."""
-    height, width = pyramid.projector
-    table = np.bincount(
-        where.pixels.ravel(),
-        weights=(where.weights * direct[:, None]).ravel(),
-        minlength=(height + 1) * (width + 1),
-    )
-    spread = np.zeros(int(np.prod(pyramid.shape)))
+    """Send an image (C,) back through d (C,) and n (C, J): (Py, Px), float64.
+
+    Parameters
+    ----------
+    direct, near, image : ndarray
+    pyramid, centres, where
+        As `blurred_pictures` takes them.
+    """
+    projector = pyramid.projector
+    corners = (projector.height + 1) * (projector.width + 1)
+    lit = np.flatnonzero(where.of_rows.any(axis=1))
     places = pyramid.places(centres)
-    for batch in blocks(len(near), BATCH_PIXELS):
-        entries = places[batch, None] + pyramid.steps
-        # Only the rows between the first and the last place are touched.
-        first = int(entries.min())
-        some = np.bincount((entries - first).ravel(), weights=near[batch].ravel())
-        spread[first : first + len(some)] += some
-    back: Floats = pyramid.spread(spread)
-    back += spread_summed_area(table, pyramid.projector)
-    return back
+    parts = [part for part in np.array_split(lit, PARTS_BACK) if len(part)]
+    levels = [np.zeros(int(np.prod(pyramid.shape))) for _ in parts]
+    tables = [np.zeros(corners) for _ in parts]
+
+    def work(number: int) -> None:
+        for batch in blocks(len(parts[number]), BATCH_PIXELS_BACK):
+            some = parts[number][batch]
+            weights = np.asarray(image[some], dtype=np.float64)
+            pyramid.scatter(near[some], places[some], weights, levels[number])
+            here = where.of(some).places(projector)
+            shares = here.weights * (direct[some] * weights)[:, None]
+            np.add.at(tables[number], here.pixels.ravel(), shares.ravel())
+
+    side_by_side(work, range(len(parts)))
+    if not parts:
+        return np.zeros(projector)
+    for more, table in zip(levels[1:], tables[1:], strict=True):
+        levels[0] += more
+        tables[0] += table
+    return pyramid.spread(levels[0]) + spread_summed_area(tables[0], projector)
 
 
 def blurred_rows(
@@ -98,7 +136,7 @@ def blurred_rows(
     near: Floats,
     pyramid: Pyramid,
     centres: NDArray[np.int64],
-    where: Footprint,
+    where: BoxAxes,
 ) -> tuple[Floats, Floats]:
     """Return dense rows of D and of N of some camera pixels, each (n, channels, P), float32.
 
@@ -107,13 +145,17 @@ def blurred_rows(
     direct, near, pyramid, centres, where
         As `blurred_pictures` takes them, of these camera pixels.
     """
-    d, n = (np.zeros((*direct.shape, pyramid.projector.pixels), dtype=np.float32) for _ in range(2))
-    for c, i in np.ndindex(direct.shape):
-        one = slice(c, c + 1)
-        its = Footprint(where.pixels[one], where.weights[one])
-        for rows, own_direct, own_near in (
-            (d, direct[one, i], np.zeros_like(near[one, i])),
-            (n, np.zeros_like(direct[one, i]), near[one, i]),
-        ):
-            rows[c, i] = blurred_adjoint(own_direct, own_near, pyramid, centres[one], its).ravel()
-    return d, n
+    projector = pyramid.projector
+    d, n = (np.zeros((*direct.shape, *projector), dtype=np.float32) for _ in range(2))
+    reach = pyramid.basis.reach
+    for c in range(len(direct)):
+        around, inside = [], []
+        for at, side in zip(centres[c].tolist(), projector, strict=True):
+            first, last = max(at - reach, 0), min(at + reach + 1, side)
+            inside.append(slice(first, last))
+            around.append(slice(first - at + reach, last - at + reach))
+        drawn = pyramid.basis.drawn(near[c].astype(np.float64))
+        n[c][:, *inside] = drawn[:, *around]
+        box, shares = where.shares(c)
+        d[c][:, *box] = direct[c][:, None, None] * shares
+    return d.reshape(*direct.shape, -1), n.reshape(*direct.shape, -1)

@@ -29,7 +29,7 @@ from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.adjoint import AdjointTransport
 from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
-from nearfar.transport.boxes import box_places
+from nearfar.transport.boxes import BoxAxes, box_axes
 from nearfar.transport.gains import as_gains, with_gains
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
@@ -166,9 +166,12 @@ class Transport(NoArray):
 
     @cached_property
     def _footprint(self) -> footprints.Footprint:
-        if self.pitch == 1:
-            return footprints.footprint(self.correspondence, self.projector)
-        return box_places(self.correspondence, self.boxes, self.projector)
+        return footprints.footprint(self.correspondence, self.projector)
+
+    @cached_property
+    def box_axes(self) -> BoxAxes:
+        """Where boxes about q read a summed-area table, where `pitch` is over 1."""
+        return box_axes(self.correspondence, self.boxes, self.projector)
 
     @cached_property
     def _centres(self) -> NDArray[np.int64]:
@@ -298,7 +301,7 @@ class Transport(NoArray):
         )
 
     def pictures(self, lights: Floats) -> Floats:
-        """Relight under many lights at once, several times as fast as one by one.
+        """Relight under many lights at once: several times as fast as one by one at a `pitch` of 1.
 
         Parameters
         ----------
@@ -368,15 +371,12 @@ class Transport(NoArray):
         pixels = as_pixels(pixels, self.camera.pixels)
         if self.pitch > 1:
             count, channels = self.camera.pixels, self.channels
-            where = footprints.Footprint(
-                self._footprint.pixels[pixels], self._footprint.weights[pixels]
-            )
             d, n = blurred_rows(
                 self.direct.reshape(count, channels)[pixels],
                 self.near.reshape(count, channels, -1)[pixels],
                 self.pyramid,
                 self._centres[pixels],
-                where,
+                self.box_axes.of(pixels),
             )
             low = self.far.reshape(count, channels, -1)[pixels]
             return Components(d, n, self.far_basis.synthesise(low).astype(np.float32, copy=False))
@@ -492,9 +492,7 @@ class Transport(NoArray):
         far = far_pictures(self.far.reshape(count, channels, -1), self.far_basis, lights)
         if self.pitch > 1:
             return Components(
-                *blurred_pictures(
-                    direct, near, self.pyramid, self._centres, self._footprint, lights
-                ),
+                *blurred_pictures(direct, near, self.pyramid, self._centres, self.box_axes, lights),
                 far,
             )
         return Components(
@@ -508,9 +506,7 @@ class Transport(NoArray):
         n = self.near.reshape(self.camera.pixels, self.channels, -1)[:, channel]
         f = self.far.reshape(-1, self.channels, self.far_basis.count)[:, channel]
         if self.pitch > 1:
-            back = blurred_adjoint(
-                d * image, n * image[:, None], self.pyramid, self._centres, self._footprint
-            )
+            back = blurred_adjoint(d, n, image, self.pyramid, self._centres, self.box_axes)
             return back + self.far_basis.synthesise(image @ f).reshape(self.projector)
         back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
         back = back + self.far_basis.synthesise(image @ f).reshape(self.projector)

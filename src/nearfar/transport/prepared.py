@@ -21,7 +21,7 @@ from nearfar.checks import NoArray, as_light, as_lights, require_instance
 from nearfar.devices import Device, mover
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import near as windows
-from nearfar.transport.boxes import box_places, summed_area
+from nearfar.transport.boxes import summed_area
 from nearfar.transport.direct import Footprint, footprint
 from nearfar.transport.gains import as_gains
 from nearfar.transport.half import rounding_over_noise
@@ -48,7 +48,9 @@ class PreparedTransport(NoArray):
         Projector pixels that direct light comes from, and their weights.
     near : array, shape (C, channels, W^2)
     entries : array of int, shape (C, W^2)
-        Projector pixels of the window entries; P for those beyond the border.
+        Projector pixels of the window entries; P for those beyond the border. With a pyramid,
+        (C, 1), q rounded: `steps` lead from it to each function.
+    steps : array of int, shape (1, J), or None
     far : array, shape (C, channels, M)
     far_basis : RealBasis
     patterns : array, shape (M, P), or None
@@ -56,7 +58,7 @@ class PreparedTransport(NoArray):
         processor.
     pyramid : Pyramid or None
         Where near-range light is made of functions of several projector pixels, lights are blurred
-        and summed on the processor first; `entries` are places in flat levels, and `corners`
+        and summed on the processor first; `entries` are places in flat levels, `corners`
         (C, 16) in summed-area tables.
     held : int
         How many values are gathered at once.
@@ -72,6 +74,7 @@ class PreparedTransport(NoArray):
     shares: Floats
     near: Floats
     entries: Integers
+    steps: Integers | None
     far: Floats
     far_basis: RealBasis
     patterns: Floats | None
@@ -82,8 +85,8 @@ class PreparedTransport(NoArray):
     def nbytes(self) -> int:
         """Bytes that the prepared transport takes on its device."""
         arrays = (self.direct, self.corners, self.shares, self.near, self.entries, self.far)
-        patterns = () if self.patterns is None else (self.patterns,)
-        return sum(int(a.nbytes) for a in (*arrays, *patterns))
+        optional = [part for part in (self.patterns, self.steps) if part is not None]
+        return sum(int(a.nbytes) for a in (*arrays, *optional))
 
     def pictures(
         self, lights: Any, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
@@ -123,15 +126,19 @@ class PreparedTransport(NoArray):
             dtype=xp.float32,
             device=device_of(lights),
         )
-        length = self.held // max(1, self.entries.shape[1] * count * light_channels)
+        length = self.held // max(1, self.near.shape[2] * count * light_channels)
         for batch in blocks(self.camera.pixels, length):
             at_q = at_direct[self.corners[batch]] * self.shares[batch][..., None, None]
             lit = xp.permute_dims(xp.sum(at_q, axis=1), (0, 2, 1))
             part = direct * self.direct[batch][..., None] * lit
-            part = part + near * _weighted_sums(self.near[batch], padded[self.entries[batch]])
+            part = part + near * _weighted_sums(self.near[batch], padded[self._entries(batch)])
             part = part + far * _weighted_sums(self.far[batch], overlaps)
             found[batch] = part
         return xp.permute_dims(found, (2, 0, 1)).reshape((count, *self.camera, self.channels))
+
+    def _entries(self, batch: slice) -> Integers:
+        """Return where camera pixels read a light for each function, (n, J)."""
+        return self.entries[batch] if self.steps is None else self.entries[batch] + self.steps
 
     def _blurred(self, lights: Any, pyramid: Pyramid) -> tuple[Any, Any, Any]:
         """Return overlaps with the far basis, levels and summed-area tables of lights.
@@ -222,6 +229,7 @@ def prepare_transport(
         shares=move(where.weights),
         near=move(transport.near.reshape(count, channels, -1).astype(dtype, copy=False)),
         entries=move(entries.astype(np.int32)),
+        steps=None if pyramid is None else move(pyramid.steps[None].astype(np.int32)),
         far=move(transport.far.reshape(count, channels, -1).astype(dtype, copy=False)),
         far_basis=basis,
         patterns=patterns,
@@ -240,6 +248,4 @@ def _places(transport: Transport) -> tuple[Footprint, Integers, Pyramid | None]:
         pixels = windows.window_pixels(centres, transport.window, projector)
         return where, np.where(inside, pixels, projector.pixels), None
     pyramid = transport.pyramid
-    entries = pyramid.places(centres)[:, None] + pyramid.steps
-    where = box_places(transport.correspondence, transport.boxes, projector)
-    return where, entries, pyramid
+    return transport.box_axes.places(projector), pyramid.places(centres)[:, None], pyramid

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
 
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.illumination.near_basis import NearBasis
+from nearfar.parallel import side_by_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,22 +60,68 @@ class Pyramid:
     def levels(self, light: Floats) -> Floats:
         """Blur a light (Py, Px) by the hat of each pitch, flat; dark beyond the border."""
         levels = np.zeros(self.shape, dtype=light.dtype)
-        around = self.margin
-        inner = (slice(around, -around), slice(around, -around))
-        for level, pitch in zip(levels, self.basis.rising_pitches, strict=True):
-            level[inner] = light
-            _blur(level, pitch)
+        lit = bounds(light)
+
+        def work(number: int) -> None:
+            # No farther than the hat carries light, which is next to nothing for a small spot.
+            pitch = self.basis.rising_pitches[number]
+            placed = [slice(side.start + self.margin, side.stop + self.margin) for side in lit]
+            levels[number][tuple(placed)] = light[lit]
+            blurred = [slice(side.start - pitch, side.stop + pitch) for side in placed]
+            _blur(levels[number][tuple(blurred)], pitch)
+
+        if light[lit].size:
+            side_by_side(work, range(len(levels)))
         return levels.reshape(-1)
 
     def spread(self, levels: NDArray[Any]) -> Floats:
-        """Adjoint of `levels`: (levels * rows * columns) to (Py, Px)."""
+        """Adjoint of `levels`: (levels * rows * columns) to (Py, Px); blurs them in place."""
         around = self.margin
-        found = np.zeros(self.projector)
-        for level, pitch in zip(levels.reshape(self.shape), self.basis.rising_pitches, strict=True):
-            blurred = level.copy()
-            _blur(blurred, pitch)
-            found += blurred[around:-around, around:-around]
-        return found
+        own = levels.reshape(self.shape)
+
+        def work(number: int) -> None:
+            _blur(own[number], self.basis.rising_pitches[number])
+
+        side_by_side(work, range(len(own)))
+        return np.asarray(own[:, around:-around, around:-around].sum(axis=0))
+
+    def scatter(self, near: Floats, places: Integers, image: Floats, levels: NDArray[Any]) -> None:
+        """Add near-range light (n, J), times an image (n,), to `levels`, flat and float64.
+
+        Parameters
+        ----------
+        near, image : ndarray
+        places : ndarray of int, shape (n,)
+            Of `places`; n is above 0.
+        levels : ndarray, shape (levels * rows * columns,)
+            Zero where nothing was added yet.
+        """
+        for pitch in self.basis.rising_pitches:
+            mine = np.flatnonzero(self.basis.pitches == pitch)
+            entries = places[:, None] + self.steps[mine]
+            # Only the rows between the first and the last place are touched.
+            first = int(entries.min())
+            length = int(entries.max()) + 1 - first
+            entries -= first
+            # A column of this matrix is a camera pixel.
+            columns = sparse.csc_array(
+                (
+                    near[:, mine[0] : mine[-1] + 1].astype(np.float32).ravel(),
+                    entries.astype(np.int32).ravel(),
+                    np.arange(0, entries.size + 1, len(mine), dtype=np.int32),
+                ),
+                shape=(length, len(places)),
+            )
+            levels[first : first + length] += columns @ image
+
+
+def bounds(light: Floats) -> tuple[slice, slice]:
+    """Return the rows and columns between the first and the last lit pixel."""
+    found = []
+    for axis in (1, 0):
+        places = np.flatnonzero(light.any(axis=axis))
+        found.append(slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 0))
+    return found[0], found[1]
 
 
 def _blur(level: Floats, pitch: int) -> None:

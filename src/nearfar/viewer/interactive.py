@@ -18,7 +18,7 @@ from nearfar.errors import InputError, NearfarError
 from nearfar.files import luminance
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
-from nearfar.transport.rows import FACTORS, of_pixels, stacked, thinned_blocks
+from nearfar.transport.rows import FACTORS, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.store import StoredTransport, open_transport
 from nearfar.viewer.messages import Light
 
@@ -160,7 +160,12 @@ class InteractiveTransport:
         return np.concatenate(pictures)
 
     def camera_row(self, y: int) -> Transport:
-        """Read the transport of one row of camera pixels."""
+        """Return the transport of one row of camera pixels, from memory or from the disk."""
+        first = 0
+        for block in self._blocks_in_memory or ():
+            if y < first + block.camera.height:
+                return of_rows(block, slice(y - first, y - first + 1))
+            first += block.camera.height
         return self.stored.rows(slice(y, y + 1))
 
     def at_display_stride(self, picture: NDArray[Any]) -> NDArray[Any]:

@@ -37,6 +37,7 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "camera": list(stored.camera),
         "channels": stored.channels,
         "window": transport.coarse.window,
+        "pitch": transport.coarse.pitch,
         "method": stored.provenance.get("method"),
         "plan": plan if isinstance(plan, dict) else None,
         "maps": [{"name": name, "title": TITLES[name]} for name in maps],

@@ -20,7 +20,7 @@ from nearfar.plan.choose import FEWEST_PHOTOS
 from nearfar.plan.window import default_window, pitch_of
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.opening import choose_exposure
-from nearfar.transport.exact import ExactTransport
+from nearfar.transport.known import KnownTransport
 from nearfar.workflow.evaluate import snr
 from nearfar.workflow.rivals import RIVALS
 from nearfar.workflow.rivals.bench import Bench
@@ -127,7 +127,7 @@ def default_budgets(projector: Size) -> tuple[int, ...]:
 
 
 def compare(
-    scene: ExactTransport,
+    scene: KnownTransport,
     budgets: Sequence[int] | None = None,
     *,
     methods: Sequence[str] | None = None,
@@ -142,11 +142,12 @@ def compare(
     The rivals are given their best: at each budget, the paper's method has the best of several far
     bands, and compressive light transport the regularisation that fits the truth best.
     Correspondence is found by each method itself. A method that fails, such as one whose plans do
-    not fit the projector, is listed with its reason, and the others go on.
+    not fit the projector, or one that holds each entry of T of a scene that is too large for it, is
+    listed with its reason, and the others go on.
 
     Parameters
     ----------
-    scene : ExactTransport
+    scene : ExactTransport or ExactOperator
     budgets : sequence of int, optional
         Numbers of photos; `default_budgets` if left out.
     methods : sequence of str, optional
@@ -191,6 +192,8 @@ def compare(
         told = _of_method(report, jobs, number)
         told(0.0)
         try:
+            if RIVALS[method].is_dense:
+                _ = bench.matrices
             found.add(method, budget, _best(method, budget, bench, told, lights, truth, found))
         except NearfarError as error:
             found.failures.append(Failure(method, _counted(budget), str(error)))
@@ -203,7 +206,7 @@ def compare(
 class _Found:
     """What a comparison has found so far."""
 
-    def __init__(self, scene: ExactTransport) -> None:
+    def __init__(self, scene: KnownTransport) -> None:
         self.scene = scene
         self.trials: list[tuple[Budget, Trial]] = []
         self.failures: list[Failure] = []
@@ -283,7 +286,7 @@ def known_budgets(projector: Size, budgets: Sequence[int] | None) -> list[int]:
     return chosen
 
 
-def describe_work(scene: ExactTransport, methods: Sequence[str], budgets: Sequence[int]) -> str:
+def describe_work(scene: KnownTransport, methods: Sequence[str], budgets: Sequence[int]) -> str:
     """Return in a line what `compare` is about to do."""
     jobs = _jobs(scene.projector, methods, budgets)
     titles = ", ".join(RIVALS[method].title for method in methods)

@@ -1,5 +1,6 @@
 """Tiles of camera rows: the memory that is counted, beside what is taken."""
 
+import numpy as np
 import pytest
 
 from nearfar.arrays import Size
@@ -28,6 +29,18 @@ def test_references_of_the_whole_camera_are_counted(photos):
     kept = sum(values.nbytes for values in (drift.black, drift.light, drift.unsaturated))
     assert reference_bytes(chosen_plan(PROJECTOR, 60, window=5), CAMERA, 3) == kept
     assert reference_bytes(paper_plan(PROJECTOR, 5, Size(3, 3)), CAMERA, 3) == 0
+
+
+def test_stripes_are_counted_where_they_come_without_pairs():
+    projector, camera, far = Size(270, 480), Size(40, 60), Size(3, 3)
+    with_stripes, without = (
+        paper_plan(projector, 5, far, offset="reference", correspondence=correspondence)
+        for correspondence in ("stripes", "none")
+    )
+    # q is found in the stripes of one axis after the other, all of a tile's rows at once.
+    more = memory_of_tile(with_stripes, camera, 1, ESTIMATORS["joint"], 40)
+    more -= memory_of_tile(without, camera, 1, ESTIMATORS["joint"], 40)
+    assert more >= 480 * camera.pixels * np.dtype(np.float32).itemsize
 
 
 @pytest.mark.parametrize("method", ["joint", "paper"])

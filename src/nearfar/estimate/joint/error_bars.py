@@ -35,8 +35,8 @@ from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import spectral_density
 from nearfar.priors.responses import ResponsePrior, response_prior
 from nearfar.transport import near
-from nearfar.transport.boxes import box_places, spread_summed_area, summed_area
-from nearfar.transport.direct import footprint, look_up
+from nearfar.transport.boxes import box_axes, summed_area
+from nearfar.transport.direct import footprint
 from nearfar.transport.model import Components, Transport
 from nearfar.transport.posterior import Posterior
 
@@ -84,7 +84,6 @@ class ErrorBars:
             )
         self._transport = transport
         self._posterior: Posterior = transport.posterior
-        self._white = np.ones(transport.projector.pixels, dtype=np.float32)
         self._levels: tuple[Floats, Floats, Floats] | None = None
         self._widening = transport.verdict.widening if transport.verdict is not None else 1.0
         self._centred: CentredBasis = _centred_on(
@@ -210,7 +209,7 @@ class ErrorBars:
             pixels, values = self._window_pixels(c, first, last)
             variance = self._variance(one, self._of_entries(values))
             n[:, pixels - first] = np.sqrt(variance).T
-        inside = self._seen(one, self._white)[1]
+        inside = self._inside(one)
         for some in blocks(lines.stop - lines.start, max(1, ENTRIES_AT_ONCE // width)):
             on_grid = slice(lines.start + some.start, lines.start + some.stop)
             variance = self._variance(one, self._of_far(one, inside[0], on_grid))
@@ -223,12 +222,10 @@ class ErrorBars:
         if transport.pitch == 1:
             return self._where.pixels[c], self._where.weights[c]
         q = transport.correspondence.reshape(-1, 2)[one]
-        places = box_places(q, transport.boxes[one], transport.projector)
-        table = np.zeros((transport.projector.height + 1) * (transport.projector.width + 1))
-        np.add.at(table, places.pixels, places.weights)
-        shares = spread_summed_area(table, transport.projector).ravel()
-        pixels = np.flatnonzero(shares > SHARE_FLOOR)
-        return pixels, shares[pixels].astype(np.float32)
+        (rows, columns), shares = box_axes(q, transport.boxes[one], transport.projector).shares(0)
+        y, x = np.nonzero(shares > SHARE_FLOOR)
+        pixels = (rows.start + y) * transport.projector.width + columns.start + x
+        return pixels, shares[y, x].astype(np.float32)
 
     def _window_pixels(self, c: int, first: int, last: int) -> tuple[Integers, Floats]:
         """Return the projector pixels of a camera pixel's window from `first` to before `last`.
@@ -297,7 +294,8 @@ class ErrorBars:
         gain_direct, gain_near, gain_far = gains
         centres = self._centres[batch]
         mean = gain_far * float(light.mean())
-        in_window, inside, direct = self._seen(batch, light)
+        in_window, direct = self._seen(batch, light)
+        inside = self._inside(batch)
         overlap = (gain_far * centred.basis.analyse(light) * self._is_held).astype(np.float32)
         overlaps = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
         lit = transport.lit.ravel()[batch]
@@ -311,14 +309,12 @@ class ErrorBars:
             truncated,
         )
 
-    def _seen(self, batch: slice, light: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return what unit near-range and direct light answer to a light (P,), and to white.
+    def _seen(self, batch: slice, light: Floats) -> tuple[Floats, Floats]:
+        """Return what unit near-range and direct light answer to a light (P,).
 
         Returns
         -------
         in_window : ndarray, shape (n, J)
-        inside : ndarray, shape (n, J)
-            Share of each function that lies on the projector.
         direct : ndarray, shape (n, 3)
             Direct light, and its derivatives by q.
         """
@@ -327,10 +323,9 @@ class ErrorBars:
         if transport.pitch == 1:
             return (
                 near.look_up(light.reshape(projector), centres, transport.window, projector),
-                near.inside(centres, transport.window, projector).astype(np.float32),
                 responses_of_direct(q, light[None], projector)[..., 0],
             )
-        pyramid, basis = transport.pyramid, transport.near_basis
+        pyramid = transport.pyramid
         if self._levels is None or self._levels[0] is not light:
             square = light.reshape(projector).astype(np.float32)
             self._levels = (light, pyramid.levels(square), summed_area(square))
@@ -338,15 +333,23 @@ class ErrorBars:
         boxes = transport.boxes[batch]
 
         def at(places: Floats) -> Floats:
-            return look_up(summed, box_places(places, boxes, projector))
+            return box_axes(places, boxes, projector).means(summed, projector)
 
         steps = DIFFERENCE_STEP * np.eye(2)
         derivatives = [(at(q + step) - at(q - step)) / (2 * DIFFERENCE_STEP) for step in steps]
         return (
             levels[pyramid.places(centres)[:, None] + pyramid.steps],
-            share_on_projector(centres, basis.offsets, basis.pitches, projector),
             np.stack([at(q), *derivatives], axis=-1),
         )
+
+    def _inside(self, batch: slice) -> Floats:
+        """Return the share of each near-range function that lies on the projector, (n, J)."""
+        transport, centres = self._transport, self._centres[batch]
+        if transport.pitch == 1:
+            within = near.inside(centres, transport.window, transport.projector)
+            return np.asarray(within, dtype=np.float32)
+        basis = transport.near_basis
+        return share_on_projector(centres, basis.offsets, basis.pitches, transport.projector)
 
     def _truncated(self, light: Floats) -> Floats:
         """Return the variance of what the transport does not hold of f, under a light (P,).
@@ -361,11 +364,14 @@ class ErrorBars:
             y, x = (round(part * side) for part, side in zip(k, projector, strict=True))
             spectrum[y % projector.height, x % projector.width] = 0.0
             spectrum[-y % projector.height, -x % projector.width] = 0.0
-        cycles = [np.fft.fftfreq(side) * side for side in projector]
-        radius = np.hypot(cycles[0][:, None], cycles[1])
         # Far-range light has no detail that is finer than the coarsest functions.
-        sampled = [np.abs(one) <= 0.5 / transport.pitch for one in map(np.fft.fftfreq, projector)]
-        spectrum *= sampled[0][:, None] & sampled[1]
+        cycles = [np.fft.fftfreq(side) for side in projector]
+        sampled = [np.flatnonzero(np.abs(one) <= 0.5 / transport.pitch) for one in cycles]
+        spectrum = spectrum[np.ix_(*sampled)]
+        down, across = (
+            side * one[kept] for side, one, kept in zip(projector, cycles, sampled, strict=True)
+        )
+        radius = np.hypot(down[:, None], across)
         total = [
             np.sum(spectral_density(radius, one) * spectrum)
             for one in self._posterior.prior_components

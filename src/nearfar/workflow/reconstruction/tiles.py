@@ -1,5 +1,6 @@
 """Tiles of camera rows: how many rows fit in the memory, and the halo that a tile needs."""
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ from nearfar.correspondence.methods import method_of
 from nearfar.errors import InputError
 from nearfar.estimate.base import Estimator
 from nearfar.plan import Plan
+from nearfar.plan.patterns import Stripe
 
 # Memory of Python and the libraries.
 LIBRARY_BYTES = 4 * 10**8
@@ -21,6 +23,8 @@ ROWS_MULTIPLE = 8
 # Memory of the references for each camera pixel and channel: mean white and black as float32, and
 # a flag of saturated white.
 REFERENCE_BYTES_PER_VALUE = 9
+# Memory of a photo of a stripe for each camera pixel, summed over channels, as float32.
+BYTES_PER_STRIPE = 4
 
 
 class Tiling(NamedTuple):
@@ -122,7 +126,16 @@ def _shared_and_row(
     """Return the memory in bytes that all rows share, and that of one row."""
     shared, pixel = estimator.memory(plan, channels)
     shared += LIBRARY_BYTES + reference_bytes(plan, camera, channels)
+    if plan.offset != "inverse":
+        # Where there are pairs, estimators count all photos, stripes among them.
+        pixel += BYTES_PER_STRIPE * _stripes_at_once(plan)
     return shared, TEMPORARY_FACTOR * pixel * camera.width
+
+
+def _stripes_at_once(plan: Plan) -> int:
+    """Return how many photos of stripes are in memory while q is found in them."""
+    kinds = Counter(pattern.kind for pattern in plan.patterns if isinstance(pattern, Stripe))
+    return max(kinds.values(), default=0)
 
 
 def _halo_rows(plan: Plan, estimator: Estimator) -> int:

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from nearfar.errors import InputError
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
+from nearfar.transport.known import KnownTransport
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,8 +17,9 @@ class Bench:
 
     Attributes
     ----------
-    scene : ExactTransport
-        The truth. A rival may choose its regularisation by it, which favours the rival.
+    scene : ExactTransport or ExactOperator
+        The truth; an operator only for rivals that are not dense. A rival may choose its
+        regularisation by it, which favours the rival.
     camera : SimulatedCamera
     window : int
         W of the joint estimate's plans.
@@ -29,12 +32,29 @@ class Bench:
         For a method that takes long: called with a sentence that says so, before the work.
     """
 
-    scene: ExactTransport
+    scene: KnownTransport
     camera: SimulatedCamera
     window: int
     gain: float
     progress: Callable[[float], None] = lambda _share: None
     note: Callable[[str], None] = lambda _sentence: None
+
+    @property
+    def matrices(self) -> ExactTransport:
+        """The truth, for a rival that is dense.
+
+        Raises
+        ------
+        InputError
+            If it is an operator.
+        """
+        if not isinstance(self.scene, ExactTransport):
+            raise InputError(
+                f"{self.scene.name} with a projector of {self.scene.projector} is too large for a "
+                f"method that holds each entry of T: compare other methods, or give a smaller "
+                f"`projector`."
+            )
+        return self.scene
 
     def rig(self, exposure: float) -> SimulatedRig:
         """Return a rig that exposes for `exposure` units, its full well deeper in proportion."""

@@ -29,7 +29,7 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
     measurements = measure_by_rig(bench.rig(budget.exposure(budget.photos)), patterns)
     choice = best_share(
         measurements,
-        bench.scene,
+        bench.matrices,
         exposure=bench.gain,
         progress=_telling_of_long_choices(bench, budget),
     )
@@ -73,4 +73,5 @@ COMPRESSIVE = Rival(
     title=TITLE,
     line={"color": "#c2561a", "marker": "^", "linestyle": "-."},
     attempts=_attempts,
+    is_dense=True,
 )

@@ -31,5 +31,6 @@ def reference_rival(
         title=title,
         line=line,
         attempts=attempts,
+        is_dense=True,
         photos=lambda projector: acquisition(projector).photos,
     )

@@ -72,6 +72,9 @@ class Rival:
         From the bench and a budget to the attempts, of which the best on pictures counts; none
         where the budget is too small for the method. An attempt takes its photos with
         ``bench.rig(budget.exposure(photos))`` and finds correspondence itself.
+    is_dense : bool
+        Whether it holds each entry of T, or a photo of each projector pixel, so that it cannot run
+        on scenes that are too large for matrices.
     photos : callable, optional
         From the pattern grid to the number of photos, for a method whose number is fixed. Left
         out for a method that adapts to a budget.
@@ -80,4 +83,5 @@ class Rival:
     title: str
     line: Mapping[str, Any]
     attempts: "Callable[[Bench, Budget], Iterable[Attempt]]"
+    is_dense: bool = False
     photos: Callable[[Size], int] | None = None

@@ -1,6 +1,8 @@
 // Buttons and sliders: they change the state, and show it.
 
 import { all, get, set } from './dom.js';
+import { zoomLight } from './light-canvas.js';
+import { ONE_PIXEL } from './painting.js';
 import { canPlay } from './playback.js';
 import { PARTS } from './state.js';
 
@@ -14,9 +16,11 @@ export function describe(scene) {
   document.title = `${scene.name} · nearfar`;
   get('about').textContent = `camera ${rows}x${columns}, ${scene.channels} channel${scene.channels > 1 ? 's' : ''}; ` +
     `projector ${height}x${width}; W = ${scene.window}` +
+    (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') +
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
   get('stage').style.setProperty('--aspect', columns / rows);
-  const maxima = { radius: side / 2, width: side, side: side / 2, cycles: side / 2, shift: side, brush: side / 4 };
+  get('pane').style.setProperty('--aspect', width / height);
+  const maxima = { radius: side / 2, width: side, side: side / 2, cycles: side / 2, shift: side, brush: side / 4, zoom: Math.max(1, Math.ceil(side / 40)) };
   for (const [name, value] of Object.entries(maxima)) slider(name).max = Math.max(1, value);
 }
 
@@ -55,6 +59,7 @@ export function showControls(state, { pictureCount, hasReference, isPlaying }) {
     const output = input.parentElement.querySelector('output');
     if (output) set(output, 'textContent', valueText(input.dataset.of, state, pictureCount));
   }
+  zoomLight(state.zoom);
   set(get('colour'), 'value', state.colour);
   set(get('maps'), 'value', state.map);
   set(get('wiping'), 'hidden', !hasReference);
@@ -75,6 +80,8 @@ function valueText(name, state, pictureCount) {
   const value = state[name];
   if (name === 'exposure') return (value > 0 ? '+' : '') + value.toFixed(1) + ' EV';
   if (name === 'cycles') return value + ' cycles';
+  if (name === 'brush' && value <= ONE_PIXEL) return 'one pixel';
+  if (name === 'zoom') return value + 'x';
   if (name === 'shown') return `${pictureCount ? value + 1 : 0} of ${pictureCount}`;
   return (TWO_DECIMALS.includes(name) ? value.toFixed(2) : +value.toFixed(1)) + (UNITS[name] || '');
 }

@@ -36,6 +36,18 @@ export class LightCanvas {
   }
 }
 
+// Enlarges the light within its pane, about the pane's middle.
+export function zoomLight(zoom) {
+  const canvas = get('light'), pane = get('pane'), width = `${100 * zoom}%`;
+  if (canvas.style.width === width) return;
+  const sides = () => [canvas.clientWidth, canvas.clientHeight], shown = [pane.clientWidth, pane.clientHeight];
+  const middle = [pane.scrollLeft, pane.scrollTop].map((at, axis) => (at + shown[axis] / 2) / sides()[axis]);
+  canvas.style.width = width;
+  pane.scrollTo(...middle.map((share, axis) => share * sides()[axis] - shown[axis] / 2));
+  // Where the screen has fewer pixels than the projector, none of a thin line's may be left out.
+  canvas.style.imageRendering = canvas.clientWidth < canvas.width ? 'auto' : '';
+}
+
 const roundToQuarter = value => Math.round(4 * value) / 4;
 
 // What a press of the pointer at [y, x] changes.

@@ -1,10 +1,12 @@
 // What brush strokes paint on the projector's grid, in linear light.
 
 import { linearColour } from './colour.js';
-import { smooth } from './shapes.js';
+import { distance, smooth } from './shapes.js';
 
 // How much of the paint below one dab of the brush covers.
 const OPACITY = 0.6;
+// The smallest brush covers whole single pixels.
+export const ONE_PIXEL = 0.5;
 
 const extendsStroke = (stroke, before) =>
   stroke?.colour === before.colour && stroke.radius === before.radius && stroke.points.length >= before.points.length &&
@@ -38,6 +40,10 @@ export class Painting {
 
   #continueStroke({ colour, radius, points }, painted) {
     const rgb = linearColour(colour);
+    if (radius <= ONE_PIXEL) {
+      this.#continueLine(points, painted, rgb);
+      return;
+    }
     if (painted === 0) this.#dab(points[0], points[1], radius, rgb);
     for (let i = Math.max(2, painted); i < points.length; i += 2) {
       const [x0, y0, x1, y1] = points.slice(i - 2, i + 2);
@@ -47,11 +53,26 @@ export class Painting {
     }
   }
 
+  // A line one pixel wide, without gaps.
+  #continueLine(points, painted, rgb) {
+    const places = points.map(Math.round);
+    if (painted === 0) this.#setPixel(places[0], places[1], rgb);
+    for (let i = Math.max(2, painted); i < places.length; i += 2) {
+      const [x0, y0, x1, y1] = places.slice(i - 2, i + 2), steps = Math.max(Math.abs(x1 - x0), Math.abs(y1 - y0));
+      for (let n = 1; n <= steps; n++)
+        this.#setPixel(Math.round(x0 + (x1 - x0) * n / steps), Math.round(y0 + (y1 - y0) * n / steps), rgb);
+    }
+  }
+
+  #setPixel(x, y, rgb) {
+    if (x >= 0 && x < this.#width && y >= 0 && y < this.#height) this.values.set(rgb, 3 * (y * this.#width + x));
+  }
+
   #dab(cx, cy, radius, rgb) {
     const reach = Math.ceil(radius) + 1;
     for (let y = Math.max(0, Math.floor(cy) - reach); y <= Math.min(this.#height - 1, Math.ceil(cy) + reach); y++)
       for (let x = Math.max(0, Math.floor(cx) - reach); x <= Math.min(this.#width - 1, Math.ceil(cx) + reach); x++) {
-        const cover = OPACITY * smooth((radius + 0.5 - Math.hypot(x - cx, y - cy)) / (0.7 * radius + 0.5));
+        const cover = OPACITY * smooth((radius + 0.5 - distance(y - cy, x - cx)) / (0.7 * radius + 0.5));
         const i = 3 * (y * this.#width + x);
         for (let c = 0; c < 3; c++) this.values[i + c] += cover * (rgb[c] - this.values[i + c]);
       }

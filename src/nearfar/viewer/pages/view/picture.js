@@ -77,10 +77,28 @@ export function drawPicture(canvas, { height, width, colours, values }, { exposu
   pen.putImageData(image, 0, 0);
 }
 
+// Bytes of the screen by the level of a light times one channel of its colour; the newest three are kept.
+const tonesOfLevels = new Map();
+
+function toneOfLevels(share) {
+  if (!tonesOfLevels.has(share)) {
+    const tone = toneCurve(1), bytes = new Uint8ClampedArray(WHITE_LEVEL + 1);
+    for (let i = 0; i <= WHITE_LEVEL; i++) bytes[i] = tone[TONE_STEPS * Math.sqrt(i / WHITE_LEVEL * share) + 0.5 | 0];
+    if (tonesOfLevels.size >= 3) tonesOfLevels.delete(tonesOfLevels.keys().next().value);
+    tonesOfLevels.set(share, bytes);
+  }
+  return tonesOfLevels.get(share);
+}
+
 export function drawLight(canvas, { height, width, levels, colour }) {
-  const values = new Float32Array(3 * height * width), isGrey = levels.length < values.length;
-  for (let i = 0; i < values.length; i++) values[i] = levels[isGrey ? i / 3 | 0 : i] / WHITE_LEVEL * colour[i % 3];
-  drawPicture(canvas, { height, width, colours: 3, values }, { exposure: 0, gamma: 1 });
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height), out = image.data;
+  const [red, green, blue] = colour.map(toneOfLevels), step = levels.length < 3 * height * width ? 0 : 1;
+  for (let i = 0, j = 0; j < out.length; i += 1 + 2 * step, j += 4) {
+    out[j] = red[levels[i]]; out[j + 1] = green[levels[i + step]]; out[j + 2] = blue[levels[i + 2 * step]];
+    out[j + 3] = 255;
+  }
+  pen.putImageData(image, 0, 0);
 }
 
 // The exposure, in stops, at which all but one value in two hundred are below white.

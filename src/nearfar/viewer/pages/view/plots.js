@@ -9,15 +9,18 @@ function colourOf(scale, share) {
 
 export const gradient = scale => `linear-gradient(to right, ${scale.map(c => `rgb(${c})`).join(', ')})`;
 
+// Where a value is not finite.
+const NONE = [128, 128, 128];
+
 // Values (height, width) between low and high; grey where a value is not finite.
 export function drawMap(canvas, values, [height, width], low, high, scale) {
   Object.assign(canvas, { width, height });
   const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height);
-  const table = Array.from({ length: 256 }, (_, i) => colourOf(scale, i / 255));
-  for (let i = 0; i < values.length; i++) {
+  const table = Array.from({ length: 256 }, (_, i) => colourOf(scale, i / 255).map(Math.round)), { data } = image;
+  for (let i = 0, j = 0; i < values.length; i++, j += 4) {
     const share = (values[i] - low) / (high - low || 1);
-    const colour = Number.isFinite(values[i]) ? table[Math.round(255 * Math.min(1, Math.max(0, share)))] : [128, 128, 128];
-    image.data.set([...colour.map(Math.round), 255], 4 * i);
+    const colour = Number.isFinite(values[i]) ? table[Math.round(255 * Math.min(1, Math.max(0, share)))] : NONE;
+    data[j] = colour[0]; data[j + 1] = colour[1]; data[j + 2] = colour[2]; data[j + 3] = 255;
   }
   pen.putImageData(image, 0, 0);
 }
@@ -38,9 +41,13 @@ const FLOOR = 1e-12;
 // Magnitudes on a log scale, down to a number of decades below the largest; grey at zero.
 // Returns the logarithm of the largest.
 export function drawLog(canvas, values, shape, scale, decades = 5) {
-  const logarithms = Float32Array.from(values, v => Math.abs(v) > FLOOR ? Math.log10(Math.abs(v)) : NaN);
+  const logarithms = new Float32Array(values.length);
   let high = Math.log10(FLOOR);
-  for (const v of logarithms) if (v > high) high = v;
+  for (let i = 0; i < values.length; i++) {
+    const v = Math.abs(values[i]);
+    logarithms[i] = v > FLOOR ? Math.log10(v) : NaN;
+    if (logarithms[i] > high) high = logarithms[i];
+  }
   drawMap(canvas, logarithms, shape, high - decades, high, scale);
   return high;
 }
@@ -60,9 +67,13 @@ export function crop(values, [height, width], [cy, cx], reach) {
 // of measured frequencies are fine.
 export function drawSpectrum(canvas, values, [height, width], { measured, k_near: near, k_far: far }, scale) {
   const small = new OffscreenCanvas(width, height);
-  const low = Math.max(-80, Math.min(-10, values.reduce((a, b) => Math.min(a, b), 0)));
+  let low = -10;
+  for (let i = 0; i < values.length; i++) if (values[i] < low) low = values[i];
+  low = Math.max(-80, low);
   drawMap(small, values, [height, width], low, 0, scale);
-  const large = Math.max(2, Math.round(360 / Math.max(height, width)));
+  const large = Math.max(1, Math.ceil(360 / Math.max(height, width)));
+  // On the page the plot is some 300 pixels wide, whatever the canvas has.
+  const thick = Math.max(1, large * Math.max(height, width) / 400);
   Object.assign(canvas, { width: large * width, height: large * height });
   const pen = canvas.getContext('2d', { willReadFrequently: true });
   pen.imageSmoothingEnabled = false;
@@ -72,12 +83,12 @@ export function drawSpectrum(canvas, values, [height, width], { measured, k_near
   for (const [ky, kx] of measured)
     for (const sign of [1, -1]) {
       pen.beginPath();
-      pen.arc(at(sign * kx, width), at(sign * ky, height), 1.4, 0, 7);
+      pen.arc(at(sign * kx, width), at(sign * ky, height), 1.4 * thick, 0, 7);
       pen.fill();
     }
   for (const [name, [ky, kx]] of [['--near', near], ['--far', far]]) {
     pen.strokeStyle = css(name);
-    pen.lineWidth = 2;
+    pen.lineWidth = 2 * thick;
     const x = at(-kx, width) - large / 2, y = at(-ky, height) - large / 2;
     pen.strokeRect(x, y, 2 * kx * width * large + large, 2 * ky * height * large + large);
   }

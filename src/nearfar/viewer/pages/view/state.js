@@ -9,14 +9,14 @@ export function initialState([height, width]) {
   return Object.freeze({
     kind: 'spot', x: (width - 1) / 2, y: (height - 1) / 2, radius: Math.max(1, Math.round(side / 4)), soft: 0.5,
     angle: 90, width: Math.max(1, Math.round(side / 16)), cycles: 4, phase: 0, side: Math.max(1, Math.round(side / 16)),
-    shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, colour: '#ffffff', strokes: [], pictures: [],
+    shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, zoom: 1, colour: '#ffffff', strokes: [], pictures: [],
     direct: 1, near: 1, far: 1, solo: '', exposure: 0, gamma: 1, wipe: 50, map: '', pixel: null,
     column: null, theme: '',
   });
 }
 
 // Everything else changes the light.
-const DISPLAY_ONLY = [...PARTS, 'solo', 'exposure', 'gamma', 'wipe', 'map', 'pixel', 'column', 'theme', 'pictures'];
+const DISPLAY_ONLY = [...PARTS, 'solo', 'exposure', 'gamma', 'wipe', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures'];
 
 export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));
 

@@ -220,7 +220,8 @@ def _choose(
     needed = None
     if seen is not None and seen.model_holds and plan.window > seen.window:
         needed = photos_for_window(seen, projector, photos, plan.window)
-    return _Chosen(plan, expected_range(expected, is_looked_at=seen is not None), seen, needed)
+    in_range = expected_range(expected, plan.pitch, is_looked_at=seen is not None)
+    return _Chosen(plan, in_range, seen, needed)
 
 
 def _looked_at(look: Path, projector: Size) -> "Look":

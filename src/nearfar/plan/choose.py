@@ -29,9 +29,9 @@ from nearfar.plan.expect import (
     ExpectedErrors,
     errors_of_all_measured,
     errors_of_none_measured,
-    errors_of_place,
     expected_of,
 )
+from nearfar.plan.expect_place import errors_under_lights
 from nearfar.plan.low_rank import ErrorsLowRank
 from nearfar.plan.model import LARGEST_SIDE, Plan
 from nearfar.plan.paper import sinusoids
@@ -291,7 +291,8 @@ def choose_frequencies(
         errors.condition_on(best, noise)
         if progress is not None:
             progress(photos - left)
-    expected = expected_of(errors, references, errors_of_place(projector, pitch), typical, noise)
+    found = errors_under_lights(errors, chosen, projector, pitch, noise)
+    expected = expected_of(found, errors.weights, references, typical, noise)
     return FrequencyChoice(chosen, start.of_direct, references, expected)
 
 

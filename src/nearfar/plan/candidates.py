@@ -29,9 +29,10 @@ HIGHEST = 0.4
 # whose fall its footprint. 15 pairs of 200 photos found q to a tenth of a pixel.
 HIGH_SHARE = 0.15
 # Pairs of such photos: no more than settle the footprint, and ten at least, as long as these are
-# a fifth of the photos or fewer. With six, the corner before a coarse camera lost 8 dB.
+# a quarter of the photos, less the first 16, which the lowest frequencies need, or fewer. With six
+# of 90 photos, the corner before a coarse camera lost 8 dB.
 ENOUGH_HIGH, MOST_HIGH = 10, 40
-LARGEST_HIGH_SHARE = 0.2
+LARGEST_HIGH_SHARE, FIRST_PHOTOS = 0.25, 16
 # And at least one in each direction.
 FEWEST_HIGH = 4
 # Their directions, (y, x), in turn from the highest on.
@@ -90,7 +91,7 @@ def high_frequencies(projector: Size, pitch: int, photos: int) -> list[Frequency
     list of Frequency
         On the projector's DFT, one of each +-k.
     """
-    enough = min(ENOUGH_HIGH, round(LARGEST_HIGH_SHARE * photos / 2))
+    enough = min(ENOUGH_HIGH, round(LARGEST_HIGH_SHARE * (photos - FIRST_PHOTOS) / 2))
     count = min(MOST_HIGH, max(FEWEST_HIGH, enough, round(HIGH_SHARE * photos / 2)))
     ratio = HIGHEST * 2 * pitch
     found = []

@@ -43,7 +43,7 @@ def _truth(folder, light):
 
 def test_lights_are_relit_at_every_pixel(job):
     transport = nearfar.load_transport(job / "transport.zarr")
-    assert (transport.projector, transport.pitch) == (PROJECTOR, 2)
+    assert (transport.projector, transport.pitch) == (PROJECTOR, 4)
     picture = natural_picture(PROJECTOR, 3)
     random = np.random.default_rng(2).random(PROJECTOR).astype(np.float32)
     white = np.ones(PROJECTOR, dtype=np.float32)

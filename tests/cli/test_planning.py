@@ -138,17 +138,17 @@ def test_a_number_of_photos_is_the_whole_command(tmp_path: Path):
 def test_a_plan_for_every_pixel_of_a_projector_says_so(tmp_path: Path):
     plan = tmp_path / "plan.json"
     ran = check_done(run_nearfar("plan", "--projector", "270x480", "--photos", 60, "-o", plan))
-    assert read_plan(plan).pitch == 4
-    assert "for every projector pixel: the window's functions are 4 projector pixels" in ran.out
-    assert "up to 20 pixels from q, 7% of the screen's shorter side" in ran.out
+    assert read_plan(plan).pitch == 8
+    assert "for every projector pixel: the window's functions are 8 projector pixels" in ran.out
+    assert "up to 32 pixels from q, 12% of the screen's shorter side" in ran.out
     assert "plan for blocks of pixels" in ran.out
     assert "--projector 33x60, and nearfar export --native 270x480" in ran.out
     info = check_done(run_nearfar("info", plan))
     assert "for every projector pixel" in info.out
     blocks = check_done(run_nearfar("plan", "--projector", "27x48", "--photos", 60))
     assert "for every projector pixel" not in blocks.out
-    ran = run_nearfar("plan", "--projector", "270x480", "--photos", 60, "--near", 69)
-    check_sentence(ran, "W = 69 at a pitch of 4 projector pixels does not fit")
+    ran = run_nearfar("plan", "--projector", "270x480", "--photos", 60, "--near", 35)
+    check_sentence(ran, "W = 35 at a pitch of 8 projector pixels does not fit")
 
 
 @pytest.mark.parametrize(

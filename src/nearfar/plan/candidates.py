@@ -28,8 +28,13 @@ HIGHEST = 0.4
 # There a row's response is direct light alone, whose phase tells q to a fraction of a pixel, and
 # whose fall its footprint. 15 pairs of 200 photos found q to a tenth of a pixel.
 HIGH_SHARE = 0.15
-# Pairs of such photos: at least one in each direction, and no more than settle the footprint.
-FEWEST_HIGH, MOST_HIGH = 4, 40
+# Pairs of such photos: no more than settle the footprint, and ten at least, as long as these are
+# a quarter of the photos, less the first 16, which the lowest frequencies need, or fewer. With six
+# of 90 photos, the corner before a coarse camera lost 8 dB.
+ENOUGH_HIGH, MOST_HIGH = 10, 40
+LARGEST_HIGH_SHARE, FIRST_PHOTOS = 0.25, 16
+# And at least one in each direction.
+FEWEST_HIGH = 4
 # Their directions, (y, x), in turn from the highest on.
 _DIAGONAL = math.sqrt(0.5)
 DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (_DIAGONAL, _DIAGONAL), (_DIAGONAL, -_DIAGONAL))
@@ -86,7 +91,8 @@ def high_frequencies(projector: Size, pitch: int, photos: int) -> list[Frequency
     list of Frequency
         On the projector's DFT, one of each +-k.
     """
-    count = min(MOST_HIGH, max(FEWEST_HIGH, round(HIGH_SHARE * photos / 2)))
+    enough = min(ENOUGH_HIGH, round(LARGEST_HIGH_SHARE * (photos - FIRST_PHOTOS) / 2))
+    count = min(MOST_HIGH, max(FEWEST_HIGH, enough, round(HIGH_SHARE * photos / 2)))
     ratio = HIGHEST * 2 * pitch
     found = []
     for number in range(count):

@@ -29,10 +29,10 @@ from nearfar.plan.expect import (
     ExpectedErrors,
     errors_of_all_measured,
     errors_of_none_measured,
-    errors_of_place,
     expected_of,
     expected_range,
 )
+from nearfar.plan.expect_place import errors_under_lights
 from nearfar.plan.low_rank import ErrorsLowRank
 from nearfar.plan.model import LARGEST_SIDE, Plan
 from nearfar.plan.paper import sinusoids
@@ -52,6 +52,10 @@ FAR_BAND_SIDE = 13
 SMALLEST_SIDE = 8
 # Pixels of the largest pattern grid all of whose frequencies are listed: more take minutes.
 MOST_LISTED = 2**17
+# Entries of a covariance times measurements up to which plans at a pitch of 1 are chosen by whole
+# covariances: four seconds. Beyond, thin products choose others of the same worth, several times
+# as fast.
+MOST_WHOLE = 2.8e7
 # Other photos from one white and black to the next. Fewer references leave more for frequencies
 # but cost white light; at 117 photos of the box, 10 instead of 16 gain 0.6 dB under pictures and
 # lose 0.7 dB under white.
@@ -213,7 +217,7 @@ def choose_plan(
         dropped=Size(1, 1),
         offset="reference",
         correspondence="phase",
-        expected_snr=expected_range(choice.expected, is_looked_at=typical is not None),
+        expected_snr=expected_range(choice.expected, pitch, is_looked_at=typical is not None),
         patterns=with_references(
             spread_checks(patterns, check_patterns(checks, projector)),
             choice.references,
@@ -289,7 +293,8 @@ def choose_frequencies(
         errors.condition_on(best, noise)
         if progress is not None:
             progress(photos - left)
-    expected = expected_of(errors, references, errors_of_place(projector, pitch), typical, noise)
+    found = errors_under_lights(errors, chosen, projector, pitch, noise)
+    expected = expected_of(found, errors.weights, references, typical, noise)
     return FrequencyChoice(chosen, start.of_direct, references, expected)
 
 
@@ -344,12 +349,15 @@ def _start(
         listed = lowest_first(projector)
         unknown = errors_of_none_measured(listed, projector, window, pitch, typical)
         return _Start(half, listed, unknown, range(len(listed)), [finest])
-    if pitch == 1:
-        listed = candidates(projector, window)
+    listed = candidates(projector, window, pitch)
+    high = [finest] if pitch == 1 else high_frequencies(projector, pitch, photos)
+    listed = representatives([*listed, *high])
+    first = [listed.index(k) for k in high]
+    left = photos - 2 * references
+    if pitch == 1 and len(listed) ** 2 * (left / 2) <= MOST_WHOLE:
         together = ErrorsTogether(listed, projector, window, typical)
-        return _Start(references, listed, together, [listed.index(finest)], [finest])
-    high = high_frequencies(projector, pitch, photos)
-    listed = representatives([*candidates(projector, window, pitch), *high])
-    most = (photos - 2 * references) // 2
+        return _Start(references, listed, together, first, high)
+    # The checkerboard and its like are single photos.
+    most = left if pitch == 1 else left // 2
     thin = ErrorsLowRank(listed, projector, window, pitch, typical, most)
-    return _Start(references, listed, thin, [listed.index(k) for k in high], high)
+    return _Start(references, listed, thin, first, high)

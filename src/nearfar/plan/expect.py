@@ -31,9 +31,6 @@ from nearfar.priors.typical import TypicalScenes
 
 # Standard deviation of direct light in the typical scenes, as a share of white.
 TYPICAL_DIRECT_DEVIATION = 0.5
-# Standard deviation of q on each axis at a pitch over 1, in projector pixels, for what is expected
-# alone. Phase finds q to a tenth of a pixel in dim light and to a few hundredths in bright.
-TYPICAL_Q_DEVIATION = 0.05
 # All frequencies up to as many cycles per pattern grid are candidates of a plan, each for itself.
 LOWEST_CYCLES = 8
 # Up to this many frequencies, what those of a complete plan tell of one another is counted.
@@ -47,6 +44,9 @@ RANDOM_VARIANCE = 1.0 / 12.0
 # a decibel (docs/decisions/0041). Where a first estimate of the scene was planned for, the same.
 OFF_PICTURES, OFF_RANDOM = (-6.0, 2.0), (-4.0, 6.5)
 OFF_PICTURES_LOOKED_AT, OFF_RANDOM_LOOKED_AT = (-4.0, 3.0), (-4.0, 6.0)
+# At a pitch over 1: camera pixels that see several projector pixels average a random light, and
+# those that see two surfaces place it wrongly (docs/decisions/0044).
+OFF_RANDOM_AT_PITCH = (-8.5, 13.0)
 
 
 class Expected(NamedTuple):
@@ -59,7 +59,9 @@ class Expected(NamedTuple):
     random: float
 
 
-def expected_range(expected: Expected, *, is_looked_at: bool = False) -> ExpectedRange:
+def expected_range(
+    expected: Expected, pitch: int = 1, *, is_looked_at: bool = False
+) -> ExpectedRange:
     """Return the range in which the SNR_b of scenes of direct, near- and far-range light lies.
 
     Its limits are rounded to hundredths, so that plans do not depend on rounding errors.
@@ -67,11 +69,15 @@ def expected_range(expected: Expected, *, is_looked_at: bool = False) -> Expecte
     Parameters
     ----------
     expected : Expected
+    pitch : int
+        Of the plan.
     is_looked_at : bool
         Whether the plan is for a first estimate of this very scene.
     """
     pictures = OFF_PICTURES_LOOKED_AT if is_looked_at else OFF_PICTURES
     random = OFF_RANDOM_LOOKED_AT if is_looked_at else OFF_RANDOM
+    if pitch > 1:
+        random = OFF_RANDOM_AT_PITCH
     return ExpectedRange(
         pictures=_around(expected.pictures, pictures), random=_around(expected.random, random)
     )
@@ -288,34 +294,18 @@ def light_weights(frequencies: list[Frequency], projector: Size, pitch: int) -> 
     return np.stack([PICTURE_VARIANCE * pictures / pictures.sum(), even / even.sum() / 12.0])
 
 
-def errors_of_place(projector: Size, pitch: int) -> Floats:
-    """Return the squared errors of pictures and of the random light that q makes, (2,).
-
-    At a pitch of 1 they are not counted: what relighting reached has them in it. Beyond it light is
-    as fine as the projector's pixels, and direct light that is looked up beside its place is wrong
-    by as much as light differs there. That is little but at the few edges of pictures; a random
-    light differs from each pixel to the next.
-    """
-    if pitch == 1:
-        return np.zeros(2)
-    difference = 2.0 * RANDOM_VARIANCE * sum(side > 1 for side in projector)
-    lost = (TYPICAL_DIRECT_DEVIATION * TYPICAL_Q_DEVIATION) ** 2
-    return np.array([0.0, lost * difference])
-
-
 def expected_of(
-    errors: ExpectedErrors,
-    references: int,
-    of_place: Floats,
-    typical: TypicalScenes,
-    noise: float,
+    found: Floats, weights: Floats, references: int, typical: TypicalScenes, noise: float
 ) -> Expected:
-    """Return the SNR_b that errors come to, beside those of q and of so many whites and blacks."""
+    """Return the SNR_b that errors (scenes, 2) come to, beside those of so many whites and blacks.
+
+    `weights` are those of `light_weights`.
+    """
     # White has twice the light of a sinusoid, and is one response and not half of one; its error
     # is in every other response too.
-    of_white = PICTURE_SQUARED_MEAN + errors.weights.sum(axis=1)
+    of_white = PICTURE_SQUARED_MEAN + weights.sum(axis=1)
     common = 0.5 * noise**2 / references * of_white
     light = PICTURE_SQUARED_MEAN + np.array([PICTURE_VARIANCE, RANDOM_VARIANCE])
-    decibels = 10 * np.log10(light / (errors.errors() + common + of_place))
+    decibels = 10 * np.log10(light / (found + common))
     expected = np.average(decibels, axis=0, weights=typical.weights)
     return Expected(*(float(value) for value in expected))

@@ -11,10 +11,10 @@ from nearfar.arrays import Size
 # Shorter side of the largest projector whose windows are of single pixels.
 LARGEST_OF_SINGLE_PIXELS = 128
 # Cells on the shorter side of a larger one: at least half as many, and no more than these.
-MOST_CELLS = 80
-# Largest W that is chosen where nothing is known: of single pixels, and at a larger pitch, where a
-# window of eleven functions reaches as far over the screen.
-LARGEST_DEFAULT, LARGEST_DEFAULT_AT_PITCH = 25, 11
+MOST_CELLS = 53
+# W where nothing is known: the largest of single pixels, and that at a larger pitch, where
+# windows reach over a quarter of the screen (docs/decisions/0042 compares others).
+LARGEST_DEFAULT, DEFAULT_AT_PITCH = 25, 9
 
 
 def pitch_of(projector: Size) -> int:
@@ -28,7 +28,7 @@ def pitch_of(projector: Size) -> int:
     -------
     int
         Projector pixels between neighbouring functions of the window: 1 up to a shorter side of
-        128, beyond that the power of two that leaves 41 to 80 cells on it. Of a single row or
+        128, beyond that the power of two that leaves 27 to 53 cells on it. Of a single row or
         column, the longer side counts.
     """
     pitch, side = 1, _shorter(projector)
@@ -49,14 +49,15 @@ def largest_window(projector: Size, pitch: int = 1) -> int:
 
 
 def default_window(projector: Size, pitch: int = 1) -> int:
-    """W where nothing is known: a sixth of the shorter side's cells, odd, between 5 and 25.
+    """W where nothing is known: a sixth of the shorter side, odd, between 5 and 25.
 
-    At a pitch over 1 it is at most 11. On a projector of one row or column it is a sixth of the
-    longer side.
+    On a projector of one row or column it is a sixth of the longer side. At a pitch over 1 it is 9.
     """
-    most = LARGEST_DEFAULT if pitch == 1 else LARGEST_DEFAULT_AT_PITCH
-    wanted = round(_shorter(projector) / (6 * pitch))
-    return int(min(2 * (min(most, max(5, wanted)) // 2) + 1, largest_window(projector, pitch)))
+    if pitch > 1:
+        wanted = DEFAULT_AT_PITCH
+    else:
+        wanted = min(LARGEST_DEFAULT, max(5, round(_shorter(projector) / 6)))
+    return int(min(2 * (wanted // 2) + 1, largest_window(projector, pitch)))
 
 
 def _shorter(projector: Size) -> int:

@@ -14,9 +14,10 @@ from nearfar.arrays import Booleans, Floats, Size, beside, fetch, namespace
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
-from nearfar.estimate.joint.footprint import box_centres, footprint_boxes
+from nearfar.estimate.joint.footprint import footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
+from nearfar.estimate.joint.seen import box_centres
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measurements import Measurements

@@ -69,7 +69,9 @@ def _by_hand(transport, light):
         )
         if np.isfinite(q[c]).all():
             *sides, down, across = transport.footprint.reshape(-1, 4)[c].astype(np.float64)
-            middles = [q[c].astype(np.float64) + sign * np.array([down, across]) for sign in (1, -1)]
+            middles = [
+                q[c].astype(np.float64) + sign * np.array([down, across]) for sign in (1, -1)
+            ]
             shares = np.mean([_box(middle, sides) for middle in middles], axis=0)
             row += transport.direct.reshape(-1, transport.channels)[c, :, None] * shares
         for i in range(transport.channels):

@@ -8,11 +8,13 @@ far-range light have faded, are most like the measured ones. Neighbours vote for
 Index convention: arrays are (n, channels, ...); r runs over real responses, s over blurs.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.estimate.joint.seen import MEDIAN_SIDE, reach_of, seen_of_projector
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.near_basis import NearBasis
@@ -31,8 +33,10 @@ BLURS = np.array([0.0, 0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0]
 VOTERS = 7
 # Rows of the camera on either side of a camera pixel that its footprint depends on.
 VOTING_ROWS = VOTERS // 2 + MEDIAN_SIDE // 2 + 1
-# Step of the differences by which direct light's derivatives are taken, in projector pixels.
-STEP = 0.05
+# Step of the differences by which direct light's derivatives are taken, in projector pixels. Boxes
+# that lie within one pixel do not change with q: with 0.05, derivatives next to such places say too
+# little, and q moves too far.
+STEP = 0.1
 BATCH_PIXELS = 4096
 
 
@@ -85,13 +89,13 @@ def unit_responses(middles: Floats, footprints: Floats, centred: CentredBasis) -
     """Return responses of unit direct light, (n, R), at middles (n, 2) from rounded q."""
     both, widths = halves(middles, footprints)
     reach = reach_of(footprints)
-    summed: Floats = np.zeros((), dtype=np.float32)
+    summed = np.zeros((len(widths), len(centred.basis.cycles)), dtype=np.complex64)
     for of_half in both:
         down, across = (
             _waves(box_overlaps(of_half[:, axis], widths[:, axis], reach), axis, centred)
             for axis in (0, 1)
         )
-        summed = summed + down * across
+        summed += down * across
     return _real(summed, centred) * np.float32(0.5)
 
 
@@ -128,33 +132,24 @@ def footprint_boxes(
     """
     if near_basis.pitch == 1:
         return None
-    basis, camera = measurements.basis, measurements.camera
+    camera = measurements.camera
     seen = seen_of_projector(correspondence)
-    high = [
-        k
-        for k, cycles in zip(basis.frequencies, basis.cycles, strict=True)
-        if np.hypot(*cycles) * near_basis.pitch >= LEAST_CYCLES
-    ]
-    if not high:
+    high = high_responses(measurements, near_basis)
+    if high is None:
         return seen
-    indices = measurements.response_indices(high)
-    centred = centred_basis(real_basis(high, measurements.projector), near_basis)
     number, blurs = camera.pixels, BLURS[near_basis.pitch >= BLURS]
     q = correspondence.reshape(-1, 2).astype(np.float64)
     lit: Booleans = np.asarray(np.isfinite(q).all(axis=1))
     centres = near.centre(correspondence, measurements.projector)
-    weight = measurements.multiplicity[indices]
     explained = np.zeros((number, len(blurs)), dtype=np.float32)
 
     def work(batch: slice) -> None:
-        responses = centred.recentre(measurements.responses[batch][..., indices], centres[batch])
-        noise = np.maximum(measurements.noise[batch] ** 2, 1e-12)
+        responses = high.at(batch, centres[batch])
         offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0)
         for place, blur in enumerate(blurs):
-            direct = unit_responses(offsets, _blurred(seen[batch], blur), centred)
-            along = np.maximum(np.einsum("nir,nr->ni", responses * weight, direct), 0.0)
-            squared = np.maximum(np.einsum("nr,nr->n", direct * weight, direct), 1e-12)
-            explained[batch, place] = np.sum(along**2 / noise, axis=1) / squared
+            explained[batch, place] = high.explained(
+                responses, offsets, _blurred(seen[batch], blur)
+            )
 
     side_by_side(work, blocks(number, BATCH_PIXELS))
     explained *= lit[:, None]
@@ -163,6 +158,62 @@ def footprint_boxes(
     ).reshape(number, -1)
     blur = blurs[np.argmax(voted, axis=1)]
     return _blurred(seen, blur[:, None]) * lit[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class HighResponses:
+    """Responses to frequencies at which near- and far-range light have faded.
+
+    Attributes
+    ----------
+    measurements : Measurements
+    indices : ndarray of int, shape (R,)
+        Of these responses among the measured ones.
+    centred : CentredBasis
+        Their frequencies.
+    """
+
+    measurements: Measurements
+    indices: NDArray[np.int64]
+    centred: CentredBasis
+
+    def at(self, selected: slice | Integers, centres: NDArray[np.int64]) -> Floats:
+        """Return re-centred responses over the noise, (n, channels, R), of some camera pixels."""
+        noise = np.maximum(self.measurements.noise[selected], 1e-6)[..., None]
+        responses = self.measurements.responses[selected][..., self.indices]
+        weights = np.sqrt(self.measurements.multiplicity[self.indices])
+        return self.centred.recentre(responses, centres) * (weights / noise).astype(np.float32)
+
+    def explained(self, responses: Floats, middles: Floats, footprints: Floats) -> Floats:
+        """Return how much of the power of responses direct light of footprints explains, (n,).
+
+        Parameters
+        ----------
+        responses : ndarray, shape (n, channels, R)
+            As `at` gives them.
+        middles : ndarray, shape (n, 2)
+            Middles of the footprints, from the rounded q.
+        footprints : ndarray, shape (n, 4)
+        """
+        direct = unit_responses(middles, footprints, self.centred)
+        direct = direct * np.sqrt(self.measurements.multiplicity[self.indices])
+        along = np.maximum(np.einsum("nir,nr->ni", responses, direct), 0.0)
+        squared = np.maximum(np.einsum("nr,nr->n", direct, direct), 1e-12)
+        return np.asarray(np.sum(along**2, axis=1) / squared)
+
+
+def high_responses(measurements: Measurements, near_basis: NearBasis) -> HighResponses | None:
+    """Return the responses to the highest frequencies, or None if none was measured."""
+    basis = measurements.basis
+    high = [
+        k
+        for k, cycles in zip(basis.frequencies, basis.cycles, strict=True)
+        if np.hypot(*cycles) * near_basis.pitch >= LEAST_CYCLES
+    ]
+    if not high:
+        return None
+    centred = centred_basis(real_basis(high, measurements.projector), near_basis)
+    return HighResponses(measurements, measurements.response_indices(high), centred)
 
 
 def _blurred(footprints: Floats, blur: Floats | float) -> Floats:

@@ -9,7 +9,7 @@ for that explain most of the camera pixel's own responses.
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, blocks
-from nearfar.estimate.joint.footprint import BATCH_PIXELS, high_responses
+from nearfar.estimate.joint.footprint import BATCH_PIXELS, HighResponses, high_responses
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
@@ -36,6 +36,7 @@ SHAPES = np.array(
 )
 # Directions of the search: along each of q's and the footprint's four numbers.
 DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
+ALONG_Q = DIRECTIONS[[0, 1, 6, 7]]
 # Times that each step is tried in each direction.
 ROUNDS = 2
 # Sides of a box are no narrower, in projector pixels; and q moves by at most as much.
@@ -81,32 +82,68 @@ def own_footprints(
         if not len(doubted):
             return
         selected, responses, before = selected[doubted], responses[doubted], before[doubted]
+        power = power[doubted]
         start = np.concatenate([middles[doubted], footprints[selected]], axis=1)
-        lowest, highest = np.full_like(start, -np.inf), np.full_like(start, np.inf)
-        lowest[:, :2], highest[:, :2] = start[:, :2] - FARTHEST, start[:, :2] + FARTHEST
-        lowest[:, 2:4] = NARROWEST
-        numbers, best = start, before
-
-        def attempt(tried: Floats) -> None:
-            """Keep what explains more."""
-            nonlocal numbers, best
-            tried = np.clip(tried, lowest, highest)
-            explained = high.explained(responses, tried[:, :2], tried[:, 2:])
-            better = explained > best
-            numbers = np.where(better[:, None], tried, numbers)
-            best = np.where(better, explained, best)
-
-        for shape in SHAPES:
-            shaped = np.tile(start[:, 2:4], 2) * shape
-            attempt(np.concatenate([start[:, :2], shaped], axis=1))
-        for step in STEPS:
-            for along in [*DIRECTIONS] * ROUNDS:
-                size = 0.5 * (1.0 + numbers[:, 2:4].mean(axis=1, keepdims=True))
-                attempt(numbers + step * size * along)
-        accepted = best - before > 2 * LEAST_GAIN
+        search = _Search(high, start)
+        # What another q explains needs no other footprint.
+        numbers, by_q = search.descend(responses, start, before, ALONG_Q)
+        shaped = np.flatnonzero(power - by_q > LEAST_MISFIT * count)
+        search = _Search(high, start[shaped])
+        own, best = search.start(responses[shaped], numbers[shaped], by_q[shaped])
+        own, best = search.descend(responses[shaped], own, best, DIRECTIONS)
+        accepted = best - by_q[shaped] > 2 * LEAST_GAIN
+        numbers[shaped[accepted]], by_q[shaped[accepted]] = own[accepted], best[accepted]
+        accepted = by_q - before > 2 * LEAST_GAIN
         selected, numbers = selected[accepted], numbers[accepted]
         q[selected] = np.clip(centres[selected] + numbers[:, :2], 0.0, last)
         found[selected] = numbers[:, 2:]
 
     side_by_side(work, blocks(len(q), BATCH_PIXELS))
     return q.reshape(correspondence.shape), found
+
+
+class _Search:
+    """Searches for q and the footprint's four numbers, (n, 6), that explain most.
+
+    Parameters
+    ----------
+    high : HighResponses
+    before : ndarray, shape (n, 6)
+        About which q is searched for.
+    """
+
+    def __init__(self, high: HighResponses, before: Floats) -> None:
+        self._high = high
+        self._lowest, self._highest = np.full_like(before, -np.inf), np.full_like(before, np.inf)
+        self._lowest[:, :2], self._highest[:, :2] = (
+            before[:, :2] - FARTHEST,
+            before[:, :2] + FARTHEST,
+        )
+        self._lowest[:, 2:4] = np.minimum(NARROWEST, before[:, 2:4])
+
+    def start(self, responses: Floats, numbers: Floats, best: Floats) -> tuple[Floats, Floats]:
+        """Return the best of the shapes that the search starts from, and what it explains."""
+        sides = np.tile(numbers[:, 2:4], 2)
+        for shape in SHAPES:
+            tried = np.concatenate([numbers[:, :2], sides * shape], axis=1)
+            numbers, best = self._better(responses, numbers, best, tried)
+        return numbers, best
+
+    def descend(
+        self, responses: Floats, numbers: Floats, best: Floats, directions: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return the best numbers that falling steps lead to, and what they explain."""
+        for step in STEPS:
+            for along in [*directions] * ROUNDS:
+                size = 0.5 * (1.0 + numbers[:, 2:4].mean(axis=1, keepdims=True))
+                tried = numbers + step * size * along
+                numbers, best = self._better(responses, numbers, best, tried)
+        return numbers, best
+
+    def _better(
+        self, responses: Floats, numbers: Floats, best: Floats, tried: Floats
+    ) -> tuple[Floats, Floats]:
+        tried = np.clip(tried, self._lowest, self._highest)
+        explained = self._high.explained(responses, tried[:, :2], tried[:, 2:])
+        better = explained > best
+        return np.where(better[:, None], tried, numbers), np.where(better, explained, best)

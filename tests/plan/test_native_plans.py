@@ -185,8 +185,9 @@ def test_a_random_light_is_wrong_by_what_enters_and_leaves_a_box(box, monkeypatc
     light = random_pattern(projector, 0).astype(np.float64)
     at = generator.uniform(10, 140, (100_000, 2))
     beside = at + generator.normal(0.0, off, at.shape)
-    table, widths = summed_area(light), np.full(at.shape, box)
-    boxes = [box_places(q, widths, projector) for q in (at, beside)]
+    table = summed_area(light)
+    footprints = np.tile([box, box, 0.0, 0.0], (len(at), 1))
+    boxes = [box_places(q, footprints, projector) for q in (at, beside)]
     seen, looked_up = (np.sum(table[b.pixels] * b.weights, axis=1) for b in boxes)
     wrong = TYPICAL_DIRECT_DEVIATION * (looked_up - seen)
     expected = random_errors_of_direct(DirectDeviation(off, 0.0))
@@ -238,8 +239,11 @@ def test_what_photos_do_not_tell_of_direct_light_is_expected_as_before():
 )
 def test_what_was_measured_lies_in_the_range_that_is_expected(projector, measured):
     plan, expected = choose_plan(projector, 200)
-    for value, (low, high) in zip(measured, expected_range(expected, plan.pitch), strict=True):
+    expected_snr = expected_range(expected, plan.pitch)
+    ranges = (expected_snr.pictures, expected_snr.random)
+    for value, (low, high) in zip(measured, ranges, strict=True):
         assert low <= value <= high
+    assert plan.expected_snr == expected_snr
 
 
 def test_a_window_that_does_not_fit_at_its_pitch_is_refused():

@@ -42,7 +42,7 @@ def transport(request):
         black=np.zeros(shape, dtype=np.float32),
         noise=np.full(shape, 1e-3, dtype=np.float32),
         pitch=BASIS.pitch,
-        footprint=(5.0 * draw.random((*CAMERA, 2))).astype(np.float32),
+        footprint=(draw.random((*CAMERA, 4)) * [5.0, 5.0, 2.0, 3.0]).astype(np.float32),
     )
 
 
@@ -68,9 +68,12 @@ def _by_hand(transport, light):
             BASIS.values_at(flat - centres[c]).T
         )
         if np.isfinite(q[c]).all():
-            row += transport.direct.reshape(-1, transport.channels)[c, :, None] * _box(
-                q[c].astype(np.float64), transport.footprint.reshape(-1, 2)[c]
-            )
+            *sides, down, across = transport.footprint.reshape(-1, 4)[c].astype(np.float64)
+            middles = [
+                q[c].astype(np.float64) + sign * np.array([down, across]) for sign in (1, -1)
+            ]
+            shares = np.mean([_box(middle, sides) for middle in middles], axis=0)
+            row += transport.direct.reshape(-1, transport.channels)[c, :, None] * shares
         for i in range(transport.channels):
             picture[c, i] = row[i] @ light[..., min(i, light.shape[-1] - 1)].ravel()
     far = replace(transport, direct=0 * transport.direct, near=0 * transport.near)

@@ -25,15 +25,25 @@ def test_a_summed_area_table_has_an_adjoint():
     )
 
 
-@pytest.mark.parametrize("sides", [(1.0, 1.0), (0.3, 2.6), (7.0, 5.5), (1e-9, 0.0)])
-def test_the_mean_of_a_box_is_that_of_the_pixels_under_it(sides):
+@pytest.mark.parametrize(
+    "footprint",
+    [
+        (1.0, 1.0, 0.0, 0.0),
+        (0.3, 2.6, 0.4, -0.7),
+        (7.0, 5.5, 0.0, 1.3),
+        (1e-9, 0.0, 0.0, 0.0),
+        (0.0, 0.5, -2.2, 1.1),
+    ],
+)
+def test_the_mean_of_a_footprint_is_that_of_the_pixels_under_its_boxes(footprint):
     draw = np.random.default_rng(1)
     light = draw.random(PROJECTOR)
     q = draw.random((40, 2)) * (np.array(PROJECTOR) - 1)
     q[:4] = [[0, 0], [8, 13], [0, 13], [4, 6]]
     q[4] = np.nan
-    boxes = np.broadcast_to(sides, q.shape)
-    found = look_up(summed_area(light), box_places(q, boxes, PROJECTOR))
+    footprints = np.broadcast_to(footprint, (len(q), 4))
+    found = look_up(summed_area(light), box_places(q, footprints, PROJECTOR))
+    sides, skew = np.array(footprint[:2]), np.array(footprint[2:])
     reach = 8
     padded = np.pad(light, reach + 1)
     for c in range(len(q)):
@@ -41,15 +51,18 @@ def test_the_mean_of_a_box_is_that_of_the_pixels_under_it(sides):
             assert found[c] == 0
             continue
         at = np.rint(q[c]).astype(int)
-        down, across = (
-            box_overlaps((q[c] - at)[axis : axis + 1], boxes[c, axis : axis + 1], reach)[0]
-            for axis in (0, 1)
-        )
         y, x = at + 1
         around = padded[y : y + 2 * reach + 1, x : x + 2 * reach + 1]
-        assert found[c] == pytest.approx(down @ around @ across, abs=1e-6)
-    white = look_up(summed_area(np.ones(PROJECTOR)), box_places(q, boxes, PROJECTOR))
-    np.testing.assert_allclose(white, share_of_boxes(q, boxes, PROJECTOR), atol=1e-6)
+        means = []
+        for middle in (q[c] - at - skew, q[c] - at + skew):
+            down, across = (
+                box_overlaps(middle[axis : axis + 1], sides[axis : axis + 1], reach)[0]
+                for axis in (0, 1)
+            )
+            means.append(down @ around @ across)
+        assert found[c] == pytest.approx(np.mean(means), abs=1e-6)
+    white = look_up(summed_area(np.ones(PROJECTOR)), box_places(q, footprints, PROJECTOR))
+    np.testing.assert_allclose(white, share_of_boxes(q, footprints, PROJECTOR), atol=1e-6)
 
 
 def test_a_box_of_one_pixel_is_the_bilinear_footprint():

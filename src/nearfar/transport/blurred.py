@@ -107,7 +107,7 @@ def blurred_adjoint(
     """
     projector = pyramid.projector
     corners = (projector.height + 1) * (projector.width + 1)
-    lit = np.flatnonzero(where.of_rows.any(axis=1))
+    lit = np.flatnonzero(where.of_rows.any(axis=(0, 2)))
     places = pyramid.places(centres)
     parts = [part for part in np.array_split(lit, PARTS_BACK) if len(part)]
     levels = [np.zeros(int(np.prod(pyramid.shape))) for _ in parts]

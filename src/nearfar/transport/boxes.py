@@ -1,9 +1,13 @@
-"""Direct light of a box of projector pixels: what a camera pixel sees of a fine projector.
+"""Direct light of a few projector pixels: what a camera pixel sees of a fine projector.
 
-The part of the projector that lights a camera pixel is a parallelogram, whose sides are how far q
-moves from one camera pixel to the next. A box of the same spread along each axis stands for it. A
-projector pixel counts by the share of the box that it covers. Sums over boxes of any size are four
-values of a summed-area table (Crow, SIGGRAPH 1984), each interpolated between four entries.
+The part of the projector that lights a camera pixel is a parallelogram about q, whose sides are how
+far q moves from one camera pixel to the next. Halved across its more slanted side, it is two boxes
+of the same spread along each axis, whose middles lie on either side of q. A projector pixel counts
+by the share of the boxes that it covers. Sums over boxes of any size are four values of a
+summed-area table (Crow, SIGGRAPH 1984), each interpolated between four entries.
+
+A footprint is four numbers, in projector pixels: height and width of each box, and how far down and
+across the middle of the second is from q; the first lies as far on the other side.
 
 Index convention: c runs over camera pixels, row by row.
 """
@@ -39,13 +43,14 @@ def spread_summed_area(table: NDArray[Any], projector: Size) -> Floats:
 
 
 class BoxAxes(NamedTuple):
-    """Where boxes read a summed-area table, an axis at a time: four rows times four columns.
+    """Where both boxes of footprints read a summed-area table: four rows times four columns.
 
     Attributes
     ----------
-    rows, columns : ndarray of int32, shape (C, 4)
-    of_rows, of_columns : ndarray of float64, shape (C, 4)
-        Their weights; 0 without direct light.
+    rows, columns : ndarray of int32, shape (2, C, 4)
+        Of each box.
+    of_rows, of_columns : ndarray of float64, shape (2, C, 4)
+        Their weights, half of each box's light; 0 without direct light.
     """
 
     rows: NDArray[np.int32]
@@ -56,83 +61,102 @@ class BoxAxes(NamedTuple):
     def of(self, some: slice | Integers) -> "BoxAxes":
         """Return those of some camera pixels."""
         rows, columns, of_rows, of_columns = self
-        return BoxAxes(rows[some], columns[some], of_rows[some], of_columns[some])
+        return BoxAxes(rows[:, some], columns[:, some], of_rows[:, some], of_columns[:, some])
 
     def places(self, projector: Size) -> Footprint:
-        """Return flat places and weights, both (C, 16)."""
-        rows, columns = self.rows[:, :, None].astype(np.int64), self.columns[:, None]
+        """Return flat places and weights, both (C, 32)."""
+        rows, columns = self.rows[..., :, None].astype(np.int64), self.columns[..., None, :]
         flat = rows * (projector.width + 1) + columns
-        weights: Any = self.of_rows[:, :, None] * self.of_columns[:, None]
-        return Footprint(flat.reshape(-1, 16), weights.reshape(-1, 16))
+        weights: Any = self.of_rows[..., :, None] * self.of_columns[..., None, :]
+        shape = (self.rows.shape[1], 32)
+        flat, weights = (np.moveaxis(v, 0, 1).reshape(shape) for v in (flat, weights))
+        return Footprint(flat, weights)
 
     def means(self, table: Floats, projector: Size) -> Floats:
-        """Return the boxes' mean light, shape (C,), from a flat summed-area table."""
-        flat = (self.rows * np.int64(projector.width + 1))[:, :, None] + self.columns[:, None]
-        along = np.take(table, flat) @ self.of_columns[:, :, None]
-        return np.asarray(np.einsum("cy,cy->c", along[..., 0], self.of_rows))
+        """Return the footprints' mean light, shape (C,), from a flat summed-area table."""
+        total = np.zeros(self.rows.shape[1])
+        for rows, columns, of_rows, of_columns in zip(*self, strict=True):
+            flat = (rows * np.int64(projector.width + 1))[:, :, None] + columns[:, None]
+            along = np.take(table, flat) @ of_columns[:, :, None]
+            total += np.einsum("cy,cy->c", along[..., 0], of_rows)
+        return total
 
     def shares(self, c: int) -> tuple[tuple[slice, slice], Floats]:
-        """Return the projector rows and columns that one box touches, and its share of each pixel.
+        """Return the projector rows and columns that one footprint touches, and its shares.
 
         Returns
         -------
         sides : tuple of slice
         shares : ndarray, shape (rows, columns)
+            Of each projector pixel.
         """
         sides, along = [], []
-        of_axes = ((self.rows[c], self.of_rows[c]), (self.columns[c], self.of_columns[c]))
+        of_axes = (
+            (self.rows[:, c], self.of_rows[:, c]),
+            (self.columns[:, c], self.of_columns[:, c]),
+        )
         for corners, weights in of_axes:
             first, last = int(corners.min()), int(corners.max())
             # A corner's sum holds all pixels before it.
-            along.append((np.arange(first, last)[:, None] < corners) @ weights)
+            before = np.arange(first, last)[None, :, None] < corners[:, None]
+            along.append((before @ weights[..., None])[..., 0])
             sides.append(slice(first, last))
-        return (sides[0], sides[1]), np.outer(*along)
+        return (sides[0], sides[1]), along[0].T @ along[1]
 
 
-def box_axes(correspondence: Floats, widths: Floats, projector: Size) -> BoxAxes:
+def box_axes(correspondence: Floats, footprints: Floats, projector: Size) -> BoxAxes:
     """Return the rows and columns of a summed-area table that boxes read; see `box_places`."""
     q = np.asarray(correspondence).reshape(-1, 2)
-    sides = np.asarray(widths).reshape(-1, 2)
-    shape = (len(q), 4)
+    numbers = np.asarray(footprints).reshape(-1, 4)
+    shape = (2, len(q), 4)
     places = np.empty((2, *shape), dtype=np.int32)
     weights = np.empty((2, *shape))
 
     def work(batch: slice) -> None:
-        middles = np.asarray(q[batch], dtype=np.float64)
-        lit: Booleans = np.asarray(np.isfinite(middles).all(axis=1))
-        middles = np.where(lit[:, None], middles, 0.0)
+        lit: Booleans = np.asarray(np.isfinite(q[batch]).all(axis=1))
+        middles, sides = halves(np.where(lit[:, None], q[batch], 0.0), numbers[batch])
         for axis, length in enumerate(projector):
-            side = np.maximum(np.asarray(sides[batch, axis], dtype=np.float64), LEAST_WIDTH)
+            side = sides[:, axis]
+            # Each of the two boxes has half of the light.
+            half = 0.5 * lit if axis == 0 else lit
             for end, sign in enumerate((-1.0, 1.0)):
                 # Corners of pixels lie half a pixel before their middles.
-                corner = np.clip(middles[:, axis] + 0.5 + 0.5 * sign * side, 0, length)
+                corner = np.clip(middles[..., axis] + 0.5 + 0.5 * sign * side, 0, length)
                 low = np.minimum(np.floor(corner), length - 1)
-                part, scale = corner - low, sign * lit / side
+                part, scale = corner - low, sign * half / side
                 for step, share in enumerate((1 - part, part)):
-                    places[axis, batch, 2 * end + step] = low + step
-                    weights[axis, batch, 2 * end + step] = scale * share
+                    places[axis, :, batch, 2 * end + step] = low + step
+                    weights[axis, :, batch, 2 * end + step] = scale * share
 
     side_by_side(work, blocks(len(q), BATCH_PIXELS))
     return BoxAxes(places[0], places[1], weights[0], weights[1])
 
 
-def box_places(correspondence: Floats, widths: Floats, projector: Size) -> Footprint:
-    """Return the entries of a summed-area table whose weighted sum is a box's mean light.
+def box_places(correspondence: Floats, footprints: Floats, projector: Size) -> Footprint:
+    """Return the entries of a summed-area table whose weighted sum is a footprint's mean light.
 
     Parameters
     ----------
     correspondence : ndarray, shape (..., 2)
-        q, the middle of each box; NaN where there is no direct light, which gets weights of 0.
-    widths : ndarray, shape (..., 2)
-        Height and width of each box, projector pixels. What lies beyond the projector is dark.
+        q; NaN where there is no direct light, which gets weights of 0.
+    footprints : ndarray, shape (..., 4)
+        What lies beyond the projector is dark.
     projector : Size
 
     Returns
     -------
     Footprint
-        Places and weights, both (C, 16).
+        Places and weights, both (C, 32).
     """
-    return box_axes(correspondence, widths, projector).places(projector)
+    return box_axes(correspondence, footprints, projector).places(projector)
+
+
+def halves(correspondence: Floats, footprints: Floats) -> tuple[Floats, Floats]:
+    """Return the middles of both boxes of footprints, (2, C, 2), and their sides, (C, 2)."""
+    q = np.asarray(correspondence, dtype=np.float64).reshape(-1, 2)
+    numbers = np.asarray(footprints, dtype=np.float64).reshape(-1, 4)
+    sides = np.maximum(numbers[:, :2], LEAST_WIDTH)
+    return np.stack([q - numbers[:, 2:], q + numbers[:, 2:]]), sides
 
 
 def box_overlaps(offsets: Floats, widths: Floats, reach: int) -> Floats:
@@ -150,19 +174,24 @@ def box_overlaps(offsets: Floats, widths: Floats, reach: int) -> Floats:
     ndarray, shape (n, 2 reach + 1)
         Of the dtype of the offsets.
     """
-    pixels = np.arange(-reach, reach + 1, dtype=offsets.dtype)
-    half = 0.5 * np.maximum(widths, LEAST_WIDTH).astype(offsets.dtype)[:, None]
-    high = np.minimum(offsets[:, None] + half, pixels + 0.5)
-    low = np.maximum(offsets[:, None] - half, pixels - 0.5)
-    high -= low
-    return np.asarray(np.maximum(high, 0.0, out=high) / (2 * half))
+    edges = np.arange(-reach, reach + 2, dtype=offsets.dtype) - offsets.dtype.type(0.5)
+    scale = (1.0 / np.maximum(widths, LEAST_WIDTH)).astype(offsets.dtype)
+    # Share of the box before each edge between two pixels.
+    before = (edges - offsets[:, None]) * scale[:, None]
+    before += 0.5
+    return np.diff(np.clip(before, 0.0, 1.0, out=before), axis=1)
 
 
-def share_of_boxes(correspondence: Floats, widths: Floats, projector: Size) -> Floats:
-    """Return the share of each box that lies on the projector, (C,); 0 without direct light."""
-    q = np.asarray(correspondence, dtype=np.float64).reshape(-1, 2)
-    half = 0.5 * np.maximum(np.asarray(widths, dtype=np.float64).reshape(-1, 2), LEAST_WIDTH)
-    high = np.minimum(q + half, np.array(projector) - 0.5)
-    low = np.maximum(q - half, -0.5)
-    shares = np.prod(np.maximum(high - low, 0.0) / (2 * half), axis=1)
+def share_of_boxes(correspondence: Floats, footprints: Floats, projector: Size) -> Floats:
+    """Return the share of each footprint that lies on the projector, (C,); 0 without direct light.
+
+    Parameters
+    ----------
+    correspondence, footprints, projector
+        As `box_places` takes them.
+    """
+    middles, sides = halves(correspondence, footprints)
+    high = np.minimum(middles + 0.5 * sides, np.array(projector) - 0.5)
+    low = np.maximum(middles - 0.5 * sides, -0.5)
+    shares = np.prod(np.maximum(high - low, 0.0) / sides, axis=2).mean(axis=0)
     return np.asarray(np.nan_to_num(shares, nan=0.0))

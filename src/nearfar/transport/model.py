@@ -79,9 +79,9 @@ class Transport(NoArray):
     pitch : int
         Projector pixels between the coarsest functions that near-range light is made of, a power of
         two; 1 for single pixels.
-    footprint : ndarray, shape (Cy, Cx, 2), float32, or None
-        Where `pitch` is over 1, height and width of the box of projector pixels about q over which
-        d is spread.
+    footprint : ndarray, shape (Cy, Cx, 4), float32, or None
+        Where `pitch` is over 1, the two boxes of projector pixels about q over which d is spread:
+        height and width of each, and how far down and across their middles are from q.
     black : ndarray, shape (Cy, Cx, channels), float32
         The photo under black: ambient light and black level.
     noise : ndarray, shape (Cy, Cx, channels), float32
@@ -154,10 +154,10 @@ class Transport(NoArray):
 
     @property
     def boxes(self) -> Floats:
-        """Heights and widths of direct light's footprints, shape (C, 2); see `footprint`."""
+        """Direct light's footprints, shape (C, 4); see `footprint`."""
         if self.footprint is None:
-            return np.zeros((self.camera.pixels, 2), dtype=np.float32)
-        return self.footprint.reshape(-1, 2)
+            return np.zeros((self.camera.pixels, 4), dtype=np.float32)
+        return self.footprint.reshape(-1, 4)
 
     @property
     def lit(self) -> Booleans:

@@ -341,7 +341,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
     }
     if near_basis.pitch > 1:
         arrays |= {name: open_array(group, name) for name in OPTIONAL_FACTORS}
-        shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 2))
+        shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 4))
     for name, shape in shapes.items():
         if len(each) != 3 or arrays[name].shape != shape:
             raise UnreadableFileError(

@@ -16,13 +16,9 @@ from nearfar.estimate.joint.cut import (
     share_on_projector,
     solve_cut,
 )
-from nearfar.estimate.joint.footprint import (
-    box_centres,
-    footprint_boxes,
-    footprint_weights,
-    seen_of_projector,
-)
+from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
+from nearfar.estimate.joint.seen import box_centres, seen_of_projector
 from nearfar.estimate.joint.solve import solve_whole, variance_ratio
 from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives, wrap
@@ -77,7 +73,7 @@ def _batch(centres, centred):
         offset_noise=offset_noise(measurements),
         white=white_scale(measurements),
         spike_expected=np.zeros((len(centres), 0), dtype=bool),
-        footprint=np.full((len(centres), 2), 1.4, dtype=np.float32),
+        footprint=np.tile(np.float32([1.4, 1.4, 0.3, -0.2]), (len(centres), 1)),
     )
     return gather(pixels, slice(None), centred, PROJECTOR)
 
@@ -183,16 +179,31 @@ def test_footprints_answer_by_the_pixels_that_they_cover():
     draw = np.random.default_rng(3)
     q = 20 + 30 * draw.random((6, 2))
     q[4] = np.nan
-    boxes = np.array([[0.0, 0.4], [1.0, 1.0], [1.6, 3.3], [7.5, 0.8], [1.0, 1.0], [2.0, 5.0]])
+    footprints = np.array(
+        [
+            [0.0, 0.4, 0.0, 0.0],
+            [1.0, 1.0, 0.3, -0.4],
+            [1.6, 3.3, 0.0, 1.2],
+            [7.5, 0.8, 3.1, 0.2],
+            [1.0, 1.0, 1.0, 1.0],
+            [2.0, 5.0, -2.0, 1.5],
+        ]
+    )
     centres = np.nan_to_num(np.rint(q), nan=0.0).astype(np.int64)
     centred = centred_basis(real_basis(HIGH, PROJECTOR), BASIS)
-    found = footprint_weights(q, centres, boxes, centred)[:, 0]
+    found = footprint_weights(q, centres, footprints, centred)[:, 0]
     assert not found[4].any()
     # Boxes of many points, each of which lights the pixel that it is on.
     points = (np.arange(400) + 0.5) / 400 - 0.5
     for c in (0, 1, 2, 3, 5):
-        sides = [np.rint(q[c, axis] + boxes[c, axis] * points).astype(np.int64) for axis in (0, 1)]
-        places = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+        places = []
+        for skew in (footprints[c, 2:], -footprints[c, 2:]):
+            sides = [
+                np.rint(q[c, axis] + skew[axis] + footprints[c, axis] * points).astype(np.int64)
+                for axis in (0, 1)
+            ]
+            places.append(np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2))
+        places = np.concatenate(places)
         offsets, counts = np.unique(places - centres[c], axis=0, return_counts=True)
         brute = centred.basis.patterns_at(offsets) @ (counts / counts.sum())
         np.testing.assert_allclose(found[c], brute, atol=0.01)
@@ -204,11 +215,26 @@ def test_a_camera_pixel_sees_as_much_as_q_moves_to_the_next():
     # Another surface, and a shadow.
     q[:, 8:] += 30.0
     q[3:5, 2:4] = np.nan
-    seen = seen_of_projector(q).reshape(12, 15, 2)
+    seen = seen_of_projector(q).reshape(12, 15, 4)
     lit = np.isfinite(q[..., 0])
-    np.testing.assert_allclose(
-        seen[lit], np.hypot([1.5, 0.0], [0.4, 2.0]) * np.ones((lit.sum(), 2)), rtol=1e-5
-    )
+    # The sides are (1.5, 0) and (0.4, 2); the boxes halve the slanted one.
+    half = [np.hypot(1.5, 0.2), 1.0, 0.1, 0.5]
+    np.testing.assert_allclose(seen[lit], half * np.ones((lit.sum(), 4)), rtol=1e-5)
+
+
+def test_both_boxes_have_the_spread_of_the_parallelogram():
+    draw = np.random.default_rng(11)
+    for _ in range(5):
+        sides = draw.normal(size=(2, 2)) * 3
+        y, x = np.meshgrid(np.arange(6.0), np.arange(7.0), indexing="ij")
+        q = 100 + y[..., None] * sides[0] + x[..., None] * sides[1]
+        height, width, down, across = seen_of_projector(q)[20].astype(np.float64)
+        points = (draw.random((100_000, 2)) - 0.5) @ sides
+        variance = np.array([height, width]) ** 2 / 12 + np.array([down, across]) ** 2
+        np.testing.assert_allclose(variance, points.var(axis=0), rtol=0.03)
+        # The halved side's slant, of which halves show three quarters.
+        halved = max((np.prod(side) for side in sides), key=abs) / 12
+        assert down * across == pytest.approx(0.75 * halved)
 
 
 @pytest.mark.parametrize("moves", [(0.6, 0.8), (1.0, 1.0), (1.6, 2.3), (5.2, 0.9)])
@@ -248,7 +274,8 @@ def test_the_highest_frequencies_show_the_blur_of_the_projector(blur):
     q[2, 3] = np.nan
     centres = np.nan_to_num(np.rint(q), nan=0.0).astype(np.int64).reshape(-1, 2)
     centred = centred_basis(real_basis(HIGH, PROJECTOR), BASIS)
-    boxes = np.broadcast_to(np.hypot([1.3, 1.7], blur), (camera.pixels, 2))
+    seen = seen_of_projector(q).astype(np.float64)
+    boxes = np.concatenate([np.hypot(seen[:, :2], blur), seen[:, 2:]], axis=1)
     direct = 0.4 * footprint_weights(q.reshape(-1, 2), centres, boxes, centred)[:, :1]
     white = np.full((camera.pixels, 1, 1), 0.5)
     responses = np.concatenate(
@@ -260,8 +287,8 @@ def test_the_highest_frequencies_show_the_blur_of_the_projector(blur):
     measurements = Measurements(
         camera, basis, responses, level, level, np.empty((basis.count, 0), dtype=np.float32)
     )
-    found = footprint_boxes(measurements, q, BASIS).reshape(*camera, 2)
+    found = footprint_boxes(measurements, q, BASIS).reshape(*camera, 4)
     assert not found[2, 3].any()
     lit = np.isfinite(q[..., 0])
-    np.testing.assert_allclose(found[lit], boxes.reshape(*camera, 2)[lit], rtol=0.02)
+    np.testing.assert_allclose(found[lit], boxes.reshape(*camera, 4)[lit], rtol=0.02)
     assert footprint_boxes(measurements, q, NearBasis(5)) is None

@@ -63,7 +63,7 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     shape = (*measurements.camera, measurements.channels)
     footprint = None
     if problem.near_basis.pitch > 1:
-        footprint = fetch(pixels.footprint).reshape(*measurements.camera, 2)
+        footprint = fetch(pixels.footprint).reshape(*measurements.camera, 4)
     # Later sweeps estimate small differences from a mean that a camera pixel's own photos are part
     # of: the first sweep's prior component and scale fit the error (docs/decisions/0011).
     first = rows.choices[0]

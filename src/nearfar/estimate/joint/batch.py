@@ -136,9 +136,9 @@ class AllPixels(NamedTuple):
         As in `PixelBatch`.
     spike_expected : ndarray of bool, shape (C, W^2)
         As in `PixelBatch`.
-    footprint : ndarray, shape (C, 2), float32
-        Height and width of direct light's footprint, projector pixels, where the functions of
-        near-range light are of several.
+    footprint : ndarray, shape (C, 4), float32
+        Direct light's footprint, as `nearfar.transport.boxes` describes it, where the functions of
+        near-range light are of several projector pixels.
     """
 
     responses: Floats

@@ -14,9 +14,11 @@ from nearfar.arrays import Booleans, Floats, Size, beside, fetch, namespace
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
-from nearfar.estimate.joint.footprint import box_centres, footprint_boxes
+from nearfar.estimate.joint.footprint import footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
+from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
+from nearfar.estimate.joint.seen import box_centres
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measurements import Measurements
@@ -31,6 +33,8 @@ SWEEPS = 3
 # Largest shift of q in one sweep, in projector pixels, and largest distance of q from its rounded
 # value.
 LARGEST_SHIFT = 0.25
+# The same where footprints are boxes, whose responses are not linear in q.
+LARGEST_SHIFT_AT_PITCH = 0.12
 LARGEST_FROM_CENTRE = 0.499
 
 
@@ -121,6 +125,8 @@ def _laid_out(
     if near_basis.pitch > 1:
         correspondence = box_centres(correspondence)
     boxes = footprint_boxes(measurements, correspondence, near_basis)
+    if boxes is not None:
+        correspondence, boxes = own_footprints(measurements, correspondence, boxes, near_basis)
     return lay_out(measurements, correspondence, near_basis, device, boxes)
 
 
@@ -150,12 +156,13 @@ def _about_new_q(problem: Problem) -> Problem:
     """Return the problem about the q that its last sweep found, with the footprints of these q."""
     pixels, measurements = problem.pixels, problem.measurements
     q = fetch(pixels.correspondence).reshape(*measurements.camera, 2)
-    changes = (
-        near.centre(q, measurements.projector),
-        footprint_boxes(measurements, q, problem.near_basis),
-    )
-    centres, boxes = (beside(np.asarray(values), pixels.white) for values in changes)
-    return problem._replace(pixels=pixels._replace(centres=centres, footprint=boxes))
+    voted = footprint_boxes(measurements, q, problem.near_basis)
+    assert voted is not None
+    q, footprints = own_footprints(measurements, q, voted, problem.near_basis)
+    changes = (q.reshape(-1, 2), near.centre(q, measurements.projector), footprints)
+    moved, centres, boxes = (beside(values, pixels.white) for values in changes)
+    changed = pixels._replace(correspondence=moved, centres=centres, footprint=boxes)
+    return problem._replace(pixels=changed)
 
 
 def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: bool) -> Floats:
@@ -170,7 +177,8 @@ def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: boo
     energy = xp.clip(xp.sum(direct**2, axis=1), min=float(np.finfo(np.float32).tiny))
     shifts = amplitudes[..., 2:COMMON_AMPLITUDES]
     off = xp.sum(shifts * direct[..., None], axis=1) / energy[:, None]
-    within = xp.clip(off, -LARGEST_SHIFT, LARGEST_SHIFT)
+    largest = LARGEST_SHIFT if problem.near_basis.pitch == 1 else LARGEST_SHIFT_AT_PITCH
+    within = xp.clip(off, -largest, largest)
     off = xp.where((xp.sum(direct, axis=1) > 0)[:, None], within, 0.0)
     pixels, centres = problem.pixels, xp.astype(problem.pixels.centres, xp.float64)
     last = beside(np.array(problem.measurements.projector) - 1.0, amplitudes)

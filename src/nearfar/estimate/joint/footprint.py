@@ -8,18 +8,22 @@ far-range light have faded, are most like the measured ones. Neighbours vote for
 Index convention: arrays are (n, channels, ...); r runs over real responses, s over blurs.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.estimate.joint.seen import MEDIAN_SIDE, reach_of, seen_of_projector
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.boxes import box_overlaps
+from nearfar.transport.boxes import box_overlaps, halves
 from nearfar.transport.direct import direct_weights
 
 # Least frequency, in cycles per cell of the coarsest pitch: near-range light has faded there.
@@ -28,24 +32,17 @@ LEAST_CYCLES = 0.45
 BLURS = np.array([0.0, 0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0])
 # Side of the square of camera pixels that vote.
 VOTERS = 7
-# q moves from one camera pixel to the next by the median over a square of this side.
-MEDIAN_SIDE = 3
 # Rows of the camera on either side of a camera pixel that its footprint depends on.
 VOTING_ROWS = VOTERS // 2 + MEDIAN_SIDE // 2 + 1
-# Step of the differences by which direct light's derivatives are taken, in projector pixels.
-STEP = 0.05
-# A farther move, in projector pixels, leads to another surface.
-LARGEST_MOVE = 24.0
-# Moves to both sides stay on one surface if the larger is at most as many times the smaller, plus
-# as many projector pixels.
-LARGEST_RATIO, LARGEST_DIFFERENCE = 1.5, 0.5
-# Steps by which the middles of boxes are found from their centroids.
-CENTRE_STEPS = 12
+# Step of the differences by which direct light's derivatives are taken, in projector pixels. Boxes
+# that lie within one pixel do not change with q: with 0.05, derivatives next to such places say too
+# little, and q moves too far.
+STEP = 0.1
 BATCH_PIXELS = 4096
 
 
 def footprint_weights(
-    correspondence: Floats, centres: NDArray[np.int64], boxes: Floats, centred: CentredBasis
+    correspondence: Floats, centres: NDArray[np.int64], footprints: Floats, centred: CentredBasis
 ) -> Floats:
     """Return unit direct light and its derivatives by q, as weights of ``centred.on_footprint``.
 
@@ -54,8 +51,8 @@ def footprint_weights(
     correspondence : ndarray, shape (n, 2)
     centres : ndarray of int, shape (n, 2)
         q rounded.
-    boxes : ndarray, shape (n, 2)
-        Heights and widths of footprints; not used where the footprint is bilinear.
+    footprints : ndarray, shape (n, 4)
+        As `nearfar.transport.boxes` describes them; not used where the footprint is bilinear.
     centred : CentredBasis
 
     Returns
@@ -66,31 +63,56 @@ def footprint_weights(
     if centred.near_basis.pitch == 1:
         return direct_weights(correspondence, centres)
     lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
-    offsets = np.where(lit[:, None], correspondence - centres, 0.0).astype(np.float32)
-    reach = _reach(boxes)
-    overlaps, slopes = [], []
-    for axis in (0, 1):
-        at, before, after = (
-            box_overlaps(offsets[:, axis] + np.float32(step), boxes[:, axis], reach)
-            for step in (0.0, -STEP, STEP)
-        )
-        overlaps.append(at)
-        slopes.append((after - before) / (2 * STEP))
-    waves, steep = (
-        [_waves(values, axis, centred) for axis, values in enumerate(of_axes)]
-        for of_axes in (overlaps, slopes)
-    )
-    found = np.empty((len(offsets), 3, centred.basis.count), dtype=np.float32)
-    parts = ((waves[0], waves[1]), (steep[0], waves[1]), (waves[0], steep[1]))
-    for place, (down, across) in enumerate(parts):
-        found[:, place] = _real(down * across, centred)
+    middles = np.where(lit[:, None], correspondence - centres, 0.0)
+    found = np.empty((len(middles), 3, centred.basis.count), dtype=np.float32)
+    reach = reach_of(footprints, STEP)
+
+    def of_box(middles: Floats, widths: Floats) -> list[NDArray[np.complex64]]:
+        waves, steep = [], []
+        for axis in (0, 1):
+            at, before, after = (
+                box_overlaps(middles[:, axis] + np.float32(step), widths[:, axis], reach)
+                for step in (0.0, -STEP, STEP)
+            )
+            waves.append(_waves(at, axis, centred))
+            steep.append(_waves((after - before) / np.float32(2 * STEP), axis, centred))
+        return [waves[0] * waves[1], steep[0] * waves[1], waves[0] * steep[1]]
+
+    for part, waves in enumerate(_mean_of_boxes(middles, footprints, of_box)):
+        found[:, part] = _real(waves, centred)
     found[~lit] = 0.0
     return found
 
 
-def _reach(boxes: Floats) -> int:
-    """Return the projector pixels from the rounded q that boxes may touch."""
-    return int(np.ceil(0.5 * boxes.max(initial=0.0) + 0.5 + STEP)) + 1
+def _mean_of_boxes(
+    middles: Floats,
+    footprints: Floats,
+    of_box: Callable[[Floats, Floats], list[NDArray[np.complex64]]],
+) -> list[NDArray[np.complex64]]:
+    """Return the means over both boxes of what `of_box` returns for middles and widths (n, 2).
+
+    Both are float32. The boxes of an upright footprint are the same, and asked for once.
+    """
+    both, widths = (part.astype(np.float32) for part in halves(middles, footprints))
+    found = of_box(both[0], widths)
+    (slanted,) = np.nonzero(footprints[:, 2:].any(axis=1))
+    for first, second in zip(found, of_box(both[1, slanted], widths[slanted]), strict=True):
+        first[slanted] = (first[slanted] + second) * np.float32(0.5)
+    return found
+
+
+def unit_responses(middles: Floats, footprints: Floats, centred: CentredBasis) -> Floats:
+    """Return responses of unit direct light, (n, R), at middles (n, 2) from rounded q."""
+    reach = reach_of(footprints)
+
+    def of_box(middles: Floats, widths: Floats) -> list[NDArray[np.complex64]]:
+        down, across = (
+            _waves(box_overlaps(middles[:, axis], widths[:, axis], reach), axis, centred)
+            for axis in (0, 1)
+        )
+        return [down * across]
+
+    return _real(_mean_of_boxes(middles, footprints, of_box)[0], centred)
 
 
 def _waves(overlaps: Floats, axis: int, centred: CentredBasis) -> NDArray[np.complex64]:
@@ -103,15 +125,14 @@ def _waves(overlaps: Floats, axis: int, centred: CentredBasis) -> NDArray[np.com
 
 def _real(waves: NDArray[np.complex64], centred: CentredBasis) -> Floats:
     """Return the responses to cosines and sines, (n, R), of conjugate responses (n, K)."""
-    basis = centred.basis
-    # The parts of a complex number are its cosine and its sine, where a frequency has both.
-    return np.asarray(waves.view(np.float32)[:, 2 * basis.index + basis.is_sine])
+    parts = np.ascontiguousarray(waves).view(np.float32)
+    return parts[:, 2 * centred.basis.index + centred.basis.is_sine]
 
 
 def footprint_boxes(
     measurements: Measurements, correspondence: Floats, near_basis: NearBasis
 ) -> Floats | None:
-    """Return height and width of each camera pixel's footprint.
+    """Return each camera pixel's footprint, blurred as neighbours vote.
 
     Parameters
     ----------
@@ -121,45 +142,30 @@ def footprint_boxes(
 
     Returns
     -------
-    ndarray, shape (C, 2), float32
-        Projector pixels; 0 without direct light. None where functions are of single pixels, and
-        the footprint is bilinear.
+    ndarray, shape (C, 4), float32
+        As `nearfar.transport.boxes` describes them; 0 without direct light. None where functions
+        are of single pixels, and the footprint is bilinear.
     """
     if near_basis.pitch == 1:
         return None
-    basis, camera = measurements.basis, measurements.camera
-    spread = seen_of_projector(correspondence)
-    high = [
-        k
-        for k, cycles in zip(basis.frequencies, basis.cycles, strict=True)
-        if np.hypot(*cycles) * near_basis.pitch >= LEAST_CYCLES
-    ]
-    if not high:
-        return spread
-    indices = measurements.response_indices(high)
-    centred = centred_basis(real_basis(high, measurements.projector), near_basis)
+    camera = measurements.camera
+    seen = seen_of_projector(correspondence)
+    high = high_responses(measurements, near_basis)
+    if high is None:
+        return seen
     number, blurs = camera.pixels, BLURS[near_basis.pitch >= BLURS]
     q = correspondence.reshape(-1, 2).astype(np.float64)
     lit: Booleans = np.asarray(np.isfinite(q).all(axis=1))
     centres = near.centre(correspondence, measurements.projector)
-    weight = measurements.multiplicity[indices]
     explained = np.zeros((number, len(blurs)), dtype=np.float32)
 
     def work(batch: slice) -> None:
-        responses = centred.recentre(measurements.responses[batch][..., indices], centres[batch])
-        noise = np.maximum(measurements.noise[batch] ** 2, 1e-12)
-        offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0).astype(np.float32)
+        responses = high.at(batch, centres[batch])
+        offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0)
         for place, blur in enumerate(blurs):
-            boxes = np.hypot(spread[batch], blur)
-            reach = _reach(boxes)
-            down, across = (
-                _waves(box_overlaps(offsets[:, axis], boxes[:, axis], reach), axis, centred)
-                for axis in (0, 1)
+            explained[batch, place] = high.explained(
+                responses, offsets, _blurred(seen[batch], blur)
             )
-            direct = _real(down * across, centred)
-            along = np.maximum(np.einsum("nir,nr->ni", responses * weight, direct), 0.0)
-            squared = np.maximum(np.einsum("nr,nr->n", direct * weight, direct), 1e-12)
-            explained[batch, place] = np.sum(along**2 / noise, axis=1) / squared
 
     side_by_side(work, blocks(number, BATCH_PIXELS))
     explained *= lit[:, None]
@@ -167,71 +173,67 @@ def footprint_boxes(
         explained.reshape(*camera, -1), (VOTERS, VOTERS, 0), mode="nearest"
     ).reshape(number, -1)
     blur = blurs[np.argmax(voted, axis=1)]
-    return np.asarray(np.hypot(spread, blur[:, None]) * lit[:, None], dtype=np.float32)
+    return _blurred(seen, blur[:, None]) * lit[:, None]
 
 
-def box_centres(correspondence: Floats) -> Floats:
-    """Return the middles of the boxes whose centroids on the pixels are q, (Cy, Cx, 2).
+@dataclass(frozen=True, eq=False)
+class HighResponses:
+    """Responses to frequencies at which near- and far-range light have faded.
 
-    The centroid of the shares of a box in whole pixels is not its middle: that of a box within one
-    pixel is the pixel's.
-
-    Parameters
+    Attributes
     ----------
-    correspondence : ndarray, shape (Cy, Cx, 2)
-        q as correspondence finds it, a centroid.
+    measurements : Measurements
+    indices : ndarray of int, shape (R,)
+        Of these responses among the measured ones.
+    centred : CentredBasis
+        Their frequencies.
     """
-    q = correspondence.reshape(-1, 2).astype(np.float64)
-    boxes = seen_of_projector(correspondence)
-    found = np.nan_to_num(q, nan=0.0)
-    for batch in blocks(len(q), BATCH_PIXELS):
-        rounded = np.rint(found[batch])
-        wanted, widths = found[batch] - rounded, boxes[batch]
-        reach = _reach(widths)
-        pixels = np.arange(-reach, reach + 1)
-        middles = wanted.copy()
-        for _ in range(CENTRE_STEPS):
-            for axis in (0, 1):
-                overlaps = box_overlaps(middles[:, axis], widths[:, axis], reach)
-                # A centroid moves by at most 1 / width times as much as the middle.
-                off = wanted[:, axis] - overlaps @ pixels
-                middles[:, axis] += off * np.clip(widths[:, axis], 0.0, 1.0)
-        found[batch] = rounded + middles
-    return np.where(np.isnan(q), np.nan, found).reshape(correspondence.shape)
+
+    measurements: Measurements
+    indices: NDArray[np.int64]
+    centred: CentredBasis
+
+    def at(self, selected: slice | Integers, centres: NDArray[np.int64]) -> Floats:
+        """Return re-centred responses over the noise, (n, channels, R), of some camera pixels."""
+        noise = np.maximum(self.measurements.noise[selected], 1e-6)[..., None]
+        responses = self.measurements.responses[selected][..., self.indices]
+        weights = np.sqrt(self.measurements.multiplicity[self.indices])
+        return self.centred.recentre(responses, centres) * (weights / noise).astype(np.float32)
+
+    def explained(self, responses: Floats, middles: Floats, footprints: Floats) -> Floats:
+        """Return how much of the power of responses direct light of footprints explains, (n,).
+
+        Parameters
+        ----------
+        responses : ndarray, shape (n, channels, R)
+            As `at` gives them.
+        middles : ndarray, shape (n, 2)
+            Middles of the footprints, from the rounded q.
+        footprints : ndarray, shape (n, 4)
+        """
+        direct = unit_responses(middles, footprints, self.centred)
+        direct = direct * np.sqrt(self.measurements.multiplicity[self.indices])
+        along = np.maximum(np.einsum("nir,nr->ni", responses, direct), 0.0)
+        squared = np.maximum(np.einsum("nr,nr->n", direct, direct), 1e-12)
+        return np.asarray(np.sum(along**2, axis=1) / squared)
 
 
-def seen_of_projector(correspondence: Floats) -> Floats:
-    """Return the height and width of what each camera pixel sees of the projector, (C, 2), float32.
+def high_responses(measurements: Measurements, near_basis: NearBasis) -> HighResponses | None:
+    """Return the responses to the highest frequencies, or None if none was measured."""
+    basis = measurements.basis
+    high = [
+        k
+        for k, cycles in zip(basis.frequencies, basis.cycles, strict=True)
+        if np.hypot(*cycles) * near_basis.pitch >= LEAST_CYCLES
+    ]
+    if not high:
+        return None
+    centred = centred_basis(real_basis(high, measurements.projector), near_basis)
+    return HighResponses(measurements, measurements.response_indices(high), centred)
 
-    A parallelogram whose sides are how far q moves from one camera pixel to the next has the same
-    spread along each axis as a box of the root of the sum of their squares.
 
-    Parameters
-    ----------
-    correspondence : ndarray, shape (Cy, Cx, 2)
-        q.
-    """
-    camera = Size(*correspondence.shape[:2])
-    squared = np.zeros((*camera, 2))
-    for axis in (0, 1):
-        move = np.abs(np.diff(correspondence, axis=axis))
-        move[~(move.max(axis=-1) <= LARGEST_MOVE)] = np.nan
-        padding = [(0, 0)] * 3
-        padding[axis] = (1, 1)
-        padded = np.pad(move, padding, constant_values=np.nan)
-        both = (np.delete(padded, 0, axis=axis), np.delete(padded, -1, axis=axis))
-        # The mean of the moves to both sides, or the smaller if one leads to another surface.
-        least, most = np.fmin(*both), np.fmax(*both)
-        alike = most.max(axis=-1) <= LARGEST_RATIO * least.max(axis=-1) + LARGEST_DIFFERENCE
-        known = np.nan_to_num(np.where(alike[..., None], (least + most) / 2, least), nan=0.0)
-        squared += (
-            np.stack(
-                [
-                    ndimage.median_filter(known[..., part], MEDIAN_SIDE, mode="nearest")
-                    for part in (0, 1)
-                ],
-                axis=-1,
-            )
-            ** 2
-        )
-    return np.sqrt(squared).reshape(-1, 2).astype(np.float32)
+def _blurred(footprints: Floats, blur: Floats | float) -> Floats:
+    """Return footprints whose boxes are blurred by a box of a width."""
+    found = footprints.copy()
+    found[:, :2] = np.hypot(found[:, :2], blur)
+    return found

@@ -173,8 +173,8 @@ def lay_out(
     near_basis : NearBasis
     device : {"cpu", "cuda", "torch"}
         Device of all arrays but those of `measurements`.
-    footprint : ndarray, shape (C, 2), optional
-        Heights and widths of footprints, as `footprint_boxes` gives them.
+    footprint : ndarray, shape (C, 4), optional
+        Footprints, as `footprint_boxes` gives them.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def lay_out(
         offset_noise=offset_noise(measurements),
         white=white,
         spike_expected=expected_spikes(correspondence, near_basis),
-        footprint=np.zeros((len(lit), 2), dtype=np.float32) if footprint is None else footprint,
+        footprint=np.zeros((len(lit), 4), dtype=np.float32) if footprint is None else footprint,
     )
     pixels = AllPixels._make(map(mover(device), pixels))
     return Problem(measurements, model, pixels, near_basis)

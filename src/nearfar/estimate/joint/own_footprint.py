@@ -39,6 +39,8 @@ DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
 ALONG_Q = DIRECTIONS[[0, 1, 6, 7]]
 # Times that each step is tried in each direction.
 ROUNDS = 2
+# Camera pixels that are searched at once.
+SEARCHED_PIXELS = 1024
 # Sides of a box are no narrower, in projector pixels; and q moves by at most as much.
 NARROWEST, FARTHEST = 0.1, 1.0
 
@@ -71,34 +73,39 @@ def own_footprints(
     centres = near.centre(correspondence, measurements.projector)
     last = np.array(measurements.projector) - 1.0
 
-    def work(batch: slice) -> None:
+    before, power = np.zeros(len(q)), np.zeros(len(q))
+    count = measurements.channels * high.centred.basis.count
+
+    def explain(batch: slice) -> None:
         selected = batch.start + np.flatnonzero(lit[batch])
         middles = q[selected] - centres[selected]
         responses = high.at(selected, centres[selected])
-        before = high.explained(responses, middles, footprints[selected])
-        power = np.sum(responses.astype(np.float64) ** 2, axis=(1, 2))
-        count = responses.shape[1] * responses.shape[2]
-        doubted = np.flatnonzero(power - before > LEAST_MISFIT * count)
-        if not len(doubted):
-            return
-        selected, responses, before = selected[doubted], responses[doubted], before[doubted]
-        power = power[doubted]
-        start = np.concatenate([middles[doubted], footprints[selected]], axis=1)
+        before[selected] = high.explained(responses, middles, footprints[selected])
+        power[selected] = np.sum(responses.astype(np.float64) ** 2, axis=(1, 2))
+
+    side_by_side(explain, blocks(len(q), BATCH_PIXELS))
+    doubted = np.flatnonzero(power - before > LEAST_MISFIT * count)
+
+    def search_in(batch: slice) -> None:
+        selected = doubted[batch]
+        responses = high.at(selected, centres[selected])
+        middles = q[selected] - centres[selected]
+        start = np.concatenate([middles, footprints[selected]], axis=1)
         search = _Search(high, start)
         # What another q explains needs no other footprint.
-        numbers, by_q = search.descend(responses, start, before, ALONG_Q)
-        shaped = np.flatnonzero(power - by_q > LEAST_MISFIT * count)
+        numbers, by_q = search.descend(responses, start, before[selected], ALONG_Q)
+        shaped = np.flatnonzero(power[selected] - by_q > LEAST_MISFIT * count)
         search = _Search(high, start[shaped])
         own, best = search.start(responses[shaped], numbers[shaped], by_q[shaped])
         own, best = search.descend(responses[shaped], own, best, DIRECTIONS)
         accepted = best - by_q[shaped] > 2 * LEAST_GAIN
         numbers[shaped[accepted]], by_q[shaped[accepted]] = own[accepted], best[accepted]
-        accepted = by_q - before > 2 * LEAST_GAIN
+        accepted = by_q - before[selected] > 2 * LEAST_GAIN
         selected, numbers = selected[accepted], numbers[accepted]
         q[selected] = np.clip(centres[selected] + numbers[:, :2], 0.0, last)
         found[selected] = numbers[:, 2:]
 
-    side_by_side(work, blocks(len(q), BATCH_PIXELS))
+    side_by_side(search_in, blocks(len(doubted), SEARCHED_PIXELS))
     return q.reshape(correspondence.shape), found
 
 

@@ -198,7 +198,7 @@ def _choose(
 ) -> _Chosen:
     """Choose a plan, for the scene of a look if there is one."""
     from nearfar.plan import choose_plan
-    from nearfar.plan.choose import MOST_LISTED, NOISE
+    from nearfar.plan.choose import NOISE, can_list_every_frequency
     from nearfar.plan.look import photos_for_window
 
     seen = None if look is None else _looked_at(look, projector)
@@ -212,7 +212,7 @@ def _choose(
         noise=NOISE if seen is None else seen.noise,
         checks=None if checks else 0,
         every_frequency=(
-            seen is not None and not seen.model_holds and projector.pixels <= MOST_LISTED
+            seen is not None and not seen.model_holds and can_list_every_frequency(projector)
         ),
         progress=progress,
     )

@@ -156,10 +156,10 @@ def choose_plan(
             f"a projector of {projector} is no pattern grid to choose frequencies on: its sides "
             f"must be from {SMALLEST_SIDE} to {LARGEST_SIDE} pixels, or one of them 1."
         )
-    if every_frequency and projector.pixels > MOST_LISTED:
+    if every_frequency and not can_list_every_frequency(projector):
         raise PlanError(
             f"a projector of {projector} has too many frequencies to list them all: plan for a "
-            f"pattern grid of at most {MOST_LISTED} pixels."
+            f"pattern grid of at most {MOST_LISTED} pixels whose windows are of single pixels."
         )
     pitch = pitch_of(projector)
     window = default_window(projector, pitch) if window is None else window
@@ -225,6 +225,15 @@ def choose_plan(
         ),
     )
     return plan, choice.expected
+
+
+def can_list_every_frequency(projector: Size) -> bool:
+    """Return whether photos can be of all frequencies of a projector, the lowest first.
+
+    Not where a window's functions are of several projector pixels: photos that end at a low
+    frequency would tell neither q nor direct light, and those of every frequency are too many.
+    """
+    return pitch_of(projector) == 1 and projector.pixels <= MOST_LISTED
 
 
 def photos_of_every_frequency(projector: Size) -> int:

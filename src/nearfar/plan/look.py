@@ -79,7 +79,7 @@ def look_at(transport: "Transport") -> Look:
     reach = _reach(transport)
     wanted = 0 if reach is None else 2 * round((WINDOW_OVER_REACH * reach - 1) / 2) + 1
     # All odd; a look tells little of what lies far beyond its own window.
-    last = largest_window(transport.projector)
+    last = largest_window(transport.projector, transport.pitch)
     largest = min(LARGEST_WINDOW, last - 1 + last % 2, 2 * transport.window - 1)
     return Look(
         typical=typical,

@@ -1,7 +1,7 @@
 """Description of a plan."""
 
 from nearfar.plan import Plan
-from nearfar.plan.choose import MOST_LISTED, photos_of_every_frequency
+from nearfar.plan.choose import can_list_every_frequency, photos_of_every_frequency
 from nearfar.plan.expected_range import ExpectedRange
 from nearfar.plan.look import Look
 from nearfar.plan.window import largest_window
@@ -92,7 +92,7 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
             f"the scene is not direct, near-range and far-range light alone: by its light, "
             f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
         )
-        if plan.projector.pixels > MOST_LISTED:
+        if not can_list_every_frequency(plan.projector):
             return f"{found}. The projector has too many frequencies to do without them"
         if plan.transport_photos >= plan.projector.pixels:
             return f"{found}. Planned without them: all frequencies are shown"

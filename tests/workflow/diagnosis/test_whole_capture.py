@@ -9,12 +9,13 @@ from nearfar.workflow.diagnosis.misfit import (
     CAUSES,
     DOWN,
     GAIN,
+    OFFSET,
     PROJECTOR_DOWN,
     PROJECTOR_FOCUS,
     REGIONS_A_SIDE,
     NormalEquations,
 )
-from nearfar.workflow.diagnosis.whole_capture import find_changes
+from nearfar.workflow.diagnosis.whole_capture import find_changes, find_changes_of_light
 
 PHOTOS = 100
 WHITES = np.arange(0, PHOTOS, 11)
@@ -37,6 +38,40 @@ def found(cause, sizes, *, regions=slice(None), information=INFORMATION, misfit=
 
 def step(photo, size=1.0):
     return np.where(np.arange(PHOTOS) < photo, -size / 2, size / 2)
+
+
+def _of_light(effects, inverses):
+    """Return what changes of light are found where photos differ by gains and offsets alone."""
+    every = np.zeros((PHOTOS, 1, CAUSES))
+    for photo, (gain, offset) in effects.items():
+        every[photo, 0, [GAIN, OFFSET]] = gain, offset
+    # So sure that each of them explains more than enough.
+    information = 1e8
+    matrix = np.broadcast_to(information * np.eye(CAUSES), (PHOTOS, 1, CAUSES, CAUSES))
+    equations = NormalEquations(matrix, information * every, VALUES)
+    return find_changes_of_light(equations, inverses)
+
+
+def test_a_photo_and_its_inverse_that_are_white_together_were_under_the_same_light():
+    pair = [(30, 31), (31, 30)]
+    wrong_model = {30: (-0.0166, 0.0071), 31: (-0.0149, 0.0070)}
+    assert _of_light(wrong_model, pair) is None
+    assert _of_light(wrong_model, [])[1].photos == (30, 31)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {30: (-0.02, 0.0)},
+        {30: (-0.02, 0.0), 31: (-0.02, 0.0)},
+        {30: (-0.02, 0.0), 31: (0.02, 0.0)},
+        {30: (0.0, 0.02), 31: (0.0, 0.02)},
+        {30: (0.0, 0.02)},
+    ],
+)
+def test_other_light_is_found_in_photos_with_an_inverse(effects):
+    _, change = _of_light(effects, [(30, 31), (31, 30)])
+    assert change.photos == tuple(effects)
 
 
 @pytest.mark.parametrize("cause", [PROJECTOR_DOWN, PROJECTOR_FOCUS])

@@ -22,6 +22,7 @@ from nearfar.workflow.diagnosis.inverse_pairs import (
 from nearfar.workflow.diagnosis.misfit import (
     SteadyPhotos,
     fit_photos,
+    inverse_photos,
     is_white_or_black,
     normal_equations,
     serves,
@@ -98,7 +99,7 @@ def find_what_spoils(
     if suspected is False:
         checks = serves(plan, "check")
         equations, misfit = equations.without(checks), np.where(checks, 1.0, misfit)
-    found = find_changes(equations, misfit, photos.drift.references.whites)
+    found = find_changes(equations, misfit, photos.drift.references.whites, inverse_photos(plan))
     if not found:
         return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.

@@ -25,6 +25,7 @@ from nearfar.illumination.frequencies import DC
 from nearfar.photometry.photos import Photos
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import is_reference
+from nearfar.plan.patterns import HalfScreen, Pattern, Picture
 from nearfar.transport.model import Transport
 from nearfar.workflow.diagnosis.sample import PATCH, CameraSample
 
@@ -34,6 +35,9 @@ MODEL_ERROR_OF_MEAN = 0.0005
 # Smallest change of exposure, and of ambient light as a share of white, that is reported: errors of
 # the model may look like smaller ones.
 SMALLEST_CHANGE = 0.01
+# Share of a change of light that is left of it in the sum of the photo and that of the inverse
+# pattern.
+LEAST_IN_SUM = 0.5
 # Values of patterns that are drawn at a time.
 MOST_DRAWN = 2**26
 # The picture is divided into as many regions down and across.
@@ -312,6 +316,19 @@ def _regions(sample: CameraSample) -> Integers:
 def serves(plan: Plan, *purposes: str) -> Booleans:
     """Return which photos of a plan serve one of some purposes, (photos,)."""
     return np.array([pattern.purpose in purposes for pattern in plan.patterns])
+
+
+def inverse_photos(plan: Plan) -> list[tuple[int, int]]:
+    """Return every photo of a plan with each photo of the inverse of its pattern, both ways."""
+    numbers: dict[Pattern, list[int]] = {}
+    for number, pattern in enumerate(plan.patterns):
+        numbers.setdefault(pattern, []).append(number)
+    found = []
+    for pattern, mine in numbers.items():
+        if isinstance(pattern, Sinusoid | HalfScreen | Picture):
+            inverse = pattern.model_copy(update={"inverse": not pattern.inverse})
+            found += [(one, other) for one in mine for other in numbers.get(inverse, [])]
+    return found
 
 
 def is_white_or_black(plan: Plan) -> Booleans:

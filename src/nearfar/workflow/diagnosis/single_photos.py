@@ -32,9 +32,11 @@ from nearfar.photometry.measure import measure
 from nearfar.plan import Plan, Sinusoid
 from nearfar.transport.model import Transport
 from nearfar.workflow.diagnosis.misfit import (
+    LEAST_IN_SUM,
     SMALLEST_CHANGE,
     PhotoFits,
     fit_photos,
+    inverse_photos,
     is_white_or_black,
     mean_white,
     relight,
@@ -286,7 +288,7 @@ def _explanations(fits: PhotoFits, plan: Plan, number: int) -> Iterator[Explanat
     channels = photo.shape[2]
     for order in list(permutations(range(channels)))[1:] if 1 < channels <= 4 else []:
         yield Explanation("colours", float(squares(relit[..., list(order)]).mean()))
-    yield _exposure(fits, number, weight)
+    yield exposure_change(fits, number)
     own = squares(relit).sum(axis=(1, 2))
     for other in range(max(0, number - TORN_REACH), min(len(fits.photos), number + TORN_REACH + 1)):
         if plan.patterns[other] == plan.patterns[number]:
@@ -303,19 +305,39 @@ def _explanations(fits: PhotoFits, plan: Plan, number: int) -> Iterator[Explanat
         yield Explanation("interlaced", float(interlaced / values), other)
 
 
-def _exposure(fits: PhotoFits, number: int, weight: Floats) -> Explanation:
-    """Return the change of lamp and ambient light that fits a photo best."""
+def exposure_change(fits: PhotoFits, number: int) -> Explanation:
+    """Return the change of lamp and ambient light that fits a photo best.
+
+    It explains nothing if it is small; nor if the photo and that of the inverse pattern sum to
+    white without it, as then the model is wrong and the light was not.
+
+    Parameters
+    ----------
+    fits : PhotoFits
+    number : int
+        Of the photo.
+    """
     lit = fits.relit[number] - fits.black
-    difference = fits.photos[number] - fits.relit[number]
     effects = np.stack([lit.ravel(), np.ones(lit.size, dtype=np.float32)]).astype(np.float64)
-    weighted = effects * weight.ravel()
-    solved = np.linalg.lstsq(weighted @ effects.T, weighted @ difference.ravel(), rcond=None)[0]
-    rest = difference.ravel() - solved @ effects
-    misfit = float((weight.ravel() * rest**2).mean())
-    gain, offset = float(solved[0]), float(solved[1]) / mean_white(fits)
-    if max(abs(gain), abs(offset)) < SMALLEST_CHANGE:
+    weight = 1 / fits.variance[number].ravel()
+    weighted = effects * weight
+    # What is left of the photo, and of its sum with that of the inverse pattern.
+    differences = [(fits.photos[number] - fits.relit[number]).ravel()]
+    for inverse in (other for one, other in inverse_photos(fits.plan) if one == number):
+        differences.append(differences[0] + (fits.photos[inverse] - fits.relit[inverse]).ravel())
+    solved, *of_sums = (
+        np.linalg.lstsq(weighted @ effects.T, weighted @ difference, rcond=None)[0]
+        * [1.0, 1.0 / mean_white(fits)]
+        for difference in differences
+    )
+    rest = differences[0] - (solved * [1.0, mean_white(fits)]) @ effects
+    misfit = float((weight * rest**2).mean())
+    largest = float(np.abs(solved).max())
+    if largest < SMALLEST_CHANGE or any(
+        float(np.abs(of_sum).max()) < LEAST_IN_SUM * largest for of_sum in of_sums
+    ):
         misfit = np.inf
-    return Explanation("exposure", misfit, gain=gain, offset=offset)
+    return Explanation("exposure", misfit, gain=float(solved[0]), offset=float(solved[1]))
 
 
 def _as_faults(explained: Mapping[int, Explanation | None]) -> list[Spoilt]:

@@ -4,7 +4,7 @@ How much of the photos' misfits each of them explains is read off the normal equ
 `nearfar.workflow.diagnosis.misfit`, in misfits summed over photos: 1 is a photo's noise.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from nearfar.workflow.diagnosis.misfit import (
     CAMERA_FOCUS,
     DOWN,
     GAIN,
+    LEAST_IN_SUM,
     OFFSET,
     PROJECTOR_ACROSS,
     PROJECTOR_DOWN,
@@ -85,7 +86,12 @@ class Step(NamedTuple):
     size: NDArray[np.float64]
 
 
-def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -> list[Spoilt]:
+def find_changes(
+    equations: NormalEquations,
+    misfit: Floats,
+    whites: Integers,
+    inverses: Sequence[tuple[int, int]] = (),
+) -> list[Spoilt]:
     """Find the changes of rig and scene while photos were taken, at one moment or all the time.
 
     Parameters
@@ -94,6 +100,8 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
     misfit : ndarray, shape (photos,)
     whites : ndarray of int
         Numbers of the photos of white.
+    inverses : sequence of tuple of int
+        Photos, and those of the inverses of their patterns.
 
     Returns
     -------
@@ -142,7 +150,7 @@ def find_changes(equations: NormalEquations, misfit: Floats, whites: Integers) -
         photo = regions[region].photo
         pixels = _shift(equations, photo, whites, region)
         found.append((in_regions, Moved("scene", photo, pixels)))
-    light = find_changes_of_light(whole)
+    light = find_changes_of_light(whole, inverses)
     bend = _explained(whole.matrix.sum(axis=(0, 1)), whole.vector.sum(axis=(0, 1)), [BEND])
     bend /= whole.values
     least_bend = max(LEAST_BEND, LEAST_SHARE_OF_BEND * beyond_noise)
@@ -182,15 +190,32 @@ def _shift(equations: NormalEquations, photo: int, whites: Integers, region: int
     return float(np.hypot(*(sizes[1] - sizes[0])))
 
 
-def find_changes_of_light(equations: NormalEquations) -> tuple[float, Spoilt] | None:
-    """Find photos under other light than the transport's, or light that changes all the time."""
+def find_changes_of_light(
+    equations: NormalEquations, inverses: Sequence[tuple[int, int]] = ()
+) -> tuple[float, Spoilt] | None:
+    """Find photos under other light than the transport's, or light that changes all the time.
+
+    Parameters
+    ----------
+    equations : NormalEquations
+    inverses : sequence of tuple of int
+        Photos, and those of the inverses of their patterns. Where both together are white without
+        any change, the transport is wrong, and the light was not.
+    """
     causes = [GAIN, OFFSET]
     matrix = equations.matrix[:, 0][:, causes][:, :, causes]
     vector = equations.vector[:, 0][:, causes]
     effects = _solved(matrix, vector)
     explained = np.einsum("np,np->n", vector, effects) / equations.values
     total = float(explained.sum())
-    is_change = np.abs(effects).max(axis=1) > SMALLEST_CHANGE
+    largest = np.abs(effects).max(axis=1)
+    is_change = largest > SMALLEST_CHANGE
+    for one, other in inverses:
+        # A gain g of both and offsets that sum to -g cancel: lit by a pattern and its inverse, a
+        # camera pixel is lit by white.
+        (gain, offset), (its_gain, its_offset) = effects[one], effects[other]
+        left = max(abs(gain - its_gain), abs((gain + its_gain) / 2 + offset + its_offset))
+        is_change[one] &= left >= LEAST_IN_SUM * largest[one]
     changed = np.flatnonzero((explained > LEAST_EXPLAINED) & is_change)
     if total > FLICKER and np.mean(explained > FLICKER / 40) > FLICKER_SHARE:
         return total, LampFlickers(float(effects[:, 0].std()))

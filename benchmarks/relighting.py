@@ -65,7 +65,7 @@ def native_transport() -> Transport:
         black=nothing,
         noise=nothing,
         pitch=near_basis.pitch,
-        footprint=np.full((*camera, 2), [1.1, 1.9], dtype=np.float32),
+        footprint=np.full((*camera, 4), [1.1, 1.9, 0.4, 0.3], dtype=np.float32),
     )
 
 

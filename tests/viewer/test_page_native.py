@@ -42,7 +42,7 @@ def native() -> Transport:
         black=nothing,
         noise=nothing,
         pitch=BASIS.pitch,
-        footprint=np.full((*CAMERA, 2), [4.0, 6.0], dtype=np.float32),
+        footprint=np.full((*CAMERA, 4), [4.0, 6.0, 1.0, 0.5], dtype=np.float32),
     )
 
 

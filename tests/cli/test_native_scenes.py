@@ -47,8 +47,10 @@ def test_an_operator_is_photographed_and_judged_by(operator, tmp_path):
     assert "its rows, by the model" not in text
 
 
-def test_an_operator_where_a_transport_is_meant_names_the_next_command(operator, tmp_path):
+def test_an_operator_where_a_transport_is_meant_names_what_it_is_good_for(operator, tmp_path):
     told = run_nearfar("view", operator, "--no-browser")
     check_sentence(told, f"nearfar acquire PLAN.json CAPTURE.zarr --rig {operator}")
-    other = check_done(run_nearfar("compare", operator, tmp_path / "o"))
-    assert "is too large for a method that holds each entry of T" in other.err + other.out
+    other = run_nearfar("compare", operator, tmp_path / "o")
+    assert other.status == 0
+    assert "Hadamard came to nothing" in other.err
+    assert "is too large for a method that holds each entry of T" in other.err

@@ -67,7 +67,7 @@ def run(name: str) -> list[dict[str, float]]:
         plan, _ = choose_plan(scene.projector, total // share, window=window, checks=0)
         measurements = measure(shoot(plan, scene, SimulatedCamera()))
         q = correspond_by_phase(measurements).q
-        found = estimate_jointly(measurements, q, plan.window, plan.far)
+        found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
         results.append(coverage(scene, found))
         values = " ".join(f"{value:8.1f}" for value in results[-1].values())
         print(f"{name:14s} {len(plan.patterns):5d}  {values}", flush=True)

@@ -51,7 +51,7 @@ def jointly(plan: Plan, photos: PhotosInMemory) -> Transport:
     """Estimate with phase and the joint estimator."""
     measurements = measure(photos)
     q = correspond_by_phase(measurements).q
-    return estimate_jointly(measurements, q, plan.window, plan.far)
+    return estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
 
 
 def report(name: str, plan: Plan, scene: ExactTransport, lights: dict[str, Floats]) -> None:

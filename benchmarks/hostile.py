@@ -138,7 +138,7 @@ def estimates(bench: Bench, photos: int, *, rivals: bool) -> Iterator[tuple[str,
     plan, _ = choose_plan(bench.scene.projector, photos, window=bench.window or None, checks=0)
     measurements = measure(acquire_in_memory(plan, bench.rig(1.0)))
     q = correspond_by_phase(measurements).q
-    yield "joint", estimate_jointly(measurements, q, plan.window, plan.far)
+    yield "joint", estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     if not rivals:
         return
     yield "DFT", Dense(inverse_dft(measurements))

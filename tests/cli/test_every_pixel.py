@@ -14,6 +14,7 @@ from nearfar.estimate.joint.estimator import JOINT
 from nearfar.illumination.pictures import natural_picture
 from nearfar.photometry.measure import measure
 from nearfar.workflow.evaluate import snr
+from nearfar.workflow.observers.quality import QualityObserver
 from tests.cli.conftest import run_nearfar
 
 PROJECTOR = Size(136, 150)
@@ -80,6 +81,15 @@ def test_its_verdict_and_its_file_say_what_it_is(job):
     assert done.status == 0, done.err
     assert done.out.startswith("good")
     assert nearfar.load_transport(job / "transport.zarr").verdict.grade == "good"
+
+
+def test_the_quality_while_photos_are_taken_is_that_of_the_finished_transport(job):
+    capture = nearfar.open_capture(job / "capture.zarr")
+    observer = QualityObserver(capture.plan, 90.0, capture.full_scale)
+    for number in range(len(capture.plan.patterns)):
+        observer.after_photo(number, np.asarray(capture.photos[number]))
+    verdict = nearfar.load_transport(job / "transport.zarr").verdict
+    assert observer.quality.snr == pytest.approx(verdict.held_out_snr, abs=1.0)
 
 
 def test_a_tile_with_the_rows_beside_it_is_that_of_the_whole(job):

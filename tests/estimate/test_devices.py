@@ -36,7 +36,7 @@ def _by_paper(measurements, q, plan, device):
 
 
 def _jointly(measurements, q, plan, device):
-    return estimate_jointly(measurements, q, plan.window, plan.far, device=device)
+    return estimate_jointly(measurements, q, plan.window, plan.far, device=device, pitch=plan.pitch)
 
 
 @pytest.mark.parametrize(

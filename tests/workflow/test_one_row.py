@@ -54,7 +54,7 @@ def _estimated(projector, photos):
     plan, _ = choose_plan(projector, photos)
     measurements = measure(_shoot(plan))
     q = correspond_by_phase(measurements).q
-    return plan, q, estimate_jointly(measurements, q, plan.window, plan.far)
+    return plan, q, estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
 
 
 @EITHER

@@ -317,7 +317,9 @@ def test_the_truth_lies_within_one_deviation_as_often_as_it_should(name):
     plan, _ = choose_plan(scene.projector, 100)
     rig = SimulatedRig(scene, name, SimulatedProjector(), SimulatedCamera(), 1.0, 0)
     measurements = measure(acquire_in_memory(plan, rig))
-    found = estimate_jointly(measurements, scene.correspondence, plan.window, plan.far)
+    found = estimate_jointly(
+        measurements, scene.correspondence, plan.window, plan.far, pitch=plan.pitch
+    )
     bars = ErrorBars(found)
     shares = {}
     for light, values in standard_lights(scene.projector).items():

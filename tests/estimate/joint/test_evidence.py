@@ -135,7 +135,7 @@ def test_narrow_projectors_and_windows_are_reconstructed(projector, window):
         black=np.zeros_like(noise),
         quantisation_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
     )
-    found = estimate_jointly(measurements, world.correspondence, window, Size(1, 1))
+    found = estimate_jointly(measurements, world.correspondence, window, Size(1, 1), pitch=1)
     light = np.random.default_rng(1).random(projector)
     truth = world @ light
     assert np.linalg.norm(found @ light - truth) < 0.01 * np.linalg.norm(truth)

@@ -43,7 +43,7 @@ def test_direct_light_that_photos_do_not_show_is_not_believed(photos):
     # The brightest entry of each row, where direct light would seem to come from.
     q = np.stack(np.divmod(truth[:, 0].argmax(axis=1), PROJECTOR.width), axis=-1)
     q = q.reshape(*CAMERA, 2).astype(np.float32)
-    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     assert not found.lit.any()
     assert not found.direct.any()
     assert not found.near.any()
@@ -54,7 +54,7 @@ def test_direct_light_that_photos_do_not_show_is_not_believed(photos):
 def test_with_as_many_photos_as_unknowns_the_estimate_is_least_squares(name):
     truth, plan, measurements = shot(name, 173, 1 / 2000)
     q = correspond_by_phase(measurements).q
-    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     by_least_squares = decibels(truth, inverse_dft(measurements))
     assert by_least_squares > 30
     assert decibels(truth, found.rows(slice(None))) > by_least_squares - 0.3
@@ -63,7 +63,7 @@ def test_with_as_many_photos_as_unknowns_the_estimate_is_least_squares(name):
 def test_errors_of_rows_without_order_lie_within_their_bars():
     truth, plan, measurements = shot("dense", 90, 1 / 200)
     q = correspond_by_phase(measurements).q
-    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     bars = ErrorBars(found)
     random = np.random.default_rng(0).random((4, *PROJECTOR))
     single = np.eye(PROJECTOR.pixels)[::13].reshape(-1, *PROJECTOR)
@@ -79,7 +79,7 @@ def test_errors_of_rows_without_order_lie_within_their_bars():
 def test_the_light_of_a_row_stays_where_direct_light_would_be_negative():
     truth, plan, measurements = shot("hair", 173, 1 / 2000)
     q = correspond_by_phase(measurements).q
-    found = estimate_jointly(measurements, q, plan.window, plan.far)
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     error = np.linalg.norm(found.rows(slice(None)) - truth, axis=-1)
     assert found.direct.min() >= 0
     assert error.max() < 0.02 * np.linalg.norm(truth, axis=-1).max()

@@ -142,7 +142,7 @@ def test_a_world_of_the_model_is_relit_by_few_responses():
     measurements = measured(
         world.dense().astype(np.float64), frequencies, noise=1e-5, camera=world.camera
     )
-    found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR)
+    found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR, pitch=1)
     light = np.random.default_rng(0).random(PROJECTOR)
     truth = world @ light
     error = np.linalg.norm(found @ light - truth) / np.linalg.norm(truth)
@@ -169,7 +169,7 @@ def test_what_eight_bits_make_of_direct_light_is_no_other_light():
     )
 
     def stray(measurements):
-        found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR)
+        found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR, pitch=1)
         return np.sqrt(np.mean(found.near**2)) / world.direct.mean()
 
     unknown, known = stray(quantisation), stray(replace(quantisation, quantisation_error=error))
@@ -189,7 +189,7 @@ def test_camera_pixels_without_direct_light_keep_far_light_alone():
     measurements = measured(
         dark.dense().astype(np.float64), chosen_frequencies(), noise=1e-4, camera=world.camera
     )
-    found = estimate_jointly(measurements, q, WINDOW, FAR)
+    found = estimate_jointly(measurements, q, WINDOW, FAR, pitch=1)
     assert not found.direct[3:6].any()
     assert not found.near[3:6].any()
     for values in (found.direct, found.near, found.far):
@@ -210,7 +210,7 @@ def test_a_q_that_is_a_little_off_is_put_right():
     measurements = measured(
         world.dense().astype(np.float64), chosen_frequencies(), noise=1e-3, camera=camera
     )
-    found = estimate_jointly(measurements, off, WINDOW, FAR)
+    found = estimate_jointly(measurements, off, WINDOW, FAR, pitch=1)
     before, after = (np.abs(q - true).mean() for q in (off, found.correspondence))
     assert after < 0.35 * before
     # It stays where it was rounded to.
@@ -227,7 +227,9 @@ def test_the_offset_of_the_references_is_taken_out():
     light = np.asarray(exponential(frequencies[3], PROJECTOR).real)
     truth = world @ light
     errors = [
-        np.linalg.norm(estimate_jointly(m, world.correspondence, WINDOW, FAR) @ light - truth)
+        np.linalg.norm(
+            estimate_jointly(m, world.correspondence, WINDOW, FAR, pitch=1) @ light - truth
+        )
         for m in (noisy, unaware)
     ]
     assert errors[0] < 0.3 * errors[1]
@@ -245,4 +247,4 @@ def test_responses_without_white_are_refused():
         multiplicity=measurements.multiplicity[1:],
     )
     with pytest.raises(InputError, match="lack white"):
-        estimate_jointly(lacking, np.array([[[8.0, 10.0]]]), WINDOW, FAR)
+        estimate_jointly(lacking, np.array([[[8.0, 10.0]]]), WINDOW, FAR, pitch=1)

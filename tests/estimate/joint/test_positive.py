@@ -70,7 +70,7 @@ def test_an_estimate_has_no_negative_transport_in_its_windows(noise):
     measurements = measured(
         world.dense().astype(np.float64), chosen_frequencies(), noise=noise, camera=world.camera
     )
-    found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR)
+    found = estimate_jointly(measurements, world.correspondence, WINDOW, FAR, pitch=1)
     rows = found.dense()[:, 0]
     centres = near.centre(found.correspondence, PROJECTOR)
     inside = near.inside(centres, WINDOW, PROJECTOR)

@@ -44,7 +44,7 @@ def estimate_jointly(
     window: int,
     far: Size,
     *,
-    pitch: int = 1,
+    pitch: int,
     sweeps: int = SWEEPS,
     chosen: Choices = (),
     device: Device = "cpu",
@@ -61,10 +61,12 @@ def estimate_jointly(
         nearly whole, and elsewhere shifted a little to fit the photos; it is NaN also where the
         photos are more probable without direct light.
     window : int
-        W, an upper bound of how far near-range light reaches.
+        W, an upper bound of how far near-range light reaches, in functions.
     far : Size
         Far band: f is kept at its measured frequencies, and at other measured ones that are whole
         numbers of cycles per pattern grid.
+    pitch : int
+        Projector pixels between the window's functions, as the plan has it.
     sweeps : int
         Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
     chosen : Choices
@@ -94,7 +96,7 @@ def choose_components(
     correspondence: Floats,
     window: int,
     *,
-    pitch: int = 1,
+    pitch: int,
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Choices:

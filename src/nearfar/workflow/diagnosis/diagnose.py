@@ -120,7 +120,9 @@ def _estimate_of(
         return sampled
     # Other estimates differ from the photos by far more than noise.
     plan, q = sample.plan, sampled.correspondence
-    return estimate_jointly(measure(photos), q, plan.window, plan.far, sweeps=SWEEPS)
+    return estimate_jointly(
+        measure(photos), q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS
+    )
 
 
 def _what_spoils_pairs(

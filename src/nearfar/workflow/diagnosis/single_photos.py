@@ -245,7 +245,7 @@ def _estimate_without(
     except InputError:
         # The lowest frequencies, which place q, are among those that were left out.
         q = known
-    return estimate_jointly(measurements, q, plan.window, plan.far, sweeps=SWEEPS)
+    return estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS)
 
 
 def _explain_all(fits: PhotoFits, plan: Plan, suspects: list[int]) -> dict[int, Explanation | None]:

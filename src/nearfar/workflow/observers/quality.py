@@ -144,7 +144,7 @@ class QualityObserver:
         except InputError:
             # Too few frequencies to determine q yet.
             return CaptureQuality(taken, -HIGHEST, "photos")
-        estimate = estimate_jointly(measurements, q, plan.window, plan.far)
+        estimate = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
         every = slice(0, photos_so_far.camera.height)
         bars = bars_of(estimate)
         held_out = HeldOut(

@@ -191,7 +191,7 @@ def test_small_projectors_are_scored_at_every_place(monkeypatch):
     assert not phase.is_large(Size(1, 2**15 + 1))
     assert phase.is_large(Size(182, 182))
     small = paper_plan(projector, 5, Size(5, 5), correspondence="phase")
-    assert method_named("phase").rows_needed(small) == 1
+    assert method_named("phase").rows_needed(small) == 3
 
 
 def test_light_by_way_of_another_surface_is_told_by_its_turning_round():

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import AnyPath, Floats, Size, middles
 from nearfar.errors import InputError, NearfarError
 from nearfar.files import luminance
+from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import FACTORS, of_pixels, of_rows, stacked, thinned_blocks
@@ -125,7 +126,8 @@ class InteractiveTransport:
 
     def relight_coarsely(self, light: Light) -> Frame:
         """Relight the coarse copy."""
-        return _frame(self._parts(self.coarse, light), self.coarse_stride)
+        parts = self._parts(self.coarse, self._analysed(self.coarse, light), light)
+        return _frame(parts, self.coarse_stride)
 
     def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
         """Relight every camera pixel that is displayed, block by block.
@@ -139,9 +141,11 @@ class InteractiveTransport:
         blocks = self.blocks()
         if self.display_stride > 1:
             blocks = thinned_blocks(blocks, self.stored.camera.height, self.display_stride)
+        analysed: AnalysedLight | None = None
         for block in blocks:
             if block.camera.height:
-                parts.append(self._parts(block, light))
+                analysed = analysed or self._analysed(block, light)
+                parts.append(self._parts(block, analysed, light))
             yield None
         yield _frame(np.concatenate(parts, axis=1), self.display_stride)
 
@@ -154,9 +158,11 @@ class InteractiveTransport:
         """
         channel_light = self._for_channels(light.as_array())
         gains = {"direct": direct, "near": near, "far": far}
-        pictures = [
-            block.relight(channel_light, **gains).astype(np.float32) for block in self.blocks()
-        ]
+        analysed: AnalysedLight | None = None
+        pictures = []
+        for block in self.blocks():
+            analysed = analysed or block.analyse(channel_light)
+            pictures.append(block.relight(analysed, **gains).astype(np.float32))
         return np.concatenate(pictures)
 
     def camera_row(self, y: int) -> Transport:
@@ -204,18 +210,26 @@ class InteractiveTransport:
             # Without a colour calibration the channels are not red, green and blue.
             return luminance(light)
 
-    def _parts(self, transport: Transport, light: Light) -> Floats:
-        """Return direct, near and far under a light, (3, y, x, colours)."""
-        if light.is_grey or light.levels.ndim == 3:
-            channel_light = self._for_channels(light.as_array())
-            tint = np.ones(1, dtype=np.float32)
-        else:
+    def _analysed(self, transport: Transport, light: Light) -> AnalysedLight:
+        """Return what a transport's camera pixels read of a light, without its tint."""
+        if self._is_tinted(light):
             # Relighting once, for all channels, takes a third of the time.
-            channel_light = light.levels
+            return transport.analyse(light.levels)
+        return transport.analyse(self._for_channels(light.as_array()))
+
+    def _parts(self, transport: Transport, analysed: AnalysedLight, light: Light) -> Floats:
+        """Return direct, near and far under a light, (3, y, x, colours)."""
+        tint = np.ones(1, dtype=np.float32)
+        if self._is_tinted(light):
             tint = np.ravel(self._for_channels(light.colour[None, None]))
-        components = transport.components(channel_light)
+        components = transport.components(analysed)
         pictures = [part.reshape(*transport.camera, -1) * tint for part in components]
         return np.stack([self.to_colours(picture) for picture in pictures])
+
+    @staticmethod
+    def _is_tinted(light: Light) -> bool:
+        """Whether a light is one of all channels times a colour."""
+        return light.levels.ndim == 2 and not light.is_grey
 
 
 def to_float16(values: Floats) -> tuple[float, NDArray[np.float16]]:

@@ -112,7 +112,7 @@ def lights_of(projector: Size) -> list[Floats]:
 
 
 def picture_on(projector: Size, seed: int) -> Floats:
-    """Return what a projector shows of an original, whose longer side is the projector's."""
+    """Crop an original to the projector's shape, and resize it so that the longer sides agree."""
     rows, columns = (ORIGINAL * side // max(projector) for side in projector)
     top, left = (ORIGINAL - rows) // 2, (ORIGINAL - columns) // 2
     original = _original(seed)[top : top + rows, left : left + columns]
@@ -164,7 +164,7 @@ def reconstruct(world: ExactOperator | Blocks, photos: int) -> tuple[Transport, 
 
 
 def judge(world: ExactOperator, photos: int, side: int = 1) -> Found:
-    """Return what so many photos come to, of a plan for blocks of side x side pixels."""
+    """Plan, simulate and estimate with so many photos of blocks of side x side pixels; score it."""
     seen = world if side == 1 else Blocks(world, side)
     blocks = "" if side == 1 else f", blocks of {side}x{side}"
     print(f"{photos} photos of projector {world.projector}{blocks}")

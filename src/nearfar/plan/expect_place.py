@@ -1,8 +1,8 @@
 """The error that the place of direct light is expected to make of a random light, beyond pitch 1.
 
 There a light is as fine as the projector's pixels, and direct light that is looked up beside its
-place is wrong by as much as light differs there. How well a plan tells the place follows from its
-frequencies, how much light differs from what a camera pixel sees of the projector.
+place is wrong by as much as light differs there. The plan's frequencies determine how precisely
+the place is known. The footprint of a camera pixel determines how much the light differs there.
 
 Index convention: k runs over frequencies.
 """
@@ -16,8 +16,8 @@ from nearfar.arrays import Floats, Size
 from nearfar.illumination.frequencies import Frequency, as_array
 from nearfar.plan.expect import RANDOM_VARIANCE, TYPICAL_DIRECT_DEVIATION, ExpectedErrors
 
-# What a camera pixel sees of the projector, as a box
-# with sides of so many projector pixels: in the built-in scenes they are a third of one to twelve.
+# Side of the box that a camera pixel sees of the projector, in projector pixels. In the built-in
+# scenes it is a third of one to twelve.
 TYPICAL_BOX = 1.0
 # Standard deviation of q on each axis that no photo lowers, in projector pixels: measured on curved
 # surfaces (docs/decisions/0045), where noise alone would leave 0.006.

@@ -41,7 +41,7 @@ def step(photo, size=1.0):
 
 
 def _of_light(effects, inverses):
-    """Return what changes of light are found where photos differ by gains and offsets alone."""
+    """Find changes of light among photos that differ by gains and offsets alone."""
     every = np.zeros((PHOTOS, 1, CAUSES))
     for photo, (gain, offset) in effects.items():
         every[photo, 0, [GAIN, OFFSET]] = gain, offset

@@ -53,10 +53,11 @@ def border_distances(
 
 @lru_cache(maxsize=16)
 def _rounded(reach: int) -> NDArray[np.int64]:
-    """Return what each distance up to the reach is rounded to.
+    """Return the rounded distance for each distance from 0 to the reach.
 
-    To the nearest of 0, 1, 2, 3, 4, 6, 8, 12, ... and the reach: near-range light fades with
-    distance, so that a sixth of the distance is as good far away as half a pixel is close by.
+    Distances are rounded to the nearest of 0, 1, 2, 3, 4, 6, 8, 12, ... and the reach. Near-range
+    light fades with distance, so an error of a sixth far away does no more harm than half a pixel
+    close by.
     """
     steps = [0, *(step for k in range(reach.bit_length()) for step in (2**k, 3 * 2**k // 2))]
     kept = np.array(sorted({step for step in steps if step < reach} | {reach}))

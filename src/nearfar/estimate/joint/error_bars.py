@@ -310,7 +310,7 @@ class ErrorBars:
         )
 
     def _seen(self, batch: slice, light: Floats) -> tuple[Floats, Floats]:
-        """Return what unit near-range and direct light answer to a light (P,).
+        """Return the responses of unit near-range and unit direct light to a light (P,).
 
         Returns
         -------

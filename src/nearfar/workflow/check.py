@@ -39,7 +39,7 @@ VALUES_AT_ONCE = 2**22
 # channel; fewer pixels would not stand for the scene.
 DEFAULT_SAMPLE = 4096
 DEFAULT_ENTRIES = 2**27
-LEAST_SAMPLE = 256
+LEAST_SAMPLE = 64
 # Shares of the energy whose bandwidths are reported.
 ENERGY_SHARES = (0.5, 0.9, 0.99)
 
@@ -142,7 +142,7 @@ def check_model(
         Cycles per projector pixel; `default_k_near` if left out.
     sample : int, optional
         Camera pixels to examine, evenly spaced; all where there are fewer. 4096 if left out, fewer
-        where the projector has more than 181 x 181 pixels, but 256 at least.
+        where the projector has more than 181 x 181 pixels, but 64 at least.
     progress : callable, optional
         Called with what is being done and the share of it that is done, 0 to 1.
 

@@ -365,6 +365,18 @@ def test_the_command_serves_until_it_is_interrupted(stored):
     assert (running.returncode, rest.decode().strip(), faults) == (0, "view ended", b"")
 
 
+def test_what_memory_would_hold_a_larger_transport_is_said(stored):
+    command = [sys.executable, "-m", "nearfar", "view", str(stored), "--port", "0", "--no-browser"]
+    with subprocess.Popen([*command, "--memory", "100kB"], stdout=subprocess.PIPE) as running:
+        said = running.stdout.readline().decode()
+        assert "is read again whenever the light comes to rest" in said
+        assert "--memory 1GB keeps it in memory" in said
+        assert " at http" in running.stdout.readline().decode()
+        os.kill(running.pid, signal.SIGINT)
+        running.communicate(timeout=LONGEST_WAIT)
+    assert running.returncode == 0
+
+
 def test_what_is_no_transport_gets_a_sentence(tmp_path):
     ran = run_nearfar("view", tmp_path / "none.zarr", "--no-browser")
     assert ran.status == 1

@@ -25,6 +25,7 @@ from nearfar.plan.expect_place import (
 )
 from nearfar.plan.low_rank import ErrorsLowRank
 from nearfar.plan.patterns import Sinusoid
+from nearfar.plan.window import side_of_blocks
 from nearfar.priors.fitted import TYPICAL_SCENES
 from nearfar.transport.boxes import box_places, summed_area
 
@@ -251,3 +252,23 @@ def test_what_was_measured_lies_in_the_range_that_is_expected(projector, measure
 def test_a_window_that_does_not_fit_at_its_pitch_is_refused():
     with pytest.raises(PlanError, match=r"W = 35 at a pitch of 32 .* between 1 and 34"):
         choose_plan(FULL_HD, 60, window=35)
+
+
+@pytest.mark.parametrize(
+    ("projector", "block"),
+    [
+        ((136, 150), 2),
+        ((256, 256), 2),
+        ((1080, 1920), 10),
+        ((2160, 3840), 20),
+        ((4320, 7680), 40),
+        ((1, 1920), 15),
+        # Nothing divides both sides.
+        ((257, 301), 3),
+    ],
+)
+def test_blocks_leave_a_grid_of_single_cells_that_is_no_coarser_than_it_must(projector, block):
+    assert side_of_blocks(Size(*projector)) == block
+    grid = Size(*(max(1, side // block) for side in projector))
+    assert pitch_of(grid) == 1
+    assert min(side for side in grid if side > 1) >= 64

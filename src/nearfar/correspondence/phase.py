@@ -9,8 +9,8 @@ one place from another. Stronger ones measure the footprint, the 5 x 5 entries o
 tell direct light from concentrated near-range light, as in a crease.
 
 The inverse transform is computed as matrix products, first along rows and then down, so that
-frequencies may lie off the DFT grid. On projectors too large for that, places are searched for from
-coarse to fine (`nearfar.correspondence.coarse_to_fine`).
+frequencies may lie off the DFT grid. On projectors too large for that, and where few frequencies
+are high, places are searched for from coarse to fine (`nearfar.correspondence.coarse_to_fine`).
 
 Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
 frequencies of one fy, o and i over the offsets of a footprint.
@@ -37,7 +37,7 @@ from nearfar.correspondence.coarse_to_fine import (
 from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
-from nearfar.correspondence.size import is_large
+from nearfar.correspondence.size import is_coarse_to_fine
 from nearfar.correspondence.weighing import (
     Weighed,
     division_by_white,
@@ -71,13 +71,16 @@ LEAST_EXCESS = 2.25
 MIRRORED_FACTOR = 1.35
 
 
-def correspond_by_phase(measurements: Measurements) -> Correspondence:
+def correspond_by_phase(measurements: Measurements, *, pitch: int) -> Correspondence:
     """Find q(c) from the responses to the sinusoids.
 
     Parameters
     ----------
     measurements : Measurements
         Of DC and of any frequencies that determine a place.
+    pitch : int
+        Projector pixels between the window's functions, as the plan has it: at a pitch over 1 few
+        frequencies are high, and places are searched for from coarse to fine.
 
     Returns
     -------
@@ -93,8 +96,8 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
         If there is no response to DC, or if the frequencies leave several places alike.
     """
     basis = without_dc(measurements)
-    require_settled(basis)
-    if is_large(basis.projector):
+    require_settled(basis, pitch)
+    if is_coarse_to_fine(basis.projector, pitch):
         least = LEAST_LARGE_EXCESS
         q, excess = correspond_coarse_to_fine(measurements, basis)
     else:
@@ -308,12 +311,12 @@ def _find(
     measure: Callable[[], Measurements],
     progress: Callable[[int], None] | None = None,
 ) -> Correspondence:
-    return correspond_by_phase(measure())
+    return correspond_by_phase(measure(), pitch=photos.plan.pitch)
 
 
 def _rows_beside(plan: Plan) -> int:
     """Return the rows of neighbours that tell where to look, and whether q is mirrored."""
-    return ROWS_BESIDE + 1 if is_large(plan.projector) else 1
+    return ROWS_BESIDE + 1 if is_coarse_to_fine(plan.projector, plan.pitch) else 1
 
 
 # Every plan has sinusoids; whether they determine q is checked when they are measured.

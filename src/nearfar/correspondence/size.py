@@ -1,4 +1,4 @@
-"""Which projectors are large: too many pixels for every place of them to be scored."""
+"""Where places are searched for from coarse to fine, and not all of them scored."""
 
 from nearfar.arrays import Size
 
@@ -6,6 +6,11 @@ from nearfar.arrays import Size
 LARGEST_SCORED = 2**15
 
 
-def is_large(projector: Size) -> bool:
-    """Return whether places are searched for from coarse to fine; never on a row or a column."""
-    return projector.pixels > LARGEST_SCORED and min(projector) > 1
+def is_coarse_to_fine(projector: Size, pitch: int) -> bool:
+    """Return whether places are searched for from coarse to fine; never on a row or a column.
+
+    On projectors with too many places; and at a pitch over 1, where few frequencies are high. What
+    direct light explains at these drowns among all responses: by the scores of every place a tenth
+    of cornell-aside's lit camera pixels are missed at 128x128 (docs/decisions/0051).
+    """
+    return (pitch > 1 or projector.pixels > LARGEST_SCORED) and min(projector) > 1

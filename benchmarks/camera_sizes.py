@@ -28,7 +28,7 @@ def main() -> None:
         for photos in PHOTOS:
             plan, _ = choose_plan(scene.projector, photos, checks=0)
             measurements = measure(shoot(plan, scene, SimulatedCamera()))
-            q = correspond_by_phase(measurements).q
+            q = correspond_by_phase(measurements, pitch=plan.pitch).q
             found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
             print(f"{scene.camera}, {photos}: {scores(truth, found, lights)}", flush=True)
 

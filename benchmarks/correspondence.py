@@ -114,15 +114,16 @@ def run(name: str, camera: Size | None) -> None:
     found = correspond_by_stripes(photos)
     seconds = time.perf_counter() - started
     report("stripes", plan.counts["correspondence"], found, truths, area, seconds)
-    measured = [("phase, pairs", measure(photos), plan.transport_photos)]
+    measured = [("phase, pairs", measure(photos), plan.transport_photos, plan.pitch)]
     for share in SHARES:
         window, _ = PAPER[name]
         chosen, _ = choose_plan(projector, len(plan.patterns) // share, window=window, checks=0)
         count = len(chosen.patterns)
-        measured.append((f"phase, 1/{share}", measure(shoot(chosen, scene, CAMERA)), count))
-    for label, measurements, count in measured:
+        measurements = measure(shoot(chosen, scene, CAMERA))
+        measured.append((f"phase, 1/{share}", measurements, count, chosen.pitch))
+    for label, measurements, count, pitch in measured:
         started = time.perf_counter()
-        found = correspond_by_phase(measurements)
+        found = correspond_by_phase(measurements, pitch=pitch)
         report(label, count, found, truths, area, time.perf_counter() - started)
 
 

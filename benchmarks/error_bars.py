@@ -66,7 +66,7 @@ def run(name: str) -> list[dict[str, float]]:
     for share in SHARES:
         plan, _ = choose_plan(scene.projector, total // share, window=window, checks=0)
         measurements = measure(shoot(plan, scene, SimulatedCamera()))
-        q = correspond_by_phase(measurements).q
+        q = correspond_by_phase(measurements, pitch=plan.pitch).q
         found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
         results.append(coverage(scene, found))
         values = " ".join(f"{value:8.1f}" for value in results[-1].values())

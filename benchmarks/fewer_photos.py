@@ -50,7 +50,7 @@ def as_the_paper(plan: Plan, photos: PhotosInMemory) -> Transport:
 def jointly(plan: Plan, photos: PhotosInMemory) -> Transport:
     """Estimate with phase and the joint estimator."""
     measurements = measure(photos)
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     return estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
 
 

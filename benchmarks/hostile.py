@@ -137,7 +137,7 @@ def estimates(bench: Bench, photos: int, *, rivals: bool) -> Iterator[tuple[str,
     """Yield every estimate that a budget allows."""
     plan, _ = choose_plan(bench.scene.projector, photos, window=bench.window or None, checks=0)
     measurements = measure(acquire_in_memory(plan, bench.rig(1.0)))
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     yield "joint", estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     if not rivals:
         return

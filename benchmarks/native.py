@@ -155,7 +155,7 @@ def reconstruct(world: ExactOperator | Blocks, photos: int) -> tuple[Transport, 
     clock.say("shoot")
     measurements = measure(taken)
     clock.say("measure")
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     clock.say("correspond")
     with single_threaded_products():
         transport = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)

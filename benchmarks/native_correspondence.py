@@ -32,9 +32,9 @@ def report(label: str, projector: Size, footprint: tuple[float, float], **option
     """Print a row of the table."""
     world = lit_surface(projector, CAMERA, footprint=footprint, **options)
     # Filters are built once for all tiles.
-    correspond_by_phase(world.measurements)
+    correspond_by_phase(world.measurements, pitch=1)
     started = time.process_time()
-    found = correspond_by_phase(world.measurements)
+    found = correspond_by_phase(world.measurements, pitch=1)
     seconds = time.process_time() - started
     off = np.hypot(*np.moveaxis(found.q - world.q, -1, 0))
     seen = off[world.lit & found.lit]

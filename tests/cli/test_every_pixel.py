@@ -95,7 +95,7 @@ def test_the_quality_while_photos_are_taken_is_that_of_the_finished_transport(jo
 def test_a_tile_with_the_rows_beside_it_is_that_of_the_whole(job):
     capture = nearfar.open_capture(job / "capture.zarr")
     plan, measurements = capture.plan, measure(capture)
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     sizes = (plan.window, plan.far)
     whole = estimate_jointly(measurements, q, *sizes, pitch=plan.pitch)
     rows = 40

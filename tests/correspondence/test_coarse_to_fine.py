@@ -11,6 +11,7 @@ from nearfar.correspondence import coarse_to_fine, correspond_by_phase, phase
 from nearfar.correspondence.ambiguity import LARGEST_EXPECTED_WRONG, expected_wrong
 from nearfar.correspondence.levels import Candidates
 from nearfar.correspondence.methods import method_named
+from nearfar.correspondence.size import is_coarse_to_fine
 from nearfar.correspondence.weighing import without_dc
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import (
@@ -21,7 +22,8 @@ from nearfar.illumination.frequencies import (
     representatives,
 )
 from nearfar.illumination.real_basis import real_basis
-from nearfar.plan import paper_plan
+from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan.patterns import Sinusoid
 from tests.correspondence.lit_surface import (
     in_front,
     lit_surface,
@@ -63,7 +65,7 @@ def _ambiguous(projector):
 )
 def test_lit_surfaces_are_found_to_a_tenth_of_a_pixel(projector, footprint):
     world = lit_surface(projector, CAMERA, footprint=footprint)
-    found = correspond_by_phase(world.measurements)
+    found = correspond_by_phase(world.measurements, pitch=1)
     off = _off(found, world)
     assert np.median(off) < 0.05
     assert np.percentile(off, 99) < 0.25
@@ -77,7 +79,7 @@ def test_lit_surfaces_are_found_to_a_tenth_of_a_pixel(projector, footprint):
 def test_noise_and_weak_light_make_no_jumps():
     """Direct light of a sixth of white, in photos of a quarter of the electrons."""
     world = lit_surface(FULL_HD, CAMERA, direct=(0.15, 0.2), footprint=(0.5, 1.5), noise=0.022)
-    off = _off(correspond_by_phase(world.measurements), world)
+    off = _off(correspond_by_phase(world.measurements, pitch=1), world)
     assert np.mean(np.isfinite(off)) > 0.95
     off = off[np.isfinite(off)]
     assert np.median(off) < 0.2
@@ -97,7 +99,8 @@ def test_footprints_of_one_or_two_projector_pixels_are_found():
         ).T + share * basis.patterns_at(np.stack([y, x + 1], axis=-1)).T
         world = lit_surface(projector, camera, noise=0.0)
         found = correspond_by_phase(
-            replace(world.measurements, responses=0.6 * drawn[:, None].astype(np.float32))
+            replace(world.measurements, responses=0.6 * drawn[:, None].astype(np.float32)),
+            pitch=1,
         )
         np.testing.assert_allclose(found.q, pixels + np.array([0.0, share]), atol=0.06)
 
@@ -107,7 +110,7 @@ def test_depth_edges_stay_where_they_are():
     front = in_front(CAMERA)
     beside = front != np.roll(front, 1, axis=1)
     beside |= np.roll(beside, -1, axis=1)
-    found = correspond_by_phase(world.measurements)
+    found = correspond_by_phase(world.measurements, pitch=1)
     assert beside.sum() > 80
     assert np.max(np.abs(found.q - world.q)[beside]) < 0.5
 
@@ -141,11 +144,11 @@ def test_places_that_were_searched_for_wrongly_are_mended_by_neighbours(monkeypa
 
 
 def test_periods_that_photos_hardly_tell_apart_are_told_by_neighbours(monkeypatch):
-    monkeypatch.setattr(phase, "require_settled", lambda basis: None)
+    monkeypatch.setattr(phase, "require_settled", lambda basis, pitch: None)
     world = _close_up(Size(48, 32), frequencies=_ambiguous(FULL_HD), footprint=(0.5, 0.6))
-    jumped = np.mean(_off(correspond_by_phase(world.measurements), world) > 1)
+    jumped = np.mean(_off(correspond_by_phase(world.measurements, pitch=1), world) > 1)
     monkeypatch.setattr(coarse_to_fine, "ROUNDS", 0)
-    alone = np.mean(_off(correspond_by_phase(world.measurements), world) > 1)
+    alone = np.mean(_off(correspond_by_phase(world.measurements, pitch=1), world) > 1)
     assert alone > 0.005
     assert jumped < alone / 2
 
@@ -162,14 +165,14 @@ def test_tiles_of_rows_are_those_of_the_whole(monkeypatch):
     _mislead(monkeypatch, is_misled, (40, -33))
     plan = paper_plan(FULL_HD, 5, Size(5, 5), correspondence="phase")
     beside = method_named("phase").rows_needed(plan)
-    whole = correspond_by_phase(world.measurements)
+    whole = correspond_by_phase(world.measurements, pitch=1)
     assert np.mean(_off(whole, world) > 0.5) < 0.02
     for tile in blocks(camera.height, 6):
         around = slice(max(0, tile.start - beside), min(camera.height, tile.stop + beside))
         part = world.measurements.of_pixels(
             Size(around.stop - around.start, 32), slice(32 * around.start, 32 * around.stop)
         )
-        found = correspond_by_phase(part)
+        found = correspond_by_phase(part, pitch=1)
         rows = slice(tile.start - around.start, tile.stop - around.start)
         np.testing.assert_allclose(found.q[rows], whole.q[tile], atol=1e-3)
         np.testing.assert_allclose(found.confidence[rows], whole.confidence[tile], atol=1e-3)
@@ -178,24 +181,43 @@ def test_tiles_of_rows_are_those_of_the_whole(monkeypatch):
 def test_small_projectors_are_scored_at_every_place(monkeypatch):
     """Up to 2**15 pixels where windows are of single pixels, and in a single row or column."""
     projector, camera = Size(128, 128), Size(5, 6)
-    assert not phase.is_large(projector)
+    assert not is_coarse_to_fine(projector, 1)
     shadow = np.zeros(camera, dtype=bool)
     world = lit_surface(projector, camera, shadow=shadow, footprint=(0.5, 0.6))
-    found = correspond_by_phase(world.measurements)
+    found = correspond_by_phase(world.measurements, pitch=1)
     # Both ways agree, within what either is off by.
     basis = without_dc(world.measurements)
     q, _ = coarse_to_fine.correspond_coarse_to_fine(world.measurements, basis)
     for one in (found, replace(found, q=q)):
         assert _off(one, world).max() < 0.15
     monkeypatch.setattr(phase, "correspond_coarse_to_fine", None)
-    np.testing.assert_array_equal(correspond_by_phase(world.measurements).q, found.q)
-    assert not phase.is_large(Size(1, 2**15 + 1))
-    assert not phase.is_large(Size(128, 256))
-    assert phase.is_large(Size(128, 257))
+    np.testing.assert_array_equal(correspond_by_phase(world.measurements, pitch=1).q, found.q)
+    assert not is_coarse_to_fine(Size(1, 2**15 + 1), 1)
+    assert not is_coarse_to_fine(Size(128, 256), 1)
+    assert is_coarse_to_fine(Size(128, 257), 1)
     # Windows of functions two pixels apart.
-    assert phase.is_large(Size(129, 129))
+    assert is_coarse_to_fine(Size(129, 129), 2)
     small = paper_plan(projector, 5, Size(5, 5), correspondence="phase")
     assert method_named("phase").rows_needed(small) == 3
+
+
+def test_plans_with_few_high_frequencies_find_weak_direct_light():
+    """On a projector all of whose places could be scored; they are at a pitch of 1."""
+    projector = Size(136, 150)
+    plan, _ = choose_plan(projector, 200)
+    assert plan.pitch > 1
+    shown = representatives(p.frequency for p in plan.patterns if isinstance(p, Sinusoid))
+    world = lit_surface(
+        projector, Size(30, 36), frequencies=shown, direct=(0.2, 0.4), footprint=(0.3, 0.6)
+    )
+    found = correspond_by_phase(world.measurements, pitch=plan.pitch)
+    assert not found.lit[~world.lit].any()
+    off = _off(found, world)
+    assert np.median(off) < 0.1
+    assert np.percentile(off, 99) < 0.25
+    missed = ~correspond_by_phase(world.measurements, pitch=1).lit[world.lit]
+    assert np.mean(missed) > 0.3
+    assert method_named("phase").rows_needed(plan) > 1
 
 
 def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
@@ -207,7 +229,7 @@ def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
         world = lit_surface(
             FULL_HD, camera, q=q, shadow=shadow, direct=(0.085, 0.086), footprint=(0.5, 0.6)
         )
-        found = correspond_by_phase(world.measurements)
+        found = correspond_by_phase(world.measurements, pitch=1)
         assert found.lit[:, :14].all()
         assert np.mean(found.lit[:, 17:-1] == seen) > 0.95
 
@@ -223,10 +245,10 @@ def test_black_camera_pixels_and_channels_do_no_harm():
         responses=world.measurements.responses * lit[..., None],
         noise=world.measurements.noise * lit,
     )
-    found = correspond_by_phase(measurements)
+    found = correspond_by_phase(measurements, pitch=1)
     assert np.flatnonzero(~found.lit).tolist() == [37]
     assert np.median(np.abs(found.q - world.q)[found.lit]) < 0.05
-    dark = correspond_by_phase(replace(measurements, responses=0 * measurements.responses))
+    dark = correspond_by_phase(replace(measurements, responses=0 * measurements.responses), pitch=1)
     assert not dark.lit.any()
     assert dark.confidence.max() < 0.5
 
@@ -240,7 +262,7 @@ def test_light_at_the_border_does_not_wrap_to_the_other_side():
     world = lit_surface(
         FULL_HD, camera, q=q, shadow=np.zeros(camera, dtype=bool), footprint=(0.5, 0.6)
     )
-    found = correspond_by_phase(world.measurements)
+    found = correspond_by_phase(world.measurements, pitch=1)
     np.testing.assert_allclose(found.q, q, atol=0.3)
 
 
@@ -250,9 +272,9 @@ def test_frequencies_that_settle_nothing_are_refused():
     for frequencies in (low, near_frequencies(5, Size(1, 1)), _ambiguous(FULL_HD)):
         world = lit_surface(FULL_HD, camera, frequencies=representatives(frequencies))
         with pytest.raises(InputError, match="leave places on the pattern grid of 1080x1920 alike"):
-            correspond_by_phase(world.measurements)
+            correspond_by_phase(world.measurements, pitch=1)
     basis = real_basis([k for k in screen_frequencies(FULL_HD) if k != DC], FULL_HD)
-    assert expected_wrong(basis) < LARGEST_EXPECTED_WRONG / 100
+    assert expected_wrong(basis, 1) < LARGEST_EXPECTED_WRONG / 100
 
 
 def test_no_array_has_a_value_for_each_place():
@@ -260,7 +282,7 @@ def test_no_array_has_a_value_for_each_place():
     world = lit_surface(FULL_HD, CAMERA)
     tracemalloc.start()
     try:
-        correspond_by_phase(world.measurements)
+        correspond_by_phase(world.measurements, pitch=1)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

@@ -60,7 +60,7 @@ def test_each_method_finds_what_it_finds_by_itself(shoot, name, by_itself):
     world = model_transport(PROJECTOR, CAMERA, window=5, far=Size(3, 3)).with_gains(near=0.2)
     photos, rows = shoot(_plan(name), world), slice(2, 7)
     measurements = measure(photos, rows)
-    expected = by_itself(photos, rows) if by_itself else correspond_by_phase(measurements)
+    expected = by_itself(photos, rows) if by_itself else correspond_by_phase(measurements, pitch=1)
     found = find_correspondence(photos, measurements, rows)
     assert found.q.shape == (5, 10, 2)
     np.testing.assert_array_equal(found.q, expected.q)

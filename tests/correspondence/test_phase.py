@@ -88,18 +88,18 @@ def _with_shade(world, shade):
 def test_the_papers_frequencies_find_whole_pixels(size, window, far):
     world = model_transport(size, size, window=3, far=Size(1, 1))
     alone = world.with_gains(near=0, far=0)
-    found = correspond_by_phase(ideal_measurements(alone, window, far, Size(1, 1)))
+    found = correspond_by_phase(ideal_measurements(alone, window, far, Size(1, 1)), pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.01)
     # Far-range light responses frequencies off the DFT grid as well.
     lit_by_all = world.with_gains(near=0)
-    found = correspond_by_phase(ideal_measurements(lit_by_all, window, far, Size(1, 1)))
+    found = correspond_by_phase(ideal_measurements(lit_by_all, window, far, Size(1, 1)), pitch=1)
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.3)
 
 
 def test_near_and_far_light_pull_q_by_little():
     world = _world()
-    found = correspond_by_phase(ideal_measurements(world, WINDOW, FAR, Size(1, 1)))
+    found = correspond_by_phase(ideal_measurements(world, WINDOW, FAR, Size(1, 1)), pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.35)
     assert np.median(np.abs(found.q - world.correspondence)) < 0.05
@@ -107,10 +107,10 @@ def test_near_and_far_light_pull_q_by_little():
 
 def test_a_finer_camera_falls_between_pixels():
     world = _world(Size(61, 77), fractional=True)
-    found = correspond_by_phase(_responses(world.with_gains(near=0), FEW))
+    found = correspond_by_phase(_responses(world.with_gains(near=0), FEW), pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.05)
-    found = correspond_by_phase(_responses(world, FEW, noise=0.003))
+    found = correspond_by_phase(_responses(world, FEW, noise=0.003), pitch=1)
     off = np.abs(found.q - world.correspondence)
     assert found.lit.all()
     assert np.percentile(off, 95) < 0.2
@@ -134,7 +134,7 @@ def test_a_coarse_camera_pixel_gets_the_centroid():
     weight = fine.direct.reshape(12, 2, 15, 2, 1)
     q = (fine.correspondence.reshape(12, 2, 15, 2, 2) * weight).sum(axis=(1, 3))
     q /= weight.sum(axis=(1, 3))
-    found = correspond_by_phase(coarse)
+    found = correspond_by_phase(coarse, pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, q, atol=0.25)
 
@@ -142,7 +142,7 @@ def test_a_coarse_camera_pixel_gets_the_centroid():
 def test_photos_of_a_noisy_camera_move_nothing_by_half_a_pixel(shoot):
     world = _world(channels=3)
     plan = paper_plan(PROJECTOR, WINDOW, FAR, correspondence="none")
-    found = correspond_by_phase(measure(shoot(plan, world, SimulatedCamera())))
+    found = correspond_by_phase(measure(shoot(plan, world, SimulatedCamera())), pitch=1)
     assert found.lit.all()
     off = np.abs(found.q - world.correspondence)
     assert off.max() < 0.5
@@ -158,7 +158,7 @@ def test_a_channel_without_light_does_no_harm():
         near=world.near * dark[:, None, None],
         far=world.far * dark[:, None],
     )
-    found = correspond_by_phase(_responses(world, FEW, noise=0.002))
+    found = correspond_by_phase(_responses(world, FEW, noise=0.002), pitch=1)
     assert found.lit.all()
     assert np.mean(np.abs(found.q - world.correspondence) < 0.5) > 0.999
 
@@ -166,7 +166,7 @@ def test_a_channel_without_light_does_no_harm():
 def test_many_times_as_much_global_light_does_not_fool_it():
     world = _world(near=0.0)
     world = replace(world, direct=0.04 + 0 * world.direct)
-    found = correspond_by_phase(_responses(world, FEW))
+    found = correspond_by_phase(_responses(world, FEW), pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.1)
 
@@ -176,7 +176,9 @@ def test_the_stronger_of_two_surfaces_wins():
     moved = np.roll(one.correspondence, (9, 11), axis=(0, 1))
     other = replace(one, correspondence=moved, direct=0.5 * one.direct)
     first, second = _responses(one, FEW), _responses(other, FEW)
-    found = correspond_by_phase(replace(first, responses=first.responses + second.responses))
+    found = correspond_by_phase(
+        replace(first, responses=first.responses + second.responses), pitch=1
+    )
     np.testing.assert_allclose(found.q, one.correspondence, atol=0.5)
 
 
@@ -185,7 +187,7 @@ def test_camera_pixels_without_direct_light_are_marked(noise):
     shade = np.zeros(PROJECTOR, dtype=bool)
     shade[5:9, 7:20] = True
     world = _with_shade(_world(channels=3), shade)
-    found = correspond_by_phase(_responses(world, FEW, noise))
+    found = correspond_by_phase(_responses(world, FEW, noise), pitch=1)
     np.testing.assert_array_equal(found.lit, ~shade)
     assert np.all(np.isnan(found.q[shade]))
     assert found.confidence[~shade].min() >= 0.5
@@ -204,7 +206,9 @@ def test_near_range_light_that_is_concentrated_is_no_direct_light():
     near = np.where(shade[..., None, None, None], 0.1 * blob / blob.sum(), world.near)
     q = world.correspondence.copy()
     world = replace(world, direct=np.where(shade[..., None], 0, world.direct), near=near)
-    found = correspond_by_phase(_responses(replace(world, correspondence=q), FEW, noise=0.003))
+    found = correspond_by_phase(
+        _responses(replace(world, correspondence=q), FEW, noise=0.003), pitch=1
+    )
     np.testing.assert_array_equal(found.lit, ~shade)
 
 
@@ -216,7 +220,7 @@ def test_light_at_the_border_does_not_wrap_to_the_other_side():
     q[:, 0], q[:, -1] = [11.5, 0.0], [6.4, 29.0]
     world = replace(world, correspondence=q)
     for noise in (0.0, 0.01):
-        found = correspond_by_phase(_responses(world, FEW, noise))
+        found = correspond_by_phase(_responses(world, FEW, noise), pitch=1)
         assert found.lit.all()
         np.testing.assert_allclose(found.q, q, atol=0.05 if noise == 0 else 0.5)
         assert np.nanmin(found.q) >= 0
@@ -228,7 +232,7 @@ def test_saturated_photos_still_correspond(shoot):
     world = _world(near=0.0)
     plan = paper_plan(PROJECTOR, WINDOW, FAR, correspondence="none")
     bright = replace(world, direct=world.direct + 0.65, far=1.2 * world.far)
-    found = correspond_by_phase(measure(shoot(plan, bright, SimulatedCamera())))
+    found = correspond_by_phase(measure(shoot(plan, bright, SimulatedCamera())), pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, world.correspondence, atol=0.5)
 
@@ -237,7 +241,7 @@ def test_saturated_photos_still_correspond(shoot):
 def test_black_photos_show_no_direct_light(noise):
     world = _world()
     black = replace(world, direct=0 * world.direct, near=0 * world.near, far=0 * world.far)
-    found = correspond_by_phase(_responses(black, FEW, noise))
+    found = correspond_by_phase(_responses(black, FEW, noise), pitch=1)
     assert not found.lit.any()
     assert np.all(np.isnan(found.q))
     assert np.all(np.isfinite(found.confidence))
@@ -249,20 +253,20 @@ def test_rounding_in_a_black_pixel_is_no_light():
     responses = measured.responses.copy()
     responses[37] = 1e-9 * np.random.default_rng(0).uniform(-1, 1, size=responses[37].shape)
     responses[37, :, measured.response_indices([DC])[0]] = 1e-9
-    found = correspond_by_phase(replace(measured, responses=responses))
+    found = correspond_by_phase(replace(measured, responses=responses), pitch=1)
     assert np.flatnonzero(~found.lit).tolist() == [37]
 
 
 @pytest.mark.parametrize("scale", [1e-3, 300.0])
 def test_the_exposure_does_not_matter(scale):
     measured = _responses(_world(), FEW, noise=0.003)
-    found = correspond_by_phase(measured)
+    found = correspond_by_phase(measured, pitch=1)
     scaled = replace(
         measured,
         responses=(scale * measured.responses).astype(np.float32),
         noise=(scale * measured.noise).astype(np.float32),
     )
-    again = correspond_by_phase(scaled)
+    again = correspond_by_phase(scaled, pitch=1)
     np.testing.assert_array_equal(again.lit, found.lit)
     np.testing.assert_allclose(again.q, found.q, atol=2e-3)
     np.testing.assert_allclose(again.confidence, found.confidence, atol=1e-3)
@@ -270,8 +274,8 @@ def test_the_exposure_does_not_matter(scale):
 
 def test_a_block_of_camera_pixels_corresponds_on_its_own():
     measured = _responses(_world(), FEW, noise=0.003)
-    whole = correspond_by_phase(measured)
-    part = correspond_by_phase(measured.of_pixels(Size(6, 30), slice(90, 270)))
+    whole = correspond_by_phase(measured, pitch=1)
+    part = correspond_by_phase(measured.of_pixels(Size(6, 30), slice(90, 270)), pitch=1)
     assert part.q.dtype == np.float32
     assert part.confidence.dtype == np.float32
     # Its first and last rows lack neighbours, which may tell that light is not direct.
@@ -291,7 +295,7 @@ def test_light_by_way_of_another_surface_is_told_by_its_turning_round():
     for beyond, seen in ((x, True), (30 - x, False)):
         q = np.stack([y, np.where(x > 15, beyond, x)], axis=-1).astype(np.float32)
         shown = replace(world, correspondence=q, direct=direct)
-        found = correspond_by_phase(_responses(shown, FEW, noise=0.003))
+        found = correspond_by_phase(_responses(shown, FEW, noise=0.003), pitch=1)
         assert found.lit[:, :12].all()
         assert np.mean(found.lit[:, 15:-1] == seen) > 0.95
 
@@ -318,7 +322,7 @@ def test_frequencies_that_settle_nothing_are_refused(frequencies):
     size = Size(64, 64)
     world = model_transport(size, Size(2, 2), window=3, far=Size(1, 1))
     with pytest.raises(InputError, match=r"pattern grid of 64x64 alike, .*: plan with .*\.$"):
-        correspond_by_phase(_responses(world, frequencies))
+        correspond_by_phase(_responses(world, frequencies), pitch=1)
 
 
 def test_responses_without_white_are_refused():
@@ -327,7 +331,7 @@ def test_responses_without_white_are_refused():
     basis = real_basis([k for k in measured.basis.frequencies if k != DC], PROJECTOR)
     without = replace(measured, basis=basis, responses=measured.responses[..., kept])
     with pytest.raises(InputError, match=r"no response to white.*: .*\.$"):
-        correspond_by_phase(without)
+        correspond_by_phase(without, pitch=1)
 
 
 def test_places_that_few_others_resemble_are_settled():
@@ -335,7 +339,9 @@ def test_places_that_few_others_resemble_are_settled():
     size = Size(64, 64)
     frequencies = [CHECKERBOARD, *near_frequencies(7, Size(1, 1))]
     frequencies += [k for k in far_frequencies(Size(3, 3), size) if k != DC]
-    assert expected_wrong(real_basis(representatives(frequencies), size)) < LARGEST_EXPECTED_WRONG
+    assert (
+        expected_wrong(real_basis(representatives(frequencies), size), 1) < LARGEST_EXPECTED_WRONG
+    )
 
 
 @pytest.mark.parametrize(
@@ -350,8 +356,8 @@ def test_places_that_few_others_resemble_are_settled():
 def test_the_papers_plans_settle_every_place(projector, window, far):
     plan = paper_plan(projector, window, far, correspondence="none")
     frequencies = representatives(pattern.frequency for pattern in plan.patterns)
-    settled = expected_wrong(real_basis([k for k in frequencies if k != DC], projector))
+    settled = expected_wrong(real_basis([k for k in frequencies if k != DC], projector), 1)
     assert settled < 1e-6 < LARGEST_EXPECTED_WRONG
     # Without far frequencies the near set repeats itself all over the grid.
     near = representatives(x.frequency for x in plan.patterns if x.purpose != "far")
-    assert expected_wrong(real_basis(near, projector)) > 1
+    assert expected_wrong(real_basis(near, projector), 1) > 1

@@ -13,7 +13,7 @@ from nearfar.capture import open_capture
 from nearfar.correspondence import correspond_by_gray_code, given_correspondence
 from nearfar.errors import InputError, PlanError
 from nearfar.illumination.pictures import natural_picture
-from nearfar.plan import paper_plan
+from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.opening import open_rig
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.drift import SimulatedDrift
@@ -372,6 +372,17 @@ def test_judgement_is_json_and_the_ceiling_is_above(tmp_path):
     # The best fit of rows is not the best of every picture, but of their mean it is.
     assert judged["ceiling"]["snr_b_pictures"] > judged["snr_b_pictures"]
     assert judged["snr_t"]["p5"] <= judged["snr_t"]["p50"] <= judged["snr_t"]["p95"]
+
+
+def test_functions_of_several_pixels_have_no_ceiling_of_single_ones(tmp_path):
+    plan = choose_plan(Size(32, 32), 60)[0].model_copy(update={"pitch": 2, "window": 7})
+    rig = open_rig("cornell", Size(32, 32))
+    transport, _ = nearfar.reconstruct(acquire(plan, tmp_path / "c.zarr", rig))
+    judged = judge_by_truth(transport, rig.world)
+    assert transport.pitch == 2
+    assert judged["snr_b_pictures"] > 25
+    assert "ceiling" not in judged
+    assert set(judged["snr"]) == {"T", "physical", "floodlit"}
 
 
 def test_a_truth_of_another_size_is_refused(world):

@@ -53,7 +53,7 @@ def _shoot(plan):
 def _estimated(projector, photos):
     plan, _ = choose_plan(projector, photos)
     measurements = measure(_shoot(plan))
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     return plan, q, estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
 
 

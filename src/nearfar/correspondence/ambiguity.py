@@ -18,7 +18,7 @@ from nearfar.correspondence.background import (
     Spectrum,
 )
 from nearfar.correspondence.normal import normal_cdf
-from nearfar.correspondence.size import is_large
+from nearfar.correspondence.size import is_coarse_to_fine
 from nearfar.errors import InputError
 from nearfar.illumination.real_basis import RealBasis
 
@@ -36,13 +36,15 @@ DISTANCES_AT_ONCE = 2**20
 
 
 @lru_cache(maxsize=4)
-def expected_wrong(basis: RealBasis) -> float:
+def expected_wrong(basis: RealBasis, pitch: int) -> float:
     """Return the expected number of wrong places that score above the right one, in weak light.
 
     Parameters
     ----------
     basis : RealBasis
         Frequencies without DC, and the pattern grid.
+    pitch : int
+        Of the plan.
 
     Returns
     -------
@@ -51,9 +53,9 @@ def expected_wrong(basis: RealBasis) -> float:
         The last few are cached for other tiles.
     """
     height, width = basis.projector
-    large = is_large(basis.projector)
-    background: Spectrum = LARGE_SEARCH_BACKGROUND if large else SEARCH_BACKGROUND
-    same = SAME_PLACE_SHARE if large else 0.0
+    coarse_to_fine = is_coarse_to_fine(basis.projector, pitch)
+    background: Spectrum = LARGE_SEARCH_BACKGROUND if coarse_to_fine else SEARCH_BACKGROUND
+    same = SAME_PLACE_SHARE if coarse_to_fine else 0.0
     weights = 1.0 / (RESPONSE_NOISE**2 + background.spectral_density(basis).astype(np.float64))
     # D and -D are alike, so that D down is enough.
     down, across = np.arange(height), np.arange(1 - width, width)
@@ -81,14 +83,14 @@ def _waves(cycles: Floats, distances: Floats | Integers) -> Floats:
     return np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def require_settled(basis: RealBasis) -> None:
+def require_settled(basis: RealBasis, pitch: int) -> None:
     """Refuse frequencies that leave the place of direct light ambiguous.
 
     Raises
     ------
     InputError
     """
-    if not basis.frequencies or expected_wrong(basis) > LARGEST_EXPECTED_WRONG:
+    if not basis.frequencies or expected_wrong(basis, pitch) > LARGEST_EXPECTED_WRONG:
         raise InputError(
             f"the frequencies of the photos, {len(basis.frequencies)} beside DC, leave places on "
             f"the pattern grid of {basis.projector} alike, so that q cannot be found from them: "

@@ -10,8 +10,8 @@ tell direct light from concentrated near-range light, as in a crease. Where neig
 places, these are tried instead (`nearfar.correspondence.sidelobes`).
 
 The inverse transform is computed as matrix products, first along rows and then down, so that
-frequencies may lie off the DFT grid. On projectors too large for that, places are searched for from
-coarse to fine (`nearfar.correspondence.coarse_to_fine`).
+frequencies may lie off the DFT grid. On projectors too large for that, and where few frequencies
+are high, places are searched for from coarse to fine (`nearfar.correspondence.coarse_to_fine`).
 
 Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
 frequencies of one fy, o and i over the offsets of a footprint.
@@ -41,7 +41,7 @@ from nearfar.correspondence.nonnegative import nonnegative_entries
 from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
 from nearfar.correspondence.sidelobes import replace_sidelobes
-from nearfar.correspondence.size import is_large
+from nearfar.correspondence.size import is_coarse_to_fine
 from nearfar.correspondence.weighing import (
     Weighed,
     division_by_white,
@@ -73,13 +73,16 @@ LEAST_EXCESS = 2.25
 MIRRORED_FACTOR = 1.35
 
 
-def correspond_by_phase(measurements: Measurements) -> Correspondence:
+def correspond_by_phase(measurements: Measurements, *, pitch: int) -> Correspondence:
     """Find q(c) from the responses to the sinusoids.
 
     Parameters
     ----------
     measurements : Measurements
         Of DC and of any frequencies that determine a place.
+    pitch : int
+        Projector pixels between the window's functions, as the plan has it: at a pitch over 1 few
+        frequencies are high, and places are searched for from coarse to fine.
 
     Returns
     -------
@@ -95,8 +98,8 @@ def correspond_by_phase(measurements: Measurements) -> Correspondence:
         If there is no response to DC, or if the frequencies leave several places alike.
     """
     basis = without_dc(measurements)
-    require_settled(basis)
-    if is_large(basis.projector):
+    require_settled(basis, pitch)
+    if is_coarse_to_fine(basis.projector, pitch):
         least = LEAST_LARGE_EXCESS
         q, excess = correspond_coarse_to_fine(measurements, basis)
     else:
@@ -283,12 +286,12 @@ def _find(
     measure: Callable[[], Measurements],
     progress: Callable[[int], None] | None = None,
 ) -> Correspondence:
-    return correspond_by_phase(measure())
+    return correspond_by_phase(measure(), pitch=photos.plan.pitch)
 
 
 def _rows_beside(plan: Plan) -> int:
-    """Return the rows of neighbours that tell sidelobes, and whether q is mirrored."""
-    return (ROWS_BESIDE if is_large(plan.projector) else REACH) + 1
+    """Return the rows of neighbours that tell places, sidelobes, and whether q is mirrored."""
+    return (ROWS_BESIDE if is_coarse_to_fine(plan.projector, plan.pitch) else REACH) + 1
 
 
 # Every plan has sinusoids; whether they determine q is checked when they are measured.

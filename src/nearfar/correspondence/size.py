@@ -1,17 +1,16 @@
-"""Which projectors are large: their footprints may be of many pixels, or their places too many."""
+"""Where places are searched for from coarse to fine, and not all of them scored."""
 
 from nearfar.arrays import Size
-from nearfar.plan.window import pitch_of
 
 # Pixels of the largest projector all of whose places are scored.
 LARGEST_SCORED = 2**15
 
 
-def is_large(projector: Size) -> bool:
+def is_coarse_to_fine(projector: Size, pitch: int) -> bool:
     """Return whether places are searched for from coarse to fine; never on a row or a column.
 
-    So they are where windows are of functions of several projector pixels: direct light is then
-    that of any number of pixels, not of the few about a place that are scored one by one.
+    On projectors with too many places; and at a pitch over 1, where few frequencies are high. What
+    direct light explains at these drowns among all responses: by the scores of every place a tenth
+    of cornell-aside's lit camera pixels are missed at 128x128 (docs/decisions/0051).
     """
-    many = projector.pixels > LARGEST_SCORED or pitch_of(projector) > 1
-    return many and min(projector) > 1
+    return (pitch > 1 or projector.pixels > LARGEST_SCORED) and min(projector) > 1

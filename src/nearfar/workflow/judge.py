@@ -78,7 +78,7 @@ def judge_by_truth(
         photo units per unit of the truth, ``exposure_is_fitted`` whether they were fitted to it,
         and ``pixels_without_light`` the camera pixels that the truth leaves dark: they have no
         SNR_t. Beside an operator rows are a sample, and there are no model's split and no
-        ceiling, which take all rows.
+        ceiling, which take all rows; nor are they at a pitch over 1.
 
     Raises
     ------
@@ -106,8 +106,8 @@ def judge_by_truth(
     if truth.is_apart:
         floodlit = floodlit_snr(transport, truth, factor)
         numbers["snr"] |= {"physical": components, "floodlit": floodlit}
-    # The model is fitted to every row, of which an operator has too many.
-    if truth.is_apart and isinstance(truth, ExactTransport):
+    # The model is fitted to every row, of which an operator has too many, by single pixels.
+    if truth.is_apart and isinstance(truth, ExactTransport) and transport.pitch == 1:
         report("model's truth", 0.0)
         fitted = model_truth(transport, truth, factor)
         ceiling = relighting_snr(fitted, truth, lights, exposure=factor)

@@ -53,7 +53,7 @@ def test_direct_light_that_photos_do_not_show_is_not_believed(photos):
 @pytest.mark.parametrize("name", ["dense", "hair", "glass"])
 def test_with_as_many_photos_as_unknowns_the_estimate_is_least_squares(name):
     truth, plan, measurements = shot(name, 173, 1 / 2000)
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     by_least_squares = decibels(truth, inverse_dft(measurements))
     assert by_least_squares > 30
@@ -62,7 +62,7 @@ def test_with_as_many_photos_as_unknowns_the_estimate_is_least_squares(name):
 
 def test_errors_of_rows_without_order_lie_within_their_bars():
     truth, plan, measurements = shot("dense", 90, 1 / 200)
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     bars = ErrorBars(found)
     random = np.random.default_rng(0).random((4, *PROJECTOR))
@@ -78,7 +78,7 @@ def test_errors_of_rows_without_order_lie_within_their_bars():
 
 def test_the_light_of_a_row_stays_where_direct_light_would_be_negative():
     truth, plan, measurements = shot("hair", 173, 1 / 2000)
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     error = np.linalg.norm(found.rows(slice(None)) - truth, axis=-1)
     assert found.direct.min() >= 0

@@ -240,7 +240,7 @@ def _estimate_without(
     except InputError:
         return None
     try:
-        q = correspond_by_phase(measurements).q
+        q = correspond_by_phase(measurements, pitch=plan.pitch).q
     except InputError:
         # The lowest frequencies, which place q, are among those that were left out.
         q = known

@@ -140,7 +140,7 @@ class QualityObserver:
         photos = remove_drift(photos_so_far)
         measurements = measure(photos)
         try:
-            q = correspond_by_phase(measurements).q
+            q = correspond_by_phase(measurements, pitch=plan.pitch).q
         except InputError:
             # Too few frequencies to determine q yet.
             return CaptureQuality(taken, -HIGHEST, "photos")

@@ -23,7 +23,7 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
     plan, _ = choose_plan(projector, budget.photos, window=bench.window, noise=float(noise))
     photos = len(plan.patterns)
     measurements = measure(acquire_in_memory(plan, bench.rig(budget.exposure(photos))))
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     yield Attempt(
         photos, estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     )

@@ -23,7 +23,6 @@ from nearfar.plan import Plan
 
 PROJECTOR = Size(128, 128)
 PHOTOS = 300
-WINDOW = 19
 FULL_WELL = 20_000.0
 # Runs the command and says how much memory it took at most.
 COMMAND = """
@@ -64,7 +63,7 @@ def run(camera: Size, folder: Path, method: str) -> None:
     """Print one camera's row."""
     given = []
     if method == "joint":
-        plan, _ = choose_plan(PROJECTOR, PHOTOS, window=WINDOW, checks=0)
+        plan, _ = choose_plan(PROJECTOR, PHOTOS, checks=0)
     else:
         plan = paper_plan(PROJECTOR, 11, Size(5, 5), correspondence="none")
         q = np.stack(np.meshgrid(*places(camera), indexing="ij"), axis=-1)

@@ -1,4 +1,4 @@
-"""A projector of more than 128 pixels a side, from plan to relit light, by the command line."""
+"""A projector of more than 106 pixels a side, from plan to relit light, by the command line."""
 
 from dataclasses import replace
 

@@ -75,7 +75,7 @@ def test_thin_products_choose_plans_as_good_as_whole_covariances(projector, phot
         (Size(64, 64), 468, True),
         (Size(68, 100), 261, True),
         (Size(96, 96), 300, False),
-        (Size(128, 128), 150, False),
+        (Size(106, 106), 150, False),
     ],
 )
 def test_large_plans_are_chosen_by_thin_products(projector, photos, is_whole, monkeypatch):
@@ -93,6 +93,7 @@ def test_large_plans_are_chosen_by_thin_products(projector, photos, is_whole, mo
 @pytest.mark.parametrize(
     ("projector", "photos", "pitch"),
     [
+        (Size(107, 107), 60, 4),
         (Size(129, 200), 60, 4),
         (Size(257, 301), 24, 8),
         (FULL_HD, 100, 32),

@@ -16,7 +16,9 @@ from nearfar.plan.model import READABLE_VERSIONS
     ("projector", "pitch"),
     [
         (Size(64, 64), 1),
-        (Size(128, 128), 1),
+        (Size(106, 110), 1),
+        (Size(107, 107), 4),
+        (Size(128, 128), 4),
         (Size(100, 1920), 1),
         (Size(1, 128), 1),
         (Size(129, 200), 4),
@@ -35,7 +37,7 @@ def test_the_pitch_leaves_some_forty_cells_on_the_shorter_side(projector, pitch)
         assert 26.5 < shorter / pitch <= 53
 
 
-@pytest.mark.parametrize("side", [8, 64, 68, 128, 129, 161, 256, 1080, 2160])
+@pytest.mark.parametrize("side", [8, 64, 68, 106, 107, 128, 161, 256, 1080, 2160])
 def test_the_default_window_is_odd_and_fits(side):
     projector = Size(side, 2 * side)
     pitch = pitch_of(projector)

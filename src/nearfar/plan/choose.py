@@ -50,8 +50,9 @@ FEWEST_PHOTOS = 24
 # f is kept at the measured ones of as many DFT frequencies on each side.
 FAR_BAND_SIDE = 13
 SMALLEST_SIDE = 8
-# Pixels of the largest pattern grid all of whose frequencies are listed: more take minutes.
-MOST_LISTED = 2**17
+# Pixels and shorter side of the largest pattern grid all of whose frequencies are listed: more
+# take minutes.
+MOST_LISTED, LARGEST_LISTED_SIDE = 2**17, 128
 # Entries of a covariance times measurements up to which plans at a pitch of 1 are chosen by whole
 # covariances: four seconds. Beyond, thin products choose others of the same worth, several times
 # as fast.
@@ -159,9 +160,13 @@ def choose_plan(
     if every_frequency and not can_list_every_frequency(projector):
         raise PlanError(
             f"a projector of {projector} has too many frequencies to list them all: plan for a "
-            f"pattern grid of at most {MOST_LISTED} pixels whose windows are of single pixels."
+            f"pattern grid of at most {MOST_LISTED} pixels, and {LARGEST_LISTED_SIDE} on the "
+            f"shorter side."
         )
-    pitch = pitch_of(projector)
+    # Rows that photos of every frequency show need no model, and fit none of several pixels.
+    is_whole = photos >= photos_of_every_frequency(projector)
+    shows_all = every_frequency or (is_whole and can_list_every_frequency(projector))
+    pitch = 1 if shows_all else pitch_of(projector)
     window = default_window(projector, pitch) if window is None else window
     if not 1 <= window <= largest_window(projector, pitch):
         apart = "" if pitch == 1 else f" at a pitch of {pitch} projector pixels"
@@ -231,10 +236,11 @@ def choose_plan(
 def can_list_every_frequency(projector: Size) -> bool:
     """Return whether photos can be of all frequencies of a projector, the lowest first.
 
-    Not where a window's functions are of several projector pixels: photos that end at a low
-    frequency would tell neither q nor direct light, and those of every frequency are too many.
+    Not on fine projectors: photos that end at a low frequency would tell neither q nor direct
+    light, and those of every frequency are too many.
     """
-    return pitch_of(projector) == 1 and projector.pixels <= MOST_LISTED
+    side = min(projector) if min(projector) > 1 else max(projector)
+    return side <= LARGEST_LISTED_SIDE and projector.pixels <= MOST_LISTED
 
 
 def photos_of_every_frequency(projector: Size) -> int:

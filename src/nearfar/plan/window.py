@@ -10,10 +10,13 @@ import math
 
 from nearfar.arrays import Size
 
-# Shorter side of the largest projector whose windows are of single pixels.
-LARGEST_OF_SINGLE_PIXELS = 128
-# Cells on the shorter side of a larger one: at least half as many, and no more than these.
+# Cells on the shorter side at a pitch over 1: at least half as many, and no more than these.
 MOST_CELLS = 53
+# Shorter side of the largest projector whose windows are of single pixels. At a pitch of 2 pixels
+# these would be nearly as few, so that the least pitch over 1 is 4 (docs/decisions/0051).
+LARGEST_OF_SINGLE_PIXELS = 2 * MOST_CELLS
+# The same of a single row or column.
+LONGEST_LINE_OF_SINGLE_PIXELS = 128
 # W where nothing is known: the largest of single pixels, and that at a larger pitch, where
 # windows reach over a quarter of the screen (docs/decisions/0042 compares others).
 LARGEST_DEFAULT, DEFAULT_AT_PITCH = 25, 9
@@ -30,11 +33,12 @@ def pitch_of(projector: Size) -> int:
     -------
     int
         Projector pixels between neighbouring functions of the window: 1 up to a shorter side of
-        128, beyond that the power of two that leaves 27 to 53 cells on it. Of a single row or
-        column, the longer side counts.
+        106, beyond that the power of two that leaves 27 to 53 cells on it. Of a single row or
+        column, the longer side counts, and it is 1 up to 128.
     """
     pitch, side = 1, _shorter(projector)
-    if side <= LARGEST_OF_SINGLE_PIXELS:
+    is_line = min(projector) == 1
+    if side <= (LONGEST_LINE_OF_SINGLE_PIXELS if is_line else LARGEST_OF_SINGLE_PIXELS):
         return pitch
     while pitch * MOST_CELLS < side:
         pitch *= 2

@@ -64,7 +64,6 @@ def import_photos(
         with progress_bar("patterns", quiet=quiet) as report:
             shown = read_shown(patterns, report)
         made = shown.plan
-        say("\n".join(["recognised:", *summarise(shown.recognised)]), quiet=quiet)
         named = pair(made, photos, list_file, source=str(patterns))
     with progress_bar("photos", quiet=quiet) as report:
         summary = bring_in(
@@ -76,6 +75,8 @@ def import_photos(
             force=force,
             progress=report,
         )
+    if shown is not None:
+        say("\n".join(["recognised:", *summarise(shown.recognised)]), quiet=quiet)
     say(f"first: {summary.first}\nlast: {summary.last}", quiet=quiet)
     say_captured(summary.capture, output, quiet=quiet)
 

@@ -236,7 +236,7 @@ def _reach(unit: Floats) -> tuple[int, int]:
             if np.median(alike) < ALIKE:
                 break
             reach = step
-        found.append(max(reach, 2))
+        found.append(max(reach, 1))
     return found[0], found[1]
 
 

@@ -42,8 +42,8 @@ def correspond(
     """
     from nearfar.capture import open_capture
     from nearfar.files import check_output, write_array
-    from nearfar.workflow.correspond import correspond as find
-    from nearfar.workflow.correspond import on_grid
+    from nearfar.workflow.by_codes import correspond_by_codes, on_grid
+    from nearfar.workflow.steps import correspond as by_plan
 
     capture = open_capture(capture_path)
     for path in (output, *([confidence] if confidence is not None else [])):
@@ -54,14 +54,18 @@ def correspond(
     if confidence is not None:
         keep_input(confidence, output)
     with progress_bar("correspondence", quiet=quiet) as report:
-        found = find(capture, report)
-    for sentence in found.warnings():
+        if capture.plan.offset == "shown":
+            by_codes = correspond_by_codes(capture, report)
+            found, warnings = by_codes.correspondence, by_codes.warnings()
+        else:
+            found, warnings = by_plan(capture, progress=report), []
+    for sentence in warnings:
         warn(sentence)
     grid = capture.plan.projector if projector is None else projector
-    q = on_grid(found.correspondence.q, capture.plan.projector, grid)
+    q = on_grid(found.q, capture.plan.projector, grid)
     write_array(output, q, force=force)
     if confidence is not None:
-        write_array(confidence, found.correspondence.confidence, force=force)
+        write_array(confidence, found.confidence, force=force)
     lit = np.isfinite(q).any(axis=-1).mean()
     say(
         f"q of {lit:.1%} of {capture.camera} camera pixels, in pixels of a projector of {grid}, "

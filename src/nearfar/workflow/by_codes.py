@@ -1,4 +1,4 @@
-"""Correspondence from a capture of any patterns."""
+"""Correspondence from a capture of any patterns, by the code of each projector pixel."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.capture import Capture
-from nearfar.correspondence import Correspondence, joined, method_of
+from nearfar.correspondence import Correspondence, joined
 from nearfar.correspondence.codes import (
     find_places,
     is_lit,
@@ -21,7 +21,6 @@ from nearfar.correspondence.photo_order import (
     find_order,
     unexplained_share,
 )
-from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.workflow.pattern_codes import (
     AS_IN_THE_FILE,
@@ -64,7 +63,7 @@ class FoundCorrespondence:
         Of "rows" and "columns" those that the patterns tell.
     explained : float
         Median share of a camera pixel's changes over the photos that direct light from q explains,
-        beyond offset and far-range light; NaN where another method than that of codes found q.
+        beyond offset and far-range light.
     order : PhotoOrder or None
         An order in which photos would follow the patterns, where they do not as they are.
     exponent : float
@@ -109,15 +108,15 @@ class FoundCorrespondence:
         return found
 
 
-def correspond(capture: Capture, progress: Report = ignore_progress) -> FoundCorrespondence:
-    """Find q(c) in the photos of a capture, whatever its patterns.
-
-    Photos of a plan are read by the method of the plan, others by the sequence of levels that each
-    projector pixel shows (`nearfar.correspondence.codes`).
+def correspond_by_codes(
+    capture: Capture, progress: Report = ignore_progress
+) -> FoundCorrespondence:
+    """Find q(c) by the sequence of levels that each projector pixel shows, whatever the patterns.
 
     Parameters
     ----------
     capture : Capture
+        With any patterns; see `nearfar.correspondence.codes`.
     progress : callable
         Called with what is done and its share.
 
@@ -130,8 +129,6 @@ def correspond(capture: Capture, progress: Report = ignore_progress) -> FoundCor
     InputError
         If the patterns do not tell places.
     """
-    if capture.plan.offset != "shown":
-        return FoundCorrespondence(_by_plan(capture, progress), AXES, float("nan"))
     patterns = read_levels(capture, progress)
     telling = find_telling(capture, patterns)
     height, width = capture.camera
@@ -157,17 +154,6 @@ def correspond(capture: Capture, progress: Report = ignore_progress) -> FoundCor
         explained,
         order,
         display.exponent,
-    )
-
-
-def _by_plan(capture: Capture, progress: Report) -> Correspondence:
-    """Find q by the method of a plan of nearfar's own."""
-    everything, count = slice(0, capture.camera.height), len(capture.plan.patterns)
-    return method_of(capture.plan).find(
-        capture,
-        everything,
-        lambda: measure(capture, everything),
-        lambda read: progress("correspondence", read / count),
     )
 
 

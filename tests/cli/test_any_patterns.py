@@ -247,14 +247,6 @@ def test_photos_of_another_order_are_noticed(order, words, folders, tmp_path):
     assert words in ran.err
 
 
-def test_what_photos_of_other_patterns_cannot_do_yet_gets_a_sentence(folders, tmp_path):
-    capture = tmp_path / "c.zarr"
-    check_done(_import(*folders, capture))
-    said = check_sentence(run_nearfar("reconstruct", capture, tmp_path / "t.zarr"))
-    assert "somebody else's pictures" in said
-    assert not (tmp_path / "t.zarr").exists()
-
-
 def test_patterns_that_tell_no_place_are_refused(world, tmp_path):
     pictures = white_and_black(SIZE) * 4
     patterns = write_pictures(tmp_path / "p", pictures)

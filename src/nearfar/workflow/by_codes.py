@@ -61,6 +61,9 @@ class FoundCorrespondence:
         NaN in the axis that no pattern tells.
     axes : tuple of str
         Of "rows" and "columns" those that the patterns tell.
+    places : ndarray, shape (Cy, Cx, 2), float32
+        The most probable q, whether or not there is direct light; NaN in an axis that no pattern
+        tells.
     explained : float
         Median share of a camera pixel's changes over the photos that direct light from q explains,
         beyond offset and far-range light.
@@ -72,6 +75,7 @@ class FoundCorrespondence:
 
     correspondence: Correspondence
     axes: tuple[str, ...]
+    places: Floats
     explained: float
     order: PhotoOrder | None = None
     exponent: float = 1.0
@@ -141,16 +145,18 @@ def correspond_by_codes(
     order = None
     if explained < FOLLOWED:
         order = find_order(sample, telling[0].photos, telling[0].codes, sample.shape[1])
-    parts = []
+    parts, places = [], []
     for rows in blocks(height, max(1, VALUES_AT_ONCE // (width * len(patterns.along)))):
         sequences = read_sequences(capture, patterns, rows)
-        part = _find(sequences, telling, misfits, _step(capture))
-        parts.append(_as_rows(part, width))
+        found, likely = _find(sequences, telling, misfits, _step(capture))
+        parts.append(_as_rows(found, width))
+        places.append(likely.reshape(-1, width, 2))
         progress("correspondence", min(rows.stop, height) / height)
     told = sorted({axis for each in telling for axis in each.axes})
     return FoundCorrespondence(
         joined(parts),
         tuple(AXES[axis] for axis in told),
+        np.concatenate(places),
         explained,
         order,
         display.exponent,
@@ -191,20 +197,21 @@ def _step(capture: Capture) -> float:
 
 def _find(
     sequences: Floats, telling: Sequence[Telling], misfits: Sequence[float], step: float
-) -> Correspondence:
-    """Return q and confidence as (C, 2) and (C,)."""
+) -> tuple[Correspondence, Floats]:
+    """Return q and confidence as (C, 2) and (C,), and the most probable q of all, (C, 2)."""
     count = len(sequences)
     q = np.full((count, 2), np.nan, dtype=np.float32)
     confidence = np.ones(count, dtype=np.float32)
     lit = np.ones(count, dtype=np.bool_)
     for each, misfit in zip(telling, misfits, strict=True):
-        places = find_places(sequences[:, each.photos], each.codes, misfit)
+        found = find_places(sequences[:, each.photos], each.codes, misfit)
         for axis in each.axes:
-            q[:, axis] = places.place[:, axis]
-        confidence = np.minimum(confidence, places.confidence.astype(np.float32))
-        lit &= is_lit(places, sequences) & (places.light >= LEAST_STEPS * step)
+            q[:, axis] = found.place[:, axis]
+        confidence = np.minimum(confidence, found.confidence.astype(np.float32))
+        lit &= is_lit(found, sequences) & (found.light >= LEAST_STEPS * step)
+    places = q.copy()
     q[~lit] = np.nan
-    return Correspondence(q, confidence)
+    return Correspondence(q, confidence), places
 
 
 def _as_rows(found: Correspondence, width: int) -> Correspondence:

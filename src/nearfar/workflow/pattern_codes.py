@@ -16,6 +16,8 @@ from nearfar.progress import Report
 
 # Number of the group of patterns of two levels.
 TWO_LEVELS = 2
+# Projectors of at most as many pixels are compared with pixel by pixel.
+PIXELS_OF_ALL_PATTERNS = 2**16
 # Levels that differ by less are the same.
 SAME_LEVEL = 1e-6
 
@@ -105,7 +107,10 @@ def _levels(capture: Capture, number: int, *, has_colours: bool) -> Floats:
 def find_telling(
     capture: Capture, patterns: PatternLevels, display: Display = AS_IN_THE_FILE
 ) -> list[Telling]:
-    """Return the photos that tell each axis by themselves, or else all, which tell both.
+    """Return the photos that tell each axis by themselves, or all, which tell both.
+
+    On a small projector all are used as soon as some differ along both axes. On a large one they
+    are only where the others do not tell both axes.
 
     The patterns are taken as the display shows them.
 
@@ -114,6 +119,9 @@ def find_telling(
     InputError
         If there are none.
     """
+    has_both = bool(patterns.along.all(axis=1).any())
+    if has_both and capture.plan.projector.pixels <= PIXELS_OF_ALL_PATTERNS:
+        return [_telling_both(capture, patterns, display)]
     found: list[Telling] = []
     reasons: list[str] = []
     for axis, lines in enumerate((patterns.rows, patterns.columns)):
@@ -129,18 +137,23 @@ def find_telling(
                 )
             except InputError as error:
                 reasons.append(str(error))
-    if len(found) < 2 and patterns.along.all(axis=1).any():
-        every = np.concatenate(
-            [
-                _levels(capture, number, has_colours=patterns.has_colours)
-                for number in range(len(capture.plan.patterns))
-            ]
-        )
-        every = _displayed(every, patterns.groups, display)
-        return [Telling((0, 1), np.arange(len(every)), prepare_codes(every, patterns.groups))]
+    if len(found) < 2 and has_both:
+        return [_telling_both(capture, patterns, display)]
     if not found:
         raise InputError(reasons[0] if reasons else "all patterns are the same everywhere.")
     return found
+
+
+def _telling_both(capture: Capture, patterns: PatternLevels, display: Display) -> Telling:
+    """Return all photos, which tell both axes together."""
+    every = np.concatenate(
+        [
+            _levels(capture, number, has_colours=patterns.has_colours)
+            for number in range(len(capture.plan.patterns))
+        ]
+    )
+    every = _displayed(every, patterns.groups, display)
+    return Telling((0, 1), np.arange(len(every)), prepare_codes(every, patterns.groups))
 
 
 def _displayed(levels: Floats, groups: Integers, display: Display) -> Floats:

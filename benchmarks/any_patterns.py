@@ -93,7 +93,7 @@ def main() -> None:
     size, count = Size(int(side), int(side)), int(photos)
     world = cached_scene(scene, size, size)
     world = world * (0.9 / float((world @ np.ones(size, dtype=np.float32)).max()))
-    path = f"/tmp/any-patterns-{scene}-{side}.zarr"
+    path = f"any-patterns-{scene}-{side}.zarr"
     uniform = [np.full(size, 255, np.uint8), np.zeros(size, np.uint8)]
     for name, draw in SETS.items():
         pictures = [*draw(size, count - 2), *uniform]
@@ -112,7 +112,7 @@ def main() -> None:
         )
     plan, _ = choose_plan(size, count)
     capture_of(world, [plan.draw(i) for i in range(len(plan.patterns))], plan, path)
-    own = judge(world, reconstruct(open_capture(path)))
+    own = judge(world, reconstruct(open_capture(path))[0])
     print(f"{scene} {size}, plan of nearfar's own, {len(plan.patterns)}: {own} dB")
 
 

@@ -2,15 +2,21 @@
 
 Run ``python benchmarks/viewer.py``; it needs Chromium. The browser and the server share the
 machine, as they do for a user. Lights that move are of one colour, of several, and all over the
-grid. The rate of the server alone, without a browser, is measured in the same run.
+grid. The rate of the server alone, without a browser, is measured in the same run. ``python
+benchmarks/viewer.py TRANSPORT.zarr`` drags a white light before a transport of your own, and tells
+how long the exact picture takes once the light is let go.
 """
 
 import json
 import struct
+import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -35,6 +41,8 @@ LIGHTS = {
     "a brush of one colour": {"kind": "paint"},
     "a brush over three colours": {"kind": "paint", "strokes": STROKES},
 }
+# The page has the exact picture of the newest light.
+EXACT = """body[data-frame*='"exact":true,"newest":true']"""
 # Moves the mouse round in the light, once for each frame of the screen.
 DRAG = """seconds => new Promise(done => {
   const light = document.getElementById('light'), box = light.getBoundingClientRect();
@@ -71,11 +79,9 @@ def of_the_server(address: str, light: np.ndarray) -> float:
         return count / (time.perf_counter() - began)
 
 
-def main() -> None:
-    """Print the table."""
-    folder = tempfile.TemporaryDirectory()
-    path = Path(folder.name) / "transport.zarr"
-    save_transport(random_transport(Size(*PROJECTOR), WINDOW, FAR), path)
+@contextmanager
+def served(path: Path) -> Iterator[str]:
+    """Serve a transport's page; yields its address."""
     started, stop = threading.Event(), threading.Event()
     addresses: list[str] = []
 
@@ -90,25 +96,49 @@ def main() -> None:
         daemon=True,
     ).start()
     started.wait()
-    (address,) = addresses
-    y, x = np.indices(PROJECTOR)
-    spot = (np.hypot(y - 64, x - 64) < PROJECTOR[0] / 6).astype(np.float32)
-    wave = (0.5 + 0.5 * np.cos(x / 5)).astype(np.float32)
-    for name, light in (("spot", spot), ("sinusoid", wave)):
-        print(f"the server alone, {name}: {of_the_server(address, light):.0f} pictures a second")
+    yield addresses[0]
+    stop.set()
+
+
+def of_the_page(address: str, lights: dict[str, dict[str, Any]]) -> None:
+    """Print the pictures a second while lights are dragged, and how long exact ones take."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox"]
         )
-        for name, state in LIGHTS.items():
+        for name, state in lights.items():
             page = browser.new_page(viewport={"width": 1400, "height": 1000})
             page.goto(f"{address}/#{quote(json.dumps(state))}")
             page.wait_for_selector("body[data-frame]", state="attached")
             time.sleep(1)
-            print(f"dragged, {name}: {page.evaluate(DRAG, SECONDS):.0f} pictures a second")
+            rate = page.evaluate(DRAG, SECONDS)
+            let_go = time.perf_counter()
+            page.wait_for_selector(EXACT, state="attached")
+            waited = time.perf_counter() - let_go
+            print(f"dragged, {name}: {rate:.0f} pictures a second, then exact in {waited:.1f} s")
             page.close()
         browser.close()
-    stop.set()
+
+
+def main() -> None:
+    """Print the table."""
+    if len(sys.argv) > 1:
+        thin, thick = ({"kind": "paint", "brush": radius} for radius in (0.5, 20))
+        with served(Path(sys.argv[1])) as address:
+            plain = {name: {"kind": name} for name in ("spot", "sinusoid", "pixel")}
+            of_the_page(address, {**plain, "a brush of one pixel": thin, "a broad brush": thick})
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "transport.zarr"
+        save_transport(random_transport(Size(*PROJECTOR), WINDOW, FAR), path)
+        with served(path) as address:
+            y, x = np.indices(PROJECTOR)
+            spot = (np.hypot(y - 64, x - 64) < PROJECTOR[0] / 6).astype(np.float32)
+            wave = (0.5 + 0.5 * np.cos(x / 5)).astype(np.float32)
+            for name, light in (("spot", spot), ("sinusoid", wave)):
+                rate = of_the_server(address, light)
+                print(f"the server alone, {name}: {rate:.0f} pictures a second")
+            of_the_page(address, LIGHTS)
 
 
 if __name__ == "__main__":

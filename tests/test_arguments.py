@@ -50,6 +50,7 @@ BAD_NUMBERS = {
 BAD_COUNTS = {**BAD_NUMBERS, "a fraction": 1.5, "a whole float": 2.0, "a bool": True}
 # A seed and a place are counted from 0; negative ones are refused, too.
 BAD_COUNTS_FROM_0 = {**BAD_COUNTS, "negative": -1}
+BAD_OPTIONAL_COUNTS = {what: bad for what, bad in BAD_COUNTS_FROM_0.items() if bad is not None}
 BAD_SIZES = {
     "one side": (6,),
     "three sides": (6, 7, 1),
@@ -114,6 +115,9 @@ COUNTS = {
     "choose_plan, photos": lambda photos: nearfar.choose_plan((8, 8), photos),
     "condition_near, window": lambda window: nearfar.condition_near(SIZE, window, (1, 1)),
     "check_model, window": lambda window: nearfar.check_model(WORLD, window, (3, 3)),
+}
+# Left out, each has a default.
+OPTIONAL_COUNTS = {
     "check_model, sample": lambda sample: nearfar.check_model(WORLD, 3, (3, 3), sample=sample),
 }
 SIZES = {
@@ -135,7 +139,12 @@ SIZES = {
 }
 CASES = {
     f"{entry}: {what}": (call, value)
-    for table, bad in ((NUMBERS, BAD_NUMBERS), (COUNTS, BAD_COUNTS_FROM_0), (SIZES, BAD_SIZES))
+    for table, bad in (
+        (NUMBERS, BAD_NUMBERS),
+        (COUNTS, BAD_COUNTS_FROM_0),
+        (OPTIONAL_COUNTS, BAD_OPTIONAL_COUNTS),
+        (SIZES, BAD_SIZES),
+    )
     for entry, call in table.items()
     for what, value in bad.items()
 } | {

@@ -142,7 +142,7 @@ def test_a_plan_for_every_pixel_of_a_projector_says_so(tmp_path: Path):
     assert "for every projector pixel: the window's functions are 8 projector pixels" in ran.out
     assert "up to 32 pixels from q, 12% of the screen's shorter side" in ran.out
     assert "plan for blocks of pixels" in ran.out
-    assert "--projector 33x60, and nearfar export --native 270x480" in ran.out
+    assert "--projector 90x160, and nearfar export --native 270x480" in ran.out
     info = check_done(run_nearfar("info", plan))
     assert "for every projector pixel" in info.out
     blocks = check_done(run_nearfar("plan", "--projector", "27x48", "--photos", 60))

@@ -47,8 +47,8 @@ def test_a_capture_that_ended_early_is_served_by_phase(name):
     plan = _plan(name)
     ended = plan.first(len(plan.patterns) - 1)
     assert method_of(ended) is CORRESPONDENCE_METHODS["phase"]
-    # Phase tells mirrored surfaces by the rows beside.
-    assert method_of(ended).rows_needed(ended) == 1
+    # Phase tells sidelobes by two rows beside, and mirrored surfaces by one more.
+    assert method_of(ended).rows_needed(ended) == 3
     assert method_of(plan).rows_needed(plan) == 0
 
 

@@ -52,10 +52,13 @@ def test_measuring_in_small_blocks_changes_nothing(monkeypatch):
         RealBasis, "patterns_on", lambda self, lines: told(patterns_on(self, lines))
     )
     monkeypatch.setattr(theory, "VALUES_AT_ONCE", 1000)
+    monkeypatch.setattr(theory, "VALUES_OF_ROWS", 999)
     parts = measure_in_theory(plan, world)
     np.testing.assert_allclose(parts.responses, whole.responses, atol=1e-6)
     assert max(largest) <= 1000
     assert len(largest) > 12
+    # Each row is computed once: patterns are in blocks of 800 values, rows in pairs of 480.
+    assert sum(size for size in largest if size % 480 == 0) == 12 * 2 * 240
 
 
 def test_a_transport_that_obeys_the_model_is_recovered():

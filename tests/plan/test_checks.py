@@ -5,9 +5,16 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.errors import InputError, PlanError
+from nearfar.illumination.frequencies import DC
 from nearfar.plan import choose_plan, paper_plan
-from nearfar.plan.checks import check_lights, check_pairs, check_patterns, spread_checks
-from nearfar.plan.patterns import HalfScreen, Picture
+from nearfar.plan.checks import (
+    check_lights,
+    check_pairs,
+    check_patterns,
+    is_reference,
+    spread_checks,
+)
+from nearfar.plan.patterns import HalfScreen, Picture, Sinusoid
 
 
 @pytest.mark.parametrize(("photos", "pairs"), [(24, 1), (56, 1), (117, 2), (200, 4), (468, 9)])
@@ -36,6 +43,26 @@ def test_without_them_all_photos_are_for_the_estimate():
     plan, _ = choose_plan(Size(16, 20), 60, checks=0)
     assert plan.counts["check"] == 0
     assert check_lights(plan) == []
+
+
+@pytest.mark.parametrize(("photos", "projector"), [(38, Size(16, 20)), (150, Size(31, 24))])
+def test_they_cost_references_and_no_frequency(photos, projector):
+    plan, _ = choose_plan(projector, photos)
+    without, _ = choose_plan(projector, photos, checks=0)
+    assert plan.counts["check"] == 2 * check_pairs(photos)
+    waves, others = (
+        [p for p in one.patterns if isinstance(p, Sinusoid) and p.frequency != DC]
+        for one in (plan, without)
+    )
+    assert waves == others
+    # White and black are still there at the start and at the end.
+    assert {is_reference(plan.patterns[at]) for at in (0, 1, -2, -1)} == {True}
+
+
+def test_many_of_them_leave_half_of_the_references():
+    plan, without = (choose_plan(Size(24, 24), 150, checks=n)[0] for n in (20, 0))
+    references, all_of_them = (sum(map(is_reference, one.patterns)) for one in (plan, without))
+    assert references == all_of_them / 2
 
 
 def test_a_plan_has_as_many_as_asked_for():

@@ -25,6 +25,7 @@ from nearfar.plan.expect_place import (
 )
 from nearfar.plan.low_rank import ErrorsLowRank
 from nearfar.plan.patterns import Sinusoid
+from nearfar.plan.window import side_of_blocks
 from nearfar.priors.fitted import TYPICAL_SCENES
 from nearfar.transport.boxes import box_places, summed_area
 
@@ -41,18 +42,19 @@ def _shown(plan: Plan, purposes: tuple[str, ...] = ("direct", "near", "far")):
     )
 
 
-# Of the patterns that were chosen before there was a pitch. On these grids no two candidates are
-# worth the same within rounding, so that every processor chooses alike.
+# Of the patterns that were chosen before there was a pitch, and before check photos took the place
+# of references. On these grids no two candidates are worth the same within rounding, so that every
+# processor chooses alike.
 @pytest.mark.parametrize(
-    ("projector", "photos", "digest"),
+    ("projector", "photos", "checks", "digest"),
     [
-        (Size(31, 24), 61, "fef31c9b62234f4d"),
-        (Size(48, 64), 200, "3f37ddde1f346490"),
-        (Size(1, 64), 60, "bc1c6abf1f480261"),
+        (Size(31, 24), 61, None, "fef31c9b62234f4d"),
+        (Size(48, 64), 200, 0, "a2664660a3b64daf"),
+        (Size(1, 64), 60, None, "bc1c6abf1f480261"),
     ],
 )
-def test_plans_of_single_pixels_are_what_they_always_were(projector, photos, digest):
-    plan, _ = choose_plan(projector, photos)
+def test_plans_of_single_pixels_are_what_they_always_were(projector, photos, checks, digest):
+    plan, _ = choose_plan(projector, photos, checks=checks)
     patterns = json.dumps(json.loads(plan.to_json())["patterns"])
     assert plan.pitch == 1
     assert hashlib.sha256(patterns.encode()).hexdigest()[:16] == digest
@@ -114,7 +116,8 @@ def test_a_plan_of_a_fine_projector_lies_on_its_frequencies(projector, photos, p
 
 
 def test_photos_do_not_grow_with_the_projector():
-    found = [choose_plan(projector, 200)[0] for projector in (Size(540, 960), FULL_HD, ULTRA_HD)]
+    projectors = (Size(540, 960), FULL_HD, ULTRA_HD)
+    found = [choose_plan(projector, 200, checks=0)[0] for projector in projectors]
     cycles = []
     for plan in found:
         low = as_array(_shown(plan, ("near", "far"))) * np.array(plan.projector)
@@ -249,3 +252,23 @@ def test_what_was_measured_lies_in_the_range_that_is_expected(projector, measure
 def test_a_window_that_does_not_fit_at_its_pitch_is_refused():
     with pytest.raises(PlanError, match=r"W = 35 at a pitch of 32 .* between 1 and 34"):
         choose_plan(FULL_HD, 60, window=35)
+
+
+@pytest.mark.parametrize(
+    ("projector", "block"),
+    [
+        ((136, 150), 2),
+        ((256, 256), 2),
+        ((1080, 1920), 10),
+        ((2160, 3840), 20),
+        ((4320, 7680), 40),
+        ((1, 1920), 15),
+        # Nothing divides both sides.
+        ((257, 301), 3),
+    ],
+)
+def test_blocks_leave_a_grid_of_single_cells_that_is_no_coarser_than_it_must(projector, block):
+    assert side_of_blocks(Size(*projector)) == block
+    grid = Size(*(max(1, side // block) for side in projector))
+    assert pitch_of(grid) == 1
+    assert min(side for side in grid if side > 1) >= 64

@@ -14,7 +14,10 @@ from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.transport import near as windows
 from nearfar.transport.model import Transport
+from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.rows import of_pixels, of_rows, stacked
+from nearfar.transport.store import StoredTransport, open_transport
+from nearfar.workflow.relight import relight_stored
 
 PROJECTOR, CAMERA = Size(37, 52), Size(5, 7)
 BASIS = NearBasis(5, 4)
@@ -173,3 +176,26 @@ def test_a_pitch_that_does_not_fit_gets_a_sentence(transport, tmp_path, pitch):
     open_durable_store(path).attrs["pitch"] = pitch
     with pytest.raises(UnreadableFileError, match="reconstruct it again"):
         nearfar.load_transport(path)
+
+
+def test_a_light_is_analysed_once_for_all_blocks_of_camera_rows(transport, tmp_path, monkeypatch):
+    colours = transport.channels
+    light = np.random.default_rng(3).random((*PROJECTOR, colours), dtype=np.float32)
+    analysed = transport.analyse(light)
+    blocks = [of_rows(transport, slice(first, first + 2)) for first in (0, 2, 4)]
+    for whole, parts in zip(
+        transport.components(light),
+        zip(*(block.components(analysed) for block in blocks), strict=True),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(whole, np.concatenate(parts))
+    nearfar.save_transport(transport, tmp_path / "stored.zarr")
+    stored = open_transport(tmp_path / "stored.zarr")
+    # A row at a time.
+    monkeypatch.setattr(StoredTransport.blocks, "__defaults__", (1,))
+    blurred = []
+    levels = Pyramid.levels
+    monkeypatch.setattr(Pyramid, "levels", lambda *given: blurred.append(None) or levels(*given))
+    by_rows = relight_stored(stored, light, {"near": 2.0})
+    assert len(blurred) == colours
+    np.testing.assert_allclose(by_rows, transport.relight(light, near=2.0), rtol=1e-5, atol=1e-5)

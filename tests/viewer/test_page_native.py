@@ -11,17 +11,19 @@ from nearfar.files.codecs import encode_png
 from nearfar.illumination.frequencies import far_frequencies, representatives
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
+from nearfar.transport.coarse import block_means
 from nearfar.transport.model import Transport
 from nearfar.transport.store import save_transport
+from nearfar.viewer import interactive
 from nearfar.viewer.interactive import InteractiveTransport
-from tests.viewer.asking import unpack
+from tests.viewer.asking import ask, frame, message, refused, socket_of, unpack
 from tests.viewer.browsing import drop, saved, seen, settled, slide, tone
 from tests.viewer.conftest import served_view
 
 pytestmark = pytest.mark.slow
 
 PROJECTOR, CAMERA = Size(144, 256), Size(30, 40)
-BASIS = NearBasis(5, 4)
+BASIS = NearBasis(5, 8)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,14 @@ def native() -> Transport:
 def page_of_native(native, tmp_path_factory):
     path = tmp_path_factory.mktemp("native") / "native.zarr"
     save_transport(native, path)
-    with served_view(InteractiveTransport(path)) as address:
+    with pytest.MonkeyPatch.context() as patch:
+        # As a projector of millions of pixels: moving lights are of blocks of 4 x 4 pixels.
+        patch.setattr(interactive, "MAXIMUM_MOVING_LIGHT_PIXELS", 2**12)
+        # A busy machine leaves out no camera pixels.
+        patch.setattr(interactive, "PACES", 1)
+        transport = InteractiveTransport(path)
+    assert transport.light_block == 4
+    with served_view(transport) as address:
         yield address
 
 
@@ -140,3 +149,72 @@ def test_a_picture_of_another_size_fills_the_projector(open_page, page_of_native
     expected = np.zeros(PROJECTOR)
     expected[:, 128:] = 1
     np.testing.assert_allclose(light.reshape(*PROJECTOR, -1)[..., 0], expected, atol=0.01)
+
+
+# What the page sends, noted before it is sent.
+NOTING = """window.sent = []; const send = WebSocket.prototype.send;
+WebSocket.prototype.send = function (data) {
+  const length = new DataView(data.buffer).getUint32(0, true);
+  const levels = new Uint16Array(data.buffer, 4 + length);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data.buffer, 4, length)));
+  window.sent.push({ ...header, levels: header.block > 1 ? [...levels] : [] });
+  return send.call(this, data);
+};"""
+SHAPES = {
+    "spot": {"radius": 30, "x": 100, "y": 60},
+    "stripe": {"width": 1, "angle": 30},
+    "sinusoid": {"cycles": 60, "angle": 20},
+    "checkerboard": {"side": 3},
+    "pixel": {"x": 9, "y": 6},
+    "white": {},
+    "paint": {"strokes": [{"colour": "#ffffff", "radius": 9, "points": [40, 30, 90, 80]}]},
+}
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_a_moving_light_is_sent_as_means_over_blocks_and_whole_at_rest(
+    open_page, page_of_native, native, tmp_path, kind
+):
+    page = open_page(page_of_native, {"kind": kind, **SHAPES[kind]}, script=NOTING)
+    page.evaluate("window.sent.length = 0")
+    # A change that leaves the light as it was.
+    slide(page, "soft", 0.5) if kind != "paint" else slide(page, "brush", 7)
+    page.wait_for_function("() => window.sent.some(light => light.block === 1)")
+    settled(page)
+    sent = page.evaluate("window.sent")
+    assert [light["block"] for light in sent[-2:]] == [4, 1]
+    light = read_light(saved(page, "#save-light", tmp_path), PROJECTOR).reshape(*PROJECTOR, -1)
+    moving = np.array(sent[-2]["levels"]).reshape(sent[-2]["shape"]) / 65535
+    # Of a spot, four pixels of a block are looked at.
+    bound = 0.1 if kind == "spot" else 1e-3
+    np.testing.assert_allclose(moving[..., 0], block_means(light[..., 0], 4), atol=bound)
+    assert np.abs(seen(page)[..., :1] - tone(native @ light[..., 0])[..., None]).max() <= 1
+
+
+def test_a_light_of_blocks_gets_a_picture_at_once_and_never_an_exact_one(page_of_native, native):
+    light = np.random.default_rng(5).random(PROJECTOR, dtype=np.float32)
+    means = block_means(light, 4)
+    with socket_of(page_of_native) as socket:
+        socket.send(message(means, block=4))
+        header, moving = frame(socket)
+        assert not header["exact"]
+        socket.send(message(light, number=2))
+        header, first = frame(socket)
+        assert (header["number"], header["exact"]) == (2, False)
+        header, exact = frame(socket)
+        assert (header["number"], header["exact"]) == (2, True)
+    np.testing.assert_allclose(moving, first, atol=2e-3)
+    whole = np.stack(native.components(light))[..., None]
+    np.testing.assert_allclose(exact, whole, rtol=1e-3, atol=2e-5)
+    enlarged = np.repeat(np.repeat(means, 4, axis=0), 4, axis=1)
+    of_blocks = np.stack(native.components(enlarged))[..., None]
+    np.testing.assert_allclose(moving[[0, 2]], of_blocks[[0, 2]], rtol=1e-2, atol=1e-3)
+
+
+def test_lights_of_other_blocks_and_sizes_are_refused(page_of_native):
+    means = np.ones((72, 128), dtype=np.float32)
+    status, said = refused(page_of_native, "/light.png", message(means, block=2))
+    assert status == 400
+    assert "blocks of 2" in said
+    assert "send it whole" in said
+    assert json.loads(ask(page_of_native, "/scene"))["light_block"] == 4

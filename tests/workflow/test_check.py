@@ -6,11 +6,11 @@ from scipy import sparse
 
 from nearfar.arrays import Size
 from nearfar.errors import InputError
-from nearfar.illumination.frequencies import near_frequencies
+from nearfar.illumination.frequencies import band, near_frequencies
 from nearfar.illumination.patterns import exponential
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
-from nearfar.workflow.check import check_model, dropped_of
+from nearfar.workflow.check import check_model, default_sample, dropped_of
 from nearfar.workflow.conditioning import condition_near
 from nearfar.workflow.model_fit import split_by_model
 from nearfar.workflow.verdict.model_check import describe_verdict, judge_check
@@ -194,3 +194,33 @@ def test_camera_pixels_without_light_count_neither_way():
     check = check_model(dark, 5, Size(3, 3))
     assert check.lit == 1.0
     assert check.best_rows > 60
+
+
+@pytest.mark.parametrize(
+    ("projector", "pixels"),
+    [((16, 16), 4096), ((128, 128), 4096), ((256, 256), 2048), ((4320, 7680), 64)],
+)
+def test_fewer_camera_pixels_are_looked_at_where_rows_are_long(projector, pixels):
+    assert default_sample(Size(*projector)) == pixels
+
+
+@pytest.mark.parametrize("far", [Size(3, 5), Size(4, 5), Size(4, 6), Size(1, 20)])
+def test_energy_beyond_the_band_is_that_of_all_frequencies(far):
+    rows = np.random.default_rng(4).normal(size=(CAMERA.pixels, PROJECTOR.pixels))
+    check = check_model(_exact(_nothing(), rows), 5, far)
+    spectrum = np.fft.fft2(rows.reshape(-1, *PROJECTOR))
+    held = [
+        np.isin(np.rint(np.fft.fftfreq(n) * n), band(m))
+        for n, m in zip(PROJECTOR, far, strict=True)
+    ]
+    in_band = np.outer(*held)
+    energy = np.abs(spectrum) ** 2
+    share = energy[:, ~in_band].sum() / energy.sum()
+    assert check.far_beyond == pytest.approx(share, rel=1e-5)
+    # As pictures, frequencies of even bands that lack their opposites are half there.
+    high = np.fft.ifft2(np.where(in_band, 0, spectrum)).real
+    pixel = 40
+    y, x = divmod(4 * pixel, PROJECTOR.width)
+    apart = np.maximum(*np.abs(np.indices(PROJECTOR) - np.array([y, x])[:, None, None]))
+    outside = (high[pixel] ** 2)[apart > 2].sum() / (rows[pixel] ** 2).sum()
+    assert check.far_beyond_map[pixel] == pytest.approx(outside, rel=1e-4)

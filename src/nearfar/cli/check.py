@@ -57,7 +57,7 @@ def check(
     from nearfar.report.model_check import check_page, check_rows
     from nearfar.report.page import write_page
     from nearfar.rigs.simulated.opening import load_world
-    from nearfar.workflow.check import DEFAULT_SAMPLE, check_model, dropped_of
+    from nearfar.workflow.check import check_model, dropped_of
     from nearfar.workflow.conditioning import condition_near
     from nearfar.workflow.verdict.model_check import describe_verdict, judge_check, numbers_of
 
@@ -67,7 +67,8 @@ def check(
     with progress_bar("checking", quiet=quiet) as told:
         world = load_world(transport, projector, camera)
         dropped = dropped_of(world.projector, near, far, drop)
-        sample = DEFAULT_SAMPLE if page is None else world.camera.pixels
+        # Pages have maps of every camera pixel.
+        sample = None if page is None else world.camera.pixels
         found = check_model(world, near, far, sample=sample, progress=told)
         condition = condition_near(world.projector, near, dropped)
         if page is not None:

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from nearfar.plan.paper import Offset
     from nearfar.progress import Report
 
-# Side of the blocks that are named as an example.
-PIXELS_OF_A_BLOCK = 8
-
 
 def plan(
     projector: Annotated[
@@ -145,9 +142,12 @@ def plan(
 
 def _on_blocks(projector: Size) -> str:
     """Return how a plan for blocks of a projector's pixels is made and shown."""
-    grid = Size(*(max(1, side // PIXELS_OF_A_BLOCK) for side in projector))
+    from nearfar.plan.window import side_of_blocks
+
+    block = side_of_blocks(projector)
+    grid = Size(*(max(1, side // block) for side in projector))
     return (
-        f"blocks of {PIXELS_OF_A_BLOCK} x {PIXELS_OF_A_BLOCK} pixels: --projector {grid}, and "
+        f"blocks of {block} x {block} pixels: --projector {grid}, and "
         f"nearfar export --native {projector}"
     )
 

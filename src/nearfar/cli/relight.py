@@ -9,7 +9,6 @@ import typer
 from nearfar.arrays import Size
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
-from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -39,13 +38,9 @@ def _gains(texts: list[str]) -> dict[str, float]:
 
 def _of_size(light: "Floats", path: Path, projector: Size) -> "Floats":
     """Return a light of the projector's size, and refuse another one."""
-    size = Size(*light.shape[:2])
-    if size != projector:
-        raise InputError(
-            f"{path} is {size} but the projector is {projector} (height x width): give a light of "
-            f"{projector}, or add --resize."
-        )
-    return light
+    from nearfar.files import light_of_size
+
+    return light_of_size(light, path, projector, other_cure=", or add --resize")
 
 
 def _resized(light: "Floats", _path: Path, projector: Size) -> "Floats":

@@ -1,5 +1,6 @@
 """``nearfar view``."""
 
+import math
 from contextlib import suppress
 from typing import Annotated
 
@@ -49,6 +50,8 @@ def view(
             transport, memory=available, progress=lambda share: report("reading", share)
         )
 
+    _tell_of_memory(interactive.stored.nbytes, available, quiet=quiet)
+
     def on_start(url: str) -> None:
         say(f"{transport} at {url}, Ctrl-C here ends it")
         if browser:
@@ -58,3 +61,13 @@ def view(
     with suppress(KeyboardInterrupt):
         run_view(interactive, ListeningAddress(host, port), on_start)
     say("view ended", quiet=quiet)
+
+
+def _tell_of_memory(needed: int, available: int, *, quiet: bool) -> None:
+    """Say how a transport that is larger than the memory for it is kept there."""
+    if needed > available:
+        say(
+            f"the transport takes {needed / 1e9:.1f} GB and is read again whenever the light comes "
+            f"to rest: --memory {math.ceil(needed / 1e9)}GB keeps it in memory",
+            quiet=quiet,
+        )

@@ -6,7 +6,8 @@ response is divided by the variance of all else in it (noise, far- and near-rang
 inverse transform of the result scores every place of the pattern grid: a whitened matched filter.
 It is used with several backgrounds. A weak one finds the place, since every response helps to tell
 one place from another. Stronger ones measure the footprint, the 5 x 5 entries of t around it, and
-tell direct light from concentrated near-range light, as in a crease.
+tell direct light from concentrated near-range light, as in a crease. Where neighbours expect other
+places, these are tried instead (`nearfar.correspondence.sidelobes`).
 
 The inverse transform is computed as matrix products, first along rows and then down, so that
 frequencies may lie off the DFT grid. On projectors too large for that, places are searched for from
@@ -22,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.correspondence.ambiguity import require_settled
 from nearfar.correspondence.background import (
     DETECTION_BACKGROUND,
@@ -35,8 +36,11 @@ from nearfar.correspondence.coarse_to_fine import (
     correspond_coarse_to_fine,
 )
 from nearfar.correspondence.methods import CorrespondenceMethod
+from nearfar.correspondence.neighbours import REACH
+from nearfar.correspondence.nonnegative import nonnegative_entries
 from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
+from nearfar.correspondence.sidelobes import replace_sidelobes
 from nearfar.correspondence.size import is_large
 from nearfar.correspondence.weighing import (
     Weighed,
@@ -56,8 +60,6 @@ SCORES_AT_ONCE = 2**22
 PIXELS_AT_ONCE = 1024
 # Pixels on each side of the middle of a footprint.
 FOOTPRINT_REACH = 2
-# Sweeps over a footprint's entries.
-SWEEPS = 15
 # Ridge on a footprint's entries two pixels from its middle, in units of the diagonal: a second
 # pixel of direct light is more probable next to the first.
 OUTER_RIDGE = 1.0
@@ -117,13 +119,18 @@ def _correspond_at_every_place(
     excess = np.empty(camera.pixels, dtype=np.float32)
     waves = _waves(basis)
 
-    def work(block: slice) -> None:
-        relative = division.of_pixels(block)
-        found = _search(basis, waves, weigh(basis, relative, SEARCH_BACKGROUND))
-        q[block], _ = _footprints(basis, weigh(basis, relative, FOOTPRINT_BACKGROUND), found)
-        _, excess[block] = _footprints(basis, weigh(basis, relative, DETECTION_BACKGROUND), found)
+    def place(pixels: slice | Integers, around: NDArray[np.float64] | None = None) -> None:
+        relative = division.of_pixels(pixels)
+        if around is None:
+            around = _search(basis, waves, weigh(basis, relative, SEARCH_BACKGROUND))
+        q[pixels], _ = _footprints(basis, weigh(basis, relative, FOOTPRINT_BACKGROUND), around)
+        _, excess[pixels] = _footprints(basis, weigh(basis, relative, DETECTION_BACKGROUND), around)
 
-    side_by_side(work, blocks(camera.pixels, PIXELS_AT_ONCE))
+    side_by_side(place, blocks(camera.pixels, PIXELS_AT_ONCE))
+    lit = (excess > LEAST_EXCESS).reshape(camera)
+    pixels, places = replace_sidelobes(division, q.reshape(*camera, 2), lit)
+    for block in blocks(len(pixels), PIXELS_AT_ONCE):
+        place(pixels[block], places[block])
     return q.reshape(*camera, 2), excess.reshape(camera)
 
 
@@ -259,47 +266,15 @@ def _footprints(
     phase_shifted = basis.recentre(weighed.responses[:, None], centre)[:, 0]
     scores = np.ascontiguousarray((phase_shifted @ basis.patterns_at(offsets)).T)
     gram = (overlap.T @ weighed.weights.T)[number]
-    entries, left = _nonnegative(scores, gram, inside, ridge)
+    entries, explained = nonnegative_entries(scores, gram, inside, ridge)
     total = entries.sum(axis=0)
     centroid = centre + (entries.T @ offsets) / np.where(total > 0, total, 1.0)[:, None]
-    # 2 s.w - w.G.w = (s + (s - G.w)).w
-    explained = np.einsum("oc,oc->c", scores + left, entries)
     return np.clip(centroid, 0, limit), np.sqrt(np.maximum(explained, 0.0) / basis.count)
 
 
 def _square(reach: int) -> NDArray[np.int64]:
     side = np.arange(-reach, reach + 1)
     return np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _nonnegative(
-    scores: Floats, gram: Floats, inside: Booleans, ridge: Floats
-) -> tuple[Floats, Floats]:
-    """Least squares with no negative entry, by coordinate descent over all pixels at once.
-
-    Parameters
-    ----------
-    scores : ndarray, shape (O, C)
-    gram : ndarray, shape (O, O, C)
-    inside : ndarray, shape (O, C)
-        Entries that are on the pattern grid; the others are 0.
-    ridge : ndarray, shape (O,)
-
-    Returns
-    -------
-    entries, left : ndarray, shape (O, C)
-        The solution w, and s - G.w.
-    """
-    entries = np.zeros_like(scores)
-    left = scores.copy()
-    inverse = inside / (gram[0, 0] + 1e-20)
-    for _ in range(SWEEPS):
-        for o in range(len(scores)):
-            change = left[o] * inverse[o] - ridge[o] * entries[o]
-            value = np.maximum(entries[o] + change / (1 + ridge[o]), 0.0)
-            left -= (value - entries[o]) * gram[o]
-            entries[o] = value
-    return entries, left
 
 
 def _find(
@@ -312,8 +287,8 @@ def _find(
 
 
 def _rows_beside(plan: Plan) -> int:
-    """Return the rows of neighbours that tell where to look, and whether q is mirrored."""
-    return ROWS_BESIDE + 1 if is_large(plan.projector) else 1
+    """Return the rows of neighbours that tell sidelobes, and whether q is mirrored."""
+    return (ROWS_BESIDE if is_large(plan.projector) else REACH) + 1
 
 
 # Every plan has sinusoids; whether they determine q is checked when they are measured.

@@ -192,14 +192,7 @@ def read_light(path: Path, projector: Size, *, srgb: bool = False) -> NDArray[np
     MissingFileError, UnreadableFileError, InputError
         As `read_picture`; also if the size is not the projector's, or floats are called sRGB.
     """
-    light = read_light_of_any_size(path, srgb=srgb)
-    size = Size(*light.shape[:2])
-    if size != projector:
-        raise InputError(
-            f"{path} is {size} but the projector is {projector} (height x width): "
-            f"resize it to {projector}."
-        )
-    return light
+    return light_of_size(read_light_of_any_size(path, srgb=srgb), path, projector)
 
 
 def read_light_of_any_size(path: Path, *, srgb: bool = False) -> NDArray[np.float32]:
@@ -215,6 +208,34 @@ def read_light_of_any_size(path: Path, *, srgb: bool = False) -> NDArray[np.floa
         raise InputError(f"{path} holds floats, which are linear light: leave out `srgb`.")
     light = pixels.astype(np.float32) / np.float32(full_scale_of(pixels.dtype))
     return from_srgb(light) if srgb else light
+
+
+def light_of_size(
+    light: NDArray[np.float32], path: Path, projector: Size, *, other_cure: str = ""
+) -> NDArray[np.float32]:
+    """Return a light that was read from a file, if it has the projector's size.
+
+    Parameters
+    ----------
+    light : array
+    path : Path
+        The file, for the message.
+    projector : Size
+    other_cure : str, optional
+        What the message ends with beside a light of the projector's size.
+
+    Raises
+    ------
+    InputError
+        If it has another.
+    """
+    size = Size(*light.shape[:2])
+    if size != projector:
+        raise InputError(
+            f"{path} is {size} but the projector is {projector} (height x width): give a light of "
+            f"{projector}{other_cure}."
+        )
+    return light
 
 
 def check_picture_ending(path: Path) -> None:

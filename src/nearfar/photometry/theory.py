@@ -4,6 +4,7 @@ One complex pattern exp(-j 2 pi k.p) for each frequency, no offset, no noise, no
 transport responds to -k by the conjugate of its response to k.
 """
 
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -18,8 +19,8 @@ from nearfar.plan.patterns import Exponential
 
 # Camera pixels at once.
 PIXELS_AT_ONCE = 512
-# Values of rows, and of patterns, at once: those of every projector pixel are many.
-VALUES_AT_ONCE = 2**25
+# Values of patterns, and of rows, at once: those of every projector pixel are many.
+VALUES_AT_ONCE, VALUES_OF_ROWS = 2**25, 2**26
 
 
 class Known(Protocol):
@@ -83,13 +84,21 @@ def measure_in_theory(plan: Plan, transport: Known) -> Measurements:
     height, width = plan.projector
     # Sums over thousands of pixels: in float64, so that exact recovery stays exact.
     responses = np.zeros((pixels, channels, basis.count))
-    at_once = max(1, min(PIXELS_AT_ONCE, VALUES_AT_ONCE // (channels * height * width)))
-    for lines in blocks(height, max(1, VALUES_AT_ONCE // (width * basis.count))):
-        patterns = np.ascontiguousarray(basis.patterns_on(lines).T, dtype=np.float64)
-        on_lines = slice(lines.start * width, lines.stop * width)
-        for block in blocks(pixels, at_once):
-            rows = transport.rows(block)[..., on_lines].astype(np.float64)
-            responses[block] += product(rows, patterns)
+    # Rows are computed once. Patterns are drawn once if they all fit into memory, and otherwise for
+    # each block of camera pixels.
+    line_blocks = list(blocks(height, max(1, VALUES_AT_ONCE // (width * basis.count))))
+
+    @lru_cache(maxsize=1)
+    def drawn(number: int) -> Floats:
+        patterns = basis.patterns_on(line_blocks[number]).T
+        return np.ascontiguousarray(patterns, dtype=np.float64)
+
+    at_once = max(1, min(PIXELS_AT_ONCE, VALUES_OF_ROWS // (channels * height * width)))
+    for block in blocks(pixels, at_once):
+        rows = transport.rows(block)
+        for number, lines in enumerate(line_blocks):
+            on_lines = slice(lines.start * width, lines.stop * width)
+            responses[block] += product(rows[..., on_lines].astype(np.float64), drawn(number))
     nothing = np.zeros((pixels, channels), dtype=np.float32)
     return Measurements(
         camera=transport.camera,

@@ -186,6 +186,7 @@ def choose_plan(
         projector,
         own,
         window,
+        references=_references(photos, checks),
         pitch=pitch,
         typical=typical or TYPICAL_SCENES,
         noise=noise,
@@ -246,6 +247,7 @@ def choose_frequencies(
     photos: int,
     window: int,
     *,
+    references: int | None = None,
     pitch: int = 1,
     typical: TypicalScenes = TYPICAL_SCENES,
     noise: float = NOISE,
@@ -259,8 +261,13 @@ def choose_frequencies(
     projector : Size
     photos : int
         Photos of transport and references together.
-    window, pitch : int
-        W, and the projector pixels between the window's functions.
+    window : int
+        W.
+    references : int, optional
+        How often white and black are each photographed at most; by default as in a plan without
+        check photos.
+    pitch : int
+        Projector pixels between the window's functions.
     typical : TypicalScenes
         Scenes to plan for.
     noise : float
@@ -274,7 +281,10 @@ def choose_frequencies(
     -------
     FrequencyChoice
     """
-    start = _start(projector, photos, window, pitch, typical, noise, every=every_frequency)
+    references = _references(photos, 0) if references is None else references
+    start = _start(
+        projector, photos, window, references, pitch, typical, noise, every=every_frequency
+    )
     listed, errors, references = start.listed, start.errors, start.references
     cost = np.array([1 if k.is_own_negative else 2 for k in listed])
     left = photos - 2 * references
@@ -333,17 +343,27 @@ class _Start(NamedTuple):
     all_measured: bool = False
 
 
+def _references(photos: int, checks: int) -> int:
+    """Return how often white and black are each photographed, of so many photos in all.
+
+    Check photos take the place of references, so that they cost no frequency: a pair of them that
+    of a white and a black, as long as half of these are left.
+    """
+    found = photos // (REFERENCE_INTERVAL + 2)
+    return max(FEWEST, found // 2, found - checks)
+
+
 def _start(
     projector: Size,
     photos: int,
     window: int,
+    references: int,
     pitch: int,
     typical: TypicalScenes,
     noise: float,
     *,
     every: bool,
 ) -> _Start:
-    references = max(FEWEST, photos // (REFERENCE_INTERVAL + 2))
     half = max(FEWEST, references // 2)
     # With as many photos as unknowns, nothing is left to what scenes are expected to be. For that,
     # half of the references are given up, or all but the fewest where no scene is expected.

@@ -6,6 +6,8 @@ projector's resolution, so that a plan for a fine projector is that for a grid o
 pitch x pitch projector pixels.
 """
 
+import math
+
 from nearfar.arrays import Size
 
 # Shorter side of the largest projector whose windows are of single pixels.
@@ -37,6 +39,23 @@ def pitch_of(projector: Size) -> int:
     while pitch * MOST_CELLS < side:
         pitch *= 2
     return pitch
+
+
+def side_of_blocks(projector: Size) -> int:
+    """Return the side of the smallest blocks that a plan of single cells can be made for.
+
+    Of blocks that leave no more than 128 cells on the shorter side, the smallest that divide both
+    sides; or, where that would leave fewer than 64, the smallest.
+    """
+    shorter = _shorter(projector)
+    smallest = -(-shorter // LARGEST_OF_SINGLE_PIXELS)
+    common = math.gcd(*(side for side in projector if side > 1))
+    dividing = (
+        block
+        for block in range(smallest, shorter * 2 // LARGEST_OF_SINGLE_PIXELS + 1)
+        if common % block == 0
+    )
+    return next(dividing, smallest)
 
 
 def largest_window(projector: Size, pitch: int = 1) -> int:

@@ -1,8 +1,10 @@
 """Pictures, adjoint and rows of d and n where near-range light is made of hats of several pixels.
 
-Index convention: c runs over camera pixels, i over channels, l over lights, w over functions;
-lights are (L, 1, P) for all channels, or (L, channels, P); pictures are (L, C, channels).
+Index convention: c runs over camera pixels, i over channels, w over functions.
 """
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +25,39 @@ BATCH_PIXELS_BACK = 2**14
 PARTS_BACK = 2
 
 
+class BlurredLight(NamedTuple):
+    """What camera pixels read of a light of one channel.
+
+    Attributes
+    ----------
+    lit : tuple of slice
+        Projector rows and columns between the first and the last lit pixel.
+    table : ndarray, float64
+        Its summed-area table, flat.
+    levels : ndarray
+        The light blurred by the hat of each pitch, flat; see `Pyramid`.
+    """
+
+    lit: tuple[slice, slice]
+    table: Floats
+    levels: Floats
+
+
+def blurred_light(light: Floats, pyramid: Pyramid) -> BlurredLight:
+    """Return what camera pixels read of a light, flat or (Py, Px)."""
+    square = light.reshape(pyramid.projector)
+    return BlurredLight(bounds(square), summed_area(square), pyramid.levels(square))
+
+
 def blurred_pictures(
     direct: Floats,
     near: Floats,
     pyramid: Pyramid,
     centres: NDArray[np.int64],
     where: BoxAxes,
-    lights: Floats,
+    light: Sequence[BlurredLight],
 ) -> tuple[Floats, Floats]:
-    """Return the pictures of d and of n.
+    """Return the pictures of d and of n under a light, each (C, channels).
 
     Parameters
     ----------
@@ -41,47 +67,42 @@ def blurred_pictures(
     centres : ndarray of int, shape (C, 2)
         q rounded.
     where : BoxAxes
-    lights : ndarray
+    light : sequence of BlurredLight
+        One for all channels, or one for each.
     """
-    shape = (len(lights), *direct.shape)
-    dtype = np.result_type(lights, near, np.float32)
-    of_direct, of_near = np.empty(shape, dtype=dtype), np.zeros(shape, dtype=dtype)
+    dtype = np.result_type(light[0].levels, near, np.float32)
+    of_direct, of_near = (make(direct.shape, dtype=dtype) for make in (np.empty, np.zeros))
     places = pyramid.places(centres)
-    own_lights = lights.shape[1] > 1
-    for number, light in enumerate(lights):
-        for place, one in enumerate(light.reshape(-1, *pyramid.projector)):
-            own = slice(place, place + 1) if own_lights else slice(None)
-            table, levels = summed_area(one), pyramid.levels(one)
-            reached = _reached(one, centres, pyramid)
+    for place, one in enumerate(light):
+        own = slice(place, place + 1) if len(light) > 1 else slice(None)
+        reached = _reached(one.lit, centres, pyramid)
 
-            def work(
-                batch: slice,
-                number: int = number,
-                own: slice = own,
-                table: Floats = table,
-                levels: Floats = levels,
-                reached: Booleans | None = reached,
-            ) -> None:
-                at_q = where.of(batch).means(table, pyramid.projector)
-                of_direct[number, batch, own] = direct[batch, own] * at_q[:, None]
-                chosen: slice | Integers = batch
-                if reached is not None and np.count_nonzero(reached[batch]) < DENSE_SHARE * len(
-                    at_q
-                ):
-                    # A small light: what most camera pixels see is dark.
-                    chosen = batch.start + np.flatnonzero(reached[batch])
-                seen = np.take(levels, places[chosen, None] + pyramid.steps)
-                for i in range(*own.indices(shape[2])):
-                    of_near[number, chosen, i] = np.einsum("cw,cw->c", near[chosen, i], seen)
+        def work(
+            batch: slice,
+            own: slice = own,
+            one: BlurredLight = one,
+            reached: Booleans | None = reached,
+        ) -> None:
+            at_q = where.of(batch).means(one.table, pyramid.projector)
+            of_direct[batch, own] = direct[batch, own] * at_q[:, None]
+            chosen: slice | Integers = batch
+            if reached is not None and np.count_nonzero(reached[batch]) < DENSE_SHARE * len(at_q):
+                # A small light: what most camera pixels see is dark.
+                chosen = batch.start + np.flatnonzero(reached[batch])
+            seen = np.take(one.levels, places[chosen, None] + pyramid.steps)
+            for i in range(*own.indices(direct.shape[1])):
+                of_near[chosen, i] = np.einsum("cw,cw->c", near[chosen, i], seen)
 
-            side_by_side(work, blocks(shape[1], BATCH_PIXELS))
+        side_by_side(work, blocks(len(direct), BATCH_PIXELS))
     return of_direct, of_near
 
 
-def _reached(square: Floats, centres: NDArray[np.int64], pyramid: Pyramid) -> Booleans | None:
+def _reached(
+    lit: tuple[slice, slice], centres: NDArray[np.int64], pyramid: Pyramid
+) -> Booleans | None:
     """Return which camera pixels a light may reach by n, (C,); None if it may reach all."""
     reached: Booleans | None = None
-    for side, length, places in zip(bounds(square), pyramid.projector, centres.T, strict=True):
+    for side, length, places in zip(lit, pyramid.projector, centres.T, strict=True):
         reach = pyramid.basis.reach
         if side.start > reach or side.stop < length - reach:
             near = (places >= side.start - reach) & (places < side.stop + reach)

@@ -47,14 +47,14 @@ class BoxAxes(NamedTuple):
 
     Attributes
     ----------
-    rows, columns : ndarray of int32, shape (2, C, 4)
+    rows, columns : ndarray of int16 or int32, shape (2, C, 4)
         Of each box.
     of_rows, of_columns : ndarray of float64, shape (2, C, 4)
         Their weights, half of each box's light; 0 without direct light.
     """
 
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
+    rows: Integers
+    columns: Integers
     of_rows: Floats
     of_columns: Floats
 
@@ -109,7 +109,9 @@ def box_axes(correspondence: Floats, footprints: Floats, projector: Size) -> Box
     q = np.asarray(correspondence).reshape(-1, 2)
     numbers = np.asarray(footprints).reshape(-1, 4)
     shape = (2, len(q), 4)
-    places = np.empty((2, *shape), dtype=np.int32)
+    # A full HD projector's take half the memory.
+    kind = np.int16 if max(projector) <= np.iinfo(np.int16).max else np.int32
+    places = np.empty((2, *shape), dtype=kind)
     weights = np.empty((2, *shape))
 
     def work(batch: slice) -> None:

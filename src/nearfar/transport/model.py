@@ -28,6 +28,7 @@ from nearfar.markup import card, picture
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.adjoint import AdjointTransport
+from nearfar.transport.analysed import AnalysedLight, analysed_light, overlaps_of
 from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
 from nearfar.transport.boxes import BoxAxes, box_axes
 from nearfar.transport.gains import as_gains, with_gains
@@ -224,12 +225,28 @@ class Transport(NoArray):
         """The adjoint T^T, an operator that takes images of the camera."""
         return AdjointTransport(self)
 
-    def components(self, light: Floats) -> Components:
-        """Relight each component by itself.
+    def analyse(self, light: Floats) -> AnalysedLight:
+        """Return what camera pixels read of a light, to be relit by several blocks of them.
+
+        Transports of other rows of the same camera take it in place of the light.
 
         Parameters
         ----------
         light : ndarray, shape (Py, Px) or (Py, Px, channels)
+
+        Raises
+        ------
+        InputError
+            As `components`.
+        """
+        return self._analyse(self.lights(light))
+
+    def components(self, light: Floats | AnalysedLight) -> Components:
+        """Relight each component by itself.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels); or AnalysedLight
 
         Returns
         -------
@@ -241,18 +258,22 @@ class Transport(NoArray):
         InputError
             If the light has another size than the pattern grid, or other channels.
         """
-        return Components(
-            *(self.picture(flat[0]) for flat in self._components(self.lights(light)[None]))
-        )
+        analysed = light if isinstance(light, AnalysedLight) else self.analyse(light)
+        return Components(*(self.picture(flat) for flat in self._relit(analysed)))
 
     def relight(
-        self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+        self,
+        light: Floats | AnalysedLight,
+        *,
+        direct: float = 1.0,
+        near: float = 1.0,
+        far: float = 1.0,
     ) -> Floats:
         """Relight with a gain for each component.
 
         Parameters
         ----------
-        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        light : ndarray, shape (Py, Px) or (Py, Px, channels); or AnalysedLight
         direct, near, far : float
 
         Returns
@@ -485,21 +506,42 @@ class Transport(NoArray):
         picture = flat.reshape(*self.camera, self.channels)
         return picture[..., 0] if self.channels == 1 else picture
 
+    def _analyse(self, flat: Floats) -> AnalysedLight:
+        """Analyse a light (1 or channels, P)."""
+        return analysed_light(flat, self.far_basis, self.pyramid if self.pitch > 1 else None)
+
+    def _relit(self, light: AnalysedLight) -> Components:
+        """Return pictures (C, channels) under a light."""
+        direct, near, far = self._flat_factors
+        (of_far,) = far_pictures(far, light.overlaps[None])
+        if self.pitch > 1:
+            centres, boxes = self._centres, self.box_axes
+            of_direct, of_near = blurred_pictures(
+                direct, near, self.pyramid, centres, boxes, light.blurred
+            )
+        else:
+            (of_direct,) = direct_pictures(direct, self._footprint, light.flat[None])
+            (of_near,) = near_pictures(near, self._centres, self.projector, light.flat[None])
+        return Components(of_direct, of_near, of_far)
+
     def _components(self, lights: Floats) -> Components:
         """Return pictures (L, C, channels) under lights (L, 1 or channels, P)."""
-        count, channels = self.camera.pixels, self.channels
-        direct, near = self.direct.reshape(count, channels), self.near.reshape(count, channels, -1)
-        far = far_pictures(self.far.reshape(count, channels, -1), self.far_basis, lights)
         if self.pitch > 1:
-            return Components(
-                *blurred_pictures(direct, near, self.pyramid, self._centres, self.box_axes, lights),
-                far,
-            )
+            pictures = [self._relit(self._analyse(light)) for light in lights]
+            return Components(*(np.stack(parts) for parts in zip(*pictures, strict=True)))
+        direct, near, far = self._flat_factors
         return Components(
             direct_pictures(direct, self._footprint, lights),
             near_pictures(near, self._centres, self.projector, lights),
-            far,
+            far_pictures(far, overlaps_of(lights, self.far_basis)),
         )
+
+    @property
+    def _flat_factors(self) -> Components:
+        """d, n and f: (C, channels), (C, channels, J) and (C, channels, M)."""
+        shape = (self.camera.pixels, self.channels)
+        near, far = (factor.reshape(*shape, -1) for factor in (self.near, self.far))
+        return Components(self.direct.reshape(shape), near, far)
 
     def _adjoint_channel(self, image: Floats, channel: int) -> Floats:
         d = self.direct.reshape(-1, self.channels)[:, channel]

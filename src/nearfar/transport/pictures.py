@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size, blocks
-from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import side_by_side
 from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
@@ -62,10 +61,18 @@ def near_pictures(
     return found
 
 
-def far_pictures(far: Floats, basis: RealBasis, lights: Floats) -> Floats:
-    """Return the pictures (L, C, channels) of f, its responses (C, channels, M) to a basis."""
-    overlaps = basis.analyse(lights).astype(np.result_type(lights, far), copy=False)
-    if lights.shape[1] == 1:
-        flat = far.reshape(-1, basis.count) @ overlaps[:, 0].T
-        return np.asarray(np.moveaxis(flat.reshape(*far.shape[:2], len(lights)), 2, 0))
+def far_pictures(far: Floats, overlaps: Floats) -> Floats:
+    """Return the pictures (L, C, channels) of f.
+
+    Parameters
+    ----------
+    far : ndarray, shape (C, channels, M)
+        Responses to a basis.
+    overlaps : ndarray, shape (L, 1 or channels, M)
+        What `RealBasis.analyse` returns of lights.
+    """
+    overlaps = overlaps.astype(np.result_type(overlaps, far), copy=False)
+    if overlaps.shape[1] == 1:
+        flat = far.reshape(-1, far.shape[2]) @ overlaps[:, 0].T
+        return np.asarray(np.moveaxis(flat.reshape(*far.shape[:2], len(overlaps)), 2, 0))
     return np.asarray(np.einsum("cim,lim->lci", far, overlaps, optimize=True))

@@ -22,7 +22,7 @@ from nearfar.devices import Device, mover
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.transport import near as windows
 from nearfar.transport.boxes import summed_area
-from nearfar.transport.direct import Footprint, footprint
+from nearfar.transport.direct import footprint
 from nearfar.transport.gains import as_gains
 from nearfar.transport.half import rounding_over_noise
 from nearfar.transport.model import Transport
@@ -44,8 +44,9 @@ class PreparedTransport(NoArray):
     projector, camera : Size
     channels : int
     direct : array, shape (C, channels)
-    corners, shares : arrays, shape (C, 4)
-        Projector pixels that direct light comes from, and their weights.
+    corners, shares : arrays
+        Projector pixels that direct light comes from, and their weights, (C, 4). With a pyramid,
+        (C, 2, 2, 4): for rows and columns, those of a summed-area table that each box reads.
     near : array, shape (C, channels, W^2)
     entries : array of int, shape (C, W^2)
         Projector pixels of the window entries; P for those beyond the border. With a pyramid,
@@ -58,8 +59,7 @@ class PreparedTransport(NoArray):
         processor.
     pyramid : Pyramid or None
         Where near-range light is made of functions of several projector pixels, lights are blurred
-        and summed on the processor first; `entries` are places in flat levels, `corners`
-        (C, 16) in summed-area tables.
+        and summed on the processor first; `entries` are places in flat levels.
     held : int
         How many values are gathered at once.
     """
@@ -128,7 +128,8 @@ class PreparedTransport(NoArray):
         )
         length = self.held // max(1, self.near.shape[2] * count * light_channels)
         for batch in blocks(self.camera.pixels, length):
-            at_q = at_direct[self.corners[batch]] * self.shares[batch][..., None, None]
+            corners, shares = self._direct_places(batch)
+            at_q = at_direct[corners] * shares[..., None, None]
             lit = xp.permute_dims(xp.sum(at_q, axis=1), (0, 2, 1))
             part = direct * self.direct[batch][..., None] * lit
             part = part + near * _weighted_sums(self.near[batch], padded[self._entries(batch)])
@@ -139,6 +140,18 @@ class PreparedTransport(NoArray):
     def _entries(self, batch: slice) -> Integers:
         """Return where camera pixels read a light for each function, (n, J)."""
         return self.entries[batch] if self.steps is None else self.entries[batch] + self.steps
+
+    def _direct_places(self, batch: slice) -> tuple[Integers, Floats]:
+        """Return where camera pixels read a light for direct light, and weights, (n, places)."""
+        corners, shares = self.corners[batch], self.shares[batch]
+        if self.pyramid is None:
+            return corners, shares
+        xp = namespace(corners)
+        corners = xp.astype(corners, xp.int64)
+        # Of each box, four rows times four columns.
+        flat = corners[:, 0, ..., None] * (self.projector.width + 1) + corners[:, 1, :, None]
+        weights = shares[:, 0, ..., None] * shares[:, 1, :, None]
+        return tuple(xp.reshape(part, (part.shape[0], 32)) for part in (flat, weights))
 
     def _blurred(self, lights: Any, pyramid: Pyramid) -> tuple[Any, Any, Any]:
         """Return overlaps with the far basis, levels and summed-area tables of lights.
@@ -215,7 +228,7 @@ def prepare_transport(
         half = device == "cuda" and rounding_over_noise(transport) < NEGLIGIBLE_ROUNDING
     dtype = np.float16 if half else np.float32
     count, channels = transport.camera.pixels, transport.channels
-    where, entries, pyramid = _places(transport)
+    corners, shares, entries, pyramid = _places(transport)
     basis = transport.far_basis
     patterns = None
     if pyramid is None:
@@ -225,8 +238,8 @@ def prepare_transport(
         camera=transport.camera,
         channels=channels,
         direct=move(transport.direct.reshape(count, channels)),
-        corners=move(where.pixels.astype(np.int32)),
-        shares=move(where.weights),
+        corners=move(corners),
+        shares=move(shares),
         near=move(transport.near.reshape(count, channels, -1).astype(dtype, copy=False)),
         entries=move(entries.astype(np.int32)),
         steps=None if pyramid is None else move(pyramid.steps[None].astype(np.int32)),
@@ -238,14 +251,22 @@ def prepare_transport(
     )
 
 
-def _places(transport: Transport) -> tuple[Footprint, Integers, Pyramid | None]:
-    """Return where direct and near-range light read a light: its pixels, or those of a pyramid."""
+def _places(transport: Transport) -> tuple[Integers, Floats, Integers, Pyramid | None]:
+    """Return where direct light reads a light, with its weights, and where near-range light does.
+
+    Both are of the light's pixels, or of a pyramid.
+    """
     projector = transport.projector
     centres = windows.centre(transport.correspondence, projector)
     if transport.pitch == 1:
         where = footprint(transport.correspondence, projector)
         inside = windows.inside(centres, transport.window, projector)
         pixels = windows.window_pixels(centres, transport.window, projector)
-        return where, np.where(inside, pixels, projector.pixels), None
-    pyramid = transport.pyramid
-    return transport.box_axes.places(projector), pyramid.places(centres)[:, None], pyramid
+        entries = np.where(inside, pixels, projector.pixels)
+        return where.pixels.astype(np.int32), where.weights, entries, None
+    pyramid, axes = transport.pyramid, transport.box_axes
+    corners, shares = (
+        np.ascontiguousarray(np.stack(both, axis=1).transpose(2, 1, 0, 3))
+        for both in ((axes.rows, axes.columns), (axes.of_rows, axes.of_columns))
+    )
+    return corners, shares, pyramid.places(centres)[:, None], pyramid

@@ -1,10 +1,14 @@
 """A transport that is relit interactively: coarsely while the light moves, exactly once it rests.
 
+While it moves, it is made of blocks of projector pixels where the projector has more than a few
+hundred rows, and fewer camera pixels are relit if the machine is slow.
+
 Index convention: camera pixels are [y, x]; parts of a frame are [component, y, x, colour], the
 components being direct, near and far. Frames have 1 colour or 3.
 """
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +20,14 @@ from numpy.typing import NDArray
 from nearfar.arrays import AnyPath, Floats, Size, middles
 from nearfar.errors import InputError, NearfarError
 from nearfar.files import luminance
+from nearfar.transport.analysed import AnalysedLight
+from nearfar.transport.coarse import block_means, in_blocks, size_in_blocks
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import FACTORS, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.store import StoredTransport, open_transport
 from nearfar.viewer.messages import Light
+from nearfar.viewer.pace import Pace
 
 # Factors of the coarse copy: relighting them takes some tens of milliseconds.
 MAXIMUM_COARSE_BYTES = 160 * 2**20
@@ -29,6 +36,10 @@ BLOCK_BYTES = 64 * 2**20
 # Larger photos are displayed at every second row and column, every third, and so on.
 MAXIMUM_DISPLAYED_PIXELS = 2**22
 DEFAULT_MEMORY_BYTES = 2 * 10**9
+# Larger lights are sent and relit as means over blocks of projector pixels while they move.
+MAXIMUM_MOVING_LIGHT_PIXELS = 2**17
+# Copies at one camera row and column in every coarse one, every second of them and every fourth.
+PACES = 3
 GREY, COLOUR = 1, 3
 # Values are scaled to about this for float16, which ends at 65504; small values keep more digits.
 FLOAT16_PEAK = 32768.0
@@ -49,15 +60,23 @@ class Frame(NamedTuple):
         A power of 2.
     stride : int
         Every how many rows and columns of the camera are there.
+    exact : bool
+        Whether every camera pixel that is displayed is there, under the light itself.
     """
 
     parts: NDArray[np.float16]
     scale: float
     stride: int
+    exact: bool
 
 
 class InteractiveTransport:
-    """A stored transport with a coarse copy in memory, and all of it if it fits.
+    """A stored transport with coarse copies in memory, and all of it if it fits.
+
+    Attributes
+    ----------
+    light_block : int
+        Side, in projector pixels, of the blocks that lights are made of while they move.
 
     Parameters
     ----------
@@ -107,6 +126,12 @@ class InteractiveTransport:
             blocks = self._blocks_in_memory
             coarse = list(thinned_blocks(blocks, camera.height, self.coarse_stride))
         self.coarse = _join(coarse)
+        self.light_block = _side_of_blocks(self.coarse)
+        self._moving = [in_blocks(self.coarse, self.light_block)]
+        while len(self._moving) < PACES:
+            finer = self._moving[-1]
+            self._moving.append(of_pixels(finer, *(middles(side, 2) for side in finer.camera)))
+        self._pace = Pace(PACES)
 
     @property
     def projector(self) -> Size:
@@ -118,14 +143,20 @@ class InteractiveTransport:
         """Colours of a frame: 3 if the camera has as many channels, else 1."""
         return COLOUR if self.stored.channels >= COLOUR else GREY
 
-    @property
-    def is_coarse_exact(self) -> bool:
-        """Whether the coarse copy has every camera pixel that is displayed."""
-        return self.coarse_stride == self.display_stride
-
     def relight_coarsely(self, light: Light) -> Frame:
-        """Relight the coarse copy."""
-        return _frame(self._parts(self.coarse, light), self.coarse_stride)
+        """Relight as finely as the pictures before allow, while the light may move on."""
+        began, level = time.perf_counter(), self._pace.level
+        is_whole = light.block == 1
+        if is_whole and self.light_block > 1:
+            means = block_means(light.levels, self.light_block)
+            light = light._replace(levels=means, block=self.light_block)
+        transport = self._moving[level]
+        parts = self._parts(transport, self._analysed(transport, light), light)
+        stride = self.coarse_stride * 2**level
+        exact = is_whole and self.light_block == 1 and stride == self.display_stride
+        frame = _frame(parts, stride, exact=exact)
+        self._pace.took(time.perf_counter() - began)
+        return frame
 
     def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
         """Relight every camera pixel that is displayed, block by block.
@@ -139,11 +170,13 @@ class InteractiveTransport:
         blocks = self.blocks()
         if self.display_stride > 1:
             blocks = thinned_blocks(blocks, self.stored.camera.height, self.display_stride)
+        analysed: AnalysedLight | None = None
         for block in blocks:
             if block.camera.height:
-                parts.append(self._parts(block, light))
+                analysed = analysed or self._analysed(block, light)
+                parts.append(self._parts(block, analysed, light))
             yield None
-        yield _frame(np.concatenate(parts, axis=1), self.display_stride)
+        yield _frame(np.concatenate(parts, axis=1), self.display_stride, exact=True)
 
     def relight(self, light: Light, *, direct: float, near: float, far: float) -> Floats:
         """Relight every camera pixel with gains of the components, as ``nearfar relight`` does.
@@ -154,9 +187,11 @@ class InteractiveTransport:
         """
         channel_light = self._for_channels(light.as_array())
         gains = {"direct": direct, "near": near, "far": far}
-        pictures = [
-            block.relight(channel_light, **gains).astype(np.float32) for block in self.blocks()
-        ]
+        analysed: AnalysedLight | None = None
+        pictures = []
+        for block in self.blocks():
+            analysed = analysed or block.analyse(channel_light)
+            pictures.append(block.relight(analysed, **gains).astype(np.float32))
         return np.concatenate(pictures)
 
     def camera_row(self, y: int) -> Transport:
@@ -204,18 +239,26 @@ class InteractiveTransport:
             # Without a colour calibration the channels are not red, green and blue.
             return luminance(light)
 
-    def _parts(self, transport: Transport, light: Light) -> Floats:
-        """Return direct, near and far under a light, (3, y, x, colours)."""
-        if light.is_grey or light.levels.ndim == 3:
-            channel_light = self._for_channels(light.as_array())
-            tint = np.ones(1, dtype=np.float32)
-        else:
+    def _analysed(self, transport: Transport, light: Light) -> AnalysedLight:
+        """Return what a transport's camera pixels read of a light, without its tint."""
+        if self._is_tinted(light):
             # Relighting once, for all channels, takes a third of the time.
-            channel_light = light.levels
+            return transport.analyse(light.levels)
+        return transport.analyse(self._for_channels(light.as_array()))
+
+    def _parts(self, transport: Transport, analysed: AnalysedLight, light: Light) -> Floats:
+        """Return direct, near and far under a light, (3, y, x, colours)."""
+        tint = np.ones(1, dtype=np.float32)
+        if self._is_tinted(light):
             tint = np.ravel(self._for_channels(light.colour[None, None]))
-        components = transport.components(channel_light)
+        components = transport.components(analysed)
         pictures = [part.reshape(*transport.camera, -1) * tint for part in components]
         return np.stack([self.to_colours(picture) for picture in pictures])
+
+    @staticmethod
+    def _is_tinted(light: Light) -> bool:
+        """Whether a light is one of all channels times a colour."""
+        return light.levels.ndim == 2 and not light.is_grey
 
 
 def to_float16(values: Floats) -> tuple[float, NDArray[np.float16]]:
@@ -225,9 +268,20 @@ def to_float16(values: Floats) -> tuple[float, NDArray[np.float16]]:
     return float(scale), (values * np.float32(scale)).astype(np.float16)
 
 
-def _frame(parts: Floats, stride: int) -> Frame:
+def _frame(parts: Floats, stride: int, *, exact: bool) -> Frame:
     scale, halves = to_float16(parts)
-    return Frame(halves, scale, stride)
+    return Frame(halves, scale, stride, exact)
+
+
+def _side_of_blocks(transport: Transport) -> int:
+    """Return the side of the blocks of projector pixels that moving lights are made of."""
+    side = 1
+    while (
+        2 * side < transport.pitch
+        and size_in_blocks(transport.projector, side).pixels > MAXIMUM_MOVING_LIGHT_PIXELS
+    ):
+        side *= 2
+    return side
 
 
 def _join(blocks: list[Transport]) -> Transport:

@@ -81,7 +81,8 @@ async def _receive_lights(
         message = await socket.receive()
         if message["type"] == "websocket.disconnect":
             raise WebSocketDisconnect
-        header, light = unpack_light(message.get("bytes") or b"", transport.projector)
+        data = message.get("bytes") or b""
+        header, light = unpack_light(data, transport.projector, transport.light_block)
         newest.number, newest.light = header.number, light
         newest.arrived.set()
 
@@ -96,8 +97,11 @@ async def _send_frames(
         number, light = newest.number, newest.light
         assert light is not None
         frame = await jobs.run(transport.relight_coarsely, light)
-        await socket.send_bytes(_pack_frame(number, frame, exact=transport.is_coarse_exact))
-        if transport.is_coarse_exact or await _arrives_within(newest, REST_SECONDS):
+        await socket.send_bytes(_pack_frame(number, frame))
+        # A page sends the light of blocks while it moves, and the whole light once it rests.
+        if frame.exact or light.block > 1:
+            continue
+        if transport.light_block == 1 and await _arrives_within(newest, REST_SECONDS):
             continue
         steps = transport.relight_exactly(light)
         while not newest.arrived.is_set():
@@ -106,12 +110,12 @@ async def _send_frames(
             except _ExhaustedError:
                 break
             if exact is not None:
-                await socket.send_bytes(_pack_frame(number, exact, exact=True))
+                await socket.send_bytes(_pack_frame(number, exact))
 
 
-def _pack_frame(number: int, frame: Frame, *, exact: bool) -> bytes:
-    header = {"number": number, "exact": exact, "stride": frame.stride, "scale": frame.scale}
-    return pack(header, frame.parts)
+def _pack_frame(number: int, frame: Frame) -> bytes:
+    header = {name: getattr(frame, name) for name in ("exact", "stride", "scale")}
+    return pack({"number": number, **header}, frame.parts)
 
 
 class _ExhaustedError(Exception):

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
+from nearfar.transport.coarse import size_in_blocks
 
 # For headers that a page sends.
 MAXIMUM_HEADER_BYTES = 2**14
@@ -46,13 +47,16 @@ class Light(NamedTuple):
     Attributes
     ----------
     levels : ndarray, shape (Py, Px) or (Py, Px, 3), float32
-        From 0 to 1.
+        From 0 to 1; Py and Px are those of blocks.
     colour : ndarray, shape (3,), float32
         Linear red, green and blue, from 0 to 1.
+    block : int
+        Side, in projector pixels, of the blocks that levels are means over.
     """
 
     levels: Floats
     colour: Floats
+    block: int = 1
 
     @property
     def is_grey(self) -> bool:
@@ -76,6 +80,8 @@ class LightHeader(BaseModel):
         Counts the lights of a page; a frame has the number of its light.
     shape : tuple of int
         Shape of the levels: Py, Px, and 1 or 3 channels.
+    block : int
+        Side, in projector pixels, of the blocks that levels are means over.
     colour : tuple of float
         Linear red, green and blue, which the levels are multiplied by.
     gains : Gains
@@ -86,6 +92,7 @@ class LightHeader(BaseModel):
 
     number: int = Field(default=0, ge=0, le=2**53)
     shape: tuple[int, int, Literal[1, 3]]
+    block: int = Field(default=1, ge=1, le=2**16)
     colour: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
     gains: Gains = Gains()
 
@@ -115,13 +122,15 @@ def maximum_light_bytes(projector: Size) -> int:
     return MAXIMUM_HEADER_BYTES + 6 * projector.pixels
 
 
-def unpack_light(message: bytes, projector: Size) -> tuple[LightHeader, Light]:
+def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[LightHeader, Light]:
     """Read the message of a light: uint16 levels, `WHITE_LEVEL` for full white.
 
     Parameters
     ----------
     message : bytes
     projector : Size
+    block : int, optional
+        Side of the blocks of projector pixels that the light may be made of as well.
 
     Returns
     -------
@@ -147,13 +156,16 @@ def unpack_light(message: bytes, projector: Size) -> tuple[LightHeader, Light]:
         where = ".".join(map(str, fault["loc"]))
         raise InputError(f"the message's header is wrong ({where}: {fault['msg']}).") from None
     channels = header.shape[2]
-    if header.shape[:2] != projector or len(data) != 2 * channels * projector.pixels:
+    if header.block not in (1, block):
+        raise InputError(f"the light is of blocks of {header.block} pixels: send it whole.")
+    size = size_in_blocks(projector, header.block)
+    if header.shape[:2] != size or len(data) != 2 * channels * size.pixels:
         raise InputError(
             f"the light is {'x'.join(map(str, header.shape))} in {len(data)} bytes, the projector "
-            f"{projector}: send {projector}x1 or x3 of 2 bytes each."
+            f"{projector}: send {size}x1 or x3 of 2 bytes each."
         )
     levels = np.frombuffer(data, dtype="<u2").reshape(header.shape)
     first = levels[..., :1]
     distinct = levels[..., 0] if bool((levels == first).all()) else levels
     shares = distinct.astype(np.float32) / np.float32(WHITE_LEVEL)
-    return header, Light(shares, np.array(header.colour, dtype=np.float32))
+    return header, Light(shares, np.array(header.colour, dtype=np.float32), header.block)

@@ -36,6 +36,7 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "projector": list(stored.projector),
         "camera": list(stored.camera),
         "channels": stored.channels,
+        "light_block": transport.light_block,
         "window": transport.coarse.window,
         "pitch": transport.coarse.pitch,
         "method": stored.provenance.get("method"),

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from nearfar.arrays import AnySize, Floats, Size, as_size, blocks
+from nearfar.arrays import AnySize, Floats, Size, as_size, blocks, product
 from nearfar.callbacks import OldReport, Report, as_report
 from nearfar.checks import as_count, as_number
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import band, default_dropped
 from nearfar.illumination.pictures import standard_lights
+from nearfar.parallel import threads
 from nearfar.plan import paper_plan
 from nearfar.plan.window import largest_window
 from nearfar.transport import near
@@ -31,9 +32,14 @@ from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import decibels, snr_where_lit
 from nearfar.workflow.model_fit import far_basis_of, held_by_model, split_by_model
 
+# Camera pixels of a block, and the values of its rows.
 PIXELS_AT_ONCE = 64
-# Camera pixels that are examined by default, evenly spaced.
+VALUES_AT_ONCE = 2**22
+# Camera pixels that are examined by default, evenly spaced, and entries of their rows in all, per
+# channel; fewer pixels would not stand for the scene.
 DEFAULT_SAMPLE = 4096
+DEFAULT_ENTRIES = 2**27
+LEAST_SAMPLE = 64
 # Shares of the energy whose bandwidths are reported.
 ENERGY_SHARES = (0.5, 0.9, 0.99)
 
@@ -107,13 +113,19 @@ def default_k_near(window: int) -> float:
     return min(0.5, 3.0 / window)
 
 
+def default_sample(projector: Size) -> int:
+    """Return how many camera pixels are examined by default: fewer where rows are long."""
+    affordable = DEFAULT_ENTRIES // projector.pixels
+    return min(DEFAULT_SAMPLE, max(LEAST_SAMPLE, affordable))
+
+
 def check_model(
     transport: KnownTransport | Transport,
     window: int,
     far: AnySize,
     *,
     k_near: float | None = None,
-    sample: int = DEFAULT_SAMPLE,
+    sample: int | None = None,
     progress: Report | OldReport | None = None,
 ) -> ModelCheck:
     """Measure how far a transport departs from the paper's model.
@@ -128,8 +140,9 @@ def check_model(
         Far band.
     k_near : float, optional
         Cycles per projector pixel; `default_k_near` if left out.
-    sample : int
-        Camera pixels to examine, evenly spaced; all where there are fewer.
+    sample : int, optional
+        Camera pixels to examine, evenly spaced; all where there are fewer. 4096 if left out, fewer
+        where the projector has more than 181 x 181 pixels, but 64 at least.
     progress : callable, optional
         Called with what is being done and the share of it that is done, 0 to 1.
 
@@ -150,7 +163,9 @@ def check_model(
     """
     report = as_report(progress)
     projector, far = transport.projector, as_size(far, "far band")
-    window, sample = as_count(window, "window"), as_count(sample, "the sample of camera pixels")
+    window = as_count(window, "window")
+    sample = default_sample(projector) if sample is None else sample
+    sample = as_count(sample, "the sample of camera pixels")
     if (
         not 1 <= window <= largest_window(projector)
         or far.height > projector[0]
@@ -179,7 +194,8 @@ def check_model(
     q = apart.correspondence.reshape(-1, 2)
     centres = near.centre(q, projector)
     lit = np.isfinite(q[:, 0])
-    for block in blocks(len(chosen), PIXELS_AT_ONCE):
+    affordable = VALUES_AT_ONCE // (transport.channels * projector.pixels)
+    for block in blocks(len(chosen), min(PIXELS_AT_ONCE, affordable)):
         mine = chosen[block]
         part = slice(int(mine[0]), int(mine[-1]) + 1, step)
         rows = [
@@ -212,15 +228,23 @@ class _Totals:
 
     def __init__(self, projector: Size, window: int, far: Size) -> None:
         self.projector, self.window, self.far = projector, window, far
-        frequencies = [np.fft.fftfreq(n) for n in projector]
+        # Rows are real: of k and -k one is looked at, and the energy of k and -k together.
+        self.half = projector.width // 2 + 1
+        frequencies = [np.abs(np.fft.fftfreq(n)) for n in projector]
         # |k| on either axis, as bands and windows are square.
-        self.height = np.maximum(np.abs(frequencies[0])[:, None], np.abs(frequencies[1])[None, :])
+        self.height = np.maximum(frequencies[0][:, None], frequencies[1][None, : self.half])
         inside = [np.isin(_whole(n), band(m)) for n, m in zip(projector, far, strict=True)]
-        self.in_band = inside[0][:, None] & inside[1][None, :]
+        in_band = inside[0][:, None] & inside[1][None, :]
+        # Bands of even sides hold k without -k.
+        opposite = np.roll(in_band[::-1, ::-1], 1, axis=(0, 1))
+        beyond = 1.0 - 0.5 * (in_band + opposite.astype(np.float64))
+        self.beyond_band = beyond[:, : self.half]
+        columns = np.arange(self.half)
+        self.of_pair = np.where((columns == 0) | (2 * columns == projector.width), 1.0, 2.0)
         y, x = np.indices(projector)
         self.checkerboard = 1.0 - 2.0 * ((y + x) % 2)
         self.flood = np.zeros(3)
-        self.spectrum = np.zeros((2, *projector))
+        self.spectrum = np.zeros((2, projector.height, self.half))
         self.near = np.zeros(2)  # outside the window, all
         self.beyond = np.zeros(2)  # beyond k_far: inside the window, all
         self.board = np.zeros(3)  # energies of D, N and F at the checkerboard, lit pixels
@@ -230,7 +254,7 @@ class _Totals:
         pictures = [
             light for name, light in standard_lights(projector).items() if name.startswith("pict")
         ]
-        self.pictures = np.stack(pictures).reshape(len(pictures), -1)
+        self.pictures = np.stack(pictures).reshape(len(pictures), -1).astype(np.float32)
         self.picture_energies = np.zeros((2, len(pictures)))  # of the truth, of the error
         self.row_energies: list[NDArray[np.float64]] = []
 
@@ -243,10 +267,13 @@ class _Totals:
             float(np.sum(n**2, dtype=np.float64)),
         ]
         for number, part in enumerate((n, f)):
-            spectrum = fft.fft2(part)
-            self.spectrum[number] += np.sum(np.abs(spectrum) ** 2, axis=(0, 1), dtype=np.float64)
+            spectrum = fft.rfft2(part, workers=threads())
+            self.spectrum[number] += (
+                self.of_pair * np.einsum("ncyx,ncyx->yx", spectrum, spectrum.conj()).real
+            )
             if number == 1:
-                high = fft.ifft2(np.where(self.in_band, 0, spectrum)).real
+                spectrum *= self.beyond_band.astype(np.float32)
+                high = fft.irfft2(spectrum, s=self.projector, workers=threads())
                 within = np.sum(high**2 * mask[:, None], axis=(1, 2, 3), dtype=np.float64)
                 total = np.sum(high**2, axis=(1, 2, 3), dtype=np.float64)
                 self.beyond += [within.sum(), total.sum()]
@@ -262,9 +289,13 @@ class _Totals:
         """Add what the model can hold at best of these rows."""
         whole = rows[0] + rows[1] + rows[2]
         off = whole - sum(held_by_model(whole, q, self.window, self.basis))
-        flat = [part.reshape(-1, self.projector.pixels).astype(np.float64) for part in (whole, off)]
-        self.picture_energies += [np.sum((part @ self.pictures.T) ** 2, axis=0) for part in flat]
-        squares = [np.square(part).reshape(len(whole), -1).sum(axis=1) for part in flat]
+        flat = [part.reshape(-1, self.projector.pixels) for part in (whole, off)]
+        self.picture_energies += [
+            np.sum(product(part, self.pictures.T).astype(np.float64) ** 2, axis=0) for part in flat
+        ]
+        squares = [
+            np.square(part).reshape(len(whole), -1).sum(axis=1, dtype=np.float64) for part in flat
+        ]
         self.row_energies.append(np.stack(squares))
 
     def _windows(self, centres: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -295,7 +326,7 @@ class _Totals:
             near_beyond=_share(n[self.height > k_near].sum(), n.sum()),
             near_outside=_share(*self.near),
             near_bandwidth=self._bandwidth(n),
-            far_beyond=_share(f[~self.in_band].sum(), f.sum()),
+            far_beyond=_share((f * self.beyond_band).sum(), f.sum()),
             far_beyond_in_window=_share(*self.beyond),
             far_bandwidth=self._bandwidth(f),
             checkerboard_near=float(np.sqrt(self.board[1] / d_board)),

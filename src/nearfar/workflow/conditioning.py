@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nearfar.arrays import AnySize, Floats, as_size
+from nearfar.arrays import AnySize, Booleans, Floats, as_size
 from nearfar.checks import as_count
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import as_array, near_frequencies, representatives
 from nearfar.illumination.near_basis import window_offsets
-from nearfar.transport import near
 
 # Eigenvectors with eigenvalues below this share of the largest are seen by no pattern.
 SMALLEST_EIGENVALUE = 1e-6
@@ -76,8 +75,9 @@ def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditi
     twice = np.array([1.0 if k.is_own_negative else 2.0 for k in frequencies])[:, None]
     patterns = np.concatenate([np.sqrt(twice) * np.cos(angle), np.sqrt(twice) * np.sin(angle)])
     gram = patterns.T @ patterns / window**2
-    y, x = np.divmod(np.arange(projector.pixels), projector.width)
-    shapes = np.unique(near.inside(np.stack([y, x], axis=1), window, projector), axis=0)
+    # The border clips rows and columns of a window each for itself.
+    rows, columns = (_clipped(window, side) for side in projector)
+    shapes = [np.outer(down, across).ravel() for down in rows for across in columns]
     spectra = [np.linalg.eigvalsh(gram[np.ix_(shape, shape)]) for shape in shapes]
     full = np.linalg.eigvalsh(gram)
     return Conditioning(
@@ -86,6 +86,12 @@ def condition_near(projector: AnySize, window: int, dropped: AnySize) -> Conditi
         whole=_ratio(full),
         worst=max(_ratio(values) for values in spectra),
     )
+
+
+def _clipped(window: int, side: int) -> Booleans:
+    """Return which entries of windows lie on an axis of the projector, one of each kind, (n, W)."""
+    entries = np.arange(side)[:, None] + np.arange(window) - window // 2
+    return np.unique((entries >= 0) & (entries < side), axis=0)
 
 
 def _ratio(eigenvalues: Floats) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.estimate.joint import ErrorBars
+from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.store import StoredTransport
 
 
@@ -25,8 +26,12 @@ def relight_stored(stored: StoredTransport, light: Floats, gains: Mapping[str, f
     ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
         In photo units.
     """
-    parts = (rows.relight(light, **gains) for rows in stored.blocks())
-    return np.concatenate([part.astype(np.float32, copy=False) for part in parts])
+    analysed: AnalysedLight | None = None
+    parts = []
+    for rows in stored.blocks():
+        analysed = analysed or rows.analyse(light)
+        parts.append(rows.relight(analysed, **gains).astype(np.float32, copy=False))
+    return np.concatenate(parts)
 
 
 def error_bars_of_stored(

@@ -15,6 +15,7 @@ are (photos, regions, causes, causes) and (photos, regions, causes).
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -116,6 +117,14 @@ class PhotoFits(Fits):
     def plan(self) -> Plan:
         """The plan of the photos."""
         return self.without_drift.plan
+
+    @cached_property
+    def inverses(self) -> dict[int, list[int]]:
+        """Photos of the inverse pattern of each photo that has any."""
+        found: dict[int, list[int]] = {}
+        for number, inverse in inverse_photos(self.plan):
+            found.setdefault(number, []).append(inverse)
+        return found
 
 
 def fit_photos(photos: SteadyPhotos, transport: Transport, start: int = 0) -> PhotoFits:

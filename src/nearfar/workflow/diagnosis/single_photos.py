@@ -36,7 +36,6 @@ from nearfar.workflow.diagnosis.misfit import (
     SMALLEST_CHANGE,
     PhotoFits,
     fit_photos,
-    inverse_photos,
     is_white_or_black,
     mean_white,
     relight,
@@ -323,7 +322,7 @@ def exposure_change(fits: PhotoFits, number: int) -> Explanation:
     weighted = effects * weight
     # What is left of the photo, and of its sum with that of the inverse pattern.
     differences = [(fits.photos[number] - fits.relit[number]).ravel()]
-    for inverse in (other for one, other in inverse_photos(fits.plan) if one == number):
+    for inverse in fits.inverses.get(number, ()):
         differences.append(differences[0] + (fits.photos[inverse] - fits.relit[inverse]).ravel())
     solved, *of_sums = (
         np.linalg.lstsq(weighted @ effects.T, weighted @ difference, rcond=None)[0]

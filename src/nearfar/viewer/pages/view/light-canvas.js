@@ -7,12 +7,16 @@ const CLICK_DISTANCE = 4;
 // Kinds that go where the pointer is.
 const PLACED = ['spot', 'stripe', 'pixel'];
 
-// Draws the light at most once for each frame of the screen, however often it changes.
+// A light that has not changed for so long is at rest.
+const REST_MILLISECONDS = 120;
+
+// Draws the light at most once for each frame of the screen, however often it changes; every pixel of it once it rests.
 export class LightCanvas {
   #light;
   #store;
   #onDrawn;
   #request = 0;
+  #rest = 0;
 
   constructor({ light, store, onDrawn }) {
     this.#light = light;
@@ -24,15 +28,33 @@ export class LightCanvas {
 
   draw() {
     this.#light.draw(this.#store.state);
-    drawLight(get('light'), this.#light);
+    this.#show();
   }
 
   requestDraw() {
+    clearTimeout(this.#rest);
     this.#request ||= requestAnimationFrame(() => {
       this.#request = 0;
-      this.draw();
+      this.#light.drawMoving(this.#store.state);
+      this.#show();
       this.#onDrawn();
+      if (this.#light.sent.block > 1) this.#rest = setTimeout(() => this.drawAtRest(), REST_MILLISECONDS);
     });
+  }
+
+  // Draws every pixel now, if it is not drawn yet.
+  drawAtRest() {
+    clearTimeout(this.#rest);
+    if (!this.isPending && this.#light.sent.block === 1) return;
+    cancelAnimationFrame(this.#request);
+    this.#request = 0;
+    this.draw();
+    this.#onDrawn();
+  }
+
+  #show() {
+    const { shown, colour, changed } = this.#light;
+    drawLight(get('light'), shown, colour, changed);
   }
 }
 

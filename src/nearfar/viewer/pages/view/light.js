@@ -1,77 +1,113 @@
-// The light on the projector's grid, as it is sent: levels of one channel or three, times a colour.
+// The light on the projector's grid, as it is shown and sent: levels of one channel or three, times a colour.
 
 import { LINEAR_OF_BYTE, WHITE_LEVEL, linearColour } from './colour.js';
+import { Levels } from './levels.js';
 import { Painting } from './painting.js';
-import { shapeOf } from './shapes.js';
+import { finestOf, shapeOf } from './shapes.js';
+
+const range = count => Array.from({ length: count }, (_, i) => i);
 
 export class Light {
-  #grey;
-  #coloured;
+  #whole;
+  #blocks;
   #painting;
   #pictures = [];
+  // The values that hold what is painted, until something else is drawn on them.
+  #painted = null;
 
-  constructor([height, width]) {
-    Object.assign(this, { height, width, colour: [1, 1, 1] });
-    this.#grey = new Uint16Array(height * width);
-    this.#coloured = new Uint16Array(height * width * 3);
+  // While it moves, the light is one of blocks of block x block pixels.
+  constructor([height, width], block = 1) {
+    Object.assign(this, { height, width, colour: [1, 1, 1], changed: null });
+    this.#whole = new Levels([height, width], 1);
+    this.#blocks = block > 1 ? new Levels([height, width], block) : this.#whole;
     this.#painting = new Painting(height, width);
-    this.levels = this.#grey;
+    this.shown = this.sent = this.#whole;
   }
-
-  get shape() { return [this.height, this.width, this.levels === this.#grey ? 1 : 3]; }
 
   // Pictures that were dropped on the page.
   get pictureCount() { return this.#pictures.length; }
 
-  draw(state) {
-    if (state.kind === 'paint') this.#drawPaint(state.strokes);
-    else if (state.kind === 'picture') this.#drawPicture(state.shown);
-    else this.#drawShape(state);
+  // Draws every projector pixel.
+  draw(state) { this.#drawOn(this.#whole, state); }
+
+  // Draws a light that moves, and soon moves on.
+  drawMoving(state) { this.#drawOn(this.#blocks, state); }
+
+  #drawOn(levels, state) {
+    this.sent = this.shown = levels;
+    this.changed = null;
+    if (state.kind === 'paint') { this.#drawPaint(state.strokes); return; }
+    this.#painted = null;
+    if (state.kind === 'picture') this.#drawPicture(levels, state.shown);
+    else this.#drawShape(levels, state);
   }
 
-  #drawShape(state) {
-    this.levels = this.#grey;
+  #drawShape(levels, state) {
+    const { height, width } = this, { block } = levels, brightness = shapeOf(state, height, width);
     this.colour = linearColour(state.kind === 'white' ? '#ffffff' : state.colour);
-    const brightness = shapeOf(state, this.height, this.width);
-    for (let y = 0, i = 0; y < this.height; y++)
-      for (let x = 0; x < this.width; x++) this.#grey[i++] = Math.round(WHITE_LEVEL * brightness(x, y));
+    if (block === 1) { levels.fill(brightness); return; }
+    // Four pixels stand for a block of a shape that is not fine.
+    const isFine = finestOf(state, height, width) < 2 * block, step = Math.floor(block / 4);
+    levels.fillMeans(brightness, isFine ? range(block) : [step, block - 1 - step], [height, width]);
   }
 
+  // Only what was added is drawn: every pixel that is seen, and the blocks that are sent.
   #drawPaint(strokes) {
-    this.#painting.paint(strokes);
-    const { values } = this.#painting;
+    let changed = this.#painting.paint(strokes);
     // Strokes of one colour are sent as one channel, which relights as quickly as a shape.
     const isOneColour = strokes.every(stroke => stroke.colour === strokes[0].colour);
-    this.levels = isOneColour ? this.#grey : this.#coloured;
+    const values = this.#whole.ofChannels(isOneColour ? 1 : 3);
     this.colour = linearColour(isOneColour && strokes[0]?.colour || '#ffffff');
-    if (isOneColour) {
-      const brightest = this.colour.indexOf(Math.max(...this.colour)), full = this.colour[brightest] || 1;
-      for (let i = 0; i < this.#grey.length; i++) this.#grey[i] = Math.round(WHITE_LEVEL * values[3 * i + brightest] / full);
-    } else for (let i = 0; i < this.#coloured.length; i++) this.#coloured[i] = Math.round(WHITE_LEVEL * values[i]);
+    if (this.#painted !== values) changed = this.#whole.everything;
+    this.#painted = values;
+    this.#setPainted(values, changed, isOneColour);
+    if (this.#blocks !== this.#whole) this.#blocks.average(this.#whole, changed);
+    Object.assign(this, { shown: this.#whole, changed });
   }
 
-  #drawPicture(index) {
-    this.levels = this.#coloured;
+  #setPainted(values, { top, left, bottom, right }, isOneColour) {
+    const painted = this.#painting.values, brightest = this.colour.indexOf(Math.max(...this.colour));
+    const full = this.colour[brightest] || 1;
+    for (let y = top; y < bottom; y++) {
+      const first = y * this.width + left, end = y * this.width + right;
+      if (isOneColour)
+        for (let i = first; i < end; i++) values[i] = Math.round(WHITE_LEVEL * painted[3 * i + brightest] / full);
+      else
+        for (let i = 3 * first; i < 3 * end; i++) values[i] = Math.round(WHITE_LEVEL * painted[i]);
+    }
+  }
+
+  #drawPicture(levels, index) {
     this.colour = [1, 1, 1];
     const picture = this.#pictures[Math.min(Math.max(Math.round(index), 0), this.#pictures.length - 1)];
-    if (picture) this.#coloured.set(picture);
-    else this.#coloured.fill(0);
+    this.#whole.ofChannels(3);
+    if (!picture) levels.ofChannels(3).fill(0);
+    else if (levels === this.#whole) this.#whole.values.set(picture.levels);
+    else levels.ofChannels(3).set(picture.inBlocks ||= this.#inBlocks(picture.levels));
+  }
+
+  #inBlocks(picture) {
+    this.#whole.values.set(picture);
+    this.#blocks.average(this.#whole, this.#whole.everything);
+    return this.#blocks.values.slice();
   }
 
   // Levels of a picture of the grid's size, in linear light.
-  addLinear(levels) { this.#pictures.push(levels.slice()); }
+  addLinear(levels) { this.#addLevels(levels.slice()); }
 
   // In place of a picture that the address does not hold.
-  addMissing() { this.#pictures.push(new Uint16Array(this.#coloured.length)); }
+  addMissing() { this.#addLevels(new Uint16Array(3 * this.height * this.width)); }
+
+  #addLevels(levels) { this.#pictures.push({ levels, inBlocks: null }); }
 
   // An sRGB picture of any size, cropped to the grid; returns it as a data URL for the address.
   async addPicture(source) {
     const canvas = new OffscreenCanvas(this.width, this.height);
     const pixels = await drawToFill(canvas, source);
-    const levels = new Uint16Array(this.#coloured.length);
+    const levels = new Uint16Array(3 * this.height * this.width);
     for (let i = 0, j = 0; j < levels.length; i += 4)
       for (let c = 0; c < 3; c++) levels[j++] = Math.round(WHITE_LEVEL * LINEAR_OF_BYTE[pixels[i + c]] * pixels[i + 3] / 255);
-    this.#pictures.push(levels);
+    this.#addLevels(levels);
     const blob = await canvas.convertToBlob({ type: 'image/png' });
     return 'data:image/png;base64,' + btoa(Array.from(new Uint8Array(await blob.arrayBuffer()),
       byte => String.fromCharCode(byte)).join(''));

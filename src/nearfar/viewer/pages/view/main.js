@@ -20,7 +20,7 @@ import { showVerdict } from './verdict.js';
 async function open() {
   const scene = await (await request('scene')).json();
   const initial = initialState(scene.projector), state = fromAddress(location.hash, initial);
-  const light = new Light(scene.projector);
+  const light = new Light(scene.projector, scene.light_block);
   const missing = await restorePictures(state.pictures, light);
   state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
 

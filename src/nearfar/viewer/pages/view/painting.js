@@ -16,6 +16,7 @@ export class Painting {
   #height;
   #width;
   #painted = [];
+  #changed;
 
   constructor(height, width) {
     this.#height = height;
@@ -24,18 +25,31 @@ export class Painting {
     this.values = new Float64Array(3 * height * width);
   }
 
-  // Paints what was added since the last time, or all strokes if one is gone.
+  // Paints what was added since the last time, or all strokes if one is gone; returns the rows and columns that
+  // changed, { top, left, bottom, right }, the last two not among them.
   paint(strokes) {
+    this.#changed = { top: this.#height, left: this.#width, bottom: 0, right: 0 };
     const last = this.#painted.length - 1;
     const onlyAdded = this.#painted.every((before, i) =>
       strokes[i] === before || i === last && extendsStroke(strokes[i], before));
     if (!onlyAdded) {
       this.values.fill(0);
       this.#painted = [];
+      this.#change(0, 0, this.#height - 1, this.#width - 1);
     }
     for (let i = Math.max(0, this.#painted.length - 1); i < strokes.length; i++)
       this.#continueStroke(strokes[i], this.#painted[i]?.points.length || 0);
     this.#painted = [...strokes];
+    return this.#changed;
+  }
+
+  // Notes that rows and columns up to the last changed.
+  #change(top, left, lastRow, lastColumn) {
+    const changed = this.#changed;
+    changed.top = Math.min(changed.top, Math.max(0, top));
+    changed.left = Math.min(changed.left, Math.max(0, left));
+    changed.bottom = Math.max(changed.bottom, Math.min(this.#height, lastRow + 1));
+    changed.right = Math.max(changed.right, Math.min(this.#width, lastColumn + 1));
   }
 
   #continueStroke({ colour, radius, points }, painted) {
@@ -65,11 +79,14 @@ export class Painting {
   }
 
   #setPixel(x, y, rgb) {
-    if (x >= 0 && x < this.#width && y >= 0 && y < this.#height) this.values.set(rgb, 3 * (y * this.#width + x));
+    if (x < 0 || x >= this.#width || y < 0 || y >= this.#height) return;
+    this.values.set(rgb, 3 * (y * this.#width + x));
+    this.#change(y, x, y, x);
   }
 
   #dab(cx, cy, radius, rgb) {
     const reach = Math.ceil(radius) + 1;
+    this.#change(Math.floor(cy) - reach, Math.floor(cx) - reach, Math.ceil(cy) + reach, Math.ceil(cx) + reach);
     for (let y = Math.max(0, Math.floor(cy) - reach); y <= Math.min(this.#height - 1, Math.ceil(cy) + reach); y++)
       for (let x = Math.max(0, Math.floor(cx) - reach); x <= Math.min(this.#width - 1, Math.ceil(cx) + reach); x++) {
         const cover = OPACITY * smooth((radius + 0.5 - distance(y - cy, x - cx)) / (0.7 * radius + 0.5));

@@ -90,15 +90,25 @@ function toneOfLevels(share) {
   return tonesOfLevels.get(share);
 }
 
-export function drawLight(canvas, { height, width, levels, colour }) {
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height), out = image.data;
-  const [red, green, blue] = colour.map(toneOfLevels), step = levels.length < 3 * height * width ? 0 : 1;
-  for (let i = 0, j = 0; j < out.length; i += 1 + 2 * step, j += 4) {
-    out[j] = red[levels[i]]; out[j + 1] = green[levels[i + step]]; out[j + 2] = blue[levels[i + 2 * step]];
-    out[j + 3] = 255;
+// Draws a light's levels, or those that changed if the canvas shows the others, { top, left, bottom, right }.
+export function drawLight(canvas, { height, width, everything, channels, values }, colour, changed) {
+  if (canvas.width !== width || canvas.height !== height) {
+    Object.assign(canvas, { width, height });
+    changed = null;
   }
-  pen.putImageData(image, 0, 0);
+  const { top, left, bottom, right } = changed || everything;
+  if (top >= bottom || left >= right) return;
+  const pen = canvas.getContext('2d', { willReadFrequently: true });
+  const image = pen.createImageData(right - left, bottom - top), out = image.data;
+  const [red, green, blue] = colour.map(toneOfLevels), step = channels === 3 ? 1 : 0;
+  for (let y = top, j = 0; y < bottom; y++) {
+    const end = (y * width + right) * channels;
+    for (let i = (y * width + left) * channels; i < end; i += channels, j += 4) {
+      out[j] = red[values[i]]; out[j + 1] = green[values[i + step]]; out[j + 2] = blue[values[i + 2 * step]];
+      out[j + 3] = 255;
+    }
+  }
+  pen.putImageData(image, left, top);
 }
 
 // The exposure, in stops, at which all but one value in two hundred are below white.

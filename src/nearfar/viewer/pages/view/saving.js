@@ -28,9 +28,10 @@ async function savePng({ scenePictures, lightCanvas, playback }) {
 }
 
 // Saves what the server makes of the light.
-async function saveResponse(path, name, { store, light }) {
-  const [direct, near, far] = gainsOf(store.state), { levels, shape, colour } = light;
-  const response = await request(path, { method: 'POST', body: pack({ shape, colour, gains: { direct, near, far } }, levels) });
+async function saveResponse(path, name, { store, light, lightCanvas }) {
+  lightCanvas.drawAtRest();
+  const [direct, near, far] = gainsOf(store.state), { sent: { values, shape }, colour } = light;
+  const response = await request(path, { method: 'POST', body: pack({ shape, colour, gains: { direct, near, far } }, values) });
   download(await response.blob(), name);
 }
 

@@ -37,3 +37,15 @@ const SHAPES = {
 };
 
 export const shapeOf = (state, height, width) => SHAPES[state.kind](state, height, width);
+
+// Projector pixels over which the brightness of a shape goes from dark to bright and on.
+const FINEST = {
+  white: () => Infinity,
+  spot: s => s.radius,
+  stripe: s => s.width,
+  sinusoid: (s, height, width) => Math.max(height, width) / (2 * Math.max(s.cycles, 1)),
+  checkerboard: s => s.side,
+  pixel: () => 0,
+};
+
+export const finestOf = (state, height, width) => FINEST[state.kind](state, height, width);

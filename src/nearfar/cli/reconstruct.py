@@ -19,7 +19,7 @@ from nearfar.cli.options import (
     check_report_page,
     keep_input,
 )
-from nearfar.cli.saying import say, say_reconstructed
+from nearfar.cli.saying import say, say_reconstructed, warn
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -167,6 +167,9 @@ def _from_patterns(
     for option, is_given in {**refused, "--report": report is not None}.items():
         if is_given:
             raise typer.BadParameter("is for photos of a plan.", param_hint=option)
+    if output.suffix.lower() == ".npy":
+        _invert(capture, output, force=force, quiet=quiet or as_json)
+        return
     given = None
     if correspondence is not None:
         given = read_correspondence(correspondence, capture.camera, capture.plan.projector)
@@ -192,6 +195,24 @@ def _from_patterns(
         }
         print(json.dumps(found))
     say(str(verdict), quiet=quiet or as_json)
+
+
+def _invert(capture: "Capture", output: Path, *, force: bool, quiet: bool) -> None:
+    """Write the dense T of a complete set of patterns."""
+    from nearfar.workflow.complete_sets import write_complete
+
+    with progress_bar("inverting", quiet=quiet) as progress:
+        found = write_complete(capture, output, force=force, progress=progress)
+    if not found.has_black:
+        warn(
+            f"{capture.path} has no photo under black, so that black was taken as 0: what is black "
+            f"in the photos stands in T as light."
+        )
+    say(
+        f"T of {' x '.join(map(str, found.shape))} written to {output}: least squares, without any "
+        f"prior. An entry's noise is {found.noise_gain:.3g} times that of a photo's pixel",
+        quiet=quiet,
+    )
 
 
 def _write_report(

@@ -68,7 +68,8 @@ def recognised_in(plan: Plan) -> Recognised:
 
 
 def _plan(projector: Size, patterns: tuple[Pattern, ...], offset: Any) -> Plan:
-    pitch = pitch_of(projector)
+    # Somebody else's patterns are estimated from with windows of single pixels.
+    pitch = 1 if offset == "shown" else pitch_of(projector)
     return Plan(
         projector=projector,
         window=default_window(projector, pitch),

@@ -12,7 +12,7 @@ from sphinx.application import Sphinx
 TOLD_ELSEWHERE = {"embreex": "BSD-2-Clause", "openexr": "BSD-3-Clause"}
 GROUPS = {
     "Plan and capture": ["plan", "export", "import", "acquire"],
-    "Estimate and judge": ["reconstruct", "evaluate", "check", "info", "convert"],
+    "Estimate and judge": ["correspond", "reconstruct", "evaluate", "check", "info", "convert"],
     "Use": ["relight", "view"],
     "Real rigs": ["devices", "init", "preview", "calibrate"],
     "Scenes and experiments": ["demo", "render", "figures", "compare", "separate"],

@@ -23,13 +23,13 @@ SEPARATE = ("separate", "--projector", "16x20")
 
 
 def _version(text: str) -> str:
-    return text.replace('"version": 6', '"version": 7')
+    return text.replace('"version": 7', '"version": 8')
 
 
 @pytest.mark.parametrize(
     ("spoil", "word"),
     [
-        (_version, "version 7"),
+        (_version, "version 8"),
         (lambda text: text[:-30], "JSON"),
         (lambda _: "", "JSON"),
         (lambda _: "[]", "not a nearfar plan"),

@@ -107,8 +107,8 @@ def test_a_frequency_that_is_none_is_refused_at_once(frequency: object):
         "[" * 100_000,
         '{"format": ' + "[" * 100_000,
         TEXT.replace('"window": 3', f'"window": {"9" * 5000}'),
-        TEXT.replace('"version": 6', f'"version": {"9" * 4000}'),
-        TEXT.replace('"version": 6', f'"version": {[[]] * 500}'),
+        TEXT.replace('"version": 7', f'"version": {"9" * 4000}'),
+        TEXT.replace('"version": 7', f'"version": {[[]] * 500}'),
     ],
 )
 def test_text_that_no_reader_takes_is_refused(text: str):

@@ -204,7 +204,7 @@ def _changed(**changes: object) -> str:
         ("{", "no JSON"),
         ("[]", "not a nearfar plan"),
         ("{}", "not a nearfar plan"),
-        (_changed(version=7), "version 7, this nearfar reads versions 1 to 6"),
+        (_changed(version=8), "version 8, this nearfar reads versions 1 to 7"),
         (_changed(version=None), "version None"),
         (_changed(colour="red"), "damaged plan: colour"),
         (_changed(window=0), "damaged plan: window"),

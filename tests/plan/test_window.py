@@ -52,7 +52,7 @@ def test_the_default_window_is_odd_and_fits(side):
 def test_plans_without_a_pitch_are_of_single_pixels():
     plan = paper_plan(Size(8, 9), 3, Size(3, 3))
     data = json.loads(plan.to_json())
-    assert (data["version"], data.pop("pitch")) == (6, 1)
+    assert (data["version"], data.pop("pitch")) == (7, 1)
     for version in READABLE_VERSIONS:
         assert parse_plan(json.dumps(data | {"version": version})) == plan
 

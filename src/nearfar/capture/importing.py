@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from nearfar.capture.shown import ShownPictures
 from nearfar.capture.store import Capture
 from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
@@ -39,7 +40,9 @@ class ImportSummary:
     last: Pairing
 
 
-def pair(plan: Plan, folder: Path, list_file: Path | None = None) -> list[Path]:
+def pair(
+    plan: Plan, folder: Path, list_file: Path | None = None, *, source: str = "the plan"
+) -> list[Path]:
     """Find the photo of each pattern: all pictures of a folder in natural order, or a list.
 
     Parameters
@@ -50,6 +53,8 @@ def pair(plan: Plan, folder: Path, list_file: Path | None = None) -> list[Path]:
     list_file : Path, optional
         Text file that names the photos instead, one per line relative to `folder`, in the order
         of the plan. Blank lines and lines that begin with # are skipped.
+    source : str
+        What the patterns are from, for the message.
 
     Returns
     -------
@@ -69,11 +74,11 @@ def pair(plan: Plan, folder: Path, list_file: Path | None = None) -> list[Path]:
     photos = list_pictures(folder) if list_file is None else _listed(folder, list_file)
     count = len(plan.patterns)
     if len(photos) != count:
-        source = folder if list_file is None else list_file
+        taken = folder if list_file is None else list_file
         ends = f" (first {photos[0].name}, last {photos[-1].name})" if photos else ""
         plural = "s" * (len(photos) != 1)
         raise InputError(
-            f"{source} has {len(photos)} photo{plural}{ends}, but the plan has {count} patterns: "
+            f"{taken} has {len(photos)} photo{plural}{ends}, but {source} has {count} patterns: "
             f"give one photo for each pattern"
             f"{_hint(folder, photos) if list_file is None else ''}."
         )
@@ -125,6 +130,7 @@ def import_photos(
     full_scale: float | None = None,
     rig: Mapping[str, Any] | None = None,
     exposure: float | None = None,
+    shown: ShownPictures | None = None,
     force: bool = False,
     progress: Report = ignore_progress,
 ) -> ImportSummary:
@@ -139,6 +145,8 @@ def import_photos(
         Capture to make.
     full_scale, rig, exposure, force, progress
         As `nearfar.capture.write_capture`.
+    shown : ShownPictures, optional
+        The pictures that `plan` was made of.
 
     Returns
     -------
@@ -158,6 +166,7 @@ def import_photos(
         rig={"description": "imported photos", **(rig or {})},
         exposure=exposure,
         names=[photo.name for photo in photos],
+        shown=shown.read() if shown is not None and plan.offset == "shown" else None,
         force=force,
         progress=progress,
     )

@@ -13,17 +13,21 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import AnyPath, Size
 from nearfar.errors import UnreadableFileError
-from nearfar.files import UNFINISHED
+from nearfar.files import UNFINISHED, full_scale_of
 from nearfar.files.stores import open_array, open_store, read_array, read_selection
 from nearfar.illumination.frequencies import DC
 from nearfar.markup import card, picture
-from nearfar.plan import Plan, Sinusoid, parse_plan
+from nearfar.plan import Pattern, Plan, Sinusoid, parse_plan
+from nearfar.plan.patterns import Shown
+from nearfar.plan.recognition.contents import Fringes, Uniform
 
 # Bytes of a chunk at most: rows of a large camera are read without the rest of it.
 CHUNK_BYTES = 2**22
 # Pixels along the longer side of a photo that a notebook shows.
 THUMBNAIL_PIXELS = 256
 KIND = "nearfar capture"
+# Name of the array of pictures that were shown.
+SHOWN = "shown"
 FORMAT_VERSION = 1
 PHOTO_DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
@@ -53,6 +57,9 @@ class Capture:
         its exposure in seconds or a temperature in degrees Celsius, or None where it is unknown.
     alarms : tuple of str
         What went wrong while the photos were taken, a sentence each.
+    shown : zarr.Array or None
+        The pictures that were shown, where they are somebody else's: (photos, Py, Px) or (photos,
+        Py, Px, 3); `pattern` gives one as light.
 
     Examples
     --------
@@ -72,6 +79,7 @@ class Capture:
     saturated: NDArray[np.float64]
     conditions: dict[str, list[float | None]]
     alarms: tuple[str, ...]
+    shown: zarr.Array[Any] | None = None
 
     @property
     def camera(self) -> Size:
@@ -87,6 +95,31 @@ class Capture:
     def saturated_share(self) -> float:
         """Share of all values of all photos that are at full scale or above."""
         return float(self.saturated.mean())
+
+    def pattern(self, index: int) -> NDArray[np.float32]:
+        """Return the pattern of photo `index` as light: linear, full white = 1.
+
+        Returns
+        -------
+        array
+            float32, shape (Py, Px), or (Py, Px, 3) of colour pictures that were shown.
+
+        Raises
+        ------
+        UnreadableFileError
+            If a picture that was shown is damaged.
+        PlanError
+            If the plan's patterns are complex.
+        """
+        if self.shown is None:
+            return self.plan.draw(index).astype(np.float32) / np.float32(255)
+        drawn = read_selection(self.shown, (index,))
+        light = drawn.astype(np.float32) / np.float32(full_scale_of(drawn.dtype))
+        pattern = self.plan.patterns[index]
+        if isinstance(pattern, Shown) and isinstance(pattern.content, Fringes):
+            # What the projector makes of values that were raised to a power for it.
+            light **= np.float32(pattern.content.exponent)
+        return light
 
     def __repr__(self) -> str:
         return f"<nearfar capture: {len(self.plan.patterns)} photos of {self.camera}, {self.path}>"
@@ -141,6 +174,23 @@ class Capture:
         scaled = raw.astype(np.float32, copy=False)
         scaled /= np.float32(self.full_scale)
         return scaled
+
+
+def _shown(path: Path, group: zarr.Group, plan: Plan) -> zarr.Array[Any] | None:
+    """Return the pictures of a plan that were shown, or None if it has none."""
+    if plan.offset != "shown":
+        return None
+    shown = open_array(group, SHOWN)
+    if (
+        shown.shape[:3] != (len(plan.patterns), *plan.projector)
+        or shown.shape[3:] not in {(), (3,)}
+        or shown.dtype not in PHOTO_DTYPES
+    ):
+        raise UnreadableFileError(
+            f"{path} is damaged: it does not hold the pictures that its plan names; "
+            f"copy or make it again."
+        )
+    return shown
 
 
 def open_capture(path: AnyPath) -> Capture:
@@ -202,6 +252,7 @@ def open_capture(path: AnyPath) -> Capture:
         saturated=saturated,
         conditions=conditions,
         alarms=tuple(map(str, alarms)),
+        shown=_shown(path, group, plan),
     )
 
 
@@ -222,9 +273,16 @@ def is_positive(value: object) -> TypeGuard[float]:
 
 def white_and_black(plan: Plan) -> tuple[int, int] | None:
     """Find the first white and the first black pattern, if the plan has both."""
-    found: dict[bool, int] = {}
-    for index, pattern in enumerate(plan.patterns):
-        uniform = isinstance(pattern, Sinusoid) and pattern.frequency == DC
-        if uniform and isinstance(pattern, Sinusoid) and pattern.kind == "cosine":
-            found.setdefault(pattern.inverse, index)
-    return (found[False], found[True]) if len(found) == 2 else None
+    levels = {i: level for i, p in enumerate(plan.patterns) if (level := _level(p)) is not None}
+    if not levels or max(levels.values()) == min(levels.values()):
+        return None
+    return max(levels, key=lambda i: (levels[i], -i)), min(levels, key=lambda i: (levels[i], i))
+
+
+def _level(pattern: Pattern) -> float | None:
+    """Return the level of a pattern that is the same everywhere, None of others."""
+    if isinstance(pattern, Sinusoid) and pattern.kind == "cosine" and pattern.frequency == DC:
+        return 0.0 if pattern.inverse else 1.0
+    if isinstance(pattern, Shown) and isinstance(pattern.content, Uniform):
+        return pattern.content.level
+    return None

@@ -24,6 +24,7 @@ from nearfar.capture.store import (
     CHUNK_BYTES,
     FORMAT_VERSION,
     KIND,
+    SHOWN,
     Capture,
     is_positive,
     open_capture,
@@ -252,6 +253,23 @@ class CaptureWriter:
             values = np.array([getattr(taken, name) for taken in self._taken])
             add_array(self._group, name, (count,), np.float64, (count,))[:] = values
 
+    def keep_shown(self, pictures: Iterable[NDArray[Any]]) -> None:
+        """Keep the pictures that were shown, one for each photo, all of one shape and type.
+
+        Parameters
+        ----------
+        pictures : iterable of ndarray, shape (Py, Px) or (Py, Px, 3)
+            uint8, uint16 or float32.
+        """
+        assert self._group is not None
+        kept: zarr.Array[Any] | None = None
+        for number, picture in enumerate(pictures):
+            if kept is None:
+                shape = (len(self._plan.patterns), *picture.shape)
+                chunk = (1, _rows_of_a_chunk(picture), *picture.shape[1:])
+                kept = add_array(self._group, SHOWN, shape, picture.dtype, chunk)
+            kept[number] = picture
+
     def _take_up(self, group: zarr.Group) -> None:
         """Resume from the photos on the disk."""
         folder, before = self._folder, dict(group.attrs)
@@ -285,12 +303,16 @@ class CaptureWriter:
         self._group = create_durable_store(
             self._folder, KIND, FORMAT_VERSION, {**self._attributes, "full_scale": scale}
         )
-        rows = max(1, min(len(first), CHUNK_BYTES // max(1, first[0].nbytes)))
-        chunk = (1, rows, *first.shape[1:])
+        chunk = (1, _rows_of_a_chunk(first), *first.shape[1:])
         photos = add_array(self._group, "photos", (count, *first.shape), first.dtype, chunk)
         synchronise_entry(self._folder)
         synchronise_entry(self._folder.parent)
         return photos
+
+
+def _rows_of_a_chunk(picture: NDArray[Any]) -> int:
+    bytes_of_a_row = picture.nbytes // len(picture)
+    return max(1, min(len(picture), CHUNK_BYTES // max(1, bytes_of_a_row)))
 
 
 @path_after_content
@@ -306,6 +328,7 @@ def write_capture(
     force: bool = False,
     progress: Report | OldReport | None = None,
     observers: Sequence[CaptureObserver] = (),
+    shown: Iterable[NDArray[Any]] | None = None,
     enough: Callable[[int, NDArray[Any]], bool] | None = None,
 ) -> Capture:
     """Write photos that are there, one for each pattern of a plan; whole or not at all.
@@ -327,6 +350,9 @@ def write_capture(
     observers : sequence of CaptureObserver
         Each is called with every photo; where one returns ``Decision.ENOUGH``, the capture and its
         plan end with that photo.
+    shown : iterable of arrays, optional
+        The pictures that were shown, of a plan with offset "shown": one for each photo, all uint8,
+        uint16 or float32 and of one shape, (Py, Px) or (Py, Px, 3).
     enough : callable, optional
         .. deprecated:: 0.1
             Use `observers`.
@@ -372,5 +398,7 @@ def write_capture(
         if not ended:
             check_count(count, count, more=next(remaining, None) is not None)
         writer.finish()
+        if shown is not None:
+            writer.keep_shown(shown)
         (partial / LOG_NAME).unlink()
     return open_capture(path)

@@ -18,6 +18,7 @@ COMMANDS = Registry(
         "export": "nearfar.cli.export:export",
         "acquire": "nearfar.cli.acquire:acquire",
         "import": "nearfar.cli.import_photos:import_photos",
+        "correspond": "nearfar.cli.correspond:correspond",
         "reconstruct": "nearfar.cli.reconstruct:reconstruct",
         "relight": "nearfar.cli.relight:relight",
         "evaluate": "nearfar.cli.evaluate:evaluate",

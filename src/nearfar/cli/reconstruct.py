@@ -19,7 +19,7 @@ from nearfar.cli.options import (
     check_report_page,
     keep_input,
 )
-from nearfar.cli.saying import say, say_reconstructed
+from nearfar.cli.saying import say, say_reconstructed, warn
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -104,6 +104,21 @@ def reconstruct(
         check_report_page(report, output, *inputs, force=force)
     check_resumable(output, RESUMABLE_TRANSPORT, resume=resume, force=force)
     opened = open_capture(capture)
+    if opened.plan.offset == "shown":
+        refused = {"--method": method != "joint", "--square": square, "--resume": resume}
+        refused |= {"--half": half, "--scheduler": scheduler is not None}
+        _from_patterns(
+            opened,
+            output,
+            correspondence,
+            available,
+            refused,
+            as_json=as_json,
+            force=force,
+            report=report,
+            quiet=quiet,
+        )
+        return
     given = None
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
@@ -130,6 +145,74 @@ def reconstruct(
     if as_json:
         print(json.dumps(verdict.as_json()))
     say(str(verdict), quiet=quiet)
+
+
+def _from_patterns(
+    capture: "Capture",
+    output: Path,
+    correspondence: Path | None,
+    memory: int,
+    refused: dict[str, bool],
+    *,
+    as_json: bool,
+    force: bool,
+    report: Path | None,
+    quiet: bool,
+) -> None:
+    """Reconstruct from photos of anybody's patterns."""
+    from nearfar.correspondence import read_correspondence
+    from nearfar.transport.store import save_transport
+    from nearfar.workflow.from_patterns import reconstruct_from_patterns
+
+    for option, is_given in {**refused, "--report": report is not None}.items():
+        if is_given:
+            raise typer.BadParameter("is for photos of a plan.", param_hint=option)
+    if output.suffix.lower() == ".npy":
+        _invert(capture, output, force=force, quiet=quiet or as_json)
+        return
+    given = None
+    if correspondence is not None:
+        given = read_correspondence(correspondence, capture.camera, capture.plan.projector)
+    with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
+        transport = reconstruct_from_patterns(capture, given, memory=memory, progress=progress)
+    save_transport(transport, output, force=force)
+    verdict = transport.verdict
+    assert verdict is not None
+    say(
+        f"transport of {capture.camera} camera pixels, {transport.lit.mean():.1%} directly lit, "
+        f"written to {output}",
+        quiet=quiet or as_json,
+    )
+    if as_json:
+        found = {
+            "verdict": verdict.grade,
+            "held_out_dB": verdict.held_out_snr,
+            "expected_dB": None,
+            "planned_dB": None,
+            "noise_dB": None,
+            "causes": list(verdict.causes),
+            "reasons": [reason.sentence for reason in verdict.reasons],
+        }
+        print(json.dumps(found))
+    say(str(verdict), quiet=quiet or as_json)
+
+
+def _invert(capture: "Capture", output: Path, *, force: bool, quiet: bool) -> None:
+    """Write the dense T of a complete set of patterns."""
+    from nearfar.workflow.complete_sets import write_complete
+
+    with progress_bar("inverting", quiet=quiet) as progress:
+        found = write_complete(capture, output, force=force, progress=progress)
+    if not found.has_black:
+        warn(
+            f"{capture.path} has no photo under black, so that black was taken as 0: what is black "
+            f"in the photos stands in T as light."
+        )
+    say(
+        f"T of {' x '.join(map(str, found.shape))} written to {output}: least squares, without any "
+        f"prior. An entry's noise is {found.noise_gain:.3g} times that of a photo's pixel",
+        quiet=quiet,
+    )
 
 
 def _write_report(

@@ -20,11 +20,12 @@ def measured_frequencies(plan: Plan) -> set[Frequency]:
     Raises
     ------
     PlanError
-        If the plan's patterns are complex.
+        If the plan's patterns are complex, or somebody else's pictures.
     InputError
         If a pattern lacks its inverse, or a plan by reference its whites and blacks.
     """
     plan.require_real("measure")
+    plan.require_sinusoids("measure")
     if plan.offset == "reference":
         find_references(plan)
         return {frequency for frequency, _ in find_waves(plan)}
@@ -47,6 +48,7 @@ def measured_basis(plan: Plan) -> tuple[RealBasis, Floats]:
         As `measure`.
     """
     plan.require_real("measure")
+    plan.require_sinusoids("measure")
     if plan.offset == "reference":
         basis, _, multiplicity = responses_by_reference(plan)
     else:
@@ -77,11 +79,12 @@ def measure(
     Raises
     ------
     PlanError
-        If the plan's patterns are complex.
+        If the plan's patterns are complex, or somebody else's pictures.
     InputError
         If a pattern lacks its inverse, or a plan by reference its whites and blacks.
     """
     photos.plan.require_real("measure")
+    photos.plan.require_sinusoids("measure")
     rows = slice(0, photos.camera.height) if rows is None else rows
     if photos.plan.offset == "reference":
         without_drift = photos if isinstance(photos, PhotosWithoutDrift) else remove_drift(photos)

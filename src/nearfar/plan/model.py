@@ -36,9 +36,10 @@ from nearfar.plan.patterns import (
 
 # Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
 # 3 Gray code, version 4 half-screens and inverse pictures, version 5 the pitch, version 6 the
-# expected SNR_b. A plan of an earlier version is one of the next as well.
-FORMAT_VERSION = 6
-READABLE_VERSIONS = (1, 2, 3, 4, 5, 6)
+# expected SNR_b, version 7 pictures that were shown. A plan of an earlier version is one of the
+# next as well.
+FORMAT_VERSION = 7
+READABLE_VERSIONS = (1, 2, 3, 4, 5, 6, 7)
 
 # Characters of a message that are quoted from a plan.
 MAXIMUM_REASON = 200
@@ -77,9 +78,9 @@ class Plan(Frozen):
         paper's window of single pixels.
     far, dropped : Size
         Far band, and the block of lowest near frequencies that are not shot.
-    offset : {"inverse", "reference", "none"}
+    offset : {"inverse", "reference", "none", "shown"}
         Inverse pairs, whites and blacks at intervals for all, or none (complex patterns, for
-        simulation).
+        simulation); "shown" for pictures of somebody else's, which are as they are.
     correspondence : str
         Name of a method of `nearfar.plan.correspondence.CORRESPONDENCE_METHODS`: photos of
         "stripes" or of "gray" code, the "phase" of the transport's own photos, "none" at all, or
@@ -99,13 +100,13 @@ class Plan(Frozen):
     """
 
     format: Literal["nearfar plan"] = "nearfar plan"
-    version: Literal[6] = 6
+    version: Literal[7] = 7
     projector: SizeField
     window: int = Field(ge=1, strict=True)
     pitch: int = Field(default=1, ge=1, le=LARGEST_SIDE, strict=True)
     far: SizeField
     dropped: SizeField
-    offset: Literal["inverse", "reference", "none"]
+    offset: Literal["inverse", "reference", "none", "shown"]
     correspondence: str
     expected_snr: ExpectedRange | None = None
     patterns: tuple[SerializeAsAny[Pattern], ...]
@@ -159,7 +160,7 @@ class Plan(Frozen):
         ):
             if size.height > largest.height or size.width > largest.width:
                 raise ValueError(f"its {name} of {size} is larger than {largest}")
-        if not self.transport_photos:
+        if not self.transport_photos and self.offset != "shown":
             raise ValueError("it has no photos of transport: direct, near or far")
         return self
 
@@ -185,7 +186,7 @@ class Plan(Frozen):
     @property
     def savings(self) -> float:
         """Brute force over photos of transport (equation 13)."""
-        return self.projector.pixels / self.transport_photos
+        return self.projector.pixels / (self.transport_photos or len(self.patterns))
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers that ``nearfar plan --json`` prints."""
@@ -217,6 +218,21 @@ class Plan(Frozen):
                 f"so there is nothing to {what}: make the plan with `offset='inverse'`."
             )
 
+    def require_sinusoids(self, what: str) -> None:
+        """Refuse a plan of pictures that were shown and are not recognised as sinusoids of a plan.
+
+        Raises
+        ------
+        PlanError
+            If the plan has offset "shown".
+        """
+        if self.offset == "shown":
+            raise PlanError(
+                f"these photos are of somebody else's pictures, not of the sinusoids of a plan, so "
+                f"that there is nothing to {what}: of such photos, nearfar finds the "
+                f"correspondence, by `correspond()`."
+            )
+
     def draw(self, index: int) -> NDArray[np.uint8]:
         """Draw the 8-bit pattern of photo `index`, shape (Py, Px)."""
         pattern = self.patterns[index]
@@ -240,7 +256,9 @@ class Plan(Frozen):
             ("photos", f"{len(self.patterns)}: {counted}"),
             ("brute force over photos of transport", f"{self.savings:.2f}"),
         ]
-        chosen = [] if self.offset == "none" else [0, *range(3, len(self.patterns), 7)][:5]
+        chosen = (
+            [] if self.offset in {"none", "shown"} else [0, *range(3, len(self.patterns), 7)][:5]
+        )
         images = [(f"pattern {i}", picture(_small(self.draw(i)), "")) for i in chosen]
         return card("plan", rows, images)
 

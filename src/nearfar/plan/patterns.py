@@ -22,8 +22,9 @@ from nearfar.errors import PlanError
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import Frequency, frequency_from_text, frequency_to_text
 from nearfar.illumination.pictures import natural_picture
+from nearfar.plan.recognition.contents import AnyContent
 
-Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check"]
+Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check", "shown"]
 
 FrequencyField = Annotated[
     Frequency,
@@ -47,7 +48,7 @@ class Pattern(Frozen, ABC):
     Attributes
     ----------
     kind : str
-    purpose : {"direct", "near", "far", "reference", "correspondence", "check"}
+    purpose : {"direct", "near", "far", "reference", "correspondence", "check", "shown"}
     """
 
     kind: str
@@ -224,6 +225,41 @@ class HalfScreen(Pattern):
         return patterns.invert(drawn) if self.inverse else drawn
 
 
+class Shown(Pattern):
+    """A picture of somebody else's that was shown; its pixels are kept in the capture.
+
+    Attributes
+    ----------
+    content : Content
+        What the picture was recognised as.
+    inverse_of : int or None
+        Number of the earlier pattern whose inverse it is.
+    """
+
+    kind: Literal["shown"] = "shown"
+    content: AnyContent
+    inverse_of: int | None = Field(default=None, ge=0)
+    purpose: Literal["shown"] = "shown"
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        described: str = self.content.description
+        return described
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Refuse: a plan does not hold the picture's pixels.
+
+        Raises
+        ------
+        PlanError
+        """
+        raise PlanError(
+            f"the {self.description} is a picture on a projector of {size}, which is kept in its "
+            f"capture alone: ask that capture for its pattern."
+        )
+
+
 OWN_PATTERNS: tuple[type[Pattern], ...] = (
     Sinusoid,
     Exponential,
@@ -231,6 +267,7 @@ OWN_PATTERNS: tuple[type[Pattern], ...] = (
     GrayCode,
     Picture,
     HalfScreen,
+    Shown,
 )
 
 

@@ -4,6 +4,8 @@ from nearfar.plan import Plan
 from nearfar.plan.choose import can_list_every_frequency, photos_of_every_frequency
 from nearfar.plan.expected_range import ExpectedRange
 from nearfar.plan.look import Look
+from nearfar.plan.recognition import summarise
+from nearfar.plan.recognition.own import recognised_in
 from nearfar.plan.window import largest_window
 
 
@@ -18,6 +20,13 @@ def describe_plan(plan: Plan) -> str:
     -------
     str
     """
+    if plan.offset == "shown":
+        return "\n".join(
+            [
+                f"projector {plan.projector}, {len(plan.patterns)} pictures of somebody else's:",
+                *summarise(recognised_in(plan)),
+            ]
+        )
     counts = ", ".join(f"{count} {purpose}" for purpose, count in plan.counts.items() if count)
     return "\n".join(
         [

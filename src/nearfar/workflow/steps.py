@@ -24,6 +24,7 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.plan.window import largest_window
 from nearfar.progress import Report, counting, ignore_progress
 from nearfar.transport.model import Transport
+from nearfar.workflow.by_codes import correspond_by_codes
 from nearfar.workflow.reconstruction.sources import brightest_white, photos_without_drift
 
 
@@ -80,7 +81,7 @@ def correspond(
     method : str, optional
         "stripes", "gray" or "phase": from photos of stripes, from photos of Gray code, or from the
         phase of the photos of transport; or a method that another package adds. By default the
-        plan's own.
+        plan's own; of pictures that are somebody else's, by what each projector pixel shows.
     measurements : Measurements, optional
         Of the capture, for the phase; by default the capture is measured here.
     progress : callable, optional
@@ -89,7 +90,8 @@ def correspond(
     Returns
     -------
     Correspondence
-        At the camera's resolution; NaN where no direct light is seen.
+        At the camera's resolution; NaN where no direct light is seen, and in an axis that no
+        pattern tells.
 
     Raises
     ------
@@ -104,6 +106,8 @@ def correspond(
     """
     require_instance(capture, Capture, "capture", "nearfar.open_capture")
     report, plan = progress or ignore_progress, capture.plan
+    if plan.offset == "shown" and method is None:
+        return correspond_by_codes(capture, report).correspondence
     chosen = method_of(plan) if method is None else method_named(method)
     photos = photos_without_drift(capture, report)
     count = max(1, plan.counts["correspondence"])

@@ -1,0 +1,105 @@
+"""Pictures of somebody else's that were shown as patterns: read, recognise, make a plan of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import AnyPath, Floats, Size
+from nearfar.errors import InputError, MissingFileError
+from nearfar.files import full_scale_of, list_pictures, read_picture
+from nearfar.files.images import PICTURE_KINDS
+from nearfar.plan import Plan
+from nearfar.plan.model import LARGEST_SIDE
+from nearfar.plan.recognition import Recognised, recognise
+from nearfar.plan.recognition.own import plan_of_pictures
+from nearfar.progress import Report, ignore_progress
+
+
+@dataclass(frozen=True, eq=False)
+class ShownPictures:
+    """A folder of pictures that were shown, and what they were recognised as.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+        In the order in which they were shown.
+    recognised : Recognised
+    plan : Plan
+        Of nearfar's own patterns where all pictures are such, with offset "shown" otherwise.
+    """
+
+    paths: tuple[Path, ...]
+    recognised: Recognised
+    plan: Plan
+
+    def read(self) -> Iterator[NDArray[Any]]:
+        """Read the pictures one after the other, as a capture keeps them."""
+        for path in self.paths:
+            yield _read(path)
+
+
+def read_shown(folder: AnyPath, progress: Report = ignore_progress) -> ShownPictures:
+    """Recognise the pictures in a folder, in natural order of their names.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Pictures of one size, grey or colour: a picture for each photo.
+    progress : callable
+        Called with "patterns" and the share of them that is recognised.
+
+    Returns
+    -------
+    ShownPictures
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        If the folder or a picture is not there, or cannot be read.
+    InputError
+        If pictures differ in size, or hold values outside 0 to 1.
+    """
+    folder = Path(folder)
+    paths = list_pictures(folder)
+    if not paths:
+        raise MissingFileError(
+            f"{folder} has no pictures: name the folder of the patterns, as {PICTURE_KINDS}."
+        )
+    recognised = recognise(_lights(paths), lambda count: progress("patterns", count / len(paths)))
+    plan = plan_of_pictures(recognised, lambda number: _read(paths[number]))
+    return ShownPictures(tuple(paths), recognised, plan)
+
+
+def _lights(paths: list[Path]) -> Iterator[Floats]:
+    """Yield pictures as light, and refuse what does not belong with the others."""
+    size: Size | None = None
+    for path in paths:
+        picture = _read(path)
+        mine = Size(*picture.shape[:2])
+        if size is not None and mine != size:
+            raise InputError(
+                f"{path} is {mine}, but {paths[0].name} is {size} (height x width): give patterns "
+                f"of one size, as the projector shows them."
+            )
+        if max(mine) > LARGEST_SIDE:
+            raise InputError(f"{path} is {mine}: no projector has more than {LARGEST_SIDE} pixels.")
+        size = mine
+        light = picture.astype(np.float32) / np.float32(full_scale_of(picture.dtype))
+        if light.min() < 0 or light.max() > 1:
+            raise InputError(
+                f"{path} has values from {light.min():g} to {light.max():g}: give patterns from 0, "
+                f"black, to 1, white."
+            )
+        yield light
+
+
+def _read(path: Path) -> NDArray[Any]:
+    """Read a picture; one of three equal channels is grey."""
+    picture = read_picture(path)
+    if picture.ndim == 3 and (picture == picture[..., :1]).all():
+        return picture[..., 0]
+    return picture

@@ -1,0 +1,231 @@
+"""Correspondence from a capture of any patterns, by the code of each projector pixel."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from nearfar.arrays import Floats, Size, blocks
+from nearfar.capture import Capture
+from nearfar.correspondence import Correspondence, joined
+from nearfar.correspondence.codes import (
+    find_places,
+    is_lit,
+    typical_misfit,
+)
+from nearfar.correspondence.photo_order import (
+    FOLLOWED,
+    PhotoOrder,
+    explained_share,
+    find_order,
+    unexplained_share,
+)
+from nearfar.progress import Report, ignore_progress
+from nearfar.workflow.pattern_codes import (
+    AS_IN_THE_FILE,
+    TWO_LEVELS,
+    Display,
+    PatternLevels,
+    Telling,
+    find_telling,
+    read_levels,
+    read_sequences,
+)
+
+# Values of photos that are held at once.
+VALUES_AT_ONCE = 2**26
+# Rows of the camera that tell how well photos follow the patterns typically.
+SAMPLE_ROWS = 16
+# Share of camera pixels with q below which something is wrong.
+LEAST_LIT = 0.05
+# Steps of the photos' numbers that direct light makes at least.
+LEAST_STEPS = 2.0
+AXES = ("rows", "columns")
+# Camera pixels by which a power is fitted; it counts where it leaves less than this share of what
+# linear levels leave unexplained, and differs from 1 by more than these octaves.
+FITTED_PIXELS = 4096
+CLEARLY_BETTER = 0.8
+LEAST_OCTAVES = 0.1
+# Standard deviations of blur that are tried, in projector pixels.
+BLURS = (0.5, 1.0, 2.0, 4.0)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundCorrespondence:
+    """Correspondence, and what it was found by.
+
+    Attributes
+    ----------
+    correspondence : Correspondence
+        NaN in the axis that no pattern tells.
+    axes : tuple of str
+        Of "rows" and "columns" those that the patterns tell.
+    places : ndarray, shape (Cy, Cx, 2), float32
+        The most probable q, whether or not there is direct light; NaN in an axis that no pattern
+        tells.
+    explained : float
+        Median share of a camera pixel's changes over the photos that direct light from q explains,
+        beyond offset and far-range light.
+    order : PhotoOrder or None
+        An order in which photos would follow the patterns, where they do not as they are.
+    exponent : float
+        Power of the patterns' levels that photos follow; 1 where projector and camera are linear.
+    """
+
+    correspondence: Correspondence
+    axes: tuple[str, ...]
+    places: Floats
+    explained: float
+    order: PhotoOrder | None = None
+    exponent: float = 1.0
+
+    def warnings(self) -> list[str]:
+        """Return what is wrong with the photos, a sentence each."""
+        found = []
+        lit = float(np.isfinite(self.correspondence.q).any(axis=-1).mean())
+        if self.explained < FOLLOWED:
+            cure = "check that each photo is of its pattern, in the same order"
+            if self.order is not None:
+                cure = f"it seems that {self.order.description}: import them in the right order"
+            found.append(
+                f"the photos do not follow the patterns: direct light explains "
+                f"{self.explained:.0%} of how they change; {cure}."
+            )
+        elif lit < LEAST_LIT:
+            found.append(
+                f"q was found at {lit:.1%} of the camera pixels alone: check that the camera sees "
+                f"what the projector lights, and is neither saturated nor too dark."
+            )
+        if self.exponent != 1.0:
+            found.append(
+                f"projector or camera is not linear: the photos follow the patterns' levels raised "
+                f"to {self.exponent:.2f}. q allows for that, a transport does not: set the gamma "
+                f"of both to 1, or calibrate."
+            )
+        found += [
+            f"no pattern tells {axis} apart: q is NaN on that axis, and no transport can be "
+            f"reconstructed with it."
+            for axis in AXES
+            if axis not in self.axes
+        ]
+        return found
+
+
+def correspond_by_codes(
+    capture: Capture, progress: Report = ignore_progress
+) -> FoundCorrespondence:
+    """Find q(c) by the sequence of levels that each projector pixel shows, whatever the patterns.
+
+    Parameters
+    ----------
+    capture : Capture
+        With any patterns; see `nearfar.correspondence.codes`.
+    progress : callable
+        Called with what is done and its share.
+
+    Returns
+    -------
+    FoundCorrespondence
+
+    Raises
+    ------
+    InputError
+        If the patterns do not tell places.
+    """
+    patterns = read_levels(capture, progress)
+    telling = find_telling(capture, patterns)
+    height, width = capture.camera
+    sample = read_sequences(capture, patterns, slice(None, None, max(1, height // SAMPLE_ROWS)))
+    display = _fit_display(capture, patterns, sample)
+    if display != AS_IN_THE_FILE:
+        telling = find_telling(capture, patterns, display)
+    misfits = [typical_misfit(sample[:, each.photos], each.codes) for each in telling]
+    explained = min(explained_share(sample[:, each.photos], each.codes) for each in telling)
+    order = None
+    if explained < FOLLOWED:
+        order = find_order(sample, telling[0].photos, telling[0].codes, sample.shape[1])
+    parts, places = [], []
+    for rows in blocks(height, max(1, VALUES_AT_ONCE // (width * len(patterns.along)))):
+        sequences = read_sequences(capture, patterns, rows)
+        found, likely = _find(sequences, telling, misfits, _step(capture))
+        parts.append(_as_rows(found, width))
+        places.append(likely.reshape(-1, width, 2))
+        progress("correspondence", min(rows.stop, height) / height)
+    told = sorted({axis for each in telling for axis in each.axes})
+    return FoundCorrespondence(
+        joined(parts),
+        tuple(AXES[axis] for axis in told),
+        np.concatenate(places),
+        explained,
+        order,
+        display.exponent,
+    )
+
+
+def _fit_display(capture: Capture, patterns: PatternLevels, sample: Floats) -> Display:
+    """Return the power and the blur of the patterns that direct light explains photos best by.
+
+    Each is kept as in the file where no other is clearly better.
+    """
+    chosen = np.random.default_rng(0).permutation(len(sample))[:FITTED_PIXELS]
+    some = sample[chosen]
+
+    def unexplained(display: Display) -> float:
+        telling = find_telling(capture, patterns, display)
+        return sum(unexplained_share(some[:, each.photos], each.codes) for each in telling)
+
+    best, least = AS_IN_THE_FILE, unexplained(AS_IN_THE_FILE)
+    if (patterns.groups != TWO_LEVELS).any():
+        found = minimize_scalar(
+            lambda octaves: unexplained(Display(2.0**octaves, 0.0)),
+            bounds=(-2.0, 2.0),
+            method="bounded",
+            options={"xatol": 0.02},
+        )
+        if found.fun < CLEARLY_BETTER * least and abs(found.x) > LEAST_OCTAVES:
+            best, least = Display(float(2.0**found.x), 0.0), found.fun
+    blurs = {blur: unexplained(best._replace(blur=blur)) for blur in BLURS}
+    blur = min(blurs, key=lambda each: blurs[each])
+    return best._replace(blur=blur) if blurs[blur] < CLEARLY_BETTER * least else best
+
+
+def _step(capture: Capture) -> float:
+    """Return the step of the photos' numbers, in photo units; 0 for floats."""
+    return 0.0 if capture.photos.dtype.kind == "f" else 1.0 / capture.full_scale
+
+
+def _find(
+    sequences: Floats, telling: Sequence[Telling], misfits: Sequence[float], step: float
+) -> tuple[Correspondence, Floats]:
+    """Return q and confidence as (C, 2) and (C,), and the most probable q of all, (C, 2)."""
+    count = len(sequences)
+    q = np.full((count, 2), np.nan, dtype=np.float32)
+    confidence = np.ones(count, dtype=np.float32)
+    lit = np.ones(count, dtype=np.bool_)
+    for each, misfit in zip(telling, misfits, strict=True):
+        found = find_places(sequences[:, each.photos], each.codes, misfit)
+        for axis in each.axes:
+            q[:, axis] = found.place[:, axis]
+        confidence = np.minimum(confidence, found.confidence.astype(np.float32))
+        lit &= is_lit(found, sequences) & (found.light >= LEAST_STEPS * step)
+    places = q.copy()
+    q[~lit] = np.nan
+    return Correspondence(q, confidence), places
+
+
+def _as_rows(found: Correspondence, width: int) -> Correspondence:
+    return Correspondence(found.q.reshape(-1, width, 2), found.confidence.reshape(-1, width))
+
+
+def on_grid(q: Floats, projector: Size, grid: Size) -> Floats:
+    """Return q counted in the pixels of another pattern grid that fills the same screen.
+
+    Parameters
+    ----------
+    q : ndarray, shape (Cy, Cx, 2)
+        In pixels of `projector`.
+    projector, grid : Size
+    """
+    scale = np.array(grid, dtype=np.float64) / np.array(projector)
+    return np.asarray(((q + 0.5) * scale - 0.5).astype(np.float32))

@@ -1,0 +1,245 @@
+"""Reconstruct a transport from photos of anybody's patterns.
+
+Index convention: photos are (C, channels, N), patterns (N, P).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers
+from nearfar.capture import Capture
+from nearfar.correspondence import Correspondence
+from nearfar.errors import InputError
+from nearfar.estimate.any_patterns import estimate_from_patterns
+from nearfar.estimate.any_patterns.covariance import PatternModel
+from nearfar.estimate.any_patterns.estimate import PatternRows
+from nearfar.plan.patterns import Shown
+from nearfar.plan.recognition.contents import Uniform
+from nearfar.progress import Report, ignore_progress
+from nearfar.release import version
+from nearfar.transport.model import Transport
+from nearfar.transport.quality import Quality
+from nearfar.transport.verdict import Grade, KeptVerdict, Reason
+from nearfar.workflow.by_codes import AXES, correspond_by_codes
+from nearfar.workflow.reconstruction.summary import description_of
+from nearfar.workflow.verdict.verdict import DOUBTFUL_DECIBELS, WRONG_DECIBELS
+
+# Photos with which the matrices of a camera pixel still take milliseconds, and projector pixels for
+# which the patterns of that many photos fit in memory.
+MOST_PHOTOS = 1000
+MOST_PROJECTOR_PIXELS = 128**2
+# Share of the photos that are held out, and fewest; they are chosen evenly.
+HELD_OUT_SHARE = 0.04
+FEWEST_HELD_OUT = 2
+# Camera pixels that are estimated without them.
+HELD_OUT_PIXELS = 512
+# Arrays of a camera pixel that are held at once, over those of its transport.
+COPIES = 2
+
+
+class _Data(NamedTuple):
+    """All that the estimate is made from."""
+
+    photos: Floats
+    patterns: Floats
+    places: Floats  # (C, 2)
+
+
+def reconstruct_from_patterns(
+    capture: Capture,
+    correspondence: Correspondence | None = None,
+    *,
+    memory: int = 2 * 10**9,
+    progress: Report = ignore_progress,
+) -> Transport:
+    """Estimate the transport from photos of patterns that are known by their levels alone.
+
+    Parameters
+    ----------
+    capture : Capture
+        Of a plan with offset "shown".
+    correspondence : Correspondence, optional
+        By default found in the photos (`nearfar.workflow.by_codes`).
+    memory : int
+        Bytes to work in.
+    progress : callable
+        Called with the step and the share of it that is done.
+
+    Returns
+    -------
+    Transport
+        With a verdict by photos that were held out from the estimate of a sample of camera pixels.
+
+    Raises
+    ------
+    InputError
+        If the patterns are too many, too large or in colour, do not tell q, or the estimate takes
+        more memory.
+    """
+    _require_small(capture, memory)
+    confidence, places = _places(capture, correspondence, progress)
+    data = _read(capture, places)
+    verdict = _judge(capture, data, progress)
+    plan = capture.plan
+    model, rows = estimate_from_patterns(
+        data.photos,
+        data.patterns,
+        data.places,
+        plan.projector,
+        plan.window,
+        lambda share: progress("estimate", share),
+    )
+    return replace(_as_transport(capture, data, model, rows, confidence), verdict=verdict)
+
+
+def _require_small(capture: Capture, memory: int) -> None:
+    plan, pixels = capture.plan, capture.plan.projector.pixels
+    if capture.shown is not None and capture.shown.ndim == 4:
+        raise InputError(
+            f"{capture.path} has colour patterns, of which the correspondence can be found, and no "
+            f"transport: give grey patterns."
+        )
+    if pixels > MOST_PROJECTOR_PIXELS:
+        raise InputError(
+            f"{capture.path} has patterns of {plan.projector}, and the transport of anybody's "
+            f"patterns is estimated on grids of up to {MOST_PROJECTOR_PIXELS} pixels: give the "
+            f"patterns as pictures of their own grid, a pixel for each block of the screen."
+        )
+    if len(plan.patterns) > MOST_PHOTOS:
+        raise InputError(
+            f"{capture.path} has {len(plan.patterns)} photos, and at most {MOST_PHOTOS} are "
+            f"estimated from: choose an output that ends in .npy, which takes a complete set."
+        )
+    values = len(plan.patterns) + plan.window**2 + 700
+    needed = COPIES * 4 * capture.camera.pixels * capture.channels * values
+    if needed > memory:
+        raise InputError(
+            f"{capture.path} needs {needed / 1e9:.1f} GB at {capture.camera} camera pixels: allow "
+            f"it by `memory`."
+        )
+
+
+def _places(
+    capture: Capture, given: Correspondence | None, progress: Report
+) -> tuple[Floats, Floats]:
+    """Return confidence (Cy, Cx), and the most probable q, (C, 2)."""
+    if given is not None:
+        return given.confidence, given.q.reshape(-1, 2)
+    found = correspond_by_codes(capture, progress)
+    places = found.places.reshape(-1, 2).copy()
+    for axis, name in enumerate(AXES):
+        if name in found.axes:
+            continue
+        if capture.plan.projector[axis] > 1:
+            raise InputError(
+                f"the patterns of {capture.path} tell no {name} apart, and a transport needs both "
+                f"axes: add patterns, or give `correspondence`."
+            )
+        places[:, axis] = 0.0
+    return found.correspondence.confidence, places
+
+
+def _read(capture: Capture, places: Floats) -> _Data:
+    photos = capture.read(slice(None))
+    count = len(photos)
+    patterns = np.stack([capture.pattern(number).ravel() for number in range(count)])
+    values = np.moveaxis(photos.reshape(count, capture.camera.pixels, -1), 0, 2)
+    return _Data(np.ascontiguousarray(values), patterns, places)
+
+
+def _judge(capture: Capture, data: _Data, progress: Report) -> KeptVerdict:
+    """Judge an estimate of some camera pixels by photos that it does not see."""
+    held_out = _held_out(capture.plan.patterns)
+    chosen = np.random.default_rng(0).permutation(len(data.photos))[:HELD_OUT_PIXELS]
+    kept = np.setdiff1d(np.arange(len(data.patterns)), held_out)
+    model, rows = estimate_from_patterns(
+        data.photos[chosen][..., kept],
+        data.patterns[kept],
+        data.places[chosen],
+        capture.plan.projector,
+        capture.plan.window,
+        lambda share: progress("held-out photos", share),
+    )
+    lights = data.patterns[held_out]
+    predicted = _relit(model, rows, data.places[chosen], lights)
+    seen = data.photos[chosen][..., held_out] - rows.black[..., None]
+    # The photos' own noise is no error of the transport.
+    noise = float(np.mean(rows.noise.astype(np.float64) ** 2))
+    error = max(float(np.mean((predicted - seen) ** 2)) - noise, 0.05 * noise)
+    snr = float(10 * np.log10(max(float(np.mean(seen**2)), 1e-30) / max(error, 1e-30)))
+    checked_by = "patterns like those shown"
+    if snr >= DOUBTFUL_DECIBELS:
+        return KeptVerdict("good", held_out_snr=snr, checked_by=checked_by)
+    reason = Reason(
+        "too-few-photos",
+        "held-out photos differ from what is relit: give more photos, and check that projector "
+        "and camera are linear and nothing moved.",
+    )
+    grade: Grade = "wrong" if snr < WRONG_DECIBELS else "doubtful"
+    return KeptVerdict(grade, (reason,), snr, checked_by=checked_by)
+
+
+def _held_out(patterns: Sequence[object]) -> Integers:
+    """Return the photos to hold out, evenly among those whose patterns are not uniform."""
+    structured = np.array(
+        [
+            i
+            for i, pattern in enumerate(patterns)
+            if not (isinstance(pattern, Shown) and isinstance(pattern.content, Uniform))
+        ]
+    )
+    count = max(FEWEST_HELD_OUT, round(HELD_OUT_SHARE * len(structured)))
+    places = np.linspace(0, len(structured) - 1, count + 2).round().astype(int)[1:-1]
+    return np.asarray(structured[places])
+
+
+def _relit(model: PatternModel, rows: PatternRows, places: Floats, lights: Floats) -> Floats:
+    """Return pictures of camera pixels under lights (L, P), (C, channels, L)."""
+    transport = Transport(
+        projector=model.projector,
+        correspondence=_lit_places(rows, places)[:, None],
+        direct=rows.direct[:, None],
+        near=rows.near.reshape(len(places), 1, -1, model.window, model.window),
+        far=rows.far[:, None],
+        far_basis=model.far_basis,
+        black=rows.black[:, None],
+        noise=rows.noise[:, None],
+    )
+    pictures = [transport @ light.reshape(model.projector) for light in lights]
+    return np.stack([picture.reshape(rows.direct.shape) for picture in pictures], axis=-1)
+
+
+def _lit_places(rows: PatternRows, places: Floats) -> Floats:
+    q = places.astype(np.float32).copy()
+    q[~rows.lit] = np.nan
+    return q
+
+
+def _as_transport(
+    capture: Capture, data: _Data, model: PatternModel, rows: PatternRows, confidence: Floats
+) -> Transport:
+    camera, shape = capture.camera, (*capture.camera, capture.channels)
+    saturated = np.asarray(data.photos.max(axis=(1, 2)) >= 1.0).reshape(camera)
+    return Transport(
+        projector=model.projector,
+        correspondence=_lit_places(rows, data.places).reshape(*camera, 2),
+        direct=rows.direct.reshape(shape),
+        near=rows.near.reshape(*shape, model.window, model.window),
+        far=rows.far.reshape(*shape, -1),
+        far_basis=model.far_basis,
+        black=rows.black.reshape(shape),
+        noise=rows.noise.reshape(shape),
+        provenance={
+            "nearfar": version(),
+            "method": "patterns",
+            "square": False,
+            **description_of(capture),
+            "drift": None,
+            "excess_of_sums": 0.0,
+            "rounding": 0.0,
+        },
+        quality=Quality(confidence, saturated),
+    )

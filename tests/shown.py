@@ -1,0 +1,89 @@
+"""Pictures of other people's patterns, and photos of them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from nearfar.arrays import Floats, Size
+from nearfar.files.codecs import encode_png
+from nearfar.illumination import patterns
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.transport.exact import ExactTransport
+
+
+def as_picture(pattern):
+    """Return a pattern in [0, 1] as 8 bits."""
+    return np.rint(255 * np.asarray(pattern)).astype(np.uint8)
+
+
+def with_inverses(pictures):
+    """Return each picture followed by its inverse."""
+    return [each for picture in pictures for each in (picture, 255 - picture)]
+
+
+def gray_code(size: Size, axis: int):
+    """Return the bits of the Gray code of rows or columns, the coarsest first."""
+    draw, side = (patterns.gray_rows, patterns.gray_columns)[axis], size[axis]
+    bits = range(patterns.gray_bits(side))
+    return [as_picture(draw(bit, size)) for bit in reversed(bits)]
+
+
+def fringes(size: Size, axis: int, periods, steps: int, power: float = 1.0):
+    """Return fringes of some periods in pixels, with phases at equal steps."""
+    place = np.indices(size)[axis]
+    return [
+        as_picture((0.5 + 0.5 * np.cos(2 * np.pi * (place / period + step / steps))) ** power)
+        for period in periods
+        for step in range(steps)
+    ]
+
+
+def micro_phase_shifting(size: Size, axis: int):
+    """Return fringes whose periods are close together: three steps of one, one of the others."""
+    first, *others = (16.0, 17.2, 18.5, 15.1, 14.3)
+    return [
+        *fringes(size, axis, [first], 3),
+        *(fringes(size, axis, [period], 1)[0] for period in others),
+    ]
+
+
+def hadamard(size: Size):
+    """Return the Hadamard patterns of Sylvester's matrix, white where it is 1."""
+    pixels = np.arange(size.pixels, dtype=np.uint64)
+    signs = np.bitwise_count(pixels[:, None] & pixels) & 1
+    return [as_picture((row == 0).reshape(size)) for row in signs]
+
+
+def random_binary(size: Size, count: int):
+    """Return random patterns, half white."""
+    generator = np.random.default_rng(3)
+    return [as_picture(generator.random(size) < 0.5) for _ in range(count)]
+
+
+def single_pixels(size: Size):
+    """Return one white pixel at a time."""
+    return [as_picture(pixel.reshape(size)) for pixel in np.eye(size.pixels)]
+
+
+def white_and_black(size: Size):
+    """Return white and black."""
+    return [np.full(size, 255, np.uint8), np.zeros(size, np.uint8)]
+
+
+def photograph(world: ExactTransport, pictures, *, noise: bool = True) -> Iterator[Floats]:
+    """Yield photos of pictures, 14 bits of a simulated camera with its black level."""
+    camera, generator = SimulatedCamera(), np.random.default_rng(1)
+    if not noise:
+        camera = SimulatedCamera(read_noise=0.0, shot_noise=False, bits=16)
+    for picture in pictures:
+        light = np.asarray(picture, dtype=np.float32) / np.float32(255)
+        yield camera.photograph(world @ light, generator)
+
+
+def write_pictures(folder: Path, pictures, name="p") -> Path:
+    """Write pictures as PNG files, numbered from 0."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, picture in enumerate(pictures):
+        (folder / f"{name}{number}.png").write_bytes(encode_png(np.squeeze(picture)))
+    return folder

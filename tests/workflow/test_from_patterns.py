@@ -1,0 +1,140 @@
+"""Transports from photos of anybody's patterns."""
+
+import numpy as np
+import pytest
+
+from nearfar import natural_picture, snr
+from nearfar.arrays import Size
+from nearfar.capture import import_photos, open_capture, read_shown
+from nearfar.errors import InputError
+from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.from_patterns import reconstruct_from_patterns
+from tests.cli.conftest import check_done, run_nearfar
+from tests.shown import (
+    fringes,
+    gray_code,
+    hadamard,
+    photograph,
+    random_binary,
+    white_and_black,
+    with_inverses,
+    write_pictures,
+)
+
+SIZE = Size(16, 16)
+CAMERA = Size(14, 12)
+
+
+@pytest.fixture(scope="module")
+def world():
+    found = cached_scene("cornell", SIZE, CAMERA)
+    return found * (0.9 / (found @ np.ones(SIZE, dtype=np.float32)).max())
+
+
+def _capture(world, pictures, folder, *, noise=True):
+    patterns = write_pictures(folder / "patterns", pictures)
+    photos = list(photograph(world, pictures, noise=noise))
+    taken = write_pictures(folder / "photos", photos)
+    shown = read_shown(patterns)
+    paths = sorted(taken.iterdir(), key=lambda path: int(path.stem[1:]))
+    full_scale = 16383 if noise else 65535
+    import_photos(shown.plan, paths, folder / "c.zarr", full_scale=full_scale, shown=shown)
+    return open_capture(folder / "c.zarr")
+
+
+def _decibels(world, transport):
+    lights = [natural_picture(SIZE, seed) for seed in range(3)]
+    pictures = np.mean([snr(world @ light, transport @ light) for light in lights])
+    random = np.random.default_rng(7).random(SIZE).astype(np.float32)
+    return float(pictures), float(snr(world @ random, transport @ random))
+
+
+SETS = {
+    "random": lambda: [*random_binary(SIZE, 90), *white_and_black(SIZE)],
+    "half of the Hadamard patterns": lambda: [
+        *(hadamard(SIZE)[row] for row in np.random.default_rng(0).permutation(256)[:120]),
+        *white_and_black(SIZE),
+    ],
+    "Gray code and fringes": lambda: [
+        *(p for axis in (0, 1) for p in with_inverses(gray_code(SIZE, axis))),
+        *(p for axis in (0, 1) for p in fringes(SIZE, axis, [16, 8, 5.3, 4, 3], 4)),
+        *white_and_black(SIZE),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
+    capture = _capture(world, SETS[name](), tmp_path)
+    transport = reconstruct_from_patterns(capture)
+    pictures, _ = _decibels(world, transport)
+    assert pictures > 33
+    assert transport.verdict is not None
+    assert transport.verdict.grade == "good"
+    assert transport.verdict.held_out_snr is not None
+    black = capture.read([len(capture.plan.patterns) - 1])[0]
+    np.testing.assert_allclose(transport.black, black, atol=0.02)
+
+
+def test_held_out_photos_tell_how_well_such_patterns_are_relit(world, tmp_path):
+    capture = _capture(world, SETS["random"](), tmp_path)
+    transport = reconstruct_from_patterns(capture)
+    lights = np.random.default_rng(9).random((5, *SIZE)) < 0.5
+    true = [snr(world @ light, transport @ light) for light in lights.astype(np.float32)]
+    assert transport.verdict.held_out_snr == pytest.approx(np.mean(true), abs=2.0)
+
+
+def test_more_photos_are_better_and_photos_without_noise_better_still(world, tmp_path):
+    found = []
+    for number, noise in ((40, True), (150, True), (150, False)):
+        pictures = [*random_binary(SIZE, number), *white_and_black(SIZE)]
+        capture = _capture(world, pictures, tmp_path / f"{number}{noise}", noise=noise)
+        found.append(_decibels(world, reconstruct_from_patterns(capture)))
+    assert found[0][0] < found[1][0] < found[2][0]
+    assert found[0][1] < found[1][1] < found[2][1]
+
+
+def test_neither_gain_nor_offset_of_the_patterns_matters(world, tmp_path):
+    pictures = SETS["random"]()
+    plain = reconstruct_from_patterns(_capture(world, pictures, tmp_path / "a", noise=False))
+    dim = [np.rint(25.5 + 0.8 * picture).astype(np.uint8) for picture in pictures]
+    found = reconstruct_from_patterns(_capture(world, dim, tmp_path / "b", noise=False))
+    light = natural_picture(SIZE, 1)
+    assert snr(plain @ light, found @ light) > 30
+
+
+def test_photos_of_other_scenes_are_wrong(world, tmp_path):
+    pictures = SETS["random"]()
+    shuffled = [pictures[i] for i in np.random.default_rng(0).permutation(len(pictures) - 2)]
+    patterns = write_pictures(tmp_path / "p", pictures)
+    photos = write_pictures(tmp_path / "f", photograph(world, [*shuffled, *white_and_black(SIZE)]))
+    shown = read_shown(patterns)
+    paths = sorted(photos.iterdir(), key=lambda path: int(path.stem[1:]))
+    import_photos(shown.plan, paths, tmp_path / "c.zarr", full_scale=16383, shown=shown)
+    transport = reconstruct_from_patterns(open_capture(tmp_path / "c.zarr"))
+    assert transport.verdict.grade != "good"
+
+
+def test_what_cannot_be_estimated_is_refused(world, tmp_path):
+    capture = _capture(world, fringes(SIZE, 1, [16, 4], 4), tmp_path / "a")
+    with pytest.raises(InputError, match="tell no rows apart"):
+        reconstruct_from_patterns(capture)
+    with pytest.raises(InputError, match=r"needs .* GB"):
+        reconstruct_from_patterns(capture, memory=1000)
+
+
+def test_the_command_line_reconstructs_and_relights(world, tmp_path):
+    _capture(world, SETS["random"](), tmp_path)
+    capture, output = tmp_path / "c.zarr", tmp_path / "t.zarr"
+    said = check_done(run_nearfar("reconstruct", capture, output)).out
+    assert "good: Relit patterns like those shown are off by" in said
+    np.save(tmp_path / "light.npy", natural_picture(SIZE, 2))
+    check_done(run_nearfar("relight", output, tmp_path / "light.npy", tmp_path / "out.npy"))
+    relit = np.load(tmp_path / "out.npy")
+    assert snr(world @ natural_picture(SIZE, 2), relit) > 30
+    assert "good:" in check_done(run_nearfar("info", output)).out
+    answer = check_done(run_nearfar("reconstruct", capture, output, "--json", "--force")).out
+    assert '"verdict": "good"' in answer
+    other = tmp_path / "other.zarr"
+    assert run_nearfar("reconstruct", capture, other, "--method", "paper").status == 2
+    assert run_nearfar("reconstruct", capture, other, "--square").status == 2

@@ -1,0 +1,118 @@
+"""Camera pixels that share a covariance of responses: amplitudes, and what is left of responses.
+
+Index convention: m runs over pairs of a camera pixel and a channel, ordered by their ratio; r over
+responses, g and h over amplitudes.
+"""
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers
+from nearfar.compiled import compiled
+from nearfar.estimate.joint.factors import backwards, factorise, forwards, solve_small
+
+
+@compiled
+def _in_columns(responses: Floats, units: Floats) -> Floats:
+    """Return responses (m, R) and those to unit amplitudes (m, G, R) as columns, (R, (1 + G) m).
+
+    All responses come first, then those to each amplitude.
+    """
+    pairs, number, count = units.shape
+    found = np.empty((count, (1 + number) * pairs))
+    for m in range(pairs):
+        for r in range(count):
+            found[r, m] = responses[m, r]
+        for g in range(number):
+            for r in range(count):
+                found[r, (1 + g) * pairs + m] = units[m, g, r]
+    return found
+
+
+@compiled
+def _fit(columns: Floats, precision: Floats, amplitudes: Floats) -> None:
+    """Write the amplitudes (m, G) that fit whitened responses, in columns, best."""
+    pairs, number = amplitudes.shape
+    products = np.zeros((number, 1 + number, pairs))
+    for row in columns:
+        for g in range(number):
+            of_g = row[(1 + g) * pairs : (2 + g) * pairs]
+            for h in range(g + 2):
+                of_h = row[h * pairs : (h + 1) * pairs]
+                for m in range(pairs):
+                    products[g, h, m] += of_g[m] * of_h[m]
+    normal = np.empty((number, number))
+    for m in range(pairs):
+        amplitudes[m] = products[:, 0, m]
+        normal[:] = products[:, 1:, m]
+        for g in range(number):
+            normal[g, g] += precision[m, g]
+        solve_small(normal, amplitudes[m])
+
+
+@compiled
+def _left(columns: Floats, amplitudes: Floats) -> Floats:
+    """Return responses, of columns, less those to amplitudes (m, G): (R, m)."""
+    pairs, number = amplitudes.shape
+    found = columns[:, :pairs].copy()
+    for r in range(len(columns)):
+        for g in range(number):
+            for m in range(pairs):
+                found[r, m] -= amplitudes[m, g] * columns[r, (1 + g) * pairs + m]
+    return found
+
+
+@compiled
+def solve_alike(
+    covariance: Floats,
+    noise_variance: Floats,
+    ratios: Floats,
+    starts: Integers,
+    responses: Floats,
+    units: Floats,
+    precision: Floats,
+) -> tuple[Floats, Floats, bool]:
+    """Estimate amplitudes, and weigh what they leave of the responses by the covariance.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (R, R), float64
+        Of the responses to near- and far-range light, at a variance ratio of 1.
+    noise_variance : ndarray, shape (R,), float64
+        Of each response, in units of one measurement's.
+    ratios : ndarray, shape (Q,), float64
+        Variance ratios, K = ratio covariance + diag(noise_variance) for each.
+    starts : ndarray of int, shape (Q + 1,)
+        First pair of each ratio, and the number of pairs.
+    responses : ndarray, shape (m, R), float32
+    units : ndarray, shape (m, G, R), float32
+        Responses to unit amplitudes.
+    precision : ndarray, shape (m, G), float64
+        Prior precision of the amplitudes, in units of one measurement's.
+
+    Returns
+    -------
+    amplitudes : ndarray, shape (m, G), float64
+    rest : ndarray, shape (m, R), float64
+        Ratio times K^-1 times the responses less those to the amplitudes.
+    is_definite : bool
+        False, and the rest unfinished, where a covariance is not positive definite.
+    """
+    number, count = units.shape[1], len(covariance)
+    factor = np.empty((count, count))
+    amplitudes, rest = np.empty((len(responses), number)), np.empty((len(responses), count))
+    for place in range(len(ratios)):
+        some = slice(starts[place], starts[place + 1])
+        for i in range(count):
+            for j in range(i, count):
+                factor[i, j] = ratios[place] * covariance[i, j]
+            factor[i, i] += noise_variance[i]
+        if not factorise(factor):
+            return amplitudes, rest, False
+        right = _in_columns(responses[some], units[some])
+        forwards(factor, right)
+        _fit(right, precision[some], amplitudes[some])
+        left = _left(right, amplitudes[some])
+        backwards(factor, left)
+        left *= ratios[place]
+        rest[some] = left.T
+    return amplitudes, rest, True

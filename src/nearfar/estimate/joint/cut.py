@@ -20,14 +20,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, product
+from nearfar.arrays import Booleans, Floats, Integers, Size, blocks, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.cut_solve import solve_alike
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis
+from nearfar.parallel import side_by_side
 from nearfar.priors.responses import ResponsePrior
+
+# Camera pixels of a batch.
+BATCH_PIXELS = 2048
 
 
 def is_cut(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
@@ -121,6 +125,21 @@ def share_on_projector(
     ndarray, shape (C, J), float32
     """
     found = np.ones((len(centres), len(offsets)), dtype=np.float32)
+
+    def work(batch: slice) -> None:
+        _multiply_by_shares(found[batch], centres[batch], offsets, pitches, projector)
+
+    side_by_side(work, blocks(len(centres), BATCH_PIXELS))
+    return found
+
+
+def _multiply_by_shares(
+    found: Floats,
+    centres: NDArray[np.int64],
+    offsets: Integers,
+    pitches: Integers,
+    projector: Size,
+) -> None:
     for axis in (0, 1):
         above, below = centres[:, axis], projector[axis] - 1 - centres[:, axis]
         places, hat = np.unique(
@@ -135,7 +154,6 @@ def share_on_projector(
             upper = table[np.clip(below - offset + pitch + 1, 0, len(table) - 1)]
             lower = table[np.clip(-above - offset + pitch, 0, len(table) - 1)]
             found[:, mine] *= np.maximum(upper - lower, 0.0).astype(np.float32)[:, None]
-    return found
 
 
 class _AxisPlaces(NamedTuple):
@@ -198,8 +216,10 @@ def solve_cut(
     far = np.empty((number, channels, count), dtype=np.float32)
     for part, at in cut_alike(batch.centres, centred):
         patterns = cut_responses(centred, at)
-        to_near = patterns @ prior.covariance
-        covariance = to_near @ patterns.T
+        # Hats beyond the border answer nothing.
+        inside = np.flatnonzero(patterns.any(axis=0))
+        to_near = patterns[:, inside] @ prior.covariance[inside]
+        covariance = to_near[:, inside] @ patterns[:, inside].T
         covariance[np.diag_indices(count)] += prior.far_variance
         pixel, channel = np.divmod(np.argsort(ratio[part], axis=None, kind="stable"), channels)
         of = part[pixel], channel

@@ -78,9 +78,12 @@ def sweep_once(
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
+        near, far = found.near, centred.uncentre(found.far, batch.centres)
+        if start is not None:
+            near += start.expected.near[selected]
+            far += start.expected.far[selected]
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
-        rows.near[selected] = found.near
-        rows.far[selected] = centred.uncentre(found.far, batch.centres)
+        rows.near[selected], rows.far[selected] = near, far
         rows.near_noise[selected] = found.near_noise
 
     done = [0]
@@ -111,9 +114,7 @@ def sweep_once(
         report(done[0] / count)
 
     side_by_side(estimate, _parts(problem))
-    if start is None:
-        return rows
-    return rows._replace(near=rows.near + start.expected.near, far=rows.far + start.expected.far)
+    return rows
 
 
 def _explained(
@@ -232,17 +233,12 @@ def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
 
 def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
-    if problem.measurements.quantisation_error.shape[-1] == 0:
+    errors = problem.quantisation_error
+    if not len(errors):
         return lambda selected: problem.pixels.responses[selected, 0] * np.float32(0.0)
-    # A row for each projector pixel, so that a camera pixel reads contiguous memory.
-    errors = problem.measurements.quantisation_error[problem.model.centred.response_indices]
     where = footprint(fetch(problem.pixels.correspondence), problem.measurements.projector)
-    error, pixels, weights = (
-        beside(np.ascontiguousarray(values), problem.pixels.responses)
-        for values in (errors.T, where.pixels, where.weights)
-    )
-
-    return lambda selected: look_up_each(error, pixels[selected], weights[selected])
+    pixels, weights = (beside(values, errors) for values in where)
+    return lambda selected: look_up_each(errors, pixels[selected], weights[selected])
 
 
 def _with_spikes(

@@ -71,11 +71,12 @@ def cut_alike(
     if not len(centres):
         return
     distances = border_distances(centres, centred.near_basis, centred.basis.projector)
-    found, group = np.unique(distances, axis=0, return_inverse=True)
-    order = np.argsort(group.ravel(), kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(group.ravel()[order])) + 1)
-    for part, at in zip(parts, found.tolist(), strict=True):
-        yield part, (at[0], at[1], at[2], at[3])
+    # Each four distances as one number.
+    code = distances @ (centred.near_basis.reach + 1) ** np.arange(4)
+    order = np.argsort(code, kind="stable")
+    for part in np.split(order, np.flatnonzero(np.diff(code[order])) + 1):
+        above, below, left, right = distances[part[0]].tolist()
+        yield part, (above, below, left, right)
 
 
 # Those of the same batch, whose camera pixels' components follow each other.

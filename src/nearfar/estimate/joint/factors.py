@@ -1,8 +1,9 @@
 """Small linear algebra within compiled loops: Cholesky factors and triangular systems.
 
-LAPACK through SciPy keeps the interpreter lock, so that threads would wait for each other.
+LAPACK through SciPy keeps the interpreter lock, so that threads would wait for each other. Rows are
+worked on eight at a time, two of them against eight others, so that most numbers stay in registers.
 
-Index convention: arrays are float64; i and j run over responses, c over right sides.
+Index convention: arrays are float64; i, j and k run over responses, c over right sides.
 """
 
 import numpy as np
@@ -12,23 +13,43 @@ from nearfar.compiled import compiled
 
 
 @compiled
-def _less_eight(row: Floats, rows: Floats, first: int, factors: Floats, start: int) -> None:
-    """Subtract eight rows from another, each times a factor of (8,), from an entry on."""
+def _less_eight(row: Floats, rows: Floats, first: int, times: Floats) -> None:
+    """Subtract eight rows from another, each times a factor of (8,)."""
     a, b, c, d = rows[first], rows[first + 1], rows[first + 2], rows[first + 3]
     e, f, g, h = rows[first + 4], rows[first + 5], rows[first + 6], rows[first + 7]
-    ta, tb, tc, td = factors[0], factors[1], factors[2], factors[3]
-    te, tf, tg, th = factors[4], factors[5], factors[6], factors[7]
-    for j in range(start, len(row)):
+    ta, tb, tc, td = times[0], times[1], times[2], times[3]
+    te, tf, tg, th = times[4], times[5], times[6], times[7]
+    for j in range(len(row)):
         less = (ta * a[j] + tb * b[j]) + (tc * c[j] + td * d[j])
         more = (te * e[j] + tf * f[j]) + (tg * g[j] + th * h[j])
         row[j] -= less + more
 
 
 @compiled
+def _two_less_eight(
+    row: Floats, other: Floats, rows: Floats, first: int, times: Floats, start: int
+) -> None:
+    """Subtract eight rows from two others, each times factors of (8, 2), from an entry on."""
+    a, b, c, d = rows[first], rows[first + 1], rows[first + 2], rows[first + 3]
+    e, f, g, h = rows[first + 4], rows[first + 5], rows[first + 6], rows[first + 7]
+    ta, tb, tc, td = times[0, 0], times[1, 0], times[2, 0], times[3, 0]
+    te, tf, tg, th = times[4, 0], times[5, 0], times[6, 0], times[7, 0]
+    ua, ub, uc, ud = times[0, 1], times[1, 1], times[2, 1], times[3, 1]
+    ue, uf, ug, uh = times[4, 1], times[5, 1], times[6, 1], times[7, 1]
+    for j in range(start, len(row)):
+        less = (ta * a[j] + tb * b[j]) + (tc * c[j] + td * d[j])
+        more = (te * e[j] + tf * f[j]) + (tg * g[j] + th * h[j])
+        less_too = (ua * a[j] + ub * b[j]) + (uc * c[j] + ud * d[j])
+        more_too = (ue * e[j] + uf * f[j]) + (ug * g[j] + uh * h[j])
+        row[j] -= less + more
+        other[j] -= less_too + more_too
+
+
+@compiled
 def factorise(matrix: Floats) -> bool:
     """Overwrite the upper triangle of a symmetric matrix (R, R) by U, where it is U^T U.
 
-    Return whether it is positive definite. The lower triangle is not read.
+    Return whether it is positive definite. The lower triangle is not read, but overwritten.
     """
     count = len(matrix)
     for first in range(0, count, 8):
@@ -44,9 +65,11 @@ def factorise(matrix: Floats) -> bool:
             scale = 1.0 / np.sqrt(own[k])
             for j in range(k, count):
                 own[j] *= scale
-        if last < count:
-            for i in range(last, count):
-                _less_eight(matrix[i], matrix, first, matrix[first:last, i], i)
+        for i in range(last, count - 1, 2):
+            times = matrix[first:last, i : i + 2]
+            _two_less_eight(matrix[i], matrix[i + 1], matrix, first, times, i)
+        if last < count and (count - last) % 2:
+            _less_eight(matrix[count - 1], matrix, first, matrix[first:last, count - 1])
     return True
 
 
@@ -54,17 +77,17 @@ def factorise(matrix: Floats) -> bool:
 def forwards(factor: Floats, right: Floats) -> None:
     """Overwrite right sides (R, c) by U^-T times them."""
     count = len(factor)
-    for i in range(count):
-        row = right[i]
-        for k in range(0, i - 7, 8):
-            _less_eight(row, right, k, factor[k : k + 8, i], 0)
-        for k in range(i - i % 8, i):
-            other, times = right[k], factor[k, i]
-            for c in range(len(row)):
-                row[c] -= times * other[c]
-        scale = 1.0 / factor[i, i]
-        for c in range(len(row)):
-            row[c] *= scale
+    for first in range(0, count, 8):
+        last = min(first + 8, count)
+        for before in range(0, first, 8):
+            for i in range(first, last - 1, 2):
+                times = factor[before : before + 8, i : i + 2]
+                _two_less_eight(right[i], right[i + 1], right, before, times, 0)
+            if (last - first) % 2:
+                times_last = factor[before : before + 8, last - 1]
+                _less_eight(right[last - 1], right, before, times_last)
+        for i in range(first, last):
+            _finish(right, i, factor[first:i, i], first, factor[i, i])
 
 
 @compiled
@@ -72,18 +95,24 @@ def backwards(factor: Floats, right: Floats) -> None:
     """Overwrite right sides (R, c) by U^-1 times them."""
     count = len(factor)
     for i in range(count - 1, -1, -1):
-        row = right[i]
         after = i + 1
         while after + 8 <= count:
-            _less_eight(row, right, after, factor[i, after : after + 8], 0)
+            _less_eight(right[i], right, after, factor[i, after : after + 8])
             after += 8
-        for k in range(after, count):
-            other, times = right[k], factor[i, k]
-            for c in range(len(row)):
-                row[c] -= times * other[c]
-        scale = 1.0 / factor[i, i]
+        _finish(right, i, factor[i, after:], after, factor[i, i])
+
+
+@compiled
+def _finish(right: Floats, i: int, times: Floats, first: int, divisor: float) -> None:
+    """Subtract rows from `first` on from row i, each times a factor, and divide it."""
+    row = right[i]
+    for k in range(len(times)):
+        other = right[first + k]
         for c in range(len(row)):
-            row[c] *= scale
+            row[c] -= times[k] * other[c]
+    scale = 1.0 / divisor
+    for c in range(len(row)):
+        row[c] *= scale
 
 
 @compiled

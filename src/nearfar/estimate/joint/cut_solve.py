@@ -19,12 +19,9 @@ def _in_columns(responses: Floats, units: Floats) -> Floats:
     """
     pairs, number, count = units.shape
     found = np.empty((count, (1 + number) * pairs))
-    for m in range(pairs):
-        for r in range(count):
-            found[r, m] = responses[m, r]
-        for g in range(number):
-            for r in range(count):
-                found[r, (1 + g) * pairs + m] = units[m, g, r]
+    found[:, :pairs] = responses.T
+    for g in range(number):
+        found[:, (1 + g) * pairs : (2 + g) * pairs] = units[:, g].T
     return found
 
 
@@ -37,9 +34,9 @@ def _fit(columns: Floats, precision: Floats, amplitudes: Floats) -> None:
         for g in range(number):
             of_g = row[(1 + g) * pairs : (2 + g) * pairs]
             for h in range(g + 2):
-                of_h = row[h * pairs : (h + 1) * pairs]
-                for m in range(pairs):
-                    products[g, h, m] += of_g[m] * of_h[m]
+                of_h, found = row[h * pairs : (h + 1) * pairs], products[g, h]
+                for m in range(len(found)):
+                    found[m] += of_g[m] * of_h[m]
     normal = np.empty((number, number))
     for m in range(pairs):
         amplitudes[m] = products[:, 0, m]
@@ -54,10 +51,13 @@ def _left(columns: Floats, amplitudes: Floats) -> Floats:
     """Return responses, of columns, less those to amplitudes (m, G): (R, m)."""
     pairs, number = amplitudes.shape
     found = columns[:, :pairs].copy()
+    of_amplitude = amplitudes.T.copy()
     for r in range(len(columns)):
+        row = found[r]
         for g in range(number):
-            for m in range(pairs):
-                found[r, m] -= amplitudes[m, g] * columns[r, (1 + g) * pairs + m]
+            unit, amplitude = columns[r, (1 + g) * pairs : (2 + g) * pairs], of_amplitude[g]
+            for m in range(len(row)):
+                row[m] -= amplitude[m] * unit[m]
     return found
 
 

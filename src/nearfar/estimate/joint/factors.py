@@ -30,19 +30,33 @@ def _two_less_eight(
     row: Floats, other: Floats, rows: Floats, first: int, times: Floats, start: int
 ) -> None:
     """Subtract eight rows from two others, each times factors of (8, 2), from an entry on."""
-    a, b, c, d = rows[first], rows[first + 1], rows[first + 2], rows[first + 3]
-    e, f, g, h = rows[first + 4], rows[first + 5], rows[first + 6], rows[first + 7]
+    # Indices that start at 0 are known not to be negative, which vector instructions need.
+    row, other = row[start:], other[start:]
+    a, b = rows[first, start:], rows[first + 1, start:]
+    c, d = rows[first + 2, start:], rows[first + 3, start:]
+    e, f = rows[first + 4, start:], rows[first + 5, start:]
+    g, h = rows[first + 6, start:], rows[first + 7, start:]
     ta, tb, tc, td = times[0, 0], times[1, 0], times[2, 0], times[3, 0]
     te, tf, tg, th = times[4, 0], times[5, 0], times[6, 0], times[7, 0]
     ua, ub, uc, ud = times[0, 1], times[1, 1], times[2, 1], times[3, 1]
     ue, uf, ug, uh = times[4, 1], times[5, 1], times[6, 1], times[7, 1]
-    for j in range(start, len(row)):
+    for j in range(len(row)):
         less = (ta * a[j] + tb * b[j]) + (tc * c[j] + td * d[j])
         more = (te * e[j] + tf * f[j]) + (tg * g[j] + th * h[j])
         less_too = (ua * a[j] + ub * b[j]) + (uc * c[j] + ud * d[j])
         more_too = (ue * e[j] + uf * f[j]) + (ug * g[j] + uh * h[j])
         row[j] -= less + more
         other[j] -= less_too + more_too
+
+
+@compiled
+def _less_each(right: Floats, i: int, times: Floats, first: int) -> None:
+    """Subtract rows from `first` on from row i, each times a factor."""
+    row = right[i]
+    for k in range(len(times)):
+        other = right[first + k]
+        for c in range(len(row)):
+            row[c] -= times[k] * other[c]
 
 
 @compiled
@@ -55,15 +69,15 @@ def factorise(matrix: Floats) -> bool:
     for first in range(0, count, 8):
         last = min(first + 8, count)
         for k in range(first, last):
-            own = matrix[k]
+            own = matrix[k, k:]
             for h in range(first, k):
-                other, factor = matrix[h], matrix[h, k]
-                for j in range(k, count):
-                    own[j] -= factor * other[j]
-            if not own[k] > 0.0:
+                other, times_other = matrix[h, k:], matrix[h, k]
+                for j in range(len(own)):
+                    own[j] -= times_other * other[j]
+            if not own[0] > 0.0:
                 return False
-            scale = 1.0 / np.sqrt(own[k])
-            for j in range(k, count):
+            scale = 1.0 / np.sqrt(own[0])
+            for j in range(len(own)):
                 own[j] *= scale
         for i in range(last, count - 1, 2):
             times = matrix[first:last, i : i + 2]
@@ -87,32 +101,26 @@ def forwards(factor: Floats, right: Floats) -> None:
                 times_last = factor[before : before + 8, last - 1]
                 _less_eight(right[last - 1], right, before, times_last)
         for i in range(first, last):
-            _finish(right, i, factor[first:i, i], first, factor[i, i])
+            _less_each(right, i, factor[first:i, i], first)
+            right[i] *= 1.0 / factor[i, i]
 
 
 @compiled
 def backwards(factor: Floats, right: Floats) -> None:
     """Overwrite right sides (R, c) by U^-1 times them."""
     count = len(factor)
-    for i in range(count - 1, -1, -1):
-        after = i + 1
-        while after + 8 <= count:
-            _less_eight(right[i], right, after, factor[i, after : after + 8])
-            after += 8
-        _finish(right, i, factor[i, after:], after, factor[i, i])
-
-
-@compiled
-def _finish(right: Floats, i: int, times: Floats, first: int, divisor: float) -> None:
-    """Subtract rows from `first` on from row i, each times a factor, and divide it."""
-    row = right[i]
-    for k in range(len(times)):
-        other = right[first + k]
-        for c in range(len(row)):
-            row[c] -= times[k] * other[c]
-    scale = 1.0 / divisor
-    for c in range(len(row)):
-        row[c] *= scale
+    for first in range((count - 1) // 8 * 8, -1, -8):
+        last = min(first + 8, count)
+        for after in range(last, count - 7, 8):
+            for i in range(first, last, 2):
+                times = factor[i : i + 2, after : after + 8].T
+                _two_less_eight(right[i], right[i + 1], right, after, times, 0)
+        # Rows after the last whole eight.
+        beyond = last + (count - last) // 8 * 8
+        for i in range(last - 1, first - 1, -1):
+            _less_each(right, i, factor[i, beyond:], beyond)
+            _less_each(right, i, factor[i, i + 1 : last], i + 1)
+            right[i] *= 1.0 / factor[i, i]
 
 
 @compiled

@@ -15,6 +15,7 @@ over y and the amplitudes of `nuisance`.
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -74,9 +75,16 @@ def cut_alike(
     # Each four distances as one number.
     code = distances @ (centred.near_basis.reach + 1) ** np.arange(4)
     order = np.argsort(code, kind="stable")
-    for part in np.split(order, np.flatnonzero(np.diff(code[order])) + 1):
-        above, below, left, right = distances[part[0]].tolist()
-        yield part, (above, below, left, right)
+    starts = _starts(code[order]).tolist()
+    for start, stop in pairwise(starts):
+        above, below, left, right = distances[order[start]].tolist()
+        yield order[start:stop], (above, below, left, right)
+
+
+def _starts(ordered: Integers | Floats) -> Integers:
+    """Return where each value of an ordered array begins, and the array's length."""
+    changes = np.flatnonzero(ordered[1:] != ordered[:-1]) + 1
+    return np.concatenate([[0], changes, [len(ordered)]])
 
 
 # Those of the same batch, whose camera pixels' components follow each other.
@@ -146,15 +154,16 @@ def _multiply_by_shares(
         places, hat = np.unique(
             np.stack([offsets[:, axis], pitches], axis=1), axis=0, return_inverse=True
         )
+        along = np.empty((len(centres), len(places)), dtype=np.float32)
         for number, (offset, pitch) in enumerate(places.tolist()):
-            mine = hat.ravel() == number
             side = np.arange(-pitch, pitch + 1)
             summed = np.cumsum(np.maximum(0.0, 1.0 - np.abs(side) / pitch) / pitch)
             table = np.concatenate([[0.0], summed])
             # Light at offsets from -above to below.
             upper = table[np.clip(below - offset + pitch + 1, 0, len(table) - 1)]
             lower = table[np.clip(-above - offset + pitch, 0, len(table) - 1)]
-            found[:, mine] *= np.maximum(upper - lower, 0.0).astype(np.float32)[:, None]
+            along[:, number] = np.maximum(upper - lower, 0.0)
+        found *= np.take(along, hat.ravel(), axis=1)
 
 
 class _AxisPlaces(NamedTuple):
@@ -225,7 +234,7 @@ def solve_cut(
         pixel, channel = np.divmod(np.argsort(ratio[part], axis=None, kind="stable"), channels)
         of = part[pixel], channel
         ratios = ratio[of]
-        starts = np.flatnonzero(np.diff(ratios, prepend=-1.0, append=-1.0))
+        starts = _starts(ratios)
         found, rest, is_definite = solve_alike(
             covariance,
             noise_variance,

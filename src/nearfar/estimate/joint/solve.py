@@ -10,6 +10,7 @@ over window entries, g over the amplitudes of `nuisance`.
 from typing import NamedTuple
 
 import numpy as np
+from array_api_compat import is_numpy_array
 
 from nearfar.arrays import Floats, beside, namespace, product
 from nearfar.estimate.joint import nuisance
@@ -52,6 +53,9 @@ def variance_ratio(batch: PixelBatch, scale: Floats) -> Floats:
 
 def near_noise(batch: PixelBatch, prior: ResponsePrior, ratio: Floats) -> Floats:
     """Return the mean variance of a window entry that noise causes, shape (n, channels)."""
+    if is_numpy_array(ratio):
+        known = np.interp(ratio, prior.variance_ratios, prior.noise_gain)
+        return np.asarray(batch.noise**2 * known, dtype=np.float32)
     xp = namespace(ratio)
     lowest, highest = float(prior.variance_ratios[0]), float(prior.variance_ratios[-1])
     table, ratios = beside(prior.noise_gain, ratio), beside(prior.variance_ratios, ratio)

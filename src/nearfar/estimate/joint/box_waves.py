@@ -32,7 +32,7 @@ class WaveTable(NamedTuple):
     waves : ndarray, shape (2, 2, 2 reach + 1, R), float32
         Axis, part, pixel, response.
     sums : ndarray, shape (2, 2, 2 reach + 2, R), float32
-        Of the waves before each pixel.
+        Of the waves from the rounded q's pixel on to before each pixel, whatever the reach.
     """
 
     waves: Floats
@@ -62,6 +62,7 @@ def _wave_table(centred: CentredBasis, reach: int) -> WaveTable:
     )
     waves = np.array(parts)
     sums = np.pad(np.cumsum(waves, axis=2), ((0, 0), (0, 0), (1, 0), (0, 0)))
+    sums -= sums[:, :, reach, None]
     return WaveTable(waves.astype(np.float32), sums.astype(np.float32))
 
 

@@ -58,7 +58,7 @@ class ComponentChoice(NamedTuple):
     prior_component: Integers
     prior_scale: Floats
 
-    def of(self, selected: Integers) -> "ComponentChoice":
+    def of(self, selected: slice | Integers) -> "ComponentChoice":
         """Return those of some camera pixels, as a copy."""
         xp = namespace(self.prior_scale)
         return ComponentChoice(*(xp.asarray(values[selected], copy=True) for values in self))

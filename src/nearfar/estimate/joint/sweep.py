@@ -71,19 +71,19 @@ def sweep_once(
     pixels, model = problem.pixels, problem.model
     centred, projector = model.centred, problem.measurements.projector
     xp, count = namespace(pixels.responses), len(pixels.responses)
-    rows = _empty_rows(problem, before)
-    choice = rows.choices[-1]
+    rows = _empty_rows(problem)
     start = None
     if before is not None:
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
+        # What is found is added to what was expected: no camera pixel reads another's expectation.
+        rows = rows._replace(near=start.expected.near, far=start.expected.far)
+        rows = rows._replace(choices=(*before.choices, *rows.choices))
+    choice = rows.choices[-1]
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
-        near, far = found.near, centred.uncentre(found.far, batch.centres)
-        if start is not None:
-            near += start.expected.near[selected]
-            far += start.expected.far[selected]
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
-        rows.near[selected], rows.far[selected] = near, far
+        rows.near[selected] += found.near
+        rows.far[selected] += centred.uncentre(found.far, batch.centres)
         rows.near_noise[selected] = found.near_noise
 
     done = [0]
@@ -136,8 +136,8 @@ def _explained(
     return responses
 
 
-def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows:
-    """Return rows of zeros for a sweep to fill, with the choices of the sweeps before it."""
+def _empty_rows(problem: Problem) -> EstimatedRows:
+    """Return rows of zeros for a sweep to fill."""
     responses = problem.pixels.responses
     xp, (number, channels, count) = namespace(responses), responses.shape
 
@@ -149,10 +149,7 @@ def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows
         zeros(number, channels, problem.near_basis.count),
         zeros(number, channels, count),
         zeros(number, channels),
-        (
-            *(before.choices if before is not None else ()),
-            ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),
-        ),
+        (ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),),
     )
 
 
@@ -279,27 +276,27 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     xp, shape = namespace(rows.near), (*camera, channels)
-    white = pixels.white.reshape((*shape, 1))
+    white = pixels.white.reshape(shape)
     tiny = float(np.finfo(np.float32).tiny) ** 0.5
     noise = beside(measurements.noise.reshape(shape), rows.near)
-    variance = xp.clip((noise / white[..., 0]) ** 2, min=tiny)
+    variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
     far = expect_each(
-        rows.far.reshape((*shape, -1)) / white,
+        rows.far.reshape((*shape, -1)),
+        white,
         variance,
         problem.model.multiplicity,
         beside(np.flatnonzero(cycles >= np.median(cycles)), white),
     )
     windows = expect_together(
-        rows.near.reshape((*shape, -1)) / white,
-        rows.near_noise.reshape(shape) / white[..., 0] ** 2,
+        rows.near.reshape((*shape, -1)),
+        white,
+        rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(camera),
     )
-    inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
-    windows *= white
-    far *= white
-    return rows._replace(
-        near=windows.reshape(rows.near.shape) * inside[:, None],
-        far=far.reshape(rows.far.shape),
-    )
+    windows = windows.reshape(rows.near.shape)
+    if problem.near_basis.pitch == 1:
+        inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
+        windows *= inside[:, None]
+    return rows._replace(near=windows, far=far.reshape(rows.far.shape))

@@ -30,11 +30,11 @@ def _fit(columns: Floats, precision: Floats, amplitudes: Floats) -> None:
     """Write the amplitudes (m, G) that fit whitened responses, in columns, best."""
     pairs, number = amplitudes.shape
     products = np.zeros((number, 1 + number, pairs))
-    for row in columns:
+    for row in columns.reshape(len(columns), 1 + number, pairs):
         for g in range(number):
-            of_g = row[(1 + g) * pairs : (2 + g) * pairs]
+            of_g = row[1 + g]
             for h in range(g + 2):
-                of_h, found = row[h * pairs : (h + 1) * pairs], products[g, h]
+                of_h, found = row[h], products[g, h]
                 for m in range(len(found)):
                     found[m] += of_g[m] * of_h[m]
     normal = np.empty((number, number))

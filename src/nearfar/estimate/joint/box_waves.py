@@ -74,7 +74,9 @@ def _mean_wave(middle: float, width: float, waves: Floats, sums: Floats, found: 
     first = int(np.floor(low + 0.5)) + reach
     last = int(np.floor(high + 0.5)) + reach
     if first == last:
-        found[:] = waves[:, first]
+        for part in range(2):
+            for r in range(found.shape[1]):
+                found[part, r] = waves[part, first, r]
         return
     scale = 1.0 / width
     of_first = np.float32((first - reach + 0.5 - low) * scale)

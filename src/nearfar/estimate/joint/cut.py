@@ -205,8 +205,11 @@ def near_responses(
     coefficients: Floats, centres: NDArray[np.int64], centred: CentredBasis
 ) -> Floats:
     """Return re-centred responses of near-range light, as the border cuts it, (n, channels, R)."""
-    found = product(coefficients, centred.on_window.T)
-    (cut,) = np.nonzero(is_cut(centres, centred.near_basis, centred.basis.projector))
+    at_border = is_cut(centres, centred.near_basis, centred.basis.projector)
+    (cut,), (whole,) = np.nonzero(at_border), np.nonzero(~at_border)
+    shape = (*coefficients.shape[:2], centred.basis.count)
+    found = np.empty(shape, dtype=np.result_type(coefficients, centred.on_window))
+    found[whole] = product(coefficients[whole], centred.on_window.T)
     for part, distances in cut_alike(centres[cut], centred):
         responses = cut_responses(centred, distances).T.astype(np.float32)
         found[cut[part]] = coefficients[cut[part]] @ responses

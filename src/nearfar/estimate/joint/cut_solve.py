@@ -19,9 +19,12 @@ def _in_columns(responses: Floats, units: Floats) -> Floats:
     """
     pairs, number, count = units.shape
     found = np.empty((count, (1 + number) * pairs))
-    found[:, :pairs] = responses.T
-    for g in range(number):
-        found[:, (1 + g) * pairs : (2 + g) * pairs] = units[:, g].T
+    for r in range(count):
+        row = found[r]
+        for m in range(pairs):
+            row[m] = responses[m, r]
+            for g in range(number):
+                row[(1 + g) * pairs + m] = units[m, g, r]
     return found
 
 
@@ -39,9 +42,10 @@ def _fit(columns: Floats, precision: Floats, amplitudes: Floats) -> None:
                     found[m] += of_g[m] * of_h[m]
     normal = np.empty((number, number))
     for m in range(pairs):
-        amplitudes[m] = products[:, 0, m]
-        normal[:] = products[:, 1:, m]
         for g in range(number):
+            amplitudes[m, g] = products[g, 0, m]
+            for h in range(g + 1):
+                normal[g, h] = products[g, 1 + h, m]
             normal[g, g] += precision[m, g]
         solve_small(normal, amplitudes[m])
 
@@ -50,10 +54,15 @@ def _fit(columns: Floats, precision: Floats, amplitudes: Floats) -> None:
 def _left(columns: Floats, amplitudes: Floats) -> Floats:
     """Return responses, of columns, less those to amplitudes (m, G): (R, m)."""
     pairs, number = amplitudes.shape
-    found = columns[:, :pairs].copy()
-    of_amplitude = amplitudes.T.copy()
+    found = np.empty((len(columns), pairs))
+    of_amplitude = np.empty((number, pairs))
+    for m in range(pairs):
+        for g in range(number):
+            of_amplitude[g, m] = amplitudes[m, g]
     for r in range(len(columns)):
-        row = found[r]
+        row, before = found[r], columns[r, :pairs]
+        for m in range(len(row)):
+            row[m] = before[m]
         for g in range(number):
             unit, amplitude = columns[r, (1 + g) * pairs : (2 + g) * pairs], of_amplitude[g]
             for m in range(len(row)):
@@ -113,6 +122,7 @@ def solve_alike(
         _fit(right, precision[some], amplitudes[some])
         left = _left(right, amplitudes[some])
         backwards(factor, left)
-        left *= ratios[place]
-        rest[some] = left.T
+        for r in range(count):
+            for m in range(left.shape[1]):
+                rest[starts[place] + m, r] = ratios[place] * left[r, m]
     return amplitudes, rest, True

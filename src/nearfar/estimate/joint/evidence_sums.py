@@ -36,7 +36,8 @@ def sums_of_products(
         Of one squared, of the product, of the other squared.
     """
     found = np.empty((3, *steps.shape), dtype=np.float32)
-    squares, products, others = np.empty((3, one.shape[1]), dtype=np.float32)
+    buffers = np.empty((3, one.shape[1]), dtype=np.float32)
+    squares, products, others = buffers[0], buffers[1], buffers[2]
     for m in range(len(steps)):
         a, b = one[of_one[m]], other[of_other[m]]
         for i in range(len(a)):
@@ -45,10 +46,12 @@ def sums_of_products(
             others[i] = b[i] * b[i]
         for s in range(steps.shape[1]):
             weight = weights[steps[m, s]]
-            first = second = third = np.float32(0.0)
+            first, second, third = np.float32(0.0), np.float32(0.0), np.float32(0.0)
             for i in range(len(weight)):
                 first += weight[i] * squares[i]
                 second += weight[i] * products[i]
                 third += weight[i] * others[i]
-            found[0, m, s], found[1, m, s], found[2, m, s] = first, second, third
+            found[0, m, s] = first
+            found[1, m, s] = second
+            found[2, m, s] = third
     return found

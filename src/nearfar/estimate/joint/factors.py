@@ -3,6 +3,8 @@
 LAPACK through SciPy keeps the interpreter lock, so that threads would wait for each other. Rows are
 worked on eight at a time, two of them against eight others, so that most numbers stay in registers.
 
+Loops stand where array expressions could, which take several times as long to compile.
+
 Index convention: arrays are float64; i, j and k run over responses, c over right sides.
 """
 
@@ -60,6 +62,13 @@ def _less_each(right: Floats, i: int, times: Floats, first: int) -> None:
 
 
 @compiled
+def _divide(row: Floats, divisor: float) -> None:
+    scale = 1.0 / divisor
+    for j in range(len(row)):
+        row[j] *= scale
+
+
+@compiled
 def factorise(matrix: Floats) -> bool:
     """Overwrite the upper triangle of a symmetric matrix (R, R) by U, where it is U^T U.
 
@@ -76,9 +85,7 @@ def factorise(matrix: Floats) -> bool:
                     own[j] -= times_other * other[j]
             if not own[0] > 0.0:
                 return False
-            scale = 1.0 / np.sqrt(own[0])
-            for j in range(len(own)):
-                own[j] *= scale
+            _divide(own, np.sqrt(own[0]))
         for i in range(last, count - 1, 2):
             times = matrix[first:last, i : i + 2]
             _two_less_eight(matrix[i], matrix[i + 1], matrix, first, times, i)
@@ -102,7 +109,7 @@ def forwards(factor: Floats, right: Floats) -> None:
                 _less_eight(right[last - 1], right, before, times_last)
         for i in range(first, last):
             _less_each(right, i, factor[first:i, i], first)
-            right[i] *= 1.0 / factor[i, i]
+            _divide(right[i], factor[i, i])
 
 
 @compiled
@@ -120,7 +127,7 @@ def backwards(factor: Floats, right: Floats) -> None:
         for i in range(last - 1, first - 1, -1):
             _less_each(right, i, factor[i, beyond:], beyond)
             _less_each(right, i, factor[i, i + 1 : last], i + 1)
-            right[i] *= 1.0 / factor[i, i]
+            _divide(right[i], factor[i, i])
 
 
 @compiled

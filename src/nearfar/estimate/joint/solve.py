@@ -137,7 +137,7 @@ def _of_several_pixels(
         prior.eigenvalues,
         noise_variance,
         ratio.ravel().astype(np.float32) * noise_variance,
-        precision.reshape(number * channels, -1),
+        np.ascontiguousarray(precision.reshape(number * channels, -1)),
     )
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes.reshape(precision.shape), batch),

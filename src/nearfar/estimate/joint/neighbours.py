@@ -92,7 +92,7 @@ def expect_together(values: Floats, white: Floats, variance: Floats, lit: Boolea
     ndarray, shape (Cy, Cx, channels, J)
     """
     xp = namespace(values)
-    found: Floats = xp.zeros_like(values)
+    found: Floats = xp.empty_like(values)
     weights = lit[..., None] / xp.clip(variance, min=DEVIATION_FLOOR**2)
     precision = xp.astype(weights[..., None], values.dtype)
 

@@ -39,8 +39,8 @@ from nearfar.transport import near
 # footprint with 10 % of its weight on the wrong pixel costs 1.5 dB under a random light. Prior
 # components with spread represent direct light that really lies beside q.
 WHOLE_PIXEL_DISTANCE = 0.1
-# Projector pixels whose quantisation errors are transposed at once.
-TRANSPOSED_PIXELS = 512
+# Projector pixels whose quantisation errors are transposed at once, and by one thread.
+TRANSPOSED_PIXELS, PARTS_PIXELS = 512, 2**14
 EVERY_COMPONENT = (*LIT_COMPONENTS, *UNLIT_COMPONENTS)
 
 
@@ -225,10 +225,12 @@ def _a_row_each(errors: Floats, indices: Integers) -> Floats:
     """Return chosen responses' quantisation errors (R, P) as rows for projector pixels."""
     found = np.empty((errors.shape[1], len(indices)), dtype=errors.dtype)
 
-    def work(batch: slice) -> None:
-        found[batch] = errors[indices, batch].T
+    def work(part: slice) -> None:
+        for within in blocks(part.stop - part.start, TRANSPOSED_PIXELS):
+            batch = slice(part.start + within.start, part.start + within.stop)
+            found[batch] = errors[indices, batch].T
 
-    side_by_side(work, blocks(len(found), TRANSPOSED_PIXELS))
+    side_by_side(work, blocks(len(found), PARTS_PIXELS))
     return found
 
 

@@ -17,7 +17,8 @@ import sys, time
 started = time.perf_counter()
 import nearfar
 seconds = time.perf_counter() - started
-heavy = {"scipy", "zarr", "trimesh", "embreex", "imagecodecs", "OpenEXR"} & set(sys.modules)
+heavy = {"scipy", "numba", "zarr", "trimesh", "embreex", "imagecodecs", "OpenEXR"}
+heavy &= set(sys.modules)
 sys.exit(f"slow: {seconds} s, {heavy}" if heavy or seconds > 0.5 else 0)
 """
 

@@ -111,6 +111,21 @@ def test_a_tile_with_the_rows_beside_it_is_that_of_the_whole(job):
     np.testing.assert_allclose((part @ light)[same], (whole @ light)[same], rtol=1e-3, atol=1e-5)
 
 
+def test_rows_that_are_not_wanted_are_left_out_without_changing_those_that_are(job):
+    capture = nearfar.open_capture(job / "capture.zarr")
+    plan, measurements = capture.plan, measure(capture)
+    q = correspond_by_phase(measurements).q
+    sizes = (plan.window, plan.far)
+    whole = estimate_jointly(measurements, q, *sizes, pitch=plan.pitch)
+    light = natural_picture(PROJECTOR, 5)
+    for rows in (slice(20, 23), slice(0, 7), slice(41, 48)):
+        part = estimate_jointly(measurements, q, *sizes, pitch=plan.pitch, rows=rows)
+        # Products of fewer camera pixels round otherwise.
+        np.testing.assert_allclose(part.footprint, whole.footprint[rows], rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(part @ light, (whole @ light)[rows], rtol=1e-3, atol=1e-5)
+        np.testing.assert_allclose(part.direct, whole.direct[rows], rtol=1e-3, atol=1e-4)
+
+
 def test_an_accelerator_is_refused_with_a_sentence(job):
     pytest.importorskip("torch", reason="no PyTorch")
     capture = nearfar.open_capture(job / "capture.zarr")

@@ -65,6 +65,7 @@ def test_a_fault_reaches_the_shell_as_one_sentence(tmp_path: Path):
 HEAVY = (
     "zarr",
     "scipy",
+    "numba",
     "trimesh",
     "embreex",
     "imagecodecs",

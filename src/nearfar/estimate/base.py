@@ -14,6 +14,7 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
 from nearfar.registry import Registry
 from nearfar.transport.model import Transport
+from nearfar.transport.rows import of_rows
 
 
 class Model(NamedTuple):
@@ -115,6 +116,27 @@ class Estimator(ABC):
         InputError, MissingPackageError
             If the measurements do not suffice, or the device is not there.
         """
+
+    def estimate_rows(
+        self,
+        measurements: Measurements,
+        q: Floats,
+        model: Model,
+        rows: slice,
+        *,
+        device: Device = "cpu",
+        progress: Callable[[float], None] | None = None,
+    ) -> Transport:
+        """Estimate the transport of some rows of the camera; other parameters as in `estimate`.
+
+        Parameters
+        ----------
+        rows : slice
+            Of those that were measured. The others lie beside them, and need no estimate but where
+            one of these rows depends on it.
+        """
+        whole = self.estimate(measurements, q, model, device=device, progress=progress)
+        return of_rows(whole, rows)
 
 
 ESTIMATORS = Registry(

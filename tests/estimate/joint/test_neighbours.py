@@ -13,11 +13,11 @@ def test_neighbours_that_agree_take_noise_away_and_edges_stay():
     noisy = truth + 0.05 * generator.normal(size=truth.shape)
     every = np.ones((40, 40), dtype=bool)
     variance = np.full((40, 40, 1), 0.05**2)
-    found = expect_each(noisy, variance, np.ones(12), np.arange(6, 12))
+    found = expect_each(noisy, np.ones((40, 40, 1)), variance, np.ones(12), np.arange(6, 12))
     flat = np.abs(np.arange(40) - 19.5) > 2
     assert np.std((found - truth)[:, flat]) < 0.6 * 0.05
     assert np.abs((found - truth)[:, 19:21]).max() < 4 * 0.05
-    together = expect_together(noisy, variance, every)
+    together = expect_together(noisy, np.ones((40, 40, 1)), variance, every)
     assert np.std((together - truth)[:, flat]) < 0.6 * 0.05
     assert np.abs((together - truth)[:, 19:21]).max() < 4 * 0.05
 
@@ -26,11 +26,11 @@ def test_rows_without_anything_in_common_are_left_as_they_are():
     generator = np.random.default_rng(0)
     values = generator.normal(size=(20, 20, 1, 40))
     variance = np.full((20, 20, 1), 0.3**2)
-    found = expect_each(values, variance, np.ones(40), np.arange(20, 40))
+    found = expect_each(values, np.ones((20, 20, 1)), variance, np.ones(40), np.arange(20, 40))
     assert np.std(found - values) < 0.05
     # Alike in the highest frequencies, they take noise from one another in the others.
     values[..., 20:] *= 0.3
-    found = expect_each(values, variance, np.ones(40), np.arange(20, 40))
+    found = expect_each(values, np.ones((20, 20, 1)), variance, np.ones(40), np.arange(20, 40))
     assert np.std((found - values)[..., 20:]) > 0.4 * 0.3
 
 
@@ -39,15 +39,17 @@ def test_neighbours_without_a_say_are_not_heard():
     values[4, 4] = 100.0
     known = np.ones((9, 9), dtype=bool)
     known[4, 4] = False
-    found = expect_together(values, np.full((9, 9, 1), 1.0), known)
+    found = expect_together(values, np.ones((9, 9, 1)), np.full((9, 9, 1), 1.0), known)
     assert not found.any()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 1), (5, 6)])
 def test_what_is_alike_everywhere_stays_so_to_the_cameras_border(shape):
-    values, variance = np.full((*shape, 2, 3), 0.7), np.full((*shape, 2), 0.01)
-    found = expect_each(values, variance, np.ones(3), np.array([1, 2]))
+    # Shares of white are; white itself is not.
+    white = 1.0 + np.random.default_rng(1).random((*shape, 2))
+    values, variance = 0.7 * white[..., None] * np.ones(3), np.full((*shape, 2), 0.01)
+    found = expect_each(values, white, variance, np.ones(3), np.array([1, 2]))
     np.testing.assert_allclose(found, values, rtol=1e-12)
     np.testing.assert_allclose(
-        expect_together(values, variance, np.ones(shape, dtype=bool)), values, rtol=1e-12
+        expect_together(values, white, variance, np.ones(shape, dtype=bool)), values, rtol=1e-12
     )

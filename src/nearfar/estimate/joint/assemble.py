@@ -4,8 +4,9 @@ Index convention: arrays are (C, channels, ...); w runs over window entries.
 """
 
 import numpy as np
+from array_api_compat import device
 
-from nearfar.arrays import Floats, Size, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import dc_index
 from nearfar.estimate.joint.cut import share_on_projector
 from nearfar.estimate.joint.positive import raise_to
@@ -46,7 +47,6 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     basis = real_basis([DC, *low], measurements.projector)
     kept = np.flatnonzero(np.isin(measured.index, [measured.frequencies.index(k) for k in low]))
     share_of_white = _share_of_white(measurements).astype(np.float32)
-    xp = namespace(rows.near)
     white, share, far_indices = (
         beside(values, rows.near)
         for values in (measurements.responses[..., dc_index(measurements)], share_of_white, kept)
@@ -54,7 +54,7 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     rows = _without_negative_direct(problem, rows)
     direct = rows.amplitudes[..., 1] * pixels.lit[:, None]
     rest = white - share * rows.amplitudes[..., 0] - _under_white(problem, direct, rows.near)
-    far_range = xp.concat([rest[..., None], rows.far[..., far_indices]], axis=-1)
+    far_range = _far_range(rest, rows.far, far_indices)
     of_far = centred_basis(basis, problem.near_basis)
     of_far = of_far.put(lambda one: beside(one, rows.near))
     windows = rows.near
@@ -94,6 +94,19 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
             share_of_white=share_of_white.reshape(shape),
         ),
     )
+
+
+def _far_range(rest: Floats, far: Floats, kept: Integers) -> Floats:
+    """Return white's far-range light, (C, channels), and kept responses of f, in one array."""
+    xp = namespace(far)
+    found: Floats = xp.empty((*rest.shape, 1 + len(kept)), dtype=far.dtype, device=device(far))
+
+    def work(batch: slice) -> None:
+        found[batch, :, 0] = rest[batch]
+        found[batch, :, 1:] = far[batch][..., kept]
+
+    side_by_side(work, blocks(len(far), BATCH_PIXELS))
+    return found
 
 
 def _under_white(problem: Problem, direct: Floats, coefficients: Floats) -> Floats:

@@ -1,12 +1,12 @@
 """The posterior mean where the projector's border cuts hats of several projector pixels.
 
 What is cut off a hat sends no light, so its responses depend on how far q is from the border. With
-C = L L^T the hats' covariance at unit prior scale, B their responses as the border cuts them, S the
+C the hats' covariance at unit prior scale, B their responses as the border cuts them, S the
 variance of f and m how often each response was measured, responses have the covariance
 
-    sigma^2 K,  K = ratio (B L L^T B^T + S) + 1 / m,  ratio = (s / sigma)^2
+    sigma^2 K,  K = ratio (B C B^T + S) + 1 / m,  ratio = (s / sigma)^2
 
-Camera pixels share B L L^T B^T + S where their distances from the border are nearly the same and so
+Camera pixels share B C B^T + S where their distances from the border are nearly the same and so
 is the prior component, and a factor of K where the ratio is the same as well.
 
 Index convention: arrays are (n, channels, ...); r runs over real responses, w over functions, g
@@ -15,22 +15,24 @@ over y and the amplitudes of `nuisance`.
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, product
+from nearfar.arrays import Booleans, Floats, Integers, Size, blocks, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
+from nearfar.estimate.joint.cut_solve import solve_alike
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis
+from nearfar.parallel import side_by_side
 from nearfar.priors.responses import ResponsePrior
 
-# Directions of the covariance with less than this share of the largest variance are left out.
-LEAST_VARIANCE = 1e-9
+# Camera pixels of a batch.
+BATCH_PIXELS = 2048
 
 
 def is_cut(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
@@ -71,13 +73,23 @@ def cut_alike(
     if not len(centres):
         return
     distances = border_distances(centres, centred.near_basis, centred.basis.projector)
-    found, group = np.unique(distances, axis=0, return_inverse=True)
-    order = np.argsort(group.ravel(), kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(group.ravel()[order])) + 1)
-    for part, at in zip(parts, found.tolist(), strict=True):
-        yield part, (at[0], at[1], at[2], at[3])
+    # Each four distances as one number.
+    code = distances @ (centred.near_basis.reach + 1) ** np.arange(4)
+    order = np.argsort(code, kind="stable")
+    starts = _starts(code[order]).tolist()
+    for start, stop in pairwise(starts):
+        above, below, left, right = distances[order[start]].tolist()
+        yield order[start:stop], (above, below, left, right)
 
 
+def _starts(ordered: Integers | Floats) -> Integers:
+    """Return where each value of an ordered array begins, and the array's length."""
+    changes = np.flatnonzero(ordered[1:] != ordered[:-1]) + 1
+    return np.concatenate([[0], changes, [len(ordered)]])
+
+
+# Those of the same batch, whose camera pixels' components follow each other.
+@lru_cache(maxsize=64)
 def cut_responses(centred: CentredBasis, distances: tuple[int, int, int, int]) -> Floats:
     """Return the responses of functions to the patterns, re-centred, as the border cuts them.
 
@@ -123,21 +135,36 @@ def share_on_projector(
     ndarray, shape (C, J), float32
     """
     found = np.ones((len(centres), len(offsets)), dtype=np.float32)
+
+    def work(batch: slice) -> None:
+        _multiply_by_shares(found[batch], centres[batch], offsets, pitches, projector)
+
+    side_by_side(work, blocks(len(centres), BATCH_PIXELS))
+    return found
+
+
+def _multiply_by_shares(
+    found: Floats,
+    centres: NDArray[np.int64],
+    offsets: Integers,
+    pitches: Integers,
+    projector: Size,
+) -> None:
     for axis in (0, 1):
         above, below = centres[:, axis], projector[axis] - 1 - centres[:, axis]
         places, hat = np.unique(
             np.stack([offsets[:, axis], pitches], axis=1), axis=0, return_inverse=True
         )
+        along = np.empty((len(centres), len(places)), dtype=np.float32)
         for number, (offset, pitch) in enumerate(places.tolist()):
-            mine = hat.ravel() == number
             side = np.arange(-pitch, pitch + 1)
             summed = np.cumsum(np.maximum(0.0, 1.0 - np.abs(side) / pitch) / pitch)
             table = np.concatenate([[0.0], summed])
             # Light at offsets from -above to below.
             upper = table[np.clip(below - offset + pitch + 1, 0, len(table) - 1)]
             lower = table[np.clip(-above - offset + pitch, 0, len(table) - 1)]
-            found[:, mine] *= np.maximum(upper - lower, 0.0).astype(np.float32)[:, None]
-    return found
+            along[:, number] = np.maximum(upper - lower, 0.0)
+        found *= np.take(along, hat.ravel(), axis=1)
 
 
 class _AxisPlaces(NamedTuple):
@@ -179,20 +206,15 @@ def near_responses(
     coefficients: Floats, centres: NDArray[np.int64], centred: CentredBasis
 ) -> Floats:
     """Return re-centred responses of near-range light, as the border cuts it, (n, channels, R)."""
-    found = product(coefficients, centred.on_window.T)
-    (cut,) = np.nonzero(is_cut(centres, centred.near_basis, centred.basis.projector))
+    at_border = is_cut(centres, centred.near_basis, centred.basis.projector)
+    (cut,), (whole,) = np.nonzero(at_border), np.nonzero(~at_border)
+    shape = (*coefficients.shape[:2], centred.basis.count)
+    found = np.empty(shape, dtype=np.result_type(coefficients, centred.on_window))
+    found[whole] = product(coefficients[whole], centred.on_window.T)
     for part, distances in cut_alike(centres[cut], centred):
         responses = cut_responses(centred, distances).T.astype(np.float32)
         found[cut[part]] = coefficients[cut[part]] @ responses
     return found
-
-
-@lru_cache(maxsize=64)
-def _root(prior: ResponsePrior) -> Floats:
-    """Return L with C = L L^T, (J, J')."""
-    variances, vectors = np.linalg.eigh(prior.covariance)
-    kept = variances >= LEAST_VARIANCE * variances[-1]
-    return np.asarray(vectors[:, kept] * np.sqrt(variances[kept]))
 
 
 def solve_cut(
@@ -201,54 +223,40 @@ def solve_cut(
     """Estimate camera pixels of one prior component and rounded ratios; see `solve_whole`."""
     number, channels, count = batch.responses.shape
     per_amplitude = nuisance.amplitude_responses(batch, centred)
-    y = np.empty((number, channels, 1 + per_amplitude.shape[1], count))
-    y[:, :, 0], y[:, :, 1:] = batch.responses, per_amplitude[:, None]
-    solved = np.empty_like(y)
-    root = _root(prior)
-    noise_variance = 1.0 / np.sum(prior.eigenvectors.astype(np.float64) ** 2, axis=1)
-    alike = [
-        (part, cut_responses(centred, at) @ root) for part, at in cut_alike(batch.centres, centred)
-    ]
-    for part, patterns in alike:
-        covariance = patterns @ patterns.T
-        covariance[np.diag_indices(count)] += prior.far_variance
-        for value, of, channel in _of_one_ratio(ratio[part]):
-            at = part[of], channel
-            solved[at] = _solve(value * covariance, noise_variance, y[at])
-    variance = batch.noise.astype(np.float64)[..., None, None] ** 2
-    products = y @ np.swapaxes(solved, -1, -2) / variance
     precision = nuisance.prior_precision(batch, centred.near_basis)
-    amplitudes = nuisance.solve(products[..., 1:, 1:], products[..., 1:, 0], precision)
-    # K^-1 times the responses less those to the amplitudes.
-    rest = solved[:, :, 0] - np.einsum("nig,nigr->nir", amplitudes, solved[:, :, 1:])
-    rest *= ratio[..., None]
+    noise_variance = 1.0 / np.sum(prior.eigenvectors.astype(np.float64) ** 2, axis=1)
+    amplitudes = np.empty(precision.shape)
     near = np.empty((number, channels, centred.near_basis.count), dtype=np.float32)
-    for part, patterns in alike:
-        near[part] = rest[part] @ patterns @ root.T
+    far = np.empty((number, channels, count), dtype=np.float32)
+    for part, at in cut_alike(batch.centres, centred):
+        patterns = cut_responses(centred, at)
+        # Hats beyond the border answer nothing.
+        inside = np.flatnonzero(patterns.any(axis=0))
+        to_near = patterns[:, inside] @ prior.covariance[inside]
+        covariance = to_near[:, inside] @ patterns[:, inside].T
+        covariance[np.diag_indices(count)] += prior.far_variance
+        pixel, channel = np.divmod(np.argsort(ratio[part], axis=None, kind="stable"), channels)
+        of = part[pixel], channel
+        ratios = ratio[of]
+        starts = _starts(ratios)
+        found, rest, is_definite = solve_alike(
+            covariance,
+            noise_variance,
+            ratios[starts[:-1]],
+            starts,
+            batch.responses[of],
+            per_amplitude[of[0]],
+            precision[of] * batch.noise[of].astype(np.float64)[:, None] ** 2,
+        )
+        if not is_definite:
+            raise np.linalg.LinAlgError("the covariance of responses is not positive definite")
+        amplitudes[of] = found
+        near[of] = rest @ to_near
+        far[of] = rest * prior.far_variance
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),
         near=near,
-        far=(rest * prior.far_variance).astype(np.float32),
+        far=far,
         near_noise=near_noise(batch, prior, ratio),
         score=np.zeros((number, channels, 0), dtype=np.float32),
     )
-
-
-def _of_one_ratio(ratio: Floats) -> Iterator[tuple[float, Integers, Integers]]:
-    """Yield each variance ratio that occurs, with its camera pixels and channels."""
-    flat = ratio.ravel()
-    order = np.argsort(flat, kind="stable")
-    ends = np.flatnonzero(np.diff(flat[order])) + 1
-    for places in np.split(order, ends):
-        yield float(flat[places[0]]), *np.divmod(places, ratio.shape[1])
-
-
-def _solve(covariance: Floats, noise_variance: Floats, y: Floats) -> Floats:
-    """Return (covariance + diag(noise_variance))^-1 y, y (..., R); overwrite the covariance."""
-    covariance[np.diag_indices_from(covariance)] += noise_variance
-    # Symmetric, and so the same in Fortran's order.
-    factor, failed = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1, clean=0)
-    if failed:
-        raise np.linalg.LinAlgError("the covariance of responses is not positive definite")
-    solved, _ = lapack.dpotrs(factor, y.reshape(-1, y.shape[-1]).T, lower=1)
-    return np.asarray(solved.T.reshape(y.shape))

@@ -14,7 +14,8 @@ from nearfar.arrays import Booleans, Floats, Size, beside, fetch, namespace
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
-from nearfar.estimate.joint.footprint import footprint_boxes
+from nearfar.estimate.joint.batch import AllPixels
+from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
@@ -36,6 +37,9 @@ LARGEST_SHIFT = 0.25
 # The same where footprints are boxes, whose responses are not linear in q.
 LARGEST_SHIFT_AT_PITCH = 0.12
 LARGEST_FROM_CENTRE = 0.499
+# Camera rows on either side of a row that its sweep depends on at a pitch over 1: neighbours, and
+# those that vote for footprints.
+ROWS_OF_SWEEP = 1 + VOTING_ROWS
 
 
 def estimate_jointly(
@@ -45,6 +49,7 @@ def estimate_jointly(
     far: Size,
     *,
     pitch: int,
+    rows: slice | None = None,
     sweeps: int = SWEEPS,
     chosen: Choices = (),
     device: Device = "cpu",
@@ -67,6 +72,9 @@ def estimate_jointly(
         numbers of cycles per pattern grid.
     pitch : int
         Projector pixels between the window's functions, as the plan has it.
+    rows : slice, optional
+        Camera rows of the transport, by default all that were measured. The others lie beside them,
+        and are estimated only as far as these depend on them.
     sweeps : int
         Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
     chosen : Choices
@@ -88,7 +96,8 @@ def estimate_jointly(
     """
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
-    return assemble(*_sweep(problem, sweeps, chosen, report), far)
+    rows = rows or slice(0, measurements.camera.height)
+    return assemble(*_sweep(problem, rows, sweeps, chosen, report), far)
 
 
 def choose_components(
@@ -111,8 +120,9 @@ def choose_components(
     """
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
-    _, rows = _sweep(problem, SWEEPS, (), report)
-    return rows.choices
+    every = slice(0, measurements.camera.height)
+    _, found = _sweep(problem, every, SWEEPS, (), report)
+    return found.choices
 
 
 def _laid_out(
@@ -133,25 +143,75 @@ def _laid_out(
 
 
 def _sweep(
-    problem: Problem, sweeps: int, chosen: Choices, progress: Callable[[float], None]
+    problem: Problem,
+    wanted: slice,
+    sweeps: int,
+    chosen: Choices,
+    progress: Callable[[float], None],
 ) -> tuple[Problem, EstimatedRows]:
-    """Make the sweeps, and shift q after each."""
-    rows = None
+    """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each."""
+    found, held = None, slice(0, problem.measurements.camera.height)
     for number, choice in zip_longest(range(sweeps), chosen[:sweeps]):
+        around = _rows_around(problem, held, wanted, sweeps - 1 - number)
+        problem, found = _of_rows(problem, found, held, around)
+        held = around
 
         def report(share: float, number: int = number) -> None:
             progress((number + share) / sweeps)
 
-        rows = sweep_once(problem, rows, report, choice)
-        lit = rows.choices[-1].prior_component < len(LIT_COMPONENTS)
+        mine = choice and choice.of(_pixels(problem, held))
+        found = sweep_once(problem, found, report, mine)
+        lit = found.choices[-1].prior_component < len(LIT_COMPONENTS)
         pixels = problem.pixels._replace(
-            lit=lit, correspondence=_moved(problem, rows, lit, is_last=number == sweeps - 1)
+            lit=lit, correspondence=_moved(problem, found, lit, is_last=number == sweeps - 1)
         )
         problem = problem._replace(pixels=pixels)
         if problem.near_basis.pitch > 1 and number < sweeps - 1:
             problem = _about_new_q(problem)
-    assert rows is not None
-    return problem, rows
+    problem, found = _of_rows(problem, found, held, wanted)
+    assert found is not None
+    return problem, found
+
+
+def _rows_around(problem: Problem, held: slice, wanted: slice, sweeps_after: int) -> slice:
+    """Return the camera rows, of those held, that a sweep estimates for the sake of wanted rows.
+
+    Later sweeps read footprints of the q that it finds, and each reads the rows of neighbours.
+    Where functions are of single pixels there are few of them, and all are estimated.
+    """
+    if problem.near_basis.pitch == 1 or held == wanted:
+        return held
+    beside = max(1, sweeps_after * ROWS_OF_SWEEP)
+    return slice(max(held.start, wanted.start - beside), min(held.stop, wanted.stop + beside))
+
+
+def _of_rows(
+    problem: Problem, found: EstimatedRows | None, held: slice, rows: slice
+) -> tuple[Problem, EstimatedRows | None]:
+    """Return some camera rows of a problem that holds more, and of what was found."""
+    if rows == held:
+        return problem, found
+    measurements = problem.measurements
+    camera = Size(rows.stop - rows.start, measurements.camera.width)
+    some = _pixels(problem, slice(rows.start - held.start, rows.stop - held.start))
+    problem = problem._replace(
+        measurements=measurements.of_pixels(camera, some),
+        pixels=AllPixels._make(values[some] for values in problem.pixels),
+    )
+    if found is not None:
+        found = EstimatedRows(
+            amplitudes=found.amplitudes[some],
+            near=found.near[some],
+            far=found.far[some],
+            near_noise=found.near_noise[some],
+            choices=tuple(choice.of(some) for choice in found.choices),
+        )
+    return problem, found
+
+
+def _pixels(problem: Problem, rows: slice) -> slice:
+    width = problem.measurements.camera.width
+    return slice(rows.start * width, rows.stop * width)
 
 
 def _about_new_q(problem: Problem) -> Problem:

@@ -6,8 +6,12 @@ from dataclasses import dataclass
 from nearfar.arrays import Floats
 from nearfar.devices import Device
 from nearfar.estimate.base import Estimator, Memory, Model
-from nearfar.estimate.joint.estimate import SWEEPS, Choices, estimate_jointly
-from nearfar.estimate.joint.footprint import VOTING_ROWS
+from nearfar.estimate.joint.estimate import (
+    ROWS_OF_SWEEP,
+    SWEEPS,
+    Choices,
+    estimate_jointly,
+)
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measured_frequencies
 from nearfar.photometry.measurements import Measurements
@@ -41,7 +45,7 @@ class JointEstimator(Estimator):
 
     def rows_beside(self, plan: Plan) -> int:
         """Return the halo; at a pitch of several pixels, neighbours also vote for footprints."""
-        return SWEEPS * (1 + VOTING_ROWS) if plan.pitch > 1 else self.halo
+        return SWEEPS * ROWS_OF_SWEEP if plan.pitch > 1 else self.halo
 
     def require(self, plan: Plan) -> None:
         """Refuse a plan of complex patterns."""
@@ -79,12 +83,27 @@ class JointEstimator(Estimator):
         progress: Callable[[float], None] | None = None,
     ) -> Transport:
         """Estimate jointly; see `nearfar.estimate.joint.estimate_jointly`."""
+        every = slice(0, measurements.camera.height)
+        return self.estimate_rows(measurements, q, model, every, device=device, progress=progress)
+
+    def estimate_rows(
+        self,
+        measurements: Measurements,
+        q: Floats,
+        model: Model,
+        rows: slice,
+        *,
+        device: Device = "cpu",
+        progress: Callable[[float], None] | None = None,
+    ) -> Transport:
+        """Estimate some rows jointly; rows beside them only as far as later sweeps read them."""
         return estimate_jointly(
             measurements,
             q,
             model.window,
             model.far,
             pitch=model.pitch,
+            rows=rows,
             chosen=self.choices,
             device=device,
             progress=progress,

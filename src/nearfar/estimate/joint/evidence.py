@@ -18,10 +18,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from array_api_compat import device
+from array_api_compat import device, is_numpy_array
 
 from nearfar.arrays import Floats, Integers, beside, fetch, namespace
 from nearfar.estimate.joint.batch import PixelBatch
+from nearfar.estimate.joint.evidence_sums import sums_of_products
 from nearfar.estimate.joint.nuisance import DIRECT_PRIOR_DEVIATION
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.fitted import PRIOR_SCALES
@@ -217,35 +218,81 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     y = whitened.responses @ eigenbasis.eigenvectors
     u = whitened.direct_weights @ eigenbasis.of_footprint
     v = whitened.of_offset @ eigenbasis.eigenvectors
-    xp, table_step = namespace(y), fetch(whitened.table_step)
-    found = xp.empty((len(y), len(PRIOR_SCALES)), dtype=xp.float32, device=device(y))
-    eigenvalues = xp.astype(eigenbasis.eigenvalues, xp.float64)[:, None]
-    first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1)).tolist()
-    for start, stop in zip(first, [*first[1:], len(y)], strict=True):
-        steps = table_step[start] + STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
-        variance = 1.0 + beside(4.0 ** (steps / STEPS_PER_SCALE), y) * eigenvalues
-        weight = xp.astype(1.0 / variance, xp.float32)
-        log_determinant = xp.astype(xp.sum(xp.log(variance), axis=0), xp.float32)
-        of_y, pixel = y[start:stop], whitened.pixel[start:stop]
-        of_u = u[pixel]
-        yy, uy, uu = ((a * b) @ weight for a, b in ((of_y, of_y), (of_u, of_y), (of_u, of_u)))
-        if len(v):
-            # Integrate o out first; what is left of y and u is independent of it.
-            of_v = v[pixel]
-            vy, vu, vv = ((a * b) @ weight for a, b in ((of_v, of_y), (of_v, of_u), (of_v, of_v)))
-            offset_variance = whitened.offset_ratio[start:stop] ** 2
-            factor = 1.0 + offset_variance * vv
-            yy, uy, uu = (
-                whole - offset_variance * left * right / factor
-                for whole, left, right in ((yy, vy, vy), (uy, vu, vy), (uu, vu, vu))
-            )
-            log_determinant = log_determinant + xp.log(factor)
-        # d in units of the noise has a prior of its own.
-        direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio[start:stop]) ** 2
-        factor = 1.0 + direct_variance * uu
-        squares = yy - direct_variance * uy**2 / factor
-        found[start:stop] = -0.5 * (squares + log_determinant + xp.log(factor))
+    xp, weighted = namespace(y), _by_row if is_numpy_array(y) else _by_table
+    sums, log_determinant = weighted(whitened, (y, u, v), eigenbasis)
+    yy, uy, uu, *of_offset = sums
+    if of_offset:
+        # Integrate o out first; what is left of y and u is independent of it.
+        vy, vu, vv = of_offset
+        offset_variance = whitened.offset_ratio**2
+        factor = 1.0 + offset_variance * vv
+        yy, uy, uu = (
+            whole - offset_variance * left * right / factor
+            for whole, left, right in ((yy, vy, vy), (uy, vu, vy), (uu, vu, vu))
+        )
+        log_determinant = log_determinant + xp.log(factor)
+    # d in units of the noise has a prior of its own.
+    direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio) ** 2
+    factor = 1.0 + direct_variance * uu
+    squares = yy - direct_variance * uy**2 / factor
+    found = -0.5 * (squares + log_determinant + xp.log(factor))
     # Back to the order of camera pixels, with a row for each channel.
     together = found[xp.argsort(whitened.pixel, stable=True)]
     total: Floats = xp.sum(together.reshape((len(u), -1, len(PRIOR_SCALES))), axis=1)
     return total
+
+
+def _by_row(
+    whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
+) -> tuple[list[Floats], Floats]:
+    """Return the weighted sums of products, and the log determinants, each (m, scales).
+
+    Of y, light u of q and errors v of the references, the sums are yy, uy and uu, and where there
+    are such errors vy, vu and vv.
+    """
+    (y, u, v), pixel, xp = projected, whitened.pixel, namespace(whitened.responses)
+    scales = STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
+    first, last = whitened.table_step[0], whitened.table_step[-1] + scales[-1]
+    weights, log_determinants = _table(np.arange(first, last + 1), eigenbasis.eigenvalues, xp)
+    steps = whitened.table_step[:, None] - first + scales
+    rows = np.arange(len(y))
+    yy, uy, uu = sums_of_products(y, u, rows, pixel, steps, weights)
+    sums = [yy, uy, uu]
+    if len(v):
+        vv, vy, _ = sums_of_products(v, y, pixel, rows, steps, weights)
+        vu = sums_of_products(v, u, pixel, pixel, steps, weights)[1]
+        sums += [vy, vu, vv]
+    return sums, log_determinants[steps]
+
+
+def _by_table(
+    whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
+) -> tuple[list[Floats], Floats]:
+    """Return the same for arrays on any device, by products with each table."""
+    y, u, v = projected
+    xp, table_step = namespace(y), fetch(whitened.table_step)
+    count, shape = 6 if len(v) else 3, (len(y), len(PRIOR_SCALES))
+    sums = [xp.empty(shape, dtype=xp.float32, device=device(y)) for _ in range(count)]
+    log_determinant = xp.empty(shape, dtype=xp.float32, device=device(y))
+    first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1)).tolist()
+    for start, stop in zip(first, [*first[1:], len(y)], strict=True):
+        steps = table_step[start] + STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
+        weights, log_determinants = _table(steps, eigenbasis.eigenvalues, xp)
+        of_y, pixel = y[start:stop], whitened.pixel[start:stop]
+        of_u = u[pixel]
+        pairs = [(of_y, of_y), (of_u, of_y), (of_u, of_u)]
+        if len(v):
+            of_v = v[pixel]
+            pairs += [(of_v, of_y), (of_v, of_u), (of_v, of_v)]
+        for found, (one, other) in zip(sums, pairs, strict=True):
+            found[start:stop] = (one * other) @ weights.T
+        log_determinant[start:stop] = log_determinants
+    return sums, log_determinant
+
+
+def _table(steps: Integers, eigenvalues: Floats, xp: Any) -> tuple[Floats, Floats]:
+    """Return 1 / v_i and the sum of log v_i at steps of the variance ratio: (T, R) and (T,)."""
+    ratios = beside(4.0 ** (steps / STEPS_PER_SCALE), eigenvalues)
+    variance = 1.0 + ratios[:, None] * xp.astype(eigenvalues, xp.float64)
+    log_determinants = xp.sum(xp.log(variance), axis=1)
+    return xp.astype(1.0 / variance, xp.float32), xp.astype(log_determinants, xp.float32)

@@ -8,7 +8,6 @@ far-range light have faded, are most like the measured ones. Neighbours vote for
 Index convention: arrays are (n, channels, ...); r runs over real responses, s over blurs.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.estimate.joint.box_waves import of_boxes, wave_table, with_derivatives
 from nearfar.estimate.joint.seen import MEDIAN_SIDE, reach_of, seen_of_projector
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.near_basis import NearBasis
@@ -23,7 +23,6 @@ from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
-from nearfar.transport.boxes import box_overlaps, halves
 from nearfar.transport.direct import direct_weights
 
 # Least frequency, in cycles per cell of the coarsest pitch: near-range light has faded there. With
@@ -67,69 +66,15 @@ def footprint_weights(
         return direct_weights(correspondence, centres)
     lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
     middles = np.where(lit[:, None], correspondence - centres, 0.0)
-    found = np.empty((len(middles), 3, centred.basis.count), dtype=np.float32)
-    reach = reach_of(footprints, STEP)
-
-    def of_box(middles: Floats, widths: Floats) -> list[NDArray[np.complex64]]:
-        waves, steep = [], []
-        for axis in (0, 1):
-            at, before, after = (
-                box_overlaps(middles[:, axis] + np.float32(step), widths[:, axis], reach)
-                for step in (0.0, -STEP, STEP)
-            )
-            waves.append(_waves(at, axis, centred))
-            steep.append(_waves((after - before) / np.float32(2 * STEP), axis, centred))
-        return [waves[0] * waves[1], steep[0] * waves[1], waves[0] * steep[1]]
-
-    for part, waves in enumerate(_mean_of_boxes(middles, footprints, of_box)):
-        found[:, part] = _real(waves, centred)
+    table = wave_table(centred, reach_of(footprints, STEP))
+    found = with_derivatives(middles, footprints, STEP, table)
     found[~lit] = 0.0
-    return found
-
-
-def _mean_of_boxes(
-    middles: Floats,
-    footprints: Floats,
-    of_box: Callable[[Floats, Floats], list[NDArray[np.complex64]]],
-) -> list[NDArray[np.complex64]]:
-    """Return the means over both boxes of what `of_box` returns for middles and widths (n, 2).
-
-    Both are float32. The boxes of an upright footprint are the same, and asked for once.
-    """
-    both, widths = (part.astype(np.float32) for part in halves(middles, footprints))
-    found = of_box(both[0], widths)
-    (slanted,) = np.nonzero(footprints[:, 2:].any(axis=1))
-    for first, second in zip(found, of_box(both[1, slanted], widths[slanted]), strict=True):
-        first[slanted] = (first[slanted] + second) * np.float32(0.5)
     return found
 
 
 def unit_responses(middles: Floats, footprints: Floats, centred: CentredBasis) -> Floats:
     """Return responses of unit direct light, (n, R), at middles (n, 2) from rounded q."""
-    reach = reach_of(footprints)
-
-    def of_box(middles: Floats, widths: Floats) -> list[NDArray[np.complex64]]:
-        down, across = (
-            _waves(box_overlaps(middles[:, axis], widths[:, axis], reach), axis, centred)
-            for axis in (0, 1)
-        )
-        return [down * across]
-
-    return _real(_mean_of_boxes(middles, footprints, of_box)[0], centred)
-
-
-def _waves(overlaps: Floats, axis: int, centred: CentredBasis) -> NDArray[np.complex64]:
-    """Return conjugate responses of shares of pixels (n, 2 reach + 1) along one axis, (n, K)."""
-    pixels = np.arange(overlaps.shape[1]) - overlaps.shape[1] // 2
-    cycles, which = np.unique(centred.basis.cycles[:, axis], return_inverse=True)
-    waves = np.exp(2j * np.pi * np.outer(pixels, cycles)).astype(np.complex64)
-    return np.take(overlaps.astype(np.float32) @ waves, which.ravel(), axis=1)
-
-
-def _real(waves: NDArray[np.complex64], centred: CentredBasis) -> Floats:
-    """Return the responses to cosines and sines, (n, R), of conjugate responses (n, K)."""
-    parts = np.ascontiguousarray(waves).view(np.float32)
-    return parts[:, 2 * centred.basis.index + centred.basis.is_sine]
+    return of_boxes(middles, footprints, wave_table(centred, reach_of(footprints)))
 
 
 def footprint_boxes(

@@ -28,16 +28,18 @@ BYTES_AT_ONCE = 2**22
 
 
 def expect_each(
-    values: Floats, variance: Floats, multiplicity: Floats, highest: Integers
+    values: Floats, white: Floats, variance: Floats, multiplicity: Floats, highest: Integers
 ) -> Floats:
     """Filter each coefficient with a gain of its own.
 
     Parameters
     ----------
     values : ndarray, shape (Cy, Cx, channels, J)
-        As shares of white.
+        Photo units.
+    white : ndarray, shape (Cy, Cx, channels)
+        Light under white, as shares of which coefficients are filtered.
     variance : ndarray, shape (Cy, Cx, channels)
-        Of their noise if measured once; above 0.
+        Of the shares' noise if measured once; above 0.
     multiplicity : ndarray, shape (J,)
         How often each was measured.
     highest : ndarray of int
@@ -55,7 +57,8 @@ def expect_each(
     by_noise = 1.0 + 1.0 / math.sqrt(len(highest))
 
     def work(rows: slice) -> None:
-        some, weight = _with_neighbours(values, rows), _with_neighbours(precision, rows)
+        some = _with_neighbours(values, rows) / _with_neighbours(white[..., None], rows)
+        weight = _with_neighbours(precision, rows)
         total = _sum(weight)
         mean, scatter = _mean_and_scatter(some, weight, total)
         noise = variance[rows, ..., None] / multiplicity
@@ -64,21 +67,23 @@ def expect_each(
         common = xp.mean(relative, axis=-1, keepdims=True) - by_noise
         change = xp.clip(xp.maximum(change, HIGHEST_FACTOR * common * noise), min=0.0)
         gain = change / (change + noise)
-        found[rows] = mean + gain * (values[rows] - mean)
+        found[rows] = (mean + gain * (some[1:-1, 1:-1] - mean)) * white[rows, ..., None]
 
     side_by_side(work, _row_blocks(values))
     return found
 
 
-def expect_together(values: Floats, variance: Floats, lit: Booleans) -> Floats:
+def expect_together(values: Floats, white: Floats, variance: Floats, lit: Booleans) -> Floats:
     """Filter coefficients with one gain for all of them.
 
     Parameters
     ----------
     values : ndarray, shape (Cy, Cx, channels, J)
-        As shares of white.
+        Photo units.
+    white : ndarray, shape (Cy, Cx, channels)
+        Light under white, as shares of which coefficients are filtered.
     variance : ndarray, shape (Cy, Cx, channels)
-        Of their noise, the mean over j.
+        Of the shares' noise, the mean over j.
     lit : ndarray of bool, shape (Cy, Cx)
         Camera pixels that are averaged; at the rest 0 is expected.
 
@@ -87,17 +92,18 @@ def expect_together(values: Floats, variance: Floats, lit: Booleans) -> Floats:
     ndarray, shape (Cy, Cx, channels, J)
     """
     xp = namespace(values)
-    found: Floats = xp.zeros_like(values)
+    found: Floats = xp.empty_like(values)
     weights = lit[..., None] / xp.clip(variance, min=DEVIATION_FLOOR**2)
     precision = xp.astype(weights[..., None], values.dtype)
 
     def work(rows: slice) -> None:
-        some, weight = _with_neighbours(values, rows), _with_neighbours(precision, rows)
+        some = _with_neighbours(values, rows) / _with_neighbours(white[..., None], rows)
+        weight = _with_neighbours(precision, rows)
         total = xp.clip(_sum(weight), min=DIVISOR_FLOOR)
         mean, scatter = _mean_and_scatter(some, weight, total)
         change = xp.clip(xp.mean(scatter, axis=-1, keepdims=True) - 1.0 / total, min=0.0)
         gain = change / xp.clip(change + variance[rows, ..., None], min=DIVISOR_FLOOR)
-        expected = mean + gain * (values[rows] - mean)
+        expected = (mean + gain * (some[1:-1, 1:-1] - mean)) * white[rows, ..., None]
         found[rows] = xp.where(lit[rows, :, None, None], expected, 0.0)
 
     side_by_side(work, _row_blocks(values))

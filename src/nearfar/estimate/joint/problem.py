@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers, Size, namespace
+from nearfar.arrays import Floats, Integers, Size, blocks, namespace
 from nearfar.devices import Device, mover
 from nearfar.errors import InputError
 from nearfar.estimate.joint.batch import (
@@ -24,6 +24,7 @@ from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis, real_basis
+from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import (
     LIT_AT_PITCH,
@@ -38,6 +39,8 @@ from nearfar.transport import near
 # footprint with 10 % of its weight on the wrong pixel costs 1.5 dB under a random light. Prior
 # components with spread represent direct light that really lies beside q.
 WHOLE_PIXEL_DISTANCE = 0.1
+# Projector pixels whose quantisation errors are transposed at once, and by one thread.
+TRANSPOSED_PIXELS, PARTS_PIXELS = 512, 2**14
 EVERY_COMPONENT = (*LIT_COMPONENTS, *UNLIT_COMPONENTS)
 
 
@@ -55,7 +58,7 @@ class ComponentChoice(NamedTuple):
     prior_component: Integers
     prior_scale: Floats
 
-    def of(self, selected: Integers) -> "ComponentChoice":
+    def of(self, selected: slice | Integers) -> "ComponentChoice":
         """Return those of some camera pixels, as a copy."""
         xp = namespace(self.prior_scale)
         return ComponentChoice(*(xp.asarray(values[selected], copy=True) for values in self))
@@ -99,12 +102,24 @@ class Model(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """Measurements, priors and camera pixels that all sweeps share."""
+    """Measurements, priors and camera pixels that all sweeps share.
+
+    Attributes
+    ----------
+    measurements : Measurements
+    model : Model
+    pixels : AllPixels
+    near_basis : NearBasis
+    quantisation_error : ndarray, shape (P or 0, R), float32
+        That of the measurements in the order of the centred basis: a row for each projector pixel,
+        so that a camera pixel reads contiguous memory.
+    """
 
     measurements: Measurements
     model: Model
     pixels: AllPixels
     near_basis: NearBasis
+    quantisation_error: Floats
 
 
 def build_model(
@@ -200,8 +215,23 @@ def lay_out(
         spike_expected=expected_spikes(correspondence, near_basis),
         footprint=np.zeros((len(lit), 4), dtype=np.float32) if footprint is None else footprint,
     )
-    pixels = AllPixels._make(map(mover(device), pixels))
-    return Problem(measurements, model, pixels, near_basis)
+    move = mover(device)
+    pixels = AllPixels._make(map(move, pixels))
+    errors = _a_row_each(measurements.quantisation_error, model.centred.response_indices)
+    return Problem(measurements, model, pixels, near_basis, move(errors))
+
+
+def _a_row_each(errors: Floats, indices: Integers) -> Floats:
+    """Return chosen responses' quantisation errors (R, P) as rows for projector pixels."""
+    found = np.empty((errors.shape[1], len(indices)), dtype=errors.dtype)
+
+    def work(part: slice) -> None:
+        for within in blocks(part.stop - part.start, TRANSPOSED_PIXELS):
+            batch = slice(part.start + within.start, part.start + within.stop)
+            found[batch] = errors[indices, batch].T
+
+    side_by_side(work, blocks(len(found), PARTS_PIXELS))
+    return found
 
 
 # Tiles of camera rows share it, and the phases that it computes once.

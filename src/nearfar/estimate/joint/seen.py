@@ -7,6 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from nearfar.arrays import Floats, blocks
+from nearfar.parallel import side_by_side
 from nearfar.transport.boxes import box_overlaps, halves
 
 # q moves from one camera pixel to the next by the median over a square of this side.
@@ -35,7 +36,13 @@ def seen_of_projector(correspondence: Floats) -> Floats:
     correspondence : ndarray, shape (Cy, Cx, 2)
         q.
     """
-    of_rows, of_columns = (_moves(correspondence, axis) for axis in (0, 1))
+    moves: list[Floats] = [np.empty(0), np.empty(0)]
+
+    def work(axis: int) -> None:
+        moves[axis] = _moves(correspondence, axis)
+
+    side_by_side(work, (0, 1))
+    of_rows, of_columns = moves
     slants = [np.abs(np.prod(side, axis=1)) for side in (of_rows, of_columns)]
     by_rows = (slants[0] >= slants[1])[:, None]
     halved, other = np.where(by_rows, of_rows, of_columns), np.where(by_rows, of_columns, of_rows)
@@ -80,7 +87,8 @@ def box_centres(correspondence: Floats) -> Floats:
     q = correspondence.reshape(-1, 2).astype(np.float64)
     footprints = seen_of_projector(correspondence)
     found = np.nan_to_num(q, nan=0.0)
-    for batch in blocks(len(q), BATCH_PIXELS):
+
+    def work(batch: slice) -> None:
         rounded = np.rint(found[batch])
         wanted, its = found[batch] - rounded, footprints[batch]
         reach = reach_of(its)
@@ -94,6 +102,8 @@ def box_centres(correspondence: Floats) -> Floats:
                 # A centroid moves by at most 1 / width times as much as the middle.
                 middles[:, axis] += off * np.clip(widths[:, axis], 0.0, 1.0)
         found[batch] = rounded + middles
+
+    side_by_side(work, blocks(len(q), BATCH_PIXELS))
     return np.where(np.isnan(q), np.nan, found).reshape(correspondence.shape)
 
 

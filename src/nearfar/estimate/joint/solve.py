@@ -9,9 +9,13 @@ over window entries, g over the amplitudes of `nuisance`.
 
 from typing import NamedTuple
 
+import numpy as np
+from array_api_compat import is_numpy_array
+
 from nearfar.arrays import Floats, beside, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
+from nearfar.estimate.joint.fit import fit_diagonal
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
 
@@ -49,6 +53,9 @@ def variance_ratio(batch: PixelBatch, scale: Floats) -> Floats:
 
 def near_noise(batch: PixelBatch, prior: ResponsePrior, ratio: Floats) -> Floats:
     """Return the mean variance of a window entry that noise causes, shape (n, channels)."""
+    if is_numpy_array(ratio):
+        known = np.interp(ratio, prior.variance_ratios, prior.noise_gain)
+        return np.asarray(batch.noise**2 * known, dtype=np.float32)
     xp = namespace(ratio)
     lowest, highest = float(prior.variance_ratios[0]), float(prior.variance_ratios[-1])
     table, ratios = beside(prior.noise_gain, ratio), beside(prior.variance_ratios, ratio)
@@ -80,6 +87,8 @@ def solve_whole(
     weight = 1.0 / (prior_variance * prior.eigenvalues + noise)
     y = product(batch.responses, prior.eigenvectors)
     per_amplitude = nuisance.projected_amplitude_responses(batch, prior)
+    if centred.near_basis.pitch > 1:
+        return _of_several_pixels(batch, prior, ratio, centred, y, per_amplitude)
     transposed = xp.permute_dims(per_amplitude, (0, 2, 1))
     normal, right = [], []
     for i in range(y.shape[1]):
@@ -94,9 +103,7 @@ def solve_whole(
     amplitudes = xp.astype(solved, xp.float32)
     y -= amplitudes @ per_amplitude
     y *= weight
-    # Spikes are looked for among single projector pixels alone.
-    is_fine = centred.near_basis.pitch == 1
-    score = product(y, prior.of_window.T) if is_fine else y[..., :0]
+    score = product(y, prior.of_window.T)
     y *= prior_variance
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),
@@ -104,4 +111,38 @@ def solve_whole(
         far=product(y, prior.to_far),
         near_noise=near_noise(batch, prior, ratio),
         score=score,
+    )
+
+
+def _of_several_pixels(
+    batch: PixelBatch,
+    prior: ResponsePrior,
+    ratio: Floats,
+    centred: CentredBasis,
+    y: Floats,
+    per_amplitude: Floats,
+) -> PosteriorMean:
+    """Return the posterior mean where functions are of several projector pixels.
+
+    y and the responses to amplitudes are projected, and y is overwritten. Spikes are looked for
+    among single projector pixels alone.
+    """
+    number, channels, count = y.shape
+    noise_variance = batch.noise.ravel() ** 2
+    precision = nuisance.prior_precision(batch, centred.near_basis)
+    amplitudes = fit_diagonal(
+        y.reshape(-1, count),
+        per_amplitude,
+        np.repeat(np.arange(number), channels),
+        prior.eigenvalues,
+        noise_variance,
+        ratio.ravel().astype(np.float32) * noise_variance,
+        np.ascontiguousarray(precision.reshape(number * channels, -1)),
+    )
+    return PosteriorMean(
+        amplitudes=nuisance.in_full(amplitudes.reshape(precision.shape), batch),
+        near=product(y, prior.to_near),
+        far=product(y, prior.to_far),
+        near_noise=near_noise(batch, prior, ratio),
+        score=y[..., :0],
     )

@@ -71,16 +71,19 @@ def sweep_once(
     pixels, model = problem.pixels, problem.model
     centred, projector = model.centred, problem.measurements.projector
     xp, count = namespace(pixels.responses), len(pixels.responses)
-    rows = _empty_rows(problem, before)
-    choice = rows.choices[-1]
+    rows = _empty_rows(problem)
     start = None
     if before is not None:
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
+        # What is found is added to what was expected: no camera pixel reads another's expectation.
+        rows = rows._replace(near=start.expected.near, far=start.expected.far)
+        rows = rows._replace(choices=(*before.choices, *rows.choices))
+    choice = rows.choices[-1]
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
-        rows.near[selected] = found.near
-        rows.far[selected] = centred.uncentre(found.far, batch.centres)
+        rows.near[selected] += found.near
+        rows.far[selected] += centred.uncentre(found.far, batch.centres)
         rows.near_noise[selected] = found.near_noise
 
     done = [0]
@@ -111,9 +114,7 @@ def sweep_once(
         report(done[0] / count)
 
     side_by_side(estimate, _parts(problem))
-    if start is None:
-        return rows
-    return rows._replace(near=rows.near + start.expected.near, far=rows.far + start.expected.far)
+    return rows
 
 
 def _explained(
@@ -135,8 +136,8 @@ def _explained(
     return responses
 
 
-def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows:
-    """Return rows of zeros for a sweep to fill, with the choices of the sweeps before it."""
+def _empty_rows(problem: Problem) -> EstimatedRows:
+    """Return rows of zeros for a sweep to fill."""
     responses = problem.pixels.responses
     xp, (number, channels, count) = namespace(responses), responses.shape
 
@@ -148,10 +149,7 @@ def _empty_rows(problem: Problem, before: EstimatedRows | None) -> EstimatedRows
         zeros(number, channels, problem.near_basis.count),
         zeros(number, channels, count),
         zeros(number, channels),
-        (
-            *(before.choices if before is not None else ()),
-            ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),
-        ),
+        (ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),),
     )
 
 
@@ -232,17 +230,12 @@ def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
 
 def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
-    if problem.measurements.quantisation_error.shape[-1] == 0:
+    errors = problem.quantisation_error
+    if not len(errors):
         return lambda selected: problem.pixels.responses[selected, 0] * np.float32(0.0)
-    # A row for each projector pixel, so that a camera pixel reads contiguous memory.
-    errors = problem.measurements.quantisation_error[problem.model.centred.response_indices]
     where = footprint(fetch(problem.pixels.correspondence), problem.measurements.projector)
-    error, pixels, weights = (
-        beside(np.ascontiguousarray(values), problem.pixels.responses)
-        for values in (errors.T, where.pixels, where.weights)
-    )
-
-    return lambda selected: look_up_each(error, pixels[selected], weights[selected])
+    pixels, weights = (beside(values, errors) for values in where)
+    return lambda selected: look_up_each(errors, pixels[selected], weights[selected])
 
 
 def _with_spikes(
@@ -283,27 +276,27 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     xp, shape = namespace(rows.near), (*camera, channels)
-    white = pixels.white.reshape((*shape, 1))
+    white = pixels.white.reshape(shape)
     tiny = float(np.finfo(np.float32).tiny) ** 0.5
     noise = beside(measurements.noise.reshape(shape), rows.near)
-    variance = xp.clip((noise / white[..., 0]) ** 2, min=tiny)
+    variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
     far = expect_each(
-        rows.far.reshape((*shape, -1)) / white,
+        rows.far.reshape((*shape, -1)),
+        white,
         variance,
         problem.model.multiplicity,
         beside(np.flatnonzero(cycles >= np.median(cycles)), white),
     )
     windows = expect_together(
-        rows.near.reshape((*shape, -1)) / white,
-        rows.near_noise.reshape(shape) / white[..., 0] ** 2,
+        rows.near.reshape((*shape, -1)),
+        white,
+        rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(camera),
     )
-    inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
-    windows *= white
-    far *= white
-    return rows._replace(
-        near=windows.reshape(rows.near.shape) * inside[:, None],
-        far=far.reshape(rows.far.shape),
-    )
+    windows = windows.reshape(rows.near.shape)
+    if problem.near_basis.pitch == 1:
+        inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
+        windows *= inside[:, None]
+    return rows._replace(near=windows, far=far.reshape(rows.far.shape))

@@ -14,7 +14,6 @@ from nearfar.progress import Report
 from nearfar.transport.half import in_half, rounding_over_noise
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import of_rows
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.sources import (
     Source,
@@ -158,14 +157,14 @@ def reconstruct_tile(
     around = job.tiling.with_halo(tile)
     core = slice(tile.start - around.start, tile.stop - around.start)
     measurements, found = job.source.read(around, known)
-    whole = job.estimator.estimate(
+    transport = job.estimator.estimate_rows(
         measurements,
         found.q,
         model_of(job.capture.plan),
+        core,
         device=job.options.device,
         progress=progress,
     )
-    transport = of_rows(whole, core)
     correspondence = found.of_rows(core)
     saturated = job.source.saturated(tile)
     provenance = {

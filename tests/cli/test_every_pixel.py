@@ -114,7 +114,7 @@ def test_a_tile_with_the_rows_beside_it_is_that_of_the_whole(job):
 def test_rows_that_are_not_wanted_are_left_out_without_changing_those_that_are(job):
     capture = nearfar.open_capture(job / "capture.zarr")
     plan, measurements = capture.plan, measure(capture)
-    q = correspond_by_phase(measurements).q
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
     sizes = (plan.window, plan.far)
     whole = estimate_jointly(measurements, q, *sizes, pitch=plan.pitch)
     light = natural_picture(PROJECTOR, 5)

@@ -76,7 +76,7 @@ def _by_each_alone(monkeypatch, measurements):
     nothing = Replaced(np.arange(0), np.empty((0, 2)))
     with monkeypatch.context() as changed:
         changed.setattr(phase, "replace_sidelobes", lambda *_: nothing)
-        return correspond_by_phase(measurements)
+        return correspond_by_phase(measurements, pitch=1)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -85,7 +85,7 @@ def test_camera_pixels_that_see_two_surfaces_get_one_of_them(monkeypatch, seed):
     edges = share == 0.5
     alone = _by_each_alone(monkeypatch, measurements)
     assert np.mean(_is_false(alone, front, behind)[edges]) > 0.9
-    found = correspond_by_phase(measurements)
+    found = correspond_by_phase(measurements, pitch=1)
     assert found.lit.all()
     assert not _is_false(found, front, behind).any()
     np.testing.assert_array_equal(found.q[~edges], alone.q[~edges])
@@ -94,7 +94,7 @@ def test_camera_pixels_that_see_two_surfaces_get_one_of_them(monkeypatch, seed):
 def test_thin_things_and_edges_stay_where_they_are(monkeypatch):
     """Single columns, with which no neighbour agrees to the left and to the right."""
     front, behind, share, measurements = _measured(thin=True)
-    found = correspond_by_phase(measurements)
+    found = correspond_by_phase(measurements, pitch=1)
     q = np.where(share[..., None] > 0.5, front, behind)
     assert np.abs(found.q - q).max() < 0.5
     np.testing.assert_array_equal(found.q, _by_each_alone(monkeypatch, measurements).q)
@@ -102,7 +102,7 @@ def test_thin_things_and_edges_stay_where_they_are(monkeypatch):
 
 def test_tiles_of_rows_are_those_of_the_whole():
     *_, measurements = _measured()
-    whole = correspond_by_phase(measurements)
+    whole = correspond_by_phase(measurements, pitch=1)
     plan = paper_plan(PROJECTOR, 5, Size(5, 5), correspondence="phase")
     beside = method_named("phase").rows_needed(plan)
     for tile in blocks(CAMERA.height, 6):
@@ -110,7 +110,7 @@ def test_tiles_of_rows_are_those_of_the_whole():
         part = measurements.of_pixels(
             Size(last - first, CAMERA.width), slice(first * CAMERA.width, last * CAMERA.width)
         )
-        found = correspond_by_phase(part)
+        found = correspond_by_phase(part, pitch=1)
         rows = slice(tile.start - first, tile.stop - first)
         np.testing.assert_allclose(found.q[rows], whole.q[tile], atol=1e-4)
         np.testing.assert_allclose(found.confidence[rows], whole.confidence[tile], atol=1e-4)

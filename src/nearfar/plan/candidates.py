@@ -38,14 +38,6 @@ FEWEST_HIGH = 4
 # Their directions, (y, x), in turn from the highest on.
 _DIAGONAL = math.sqrt(0.5)
 DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (_DIAGONAL, _DIAGONAL), (_DIAGONAL, -_DIAGONAL))
-# At pitches up to this one projectors are coarse, and camera pixels see one projector pixel or a
-# few. There frequencies reach further into the corners of the spectrum, along more directions: at
-# 136x150 a random light gains 2.4 dB on the corner and 0.5 dB on cornell-aside.
-COARSE_PITCH, HIGHEST_AT_COARSE = 4, 0.45
-DIRECTIONS_AT_COARSE = (
-    *((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, -1.0)),
-    *((1.0, 0.5), (0.5, -1.0), (0.5, 1.0), (1.0, -0.5)),
-)
 
 
 def finest_pattern(projector: Size) -> Frequency:
@@ -84,8 +76,7 @@ def high_frequencies(projector: Size, pitch: int, photos: int) -> list[Frequency
     """Return the frequencies above those of the grid of cells, the highest first.
 
     They fall evenly by ratio from `HIGHEST` towards half a cycle per pitch, so that each step in
-    the phase of direct light leaves the next without ambiguity; at a pitch of 4, along their
-    longer axis, from `HIGHEST_AT_COARSE`.
+    the phase of direct light leaves the next without ambiguity.
 
     Parameters
     ----------
@@ -102,14 +93,11 @@ def high_frequencies(projector: Size, pitch: int, photos: int) -> list[Frequency
     """
     enough = min(ENOUGH_HIGH, round(LARGEST_HIGH_SHARE * (photos - FIRST_PHOTOS) / 2))
     count = min(MOST_HIGH, max(FEWEST_HIGH, enough, round(HIGH_SHARE * photos / 2)))
-    is_coarse = pitch <= COARSE_PITCH
-    highest = HIGHEST_AT_COARSE if is_coarse else HIGHEST
-    directions = DIRECTIONS_AT_COARSE if is_coarse else DIRECTIONS
-    ratio = highest * 2 * pitch
+    ratio = HIGHEST * 2 * pitch
     found = []
     for number in range(count):
-        cycles = highest * ratio ** (-number / count)
-        direction = directions[number % len(directions)]
+        cycles = HIGHEST * ratio ** (-number / count)
+        direction = DIRECTIONS[number % len(DIRECTIONS)]
         if min(projector) == 1:
             # All frequencies lie along the only row or column.
             direction = (float(projector.height > 1), float(projector.width > 1))

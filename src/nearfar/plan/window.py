@@ -48,8 +48,8 @@ def pitch_of(projector: Size) -> int:
 def side_of_blocks(projector: Size) -> int:
     """Return the side of the smallest blocks that a plan of single cells can be made for.
 
-    Of blocks that leave no more than 128 cells on the shorter side, the smallest that divide both
-    sides; or, where that would leave fewer than 64, the smallest.
+    Of blocks that leave no more than 106 cells on the shorter side, the smallest that divide both
+    sides; or, where that would leave fewer than 53, the smallest.
     """
     shorter = _shorter(projector)
     smallest = -(-shorter // LARGEST_OF_SINGLE_PIXELS)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.correspondence.codes import find_places, is_lit, prepare_codes, typical_misfit
+from nearfar.correspondence.codes import prepare_codes
 from nearfar.correspondence.photo_order import FOLLOWED, explained_share, find_order
+from nearfar.correspondence.places import find_places, is_lit, typical_misfit
 from nearfar.errors import InputError
 from nearfar.scenes.cache import cached_scene
 from tests.shown import (

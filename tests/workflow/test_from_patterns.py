@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+import nearfar
 from nearfar import natural_picture, snr
 from nearfar.arrays import Size
 from nearfar.capture import import_photos, open_capture, read_shown
-from nearfar.errors import InputError
+from nearfar.errors import InputError, PlanError
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.from_patterns import reconstruct_from_patterns
 from tests.cli.conftest import check_done, run_nearfar
@@ -74,6 +75,17 @@ def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
     assert transport.verdict.held_out_snr is not None
     black = capture.read([len(capture.plan.patterns) - 1])[0]
     np.testing.assert_allclose(transport.black, black, atol=0.02)
+
+
+def test_python_reconstructs_as_any_capture(world, tmp_path):
+    capture = _capture(world, SETS["random"](), tmp_path)
+    transport, correspondence = nearfar.reconstruct(capture)
+    assert _decibels(world, transport)[0] > 33
+    np.testing.assert_array_equal(correspondence.q, transport.correspondence)
+    with pytest.raises(PlanError, match="somebody else's pictures"):
+        nearfar.reconstruct(capture, method="paper")
+    with pytest.raises(PlanError, match="somebody else's pictures"):
+        nearfar.measure(capture)
 
 
 def test_held_out_photos_tell_how_well_such_patterns_are_relit(world, tmp_path):

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Integers
-from nearfar.correspondence.codes import Codes, find_places
+from nearfar.correspondence.codes import Codes
+from nearfar.correspondence.places import find_places
 
 # Of the camera pixels that change most, the median share of a sequence that direct light explains
 # is above this where photos follow the patterns, and below where they do not.

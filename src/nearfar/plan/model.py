@@ -229,8 +229,7 @@ class Plan(Frozen):
         if self.offset == "shown":
             raise PlanError(
                 f"these photos are of somebody else's pictures, not of the sinusoids of a plan, so "
-                f"that there is nothing to {what}: of such photos, nearfar finds the "
-                f"correspondence, by `correspond()`."
+                f"that there is nothing to {what}: go on with `correspond()` or `reconstruct()`."
             )
 
     def draw(self, index: int) -> NDArray[np.uint8]:

@@ -9,11 +9,6 @@ from scipy.optimize import minimize_scalar
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence, joined
-from nearfar.correspondence.codes import (
-    find_places,
-    is_lit,
-    typical_misfit,
-)
 from nearfar.correspondence.photo_order import (
     FOLLOWED,
     PhotoOrder,
@@ -21,6 +16,7 @@ from nearfar.correspondence.photo_order import (
     find_order,
     unexplained_share,
 )
+from nearfar.correspondence.places import find_places, is_lit, typical_misfit
 from nearfar.progress import Report, ignore_progress
 from nearfar.workflow.pattern_codes import (
     AS_IN_THE_FILE,

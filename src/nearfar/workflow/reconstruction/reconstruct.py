@@ -11,6 +11,7 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
+from nearfar.workflow.from_patterns import reconstruct_from_patterns
 from nearfar.workflow.reconstruction.executors import (
     Executor,
     SerialExecutor,
@@ -42,7 +43,8 @@ def reconstruct(
     capture : Capture
     correspondence : Correspondence, optional
         By default it is found from the capture: from its stripes or Gray code, or without them
-        from the phase of the photos of transport.
+        from the phase of the photos of transport; of pictures that are somebody else's, from what
+        each projector pixel shows.
     method, square, memory, device, half
         As `ReconstructionOptions` describes them.
     progress : callable, optional
@@ -72,11 +74,15 @@ def reconstruct(
     _require(capture, correspondence)
     options = ReconstructionOptions(method, square, memory, device, half)
     report, sink = progress or ignore_progress, MemorySink()
+    if capture.plan.offset == "shown" and options == ReconstructionOptions(memory=memory):
+        found = reconstruct_from_patterns(capture, correspondence, memory=memory, progress=report)
+        assert found.quality is not None
+        return found, Correspondence(found.correspondence, found.quality.confidence)
     job = prepare(capture, options, correspondence, report)
     work = Work(capture, options, correspondence, job.tiling, lambda _report: job)
     execute(work, executor_of(options), sink, report)
-    transport, found = sink.collected()
-    return transport, job.correspondence or found
+    transport, in_tiles = sink.collected()
+    return transport, job.correspondence or in_tiles
 
 
 def reconstruct_to_file(

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from array_api_compat import device, is_numpy_array
+from array_api_compat import device
 
 from nearfar.arrays import Floats, Integers, beside, fetch, namespace
 from nearfar.estimate.joint.batch import PixelBatch
@@ -93,13 +93,17 @@ def prior_set(
     return PriorSet(priors, screens, screening, numbers)
 
 
-def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Floats, Floats]:
+def most_probable(
+    batch: PixelBatch, candidates: PriorSet, weigh: "WeightedSums"
+) -> tuple[Integers, Floats, Floats]:
     """Choose a prior component and scale for each camera pixel, the same for all channels.
 
     Parameters
     ----------
     batch : PixelBatch
     candidates : PriorSet
+    weigh : callable
+        As `log_evidence` takes it.
 
     Returns
     -------
@@ -116,7 +120,7 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
     some = whitened._replace(
         responses=whitened.responses[:, screening], of_offset=whitened.of_offset[:, screening]
     )
-    found = [log_evidence(some, screen) for screen in candidates.screens]
+    found = [log_evidence(some, screen, weigh) for screen in candidates.screens]
     values = xp.stack([xp.max(each, axis=1) for each in found])
     steps = xp.stack([xp.argmax(each, axis=1) for each in found])
     if candidates.screens is not candidates.priors:
@@ -126,7 +130,7 @@ def most_probable(batch: PixelBatch, candidates: PriorSet) -> tuple[Integers, Fl
         for index, prior in enumerate(candidates.priors):
             (mine,) = xp.nonzero(shortlisted[index, :])
             if len(mine):
-                by_all = log_evidence(whitened.only(mine), prior)
+                by_all = log_evidence(whitened.only(mine), prior, weigh)
                 steps[index, mine] = xp.argmax(by_all, axis=1)
                 values[index, mine] = xp.max(by_all, axis=1)
     best = xp.argmax(values, axis=0)
@@ -201,7 +205,9 @@ def whiten(batch: PixelBatch) -> WhitenedResponses:
     )
 
 
-def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
+def log_evidence(
+    whitened: WhitenedResponses, eigenbasis: Eigenbasis, weigh: "WeightedSums"
+) -> Floats:
     """Return the log evidence of one prior component at every prior scale.
 
     Parameters
@@ -209,6 +215,8 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     whitened : WhitenedResponses
     eigenbasis : Eigenbasis
         Of the component.
+    weigh : callable
+        `sums_by_table`, or `sums_by_row` for NumPy arrays.
 
     Returns
     -------
@@ -218,8 +226,8 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     y = whitened.responses @ eigenbasis.eigenvectors
     u = whitened.direct_weights @ eigenbasis.of_footprint
     v = whitened.of_offset @ eigenbasis.eigenvectors
-    xp, weighted = namespace(y), _by_row if is_numpy_array(y) else _by_table
-    sums, log_determinant = weighted(whitened, (y, u, v), eigenbasis)
+    xp = namespace(y)
+    sums, log_determinant = weigh(whitened, (y, u, v), eigenbasis)
     yy, uy, uu, *of_offset = sums
     if of_offset:
         # Integrate o out first; what is left of y and u is independent of it.
@@ -242,7 +250,7 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     return total
 
 
-def _by_row(
+def sums_by_row(
     whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
 ) -> tuple[list[Floats], Floats]:
     """Return the weighted sums of products, and the log determinants, each (m, scales).
@@ -265,7 +273,7 @@ def _by_row(
     return sums, log_determinants[steps]
 
 
-def _by_table(
+def sums_by_table(
     whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
 ) -> tuple[list[Floats], Floats]:
     """Return the same for arrays on any device, by products with each table."""
@@ -296,3 +304,8 @@ def _table(steps: Integers, eigenvalues: Floats, xp: Any) -> tuple[Floats, Float
     variance = 1.0 + ratios[:, None] * xp.astype(eigenvalues, xp.float64)
     log_determinants = xp.sum(xp.log(variance), axis=1)
     return xp.astype(1.0 / variance, xp.float32), xp.astype(log_determinants, xp.float32)
+
+
+WeightedSums = Callable[
+    [WhitenedResponses, tuple[Floats, Floats, Floats], Eigenbasis], tuple[list[Floats], Floats]
+]

@@ -32,10 +32,10 @@ def sums_of_products(
 
     Returns
     -------
-    ndarray, shape (3, m, S), float32
+    ndarray, shape (3, m, S), float64
         Of one squared, of the product, of the other squared.
     """
-    found = np.empty((3, *steps.shape), dtype=np.float32)
+    found = np.empty((3, *steps.shape))
     buffers = np.empty((3, one.shape[1]), dtype=np.float32)
     squares, products, others = buffers[0], buffers[1], buffers[2]
     for m in range(len(steps)):
@@ -46,7 +46,7 @@ def sums_of_products(
             others[i] = b[i] * b[i]
         for s in range(steps.shape[1]):
             weight = weights[steps[m, s]]
-            first, second, third = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+            first, second, third = 0.0, 0.0, 0.0
             for i in range(len(weight)):
                 first += weight[i] * squares[i]
                 second += weight[i] * products[i]

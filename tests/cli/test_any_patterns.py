@@ -277,3 +277,17 @@ def test_random_and_hadamard_patterns_tell_both_axes(world, tmp_path):
         off, found = _off(world, np.load(q))
         assert found.mean() > 0.9
         assert np.mean(off < 0.5) > 0.95
+
+
+def test_random_blocks_on_a_fine_screen_count_in_its_pixels(world, tmp_path):
+    pictures = random_binary(SIZE, 40)
+    shown = [np.kron(picture, np.ones((12, 20), np.uint8)) for picture in pictures]
+    patterns = write_pictures(tmp_path / "p", shown)
+    photos = write_pictures(tmp_path / "f", photograph(world, pictures))
+    check_done(_import(patterns, photos, tmp_path / "c.zarr"))
+    said = check_done(run_nearfar("correspond", tmp_path / "c.zarr", tmp_path / "q.npy")).out
+    assert "projector of 384x640" in said
+    in_blocks = (np.load(tmp_path / "q.npy") + 0.5) / [12, 20] - 0.5
+    off, found = _off(world, in_blocks)
+    assert found.mean() > 0.9
+    assert np.mean(off < 0.5) > 0.95

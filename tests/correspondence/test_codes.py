@@ -25,7 +25,7 @@ SIDE = 32
 
 
 def _levels(pictures, axis):
-    """Return what pictures of one axis show along it, (N, down, across)."""
+    """Return the levels of pictures of one axis along that axis, (N, down, across)."""
     levels = np.array(pictures, dtype=np.float32) / np.float32(255)
     return levels[:, :, :1] if axis == 0 else levels[:, :1]
 

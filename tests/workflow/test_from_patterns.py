@@ -10,7 +10,7 @@ from nearfar.capture import import_photos, open_capture, read_shown
 from nearfar.errors import InputError, PlanError
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.from_patterns import reconstruct_from_patterns
-from tests.cli.conftest import check_done, run_nearfar
+from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.shown import (
     fringes,
     gray_code,
@@ -145,6 +145,8 @@ def test_the_command_line_reconstructs_and_relights(world, tmp_path):
     relit = np.load(tmp_path / "out.npy")
     assert snr(world @ natural_picture(SIZE, 2), relit) > 30
     assert "good:" in check_done(run_nearfar("info", output)).out
+    again = check_sentence(run_nearfar("info", output, "--capture", capture))
+    assert "judged by held-out photos when it was reconstructed" in again
     answer = check_done(run_nearfar("reconstruct", capture, output, "--json", "--force")).out
     assert '"verdict": "good"' in answer
     other = tmp_path / "other.zarr"

@@ -184,16 +184,7 @@ def _from_patterns(
         quiet=quiet or as_json,
     )
     if as_json:
-        found = {
-            "verdict": verdict.grade,
-            "held_out_dB": verdict.held_out_snr,
-            "expected_dB": None,
-            "planned_dB": None,
-            "noise_dB": None,
-            "causes": list(verdict.causes),
-            "reasons": [reason.sentence for reason in verdict.reasons],
-        }
-        print(json.dumps(found))
+        print(json.dumps(verdict.as_json()))
     say(str(verdict), quiet=quiet or as_json)
 
 

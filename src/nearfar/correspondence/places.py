@@ -60,7 +60,7 @@ def is_lit(places: Places, sequences: Floats) -> Booleans:
 
 
 def typical_misfit(sequences: Floats, codes: Codes) -> float:
-    """Return what sequences typically differ from direct light's, over it.
+    """Return the typical variance of what direct light leaves of a photo, over its own power.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def typical_misfit(sequences: Floats, codes: Codes) -> float:
     Returns
     -------
     float
-        The median variance of what is left of a photo, over the power of direct light.
+        The median over the camera pixels.
     """
     places = find_places(sequences, codes, 0.0)
     misfits = (1.0 - places.explained) / np.maximum(places.explained, SAME_CODE)

@@ -12,7 +12,7 @@ from nearfar.transport.pyramid import Pyramid
 
 @dataclass(frozen=True, eq=False)
 class AnalysedLight:
-    """What camera pixels read of a light; made by `Transport.analyse`.
+    """A light, summed, blurred and transformed; made by `Transport.analyse`.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ PARTS_BACK = 2
 
 
 class BlurredLight(NamedTuple):
-    """What camera pixels read of a light of one channel.
+    """A light of one channel, summed and blurred for the lookups of camera pixels.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class BlurredLight(NamedTuple):
 
 
 def blurred_light(light: Floats, pyramid: Pyramid) -> BlurredLight:
-    """Return what camera pixels read of a light, flat or (Py, Px)."""
+    """Sum and blur a light, flat or (Py, Px), for the lookups of camera pixels."""
     square = light.reshape(pyramid.projector)
     return BlurredLight(bounds(square), summed_area(square), pyramid.levels(square))
 

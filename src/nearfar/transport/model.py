@@ -226,7 +226,7 @@ class Transport(NoArray):
         return AdjointTransport(self)
 
     def analyse(self, light: Floats) -> AnalysedLight:
-        """Return what camera pixels read of a light, to be relit by several blocks of them.
+        """Analyse a light once, to relight several blocks of camera pixels under it.
 
         Transports of other rows of the same camera take it in place of the light.
 

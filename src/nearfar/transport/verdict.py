@@ -111,6 +111,18 @@ class KeptVerdict:
         """What is wrong and what to do, for each reason; each begins with a capital."""
         return tuple(each.sentence[:1].upper() + each.sentence[1:] for each in self.reasons)
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the verdict as a mapping of JSON types, for ``nearfar reconstruct --json``."""
+        return {
+            "verdict": self.grade,
+            "held_out_dB": self.held_out_snr,
+            "expected_dB": self.expected_snr,
+            "planned_dB": None if self.planned_snr is None else list(self.planned_snr),
+            "noise_dB": self.noise_snr,
+            "causes": list(self.causes),
+            "reasons": [reason.sentence for reason in self.reasons],
+        }
+
     def __str__(self) -> str:
         return " ".join([f"{self.grade}:", *self.sentences, self.summary]).rstrip()
 

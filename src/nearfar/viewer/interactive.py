@@ -240,7 +240,7 @@ class InteractiveTransport:
             return luminance(light)
 
     def _analysed(self, transport: Transport, light: Light) -> AnalysedLight:
-        """Return what a transport's camera pixels read of a light, without its tint."""
+        """Return a light, without its tint, analysed for a transport."""
         if self._is_tinted(light):
             # Relighting once, for all channels, takes a third of the time.
             return transport.analyse(light.levels)

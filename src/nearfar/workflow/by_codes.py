@@ -77,7 +77,7 @@ class FoundCorrespondence:
     exponent: float = 1.0
 
     def warnings(self) -> list[str]:
-        """Return what is wrong with the photos, a sentence each."""
+        """Return warnings about the photos, one sentence each."""
         found = []
         lit = float(np.isfinite(self.correspondence.q).any(axis=-1).mean())
         if self.explained < FOLLOWED:

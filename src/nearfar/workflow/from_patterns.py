@@ -14,7 +14,7 @@ from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence
 from nearfar.errors import InputError
 from nearfar.estimate.any_patterns import estimate_from_patterns
-from nearfar.estimate.any_patterns.covariance import PatternModel
+from nearfar.estimate.any_patterns.covariance import PatternModel, far_band
 from nearfar.estimate.any_patterns.estimate import PatternRows
 from nearfar.plan.patterns import Shown
 from nearfar.plan.recognition.contents import Uniform
@@ -113,11 +113,11 @@ def _require_small(capture: Capture, memory: int) -> None:
             f"{capture.path} has {len(plan.patterns)} photos, and at most {MOST_PHOTOS} are "
             f"estimated from: choose an output that ends in .npy, which takes a complete set."
         )
-    values = len(plan.patterns) + plan.window**2 + 700
+    values = len(plan.patterns) + plan.window**2 + far_band(plan.projector).pixels
     needed = COPIES * 4 * capture.camera.pixels * capture.channels * values
     if needed > memory:
         raise InputError(
-            f"{capture.path} needs {needed / 1e9:.1f} GB at {capture.camera} camera pixels: allow "
+            f"{capture.path} needs {needed / 1e9:.2g} GB at {capture.camera} camera pixels: allow "
             f"it by `memory`."
         )
 

@@ -1,11 +1,12 @@
 """The codes of a capture's patterns, and the sequences of its camera pixels."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.capture import Capture
 from nearfar.correspondence.codes import Codes, prepare_codes
 from nearfar.errors import InputError
@@ -16,8 +17,8 @@ from nearfar.progress import Report
 
 # Number of the group of patterns of two levels.
 TWO_LEVELS = 2
-# Projectors of at most as many pixels are compared with pixel by pixel.
-PIXELS_OF_ALL_PATTERNS = 2**16
+# Places that camera pixels are compared with one by one, at most.
+MOST_PLACES = 2**16
 # Levels that differ by less are the same.
 SAME_LEVEL = 1e-6
 
@@ -53,6 +54,9 @@ class PatternLevels(NamedTuple):
         Levels of the first column and the first row.
     groups : ndarray of int, shape (photos,)
         Patterns of one number share an offset and a direct light.
+    whole : WholePatterns or None
+        All levels, if some patterns differ along both axes and there are few enough places to
+        compare camera pixels with each.
     """
 
     has_colours: bool
@@ -60,6 +64,22 @@ class PatternLevels(NamedTuple):
     rows: Floats
     columns: Floats
     groups: Integers
+    whole: "WholePatterns | None"
+
+
+class WholePatterns(NamedTuple):
+    """The levels of all patterns, once for each run of rows and columns that show the same.
+
+    Attributes
+    ----------
+    levels : ndarray, shape (photos, rows, columns)
+    rows, columns : ndarray of int
+        First row and column of each run.
+    """
+
+    levels: Floats
+    rows: Integers
+    columns: Integers
 
 
 class Telling(NamedTuple):
@@ -71,10 +91,11 @@ class Telling(NamedTuple):
 
 
 def read_levels(capture: Capture, progress: Report) -> PatternLevels:
-    """Read all patterns once, one after the other, and keep what those of one axis show."""
-    shown = capture.shown
+    """Read all patterns, one after the other."""
+    shown, projector = capture.shown, capture.plan.projector
     has_colours = shown is not None and shown.ndim == 4 and capture.channels == 3
     along, rows, columns, groups = [], [], [], []
+    changes = tuple(np.zeros(side, dtype=bool) for side in projector)
     count = len(capture.plan.patterns)
     for number in range(count):
         for level in _levels(capture, number, has_colours=has_colours):
@@ -82,9 +103,26 @@ def read_levels(capture: Capture, progress: Report) -> PatternLevels:
             rows.append(level[:, 0])
             columns.append(level[0])
             groups.append(_group(capture.plan.patterns[number]))
+            for axis, change in enumerate(changes):
+                moved = np.abs(np.diff(level, axis=axis)) > SAME_LEVEL
+                change[1:] |= moved.any(axis=1 - axis)
         progress("patterns", (number + 1) / count)
+    whole = None
+    lines = [np.flatnonzero(change | (np.arange(len(change)) == 0)) for change in changes]
+    if np.array(along).all(axis=1).any() and len(lines[0]) * len(lines[1]) <= MOST_PLACES:
+        whole = WholePatterns(_thinned(capture, lines, has_colours=has_colours), *lines)
     return PatternLevels(
-        has_colours, np.array(along), np.array(rows), np.array(columns), np.array(groups)
+        has_colours, np.array(along), np.array(rows), np.array(columns), np.array(groups), whole
+    )
+
+
+def _thinned(capture: Capture, lines: Sequence[Integers], *, has_colours: bool) -> Floats:
+    """Return all levels at some rows and columns, (photos, rows, columns)."""
+    return np.concatenate(
+        [
+            _levels(capture, number, has_colours=has_colours)[:, lines[0][:, None], lines[1]]
+            for number in range(len(capture.plan.patterns))
+        ]
     )
 
 
@@ -109,8 +147,7 @@ def find_telling(
 ) -> list[Telling]:
     """Return the photos that tell each axis by themselves, or all, which tell both.
 
-    On a small projector all are used as soon as some differ along both axes. On a large one they
-    are only where the others do not tell both axes.
+    All are used as soon as some differ along both axes, if there are few enough places.
 
     The patterns are taken as the display shows them.
 
@@ -119,9 +156,8 @@ def find_telling(
     InputError
         If there are none.
     """
-    has_both = bool(patterns.along.all(axis=1).any())
-    if has_both and capture.plan.projector.pixels <= PIXELS_OF_ALL_PATTERNS:
-        return [_telling_both(capture, patterns, display)]
+    if patterns.whole is not None:
+        return [_telling_both(capture.plan.projector, patterns, patterns.whole, display)]
     found: list[Telling] = []
     reasons: list[str] = []
     for axis, lines in enumerate((patterns.rows, patterns.columns)):
@@ -137,23 +173,31 @@ def find_telling(
                 )
             except InputError as error:
                 reasons.append(str(error))
-    if len(found) < 2 and has_both:
-        return [_telling_both(capture, patterns, display)]
+    if len(found) < 2 and patterns.along.all(axis=1).any():
+        raise InputError(
+            f"patterns of {capture.plan.projector} that differ along both axes are too many to "
+            f"compare every camera pixel with: give patterns of larger blocks, or Gray code or "
+            f"fringes of rows and of columns."
+        )
     if not found:
         raise InputError(reasons[0] if reasons else "all patterns are the same everywhere.")
     return found
 
 
-def _telling_both(capture: Capture, patterns: PatternLevels, display: Display) -> Telling:
+def _telling_both(
+    projector: Size, patterns: PatternLevels, whole: "WholePatterns", display: Display
+) -> Telling:
     """Return all photos, which tell both axes together."""
-    every = np.concatenate(
-        [
-            _levels(capture, number, has_colours=patterns.has_colours)
-            for number in range(len(capture.plan.patterns))
-        ]
-    )
-    every = _displayed(every, patterns.groups, display)
-    return Telling((0, 1), np.arange(len(every)), prepare_codes(every, patterns.groups))
+    lines = (whole.rows, whole.columns)
+    levels = whole.levels
+    if levels.shape[1:] != projector:
+        # Blocks of several pixels are wider than any blur that is tried.
+        display = display._replace(blur=0.0)
+    codes = prepare_codes(_displayed(levels, patterns.groups, display), patterns.groups)
+    ends = (np.append(first[1:], side) for first, side in zip(lines, projector, strict=True))
+    down, across = (0.5 * (a + b - 1) for a, b in zip(lines, ends, strict=True))
+    codes = codes._replace(places=(down, across))
+    return Telling((0, 1), np.arange(len(levels)), codes)
 
 
 def _displayed(levels: Floats, groups: Integers, display: Display) -> Floats:

@@ -56,11 +56,15 @@ class PatternModel:
     of_far: Floats
 
 
+def far_band(projector: Size) -> Size:
+    """Return the band of frequencies that far-range light is kept at: one value for each."""
+    side = FAR_SIDE if projector.pixels > PIXELS_OF_ALL_FREQUENCIES else max(projector)
+    return Size(*(min(side, length) for length in projector))
+
+
 def pattern_model(patterns: Floats, projector: Size, window: int) -> PatternModel:
     """Return the model of photos of patterns (N, P)."""
-    side = FAR_SIDE if projector.pixels > PIXELS_OF_ALL_FREQUENCIES else max(projector)
-    band = Size(*(min(side, length) for length in projector))
-    basis = real_basis(representatives(far_frequencies(band, projector)), projector)
+    basis = real_basis(representatives(far_frequencies(far_band(projector), projector)), projector)
     drawn = basis.patterns * basis.weights.astype(np.float32)[:, None]
     of_far = patterns.astype(np.float32) @ drawn.T
     return PatternModel(patterns.astype(np.float32), projector, window, basis, of_far)

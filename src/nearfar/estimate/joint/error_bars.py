@@ -80,7 +80,8 @@ class ErrorBars:
     def __init__(self, transport: Transport) -> None:
         if transport.posterior is None:
             raise InputError(
-                "this transport holds no error bars: reconstruct the capture with `method='joint'`."
+                "this transport holds no error bars: reconstruct a capture of a plan of "
+                "nearfar's own with `method='joint'`."
             )
         self._transport = transport
         self._posterior: Posterior = transport.posterior

@@ -58,7 +58,7 @@ def plan_of_pictures(recognised: Recognised, read: Callable[[int], NDArray[Any]]
 
 
 def recognised_in(plan: Plan) -> Recognised:
-    """Return what the pictures of a plan with offset "shown" were recognised as."""
+    """Return the recognised contents of a plan with offset "shown"."""
     shown = [pattern for pattern in plan.patterns if isinstance(pattern, Shown)]
     return Recognised(
         plan.projector,

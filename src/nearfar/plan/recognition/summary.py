@@ -44,7 +44,7 @@ def summarise(recognised: Recognised) -> list[str]:
 
 
 def _group(content: Content) -> tuple[str, ...]:
-    """Return what pictures of one group share."""
+    """Return the group of a picture: kind, and axis, direction or level where these matter."""
     match content:
         case Fringes():
             return (content.kind, content.direction if not content.fy or not content.fx else "")

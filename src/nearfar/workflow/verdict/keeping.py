@@ -79,6 +79,11 @@ def _require_origin(stored: StoredTransport, capture: Capture) -> None:
         )
     if why := why_unjudgeable(stored.provenance):
         raise InputError(f"{stored.path} {why}")
+    if capture.plan.offset == "shown":
+        raise InputError(
+            f"{stored.path} is of somebody else's patterns, and was judged by held-out photos when "
+            f"it was reconstructed: reconstruct the capture again to judge it anew."
+        )
     of_transport: dict[str, Any] = {
         "projector": stored.projector,
         "channels": stored.channels,

@@ -131,16 +131,7 @@ class Verdict:
 
     def as_json(self) -> dict[str, Any]:
         """Return the verdict as a mapping of JSON types, for ``nearfar reconstruct --json``."""
-        kept = self.kept
-        return {
-            "verdict": self.grade,
-            "held_out_dB": kept.held_out_snr,
-            "expected_dB": kept.expected_snr,
-            "planned_dB": None if kept.planned_snr is None else list(kept.planned_snr),
-            "noise_dB": kept.noise_snr,
-            "causes": list(kept.causes),
-            "reasons": [reason.sentence for reason in self.reasons],
-        }
+        return self.kept.as_json()
 
     def __str__(self) -> str:
         return str(self.kept)

@@ -92,11 +92,9 @@ function toneOfLevels(share) {
 
 // Draws a light's levels, or those that changed if the canvas shows the others, { top, left, bottom, right }.
 export function drawLight(canvas, { height, width, everything, channels, values }, colour, changed) {
-  if (canvas.width !== width || canvas.height !== height) {
-    Object.assign(canvas, { width, height });
-    changed = null;
-  }
-  const { top, left, bottom, right } = changed || everything;
+  const isNew = canvas.width !== width || canvas.height !== height;
+  if (isNew) Object.assign(canvas, { width, height });
+  const { top, left, bottom, right } = !isNew && changed || everything;
   if (top >= bottom || left >= right) return;
   const pen = canvas.getContext('2d', { willReadFrequently: true });
   const image = pen.createImageData(right - left, bottom - top), out = image.data;

@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from nearfar.arrays import Floats, Size
+from nearfar.capture import Capture, import_photos, open_capture, read_shown
 from nearfar.files.codecs import encode_png
 from nearfar.illumination import patterns
 from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.scenes.cache import cached_scene
 from nearfar.transport.exact import ExactTransport
 
 
@@ -71,6 +73,12 @@ def white_and_black(size: Size):
     return [np.full(size, 255, np.uint8), np.zeros(size, np.uint8)]
 
 
+def cornell(projector: Size, camera: Size) -> ExactTransport:
+    """Return the box, nowhere brighter under white than 0.9 of the camera's full scale."""
+    found = cached_scene("cornell", projector, camera)
+    return found * (0.9 / (found @ np.ones(projector, dtype=np.float32)).max())
+
+
 def photograph(world: ExactTransport, pictures, *, noise: bool = True) -> Iterator[Floats]:
     """Yield photos of pictures, 14 bits of a simulated camera with its black level."""
     camera, generator = SimulatedCamera(), np.random.default_rng(1)
@@ -87,3 +95,14 @@ def write_pictures(folder: Path, pictures, name="p") -> Path:
     for number, picture in enumerate(pictures):
         (folder / f"{name}{number}.png").write_bytes(encode_png(np.squeeze(picture)))
     return folder
+
+
+def captured(world: ExactTransport, pictures, folder: Path, *, shown=None, noise=True) -> Capture:
+    """Return a capture of pictures, which were shown as others on a finer screen, perhaps."""
+    patterns = write_pictures(folder / "patterns", pictures if shown is None else shown)
+    taken = write_pictures(folder / "photos", photograph(world, pictures, noise=noise))
+    found = read_shown(patterns)
+    paths = [taken / f"p{number}.png" for number in range(len(pictures))]
+    scale = 16383 if noise else 65535
+    import_photos(found.plan, paths, folder / "c.zarr", full_scale=scale, shown=found)
+    return open_capture(folder / "c.zarr")

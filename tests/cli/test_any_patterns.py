@@ -8,9 +8,9 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
 from nearfar.plan import paper_plan
-from nearfar.scenes.cache import cached_scene
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.shown import (
+    cornell,
     fringes,
     gray_code,
     hadamard,
@@ -27,8 +27,7 @@ CAMERA = Size(40, 36)
 
 @pytest.fixture(scope="module")
 def world():
-    found = cached_scene("cornell", SIZE, CAMERA)
-    return found * (0.9 / (found @ np.ones(SIZE, dtype=np.float32)).max())
+    return cornell(SIZE, CAMERA)
 
 
 @pytest.fixture(scope="module")

@@ -4,18 +4,16 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.capture import import_photos, open_capture, read_shown
 from nearfar.errors import InputError
-from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.complete_sets import write_complete
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.shown import (
+    captured,
+    cornell,
     hadamard,
-    photograph,
     random_binary,
     single_pixels,
     white_and_black,
-    write_pictures,
 )
 
 SIZE = Size(8, 8)
@@ -25,19 +23,7 @@ BLACK = [np.zeros(SIZE, np.uint8)]
 
 @pytest.fixture(scope="module")
 def world():
-    found = cached_scene("cornell", SIZE, CAMERA)
-    return found * (0.9 / (found @ np.ones(SIZE, dtype=np.float32)).max())
-
-
-def _capture(world, pictures, folder, shown=None, *, noise=False):
-    """Return a capture of pictures, which were shown as others on a finer screen, perhaps."""
-    patterns = write_pictures(folder / "p", pictures if shown is None else shown)
-    write_pictures(folder / "f", photograph(world, pictures, noise=noise))
-    found = read_shown(patterns)
-    paths = [folder / "f" / f"p{number}.png" for number in range(len(pictures))]
-    scale = 16383 if noise else 65535
-    import_photos(found.plan, paths, folder / "c.zarr", full_scale=scale, shown=found)
-    return open_capture(folder / "c.zarr")
+    return cornell(SIZE, CAMERA)
 
 
 def _truth(world):
@@ -53,7 +39,7 @@ SETS = {
 
 @pytest.mark.parametrize("name", SETS)
 def test_a_complete_set_gives_t_exactly_without_noise(world, name, tmp_path):
-    capture = _capture(world, SETS[name](), tmp_path)
+    capture = captured(world, SETS[name](), tmp_path, noise=False)
     written = write_complete(capture, tmp_path / "T.npy")
     found = np.load(tmp_path / "T.npy").reshape(CAMERA.pixels, SIZE.pixels, -1)
     truth = _truth(world)
@@ -67,7 +53,7 @@ def test_the_noise_gain_is_that_of_the_entries(world, tmp_path):
     gains = []
     for name in ("one light at a time", "Hadamard"):
         folder = tmp_path / name
-        capture = _capture(world, SETS[name](), folder, noise=True)
+        capture = captured(world, SETS[name](), folder)
         written = write_complete(capture, folder / "T.npy")
         off = np.load(folder / "T.npy").reshape(CAMERA.pixels, SIZE.pixels, -1) - _truth(world)
         read_noise = np.hypot(4 / 30_000, 12**-0.5 / 16383)
@@ -80,7 +66,7 @@ def test_the_noise_gain_is_that_of_the_entries(world, tmp_path):
 def test_patterns_of_blocks_are_solved_on_their_own_grid(world, tmp_path):
     pictures = SETS["one light at a time"]()
     shown = [np.kron(picture, np.ones((3, 5), np.uint8)) for picture in pictures]
-    capture = _capture(world, pictures, tmp_path, shown)
+    capture = captured(world, pictures, tmp_path, shown=shown, noise=False)
     assert capture.plan.projector == Size(24, 40)
     written = write_complete(capture, tmp_path / "T.npy")
     assert written.grid == SIZE
@@ -96,14 +82,14 @@ def test_patterns_of_blocks_are_solved_on_their_own_grid(world, tmp_path):
     ],
 )
 def test_sets_that_are_not_complete_are_refused(world, pictures, words, tmp_path):
-    capture = _capture(world, pictures, tmp_path)
+    capture = captured(world, pictures, tmp_path, noise=False)
     with pytest.raises(InputError, match=words):
         write_complete(capture, tmp_path / "T.npy")
     assert not (tmp_path / "T.npy").exists()
 
 
 def test_the_command_line_writes_a_t_that_other_commands_take(world, tmp_path):
-    _capture(world, SETS["one light at a time"](), tmp_path / "a")
+    captured(world, SETS["one light at a time"](), tmp_path / "a", noise=False)
     said = check_done(run_nearfar("reconstruct", tmp_path / "a" / "c.zarr", tmp_path / "T.npy"))
     assert "T of 9 x 7 x 8 x 8 x 3 written to" in said.out
     check_done(run_nearfar("info", tmp_path / "T.npy"))
@@ -111,7 +97,7 @@ def test_the_command_line_writes_a_t_that_other_commands_take(world, tmp_path):
     assert check.status == 0
     again = run_nearfar("reconstruct", tmp_path / "a" / "c.zarr", tmp_path / "T.npy")
     assert "exists already" in check_sentence(again)
-    _capture(world, single_pixels(SIZE), tmp_path / "b")
+    captured(world, single_pixels(SIZE), tmp_path / "b", noise=False)
     ran = run_nearfar("reconstruct", tmp_path / "b" / "c.zarr", tmp_path / "U.npy")
     assert ran.status == 0
     assert "black was taken as 0" in ran.err

@@ -6,20 +6,18 @@ import pytest
 import nearfar
 from nearfar import natural_picture, snr
 from nearfar.arrays import Size
-from nearfar.capture import import_photos, open_capture, read_shown
 from nearfar.errors import InputError, PlanError
-from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.from_patterns import reconstruct_from_patterns
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.shown import (
+    captured,
+    cornell,
     fringes,
     gray_code,
     hadamard,
-    photograph,
     random_binary,
     white_and_black,
     with_inverses,
-    write_pictures,
 )
 
 SIZE = Size(8, 16)
@@ -28,19 +26,7 @@ CAMERA = Size(9, 12)
 
 @pytest.fixture(scope="module")
 def world():
-    found = cached_scene("cornell", SIZE, CAMERA)
-    return found * (0.9 / (found @ np.ones(SIZE, dtype=np.float32)).max())
-
-
-def _capture(world, pictures, folder, *, noise=True):
-    patterns = write_pictures(folder / "patterns", pictures)
-    photos = list(photograph(world, pictures, noise=noise))
-    taken = write_pictures(folder / "photos", photos)
-    shown = read_shown(patterns)
-    paths = sorted(taken.iterdir(), key=lambda path: int(path.stem[1:]))
-    full_scale = 16383 if noise else 65535
-    import_photos(shown.plan, paths, folder / "c.zarr", full_scale=full_scale, shown=shown)
-    return open_capture(folder / "c.zarr")
+    return cornell(SIZE, CAMERA)
 
 
 def _decibels(world, transport):
@@ -66,7 +52,7 @@ SETS = {
 
 @pytest.mark.parametrize("name", SETS)
 def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
-    capture = _capture(world, SETS[name](), tmp_path)
+    capture = captured(world, SETS[name](), tmp_path)
     transport = reconstruct_from_patterns(capture)
     pictures, _ = _decibels(world, transport)
     assert pictures > 33
@@ -78,7 +64,7 @@ def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
 
 
 def test_python_reconstructs_as_any_capture(world, tmp_path):
-    capture = _capture(world, SETS["random"](), tmp_path)
+    capture = captured(world, SETS["random"](), tmp_path)
     transport, correspondence = nearfar.reconstruct(capture)
     assert _decibels(world, transport)[0] > 33
     np.testing.assert_array_equal(correspondence.q, transport.correspondence)
@@ -89,7 +75,7 @@ def test_python_reconstructs_as_any_capture(world, tmp_path):
 
 
 def test_held_out_photos_tell_how_well_such_patterns_are_relit(world, tmp_path):
-    capture = _capture(world, SETS["random"](), tmp_path)
+    capture = captured(world, SETS["random"](), tmp_path)
     transport = reconstruct_from_patterns(capture)
     lights = np.random.default_rng(9).random((5, *SIZE)) < 0.5
     true = [snr(world @ light, transport @ light) for light in lights.astype(np.float32)]
@@ -100,7 +86,7 @@ def test_more_photos_are_better_and_photos_without_noise_better_still(world, tmp
     found = []
     for number, noise in ((30, True), (80, True), (80, False)):
         pictures = [*random_binary(SIZE, number), *white_and_black(SIZE)]
-        capture = _capture(world, pictures, tmp_path / f"{number}{noise}", noise=noise)
+        capture = captured(world, pictures, tmp_path / f"{number}{noise}", noise=noise)
         found.append(_decibels(world, reconstruct_from_patterns(capture)))
     assert found[0][0] < found[1][0] < found[2][0]
     assert found[0][1] < found[1][1] < found[2][1]
@@ -108,9 +94,9 @@ def test_more_photos_are_better_and_photos_without_noise_better_still(world, tmp
 
 def test_neither_gain_nor_offset_of_the_patterns_matters(world, tmp_path):
     pictures = SETS["random"]()
-    plain = reconstruct_from_patterns(_capture(world, pictures, tmp_path / "a", noise=False))
+    plain = reconstruct_from_patterns(captured(world, pictures, tmp_path / "a", noise=False))
     dim = [np.rint(25.5 + 0.8 * picture).astype(np.uint8) for picture in pictures]
-    found = reconstruct_from_patterns(_capture(world, dim, tmp_path / "b", noise=False))
+    found = reconstruct_from_patterns(captured(world, dim, tmp_path / "b", noise=False))
     light = natural_picture(SIZE, 1)
     assert snr(plain @ light, found @ light) > 30
 
@@ -118,17 +104,13 @@ def test_neither_gain_nor_offset_of_the_patterns_matters(world, tmp_path):
 def test_photos_of_other_scenes_are_wrong(world, tmp_path):
     pictures = SETS["random"]()
     shuffled = [pictures[i] for i in np.random.default_rng(0).permutation(len(pictures) - 2)]
-    patterns = write_pictures(tmp_path / "p", pictures)
-    photos = write_pictures(tmp_path / "f", photograph(world, [*shuffled, *white_and_black(SIZE)]))
-    shown = read_shown(patterns)
-    paths = sorted(photos.iterdir(), key=lambda path: int(path.stem[1:]))
-    import_photos(shown.plan, paths, tmp_path / "c.zarr", full_scale=16383, shown=shown)
-    transport = reconstruct_from_patterns(open_capture(tmp_path / "c.zarr"))
+    taken = [*shuffled, *white_and_black(SIZE)]
+    transport = reconstruct_from_patterns(captured(world, taken, tmp_path, shown=pictures))
     assert transport.verdict.grade != "good"
 
 
 def test_what_cannot_be_estimated_is_refused(world, tmp_path):
-    capture = _capture(world, fringes(SIZE, 1, [16, 4], 4), tmp_path / "a")
+    capture = captured(world, fringes(SIZE, 1, [16, 4], 4), tmp_path / "a")
     with pytest.raises(InputError, match="tell no rows apart"):
         reconstruct_from_patterns(capture)
     with pytest.raises(InputError, match=r"needs .* GB"):
@@ -136,7 +118,7 @@ def test_what_cannot_be_estimated_is_refused(world, tmp_path):
 
 
 def test_the_command_line_reconstructs_and_relights(world, tmp_path):
-    _capture(world, SETS["random"](), tmp_path)
+    captured(world, SETS["random"](), tmp_path)
     capture, output = tmp_path / "c.zarr", tmp_path / "t.zarr"
     said = check_done(run_nearfar("reconstruct", capture, output)).out
     assert "good: Relit patterns like those shown are off by" in said

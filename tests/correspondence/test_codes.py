@@ -32,7 +32,7 @@ def _levels(pictures, axis):
 
 def _codes(pictures, axis, groups=None):
     groups = np.zeros(len(pictures), dtype=int) if groups is None else np.array(groups)
-    return prepare_codes(_levels(pictures, axis), groups)
+    return [prepare_codes(_levels(pictures, axis), groups)]
 
 
 @pytest.fixture(scope="module", params=["cornell", "cornell-aside", "shelf"])
@@ -73,7 +73,7 @@ def test_random_codes_tell_both_axes(world):
     pictures = random_binary(SIZE, 60)
     photos = np.array([photo.mean(axis=-1) for photo in photograph(world, pictures)])
     sequences = photos.reshape(len(photos), -1).T.astype(np.float64)
-    codes = prepare_codes(np.array(pictures) / np.float32(255), np.zeros(60, dtype=int))
+    codes = [prepare_codes(np.array(pictures) / np.float32(255), np.zeros(60, dtype=int))]
     found = find_places(sequences, codes, typical_misfit(sequences, codes))
     sure, lit = is_lit(found, sequences), world.lit.ravel()
     off = np.abs(found.place - world.correspondence.reshape(-1, 2)).max(axis=1)

@@ -70,6 +70,12 @@ class Codes(NamedTuple):
     reach: tuple[int, int]
 
     @property
+    def steps(self) -> tuple[float, float]:
+        """Projector pixels from a place to the next, down and across, at most."""
+        down, across = (np.diff(axis).max(initial=1.0) for axis in self.places)
+        return float(down), float(across)
+
+    @property
     def degrees(self) -> int:
         """Photos beyond those that offsets, places and the groups' d take."""
         return max(0, sum(len(each) for each in self.whitening) - 1 - len(self.whitening))

@@ -1,6 +1,6 @@
 """Whether photos follow their patterns, and if not, which order of them would."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,13 +33,13 @@ class PhotoOrder(NamedTuple):
     description: str
 
 
-def explained_share(sequences: Floats, codes: Codes) -> float:
+def explained_share(sequences: Floats, codes: Sequence[Codes]) -> float:
     """Return the median share that direct light explains, of camera pixels that change most.
 
     Parameters
     ----------
     sequences : ndarray, shape (C, N)
-    codes : Codes
+    codes : sequence of Codes
 
     Returns
     -------
@@ -48,7 +48,7 @@ def explained_share(sequences: Floats, codes: Codes) -> float:
     return float(np.median(find_places(_changing(sequences), codes, 0.0).explained))
 
 
-def unexplained_share(sequences: Floats, codes: Codes) -> float:
+def unexplained_share(sequences: Floats, codes: Sequence[Codes]) -> float:
     """Return the mean share that direct light leaves, of camera pixels that change most.
 
     Other than the median, it tells of the edges of stripes.
@@ -61,7 +61,9 @@ def _changing(sequences: Floats) -> Floats:
     return np.asarray(sequences[changes >= np.quantile(changes, 1 - CHANGING_SHARE)])
 
 
-def find_order(sequences: Floats, photos: Integers, codes: Codes, count: int) -> PhotoOrder | None:
+def find_order(
+    sequences: Floats, photos: Integers, codes: Sequence[Codes], count: int
+) -> PhotoOrder | None:
     """Find an order in which photos follow their patterns, where they do not as they are.
 
     Parameters
@@ -70,7 +72,7 @@ def find_order(sequences: Floats, photos: Integers, codes: Codes, count: int) ->
         Of all photos.
     photos : ndarray of int
         Those that the codes are of.
-    codes : Codes
+    codes : sequence of Codes
     count : int
         Number of photos.
 

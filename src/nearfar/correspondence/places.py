@@ -59,14 +59,15 @@ def is_lit(places: Places, sequences: Floats) -> Booleans:
     return found
 
 
-def typical_misfit(sequences: Floats, codes: Codes) -> float:
+def typical_misfit(sequences: Floats, codes: Sequence[Codes]) -> float:
     """Return the typical variance of what direct light leaves of a photo, over its own power.
 
     Parameters
     ----------
     sequences : ndarray, shape (C, N)
         Of camera pixels all over the camera; some thousand tell enough.
-    codes : Codes
+    codes : sequence of Codes
+        As `find_places` takes them.
 
     Returns
     -------
@@ -75,17 +76,19 @@ def typical_misfit(sequences: Floats, codes: Codes) -> float:
     """
     places = find_places(sequences, codes, 0.0)
     misfits = (1.0 - places.explained) / np.maximum(places.explained, SAME_CODE)
-    return float(np.median(misfits) / max(1, codes.degrees))
+    return float(np.median(misfits) / max(1, codes[0].degrees))
 
 
-def find_places(sequences: Floats, codes: Codes, misfit: float) -> Places:
+def find_places(sequences: Floats, codes: Sequence[Codes], misfit: float) -> Places:
     """Find the place whose code explains each camera pixel's sequence best.
 
     Parameters
     ----------
     sequences : ndarray, shape (C, N)
         Photos' values; the last axis in the order of the patterns.
-    codes : Codes
+    codes : sequence of Codes
+        The same patterns, as camera pixels with footprints of different widths see them. Each
+        camera pixel has the width that explains its sequence best.
     misfit : float
         That of `typical_misfit`.
 
@@ -93,21 +96,68 @@ def find_places(sequences: Floats, codes: Codes, misfit: float) -> Places:
     -------
     Places
     """
-    count = len(sequences)
+    count, largest = len(sequences), max(each.grid.pixels for each in codes)
     found = Places(np.zeros((count, 2)), *(np.zeros(count) for _ in range(3)))
 
     def work(block: slice) -> None:
-        whitened = [sequences[block] @ matrix.T for matrix in codes.whitening]
-        mine = _places(whitened, codes, misfit)
+        compared = [_compare(sequences[block], each) for each in codes]
+        mine = _surest(compared, codes, misfit)
         for all_of, part in zip(found, mine, strict=True):
             all_of[block] = part
 
-    side_by_side(work, blocks(count, max(64, SCORES_AT_ONCE // codes.grid.pixels // 4)))
+    side_by_side(work, blocks(count, max(64, SCORES_AT_ONCE // largest // 4)))
     return found
 
 
-def _places(whitened: Sequence[Floats], codes: Codes, misfit: float) -> Places:
-    count, (height, width) = len(whitened[0]), codes.grid
+class _Compared(NamedTuple):
+    """Camera pixels, compared with the codes of one width of their footprints.
+
+    Attributes
+    ----------
+    place : ndarray, shape (C, 2)
+        The best place, in projector pixels.
+    explained : ndarray, shape (C,)
+        Share of the power of a sequence that it explains.
+    runner_up : ndarray, shape (C,)
+        Share that the best place with another code explains.
+    light : ndarray, shape (C,)
+    """
+
+    place: Floats
+    explained: Floats
+    runner_up: Floats
+    light: Floats
+
+
+def _surest(compared: Sequence[_Compared], codes: Sequence[Codes], misfit: float) -> Places:
+    """Choose the width of each camera pixel, and say how sure its place is."""
+    number = np.arange(len(compared[0].explained))
+    shares = np.stack([each.explained for each in compared])
+    chosen = shares.argmax(axis=0)
+    best = shares[chosen, number]
+    place = np.stack([each.place for each in compared])[chosen, number]
+    second = np.zeros(len(number))
+    for each, its in zip(compared, codes, strict=True):
+        reach = [side * step for side, step in zip(its.reach, its.steps, strict=True)]
+        is_elsewhere = (np.abs(each.place - place) > reach).any(axis=1)
+        second = np.maximum(second, np.where(is_elsewhere, each.explained, each.runner_up))
+    # The noise being unknown, the likelihood of a place is a power of what it leaves.
+    degrees = codes[0].degrees + PHOTOS_OF_TYPICAL
+    expected = PHOTOS_OF_TYPICAL * misfit * best + SAME_CODE
+    odds = (1.0 - second + expected) / (np.maximum(1.0 - best, 0.0) + expected)
+    log_odds = 0.5 * degrees * np.log(np.maximum(odds, SAME_CODE)) - np.log(codes[0].grid.pixels)
+    return Places(
+        place=place,
+        confidence=1.0 / (1.0 + np.exp(-np.clip(log_odds, -50, 50))) * (best > 0),
+        explained=best,
+        light=np.stack([each.light for each in compared])[chosen, number],
+    )
+
+
+def _compare(sequences: Floats, codes: Codes) -> _Compared:
+    """Compare camera pixels with all places, and refine the best ones."""
+    whitened = [sequences @ matrix.T for matrix in codes.whitening]
+    count, (height, width) = len(sequences), codes.grid
     number = np.arange(count)
     scores = np.zeros((count, height * width), dtype=np.float32)
     for mine, unit in zip(whitened, codes.unit, strict=True):
@@ -123,25 +173,18 @@ def _places(whitened: Sequence[Floats], codes: Codes, misfit: float) -> Places:
         np.copyto(shaped, 0.0, where=is_near_y[:, :, None] & is_near_x[:, None, :])
     explained = np.stack([each.explained for each in candidates])
     order = np.argsort(-explained, axis=0, kind="stable")
-    best, second = explained[order[0], number], explained[order[1], number]
     power = sum(np.einsum("cn,cn->c", each, each).astype(np.float64) for each in whitened)
-    power = np.maximum(power, np.finfo(np.float32).tiny)
-    # The noise being unknown, the likelihood of a place is a power of what it leaves.
-    degrees = codes.degrees + PHOTOS_OF_TYPICAL
-    expected = PHOTOS_OF_TYPICAL * misfit * best + SAME_CODE * power
-    odds = (power - second + expected) / (np.maximum(power - best, 0.0) + expected)
-    log_odds = 0.5 * degrees * np.log(np.maximum(odds, SAME_CODE)) - np.log(codes.grid.pixels)
+    explained /= np.maximum(power, np.finfo(np.float32).tiny)
     place = np.stack([each.place for each in candidates])[order[0], number]
     in_pixels = [
         np.interp(place[:, axis], np.arange(codes.grid[axis]), codes.places[axis])
         for axis in (0, 1)
     ]
-    light = np.stack([each.light for each in candidates])[order[0], number]
-    return Places(
-        place=np.stack(in_pixels, axis=1),
-        confidence=1.0 / (1.0 + np.exp(-np.clip(log_odds, -50, 50))) * (best > 0),
-        explained=best / power,
-        light=light,
+    return _Compared(
+        np.stack(in_pixels, axis=1),
+        explained[order[0], number],
+        explained[order[1], number],
+        np.stack([each.light for each in candidates])[order[0], number],
     )
 
 

@@ -1,6 +1,6 @@
 """Correspondence from a capture of any patterns, by the code of each projector pixel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +21,8 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.workflow.pattern_codes import (
     AS_IN_THE_FILE,
     TWO_LEVELS,
-    Display,
     PatternLevels,
+    Seen,
     Telling,
     find_telling,
     read_levels,
@@ -43,8 +43,15 @@ AXES = ("rows", "columns")
 FITTED_PIXELS = 4096
 CLEARLY_BETTER = 0.8
 LEAST_OCTAVES = 0.1
-# Standard deviations of blur that are tried, in projector pixels.
-BLURS = (0.5, 1.0, 2.0, 4.0)
+# Footprints of camera pixels that are tried: from this size in projector pixels on, each so much
+# larger than the one before, up to this share of a side of the projector; they end where so much
+# more is left unexplained than by the best.
+SMALLEST_FOOTPRINT = 2**0.5
+FOOTPRINT_STEP = 2**0.5
+LARGEST_FOOTPRINT = 1 / 8
+CLEARLY_WORSE = 1.5
+# Steps by which footprints of single camera pixels are smaller and larger than the typical one.
+OTHER_FOOTPRINTS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +140,9 @@ def correspond_by_codes(
     telling = find_telling(capture, patterns)
     height, width = capture.camera
     sample = read_sequences(capture, patterns, slice(None, None, max(1, height // SAMPLE_ROWS)))
-    display = _fit_display(capture, patterns, sample)
-    if display != AS_IN_THE_FILE:
-        telling = find_telling(capture, patterns, display)
+    seen = _fit_seen(capture, patterns, sample)
+    if seen != AS_IN_THE_FILE:
+        telling = find_telling(capture, patterns, seen)
     misfits = [typical_misfit(sample[:, each.photos], each.codes) for each in telling]
     explained = min(explained_share(sample[:, each.photos], each.codes) for each in telling)
     order = None
@@ -155,35 +162,60 @@ def correspond_by_codes(
         np.concatenate(places),
         explained,
         order,
-        display.exponent,
+        seen.exponent,
     )
 
 
-def _fit_display(capture: Capture, patterns: PatternLevels, sample: Floats) -> Display:
-    """Return the power and the blur of the patterns that direct light explains photos best by.
+def _fit_seen(capture: Capture, patterns: PatternLevels, sample: Floats) -> Seen:
+    """Return the power and the footprints with which direct light explains photos best.
 
-    Each is kept as in the file where no other is clearly better.
+    The power is kept as in the file where no other is clearly better.
     """
     chosen = np.random.default_rng(0).permutation(len(sample))[:FITTED_PIXELS]
     some = sample[chosen]
 
-    def unexplained(display: Display) -> float:
-        telling = find_telling(capture, patterns, display)
+    def unexplained(seen: Seen) -> float:
+        telling = find_telling(capture, patterns, seen)
         return sum(unexplained_share(some[:, each.photos], each.codes) for each in telling)
 
     best, least = AS_IN_THE_FILE, unexplained(AS_IN_THE_FILE)
     if (patterns.groups != TWO_LEVELS).any():
         found = minimize_scalar(
-            lambda octaves: unexplained(Display(2.0**octaves, 0.0)),
+            lambda octaves: unexplained(Seen(2.0**octaves)),
             bounds=(-2.0, 2.0),
             method="bounded",
             options={"xatol": 0.02},
         )
         if found.fun < CLEARLY_BETTER * least and abs(found.x) > LEAST_OCTAVES:
-            best, least = Display(float(2.0**found.x), 0.0), found.fun
-    blurs = {blur: unexplained(best._replace(blur=blur)) for blur in BLURS}
-    blur = min(blurs, key=lambda each: blurs[each])
-    return best._replace(blur=blur) if blurs[blur] < CLEARLY_BETTER * least else best
+            best = Seen(float(2.0**found.x))
+    height, width = capture.plan.projector
+    best = _typical(lambda size: best._replace(heights=(size,)), height, unexplained)
+    best = _typical(lambda size: best._replace(widths=(size,)), width, unexplained)
+    return best._replace(heights=_about(best.heights[0]), widths=_about(best.widths[0]))
+
+
+def _typical(
+    seen_by: Callable[[float], Seen], side: int, unexplained: Callable[[Seen], float]
+) -> Seen:
+    """Return how camera pixels see patterns with the size of footprints that explains most."""
+    best, size = seen_by(0.0), SMALLEST_FOOTPRINT
+    least = unexplained(best)
+    while size <= LARGEST_FOOTPRINT * side:
+        seen = seen_by(size)
+        left = unexplained(seen)
+        if left > CLEARLY_WORSE * least:
+            break
+        if left < least:
+            best, least = seen, left
+        size *= FOOTPRINT_STEP
+    return best
+
+
+def _about(size: float) -> tuple[float, ...]:
+    """Return sizes of footprints about the typical one."""
+    steps = np.arange(-OTHER_FOOTPRINTS, OTHER_FOOTPRINTS + 1)
+    sizes = np.maximum(size, SMALLEST_FOOTPRINT / FOOTPRINT_STEP) * FOOTPRINT_STEP**steps
+    return tuple(float(each) if each >= SMALLEST_FOOTPRINT - 1e-9 else 0.0 for each in sizes)
 
 
 def _step(capture: Capture) -> float:

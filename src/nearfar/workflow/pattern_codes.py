@@ -1,14 +1,15 @@
 """The codes of a capture's patterns, and the sequences of its camera pixels."""
 
 from collections.abc import Sequence
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.interpolate import make_interp_spline
 
 from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.capture import Capture
-from nearfar.correspondence.codes import Codes, prepare_codes
+from nearfar.correspondence.codes import MOST_CODE_VALUES, Codes, prepare_codes
 from nearfar.errors import InputError
 from nearfar.plan import Pattern
 from nearfar.plan.patterns import Shown
@@ -23,22 +24,24 @@ MOST_PLACES = 2**16
 SAME_LEVEL = 1e-6
 
 
-class Display(NamedTuple):
-    """How a projector shows patterns, and a camera sees them.
+class Seen(NamedTuple):
+    """How camera pixels see the levels of patterns.
 
     Attributes
     ----------
     exponent : float
         Power that levels are raised to, but those of patterns with two.
-    blur : float
-        Standard deviation in projector pixels.
+    heights, widths : tuple of float
+        Sizes of the footprints of camera pixels on the projector, in its pixels; 0 is a single
+        place. As many heights as widths, the smallest first.
     """
 
-    exponent: float
-    blur: float
+    exponent: float = 1.0
+    heights: tuple[float, ...] = (0.0,)
+    widths: tuple[float, ...] = (0.0,)
 
 
-AS_IN_THE_FILE = Display(1.0, 0.0)
+AS_IN_THE_FILE = Seen()
 
 
 class PatternLevels(NamedTuple):
@@ -83,11 +86,19 @@ class WholePatterns(NamedTuple):
 
 
 class Telling(NamedTuple):
-    """Photos that tell a place, along one axis or along both, and their codes."""
+    """Photos that tell a place, along one axis or along both.
+
+    Attributes
+    ----------
+    axes : tuple of int
+    photos : ndarray of int
+    codes : list of Codes
+        Of each size of the footprints of camera pixels.
+    """
 
     axes: tuple[int, ...]
     photos: Integers
-    codes: Codes
+    codes: list[Codes]
 
 
 def read_levels(capture: Capture, progress: Report) -> PatternLevels:
@@ -143,13 +154,13 @@ def _levels(capture: Capture, number: int, *, has_colours: bool) -> Floats:
 
 
 def find_telling(
-    capture: Capture, patterns: PatternLevels, display: Display = AS_IN_THE_FILE
+    capture: Capture, patterns: PatternLevels, seen: Seen = AS_IN_THE_FILE
 ) -> list[Telling]:
     """Return the photos that tell each axis by themselves, or all, which tell both.
 
     All are used as soon as some differ along both axes, if there are few enough places.
 
-    The patterns are taken as the display shows them.
+    The patterns are taken as camera pixels see them.
 
     Raises
     ------
@@ -157,7 +168,7 @@ def find_telling(
         If there are none.
     """
     if patterns.whole is not None:
-        return [_telling_both(capture.plan.projector, patterns, patterns.whole, display)]
+        return [_telling_both(capture.plan.projector, patterns, patterns.whole, seen)]
     found: list[Telling] = []
     reasons: list[str] = []
     for axis, lines in enumerate((patterns.rows, patterns.columns)):
@@ -166,10 +177,9 @@ def find_telling(
         photos = np.flatnonzero(is_mine | is_uniform)
         if is_mine.any():
             shaped = lines[photos][:, :, None] if axis == 0 else lines[photos][:, None, :]
-            levels = _displayed(shaped, patterns.groups[photos], display)
             try:
                 found.append(
-                    Telling((axis,), photos, prepare_codes(levels, patterns.groups[photos]))
+                    Telling((axis,), photos, _codes(shaped, patterns.groups[photos], seen))
                 )
             except InputError as error:
                 reasons.append(str(error))
@@ -185,30 +195,48 @@ def find_telling(
 
 
 def _telling_both(
-    projector: Size, patterns: PatternLevels, whole: "WholePatterns", display: Display
+    projector: Size, patterns: PatternLevels, whole: "WholePatterns", seen: Seen
 ) -> Telling:
     """Return all photos, which tell both axes together."""
     lines = (whole.rows, whole.columns)
     levels = whole.levels
     if levels.shape[1:] != projector:
-        # Blocks of several pixels are wider than any blur that is tried.
-        display = display._replace(blur=0.0)
-    codes = prepare_codes(_displayed(levels, patterns.groups, display), patterns.groups)
+        # Blocks of several pixels are wider than most footprints.
+        seen = Seen(seen.exponent)
     ends = (np.append(first[1:], side) for first, side in zip(lines, projector, strict=True))
     down, across = (0.5 * (a + b - 1) for a, b in zip(lines, ends, strict=True))
-    codes = codes._replace(places=(down, across))
+    codes = [each._replace(places=(down, across)) for each in _codes(levels, patterns.groups, seen)]
     return Telling((0, 1), np.arange(len(levels)), codes)
 
 
-def _displayed(levels: Floats, groups: Integers, display: Display) -> Floats:
-    """Return patterns (photos, down, across) as a display shows them."""
-    if display.exponent != 1.0:
-        powers = np.where(groups == TWO_LEVELS, 1.0, display.exponent).astype(np.float32)
+def _codes(levels: Floats, groups: Integers, seen: Seen) -> list[Codes]:
+    """Return the codes of patterns (photos, down, across) for each size of footprints."""
+    if seen.exponent != 1.0:
+        powers = np.where(groups == TWO_LEVELS, 1.0, seen.exponent).astype(np.float32)
         levels = levels ** powers[:, None, None]
-    if display.blur:
-        deviations = [0.0, *(display.blur if side > 1 else 0.0 for side in levels.shape[1:])]
-        levels = gaussian_filter(levels, deviations, mode="nearest")
-    return levels
+    most = max(1, MOST_CODE_VALUES // levels.size)
+    sizes = dict.fromkeys(
+        (height if levels.shape[1] > 1 else 0.0, width if levels.shape[2] > 1 else 0.0)
+        for height, width in zip(seen.heights, seen.widths, strict=True)
+    )
+    return [
+        prepare_codes(_averaged(_averaged(levels, height, 1), width, 2), groups)
+        for height, width in list(sizes)[:most]
+    ]
+
+
+def _averaged(levels: Floats, size: float, axis: int) -> Floats:
+    """Return the means of levels over a size in pixels along one axis."""
+    if not size:
+        return levels
+    side, before = levels.shape[axis], ceil(size)
+    padding = [(before, before) if axis == other else (0, 0) for other in range(levels.ndim)]
+    summed = np.cumsum(np.pad(levels, padding, mode="edge"), axis=axis, dtype=np.float64)
+    # The sum up to place x, its pixel's share included, is at x + 1/2.
+    sums = make_interp_spline(np.arange(side + 2 * before) + 0.5, summed, k=1, axis=axis)
+    middle = np.arange(side) + before
+    found = (sums(middle + size / 2) - sums(middle - size / 2)) / size
+    return np.asarray(found, dtype=np.float32)
 
 
 def read_sequences(capture: Capture, patterns: PatternLevels, rows: slice) -> Floats:

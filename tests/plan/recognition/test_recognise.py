@@ -112,6 +112,16 @@ def test_fringes_that_were_raised_to_a_power_are_recognised(power):
         assert content.exponent == pytest.approx(1 / power, rel=0.03)
 
 
+@pytest.mark.parametrize("power", [1 / 2.2, 2.2])
+@pytest.mark.parametrize("periods", [[192.0], [192.0, 24.0], [150.0, 60.0]])
+def test_fringes_of_few_cycles_were_raised_to_the_power_of_the_set(periods, power):
+    found = _recognised(fringes(Size(8, 192), 1, periods, 8, power))
+    for number, content in enumerate(found.contents):
+        assert isinstance(content, Fringes)
+        assert content.exponent == pytest.approx(1 / power, rel=0.03)
+        assert 1 / content.fx == pytest.approx(periods[number // 8], rel=0.02)
+
+
 def test_levels_from_a_tenth_to_nine_tenths_are_taken_as_they_are():
     pictures = with_inverses(gray_code(SIZE, 1))
     grey = [np.rint(25.5 + 0.8 * picture).astype(np.uint8) for picture in pictures]
@@ -233,3 +243,9 @@ def test_a_plan_of_shown_pictures_is_read_back_as_it_was_written(pictures):
     assert parse_plan(plan.to_json()) == plan
     assert summarise(recognised_in(plan)) == summarise(_recognised(pictures))
     assert plan.summary()["photos"]["shown"] == len(pictures)
+
+
+def test_a_picture_is_the_inverse_of_one_picture_alone():
+    first, second = with_inverses(gray_code(SIZE, 1))[:2]
+    shown = [each / np.float32(255) for each in (first, second, first, first, second)]
+    assert recognise(shown).inverse_of == (None, 0, None, None, 2)

@@ -14,6 +14,7 @@ from nearfar.plan.recognition.contents import (
     Binary,
     Code,
     Content,
+    Fringes,
     HadamardRow,
     Uniform,
 )
@@ -25,7 +26,7 @@ from nearfar.plan.recognition.two_levels import (
     name_code,
     name_picture,
 )
-from nearfar.plan.recognition.waves import find_fringes
+from nearfar.plan.recognition.waves import Samples, find_fringes, find_raised_fringes, take_samples
 
 # Levels that differ by less are one: half a step of 8 bits.
 SAME_LEVEL = 0.5 / 255
@@ -33,6 +34,11 @@ SAME_LEVEL = 0.5 / 255
 FEWEST_HADAMARD_ROWS = 4
 # Places at which two pictures are compared for being inverse.
 COMPARED_PLACES = 1024
+# Fringes of so many cycles on the picture tell the power that they were raised to.
+TELLING_CYCLES = 2.0
+# Fewest fringes that tell a power of all, and how much theirs may differ.
+FEWEST_TELLING = 2
+SAME_POWER = 1.05
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,7 @@ class _Seen(NamedTuple):
     lowest: float
     highest: float
     is_binary: bool
+    samples: Samples | None
 
 
 def recognise(
@@ -124,7 +131,20 @@ def _see(picture: Floats) -> _Seen:
         lowest=lowest,
         highest=highest,
         is_binary=is_binary,
+        samples=take_samples(grey) if _may_be_raised(content, Size(*grey.shape)) else None,
     )
+
+
+def _may_be_raised(content: Content, size: Size) -> bool:
+    """Return whether other pictures may tell that this one is fringes raised to a power."""
+    if isinstance(content, Fringes):
+        return _cycles(content, size) < TELLING_CYCLES
+    return isinstance(content, AnyPicture) and not content.is_colour
+
+
+def _cycles(fringes: Fringes, size: Size) -> float:
+    """Return the cycles that fringes have on the picture."""
+    return float(np.hypot(fringes.fy * size.height, fringes.fx * size.width))
 
 
 def _signature(grey: Floats) -> NDArray[np.float64]:
@@ -136,7 +156,7 @@ def _signature(grey: Floats) -> NDArray[np.float64]:
 
 def _settle(seen: list[_Seen]) -> list[Content]:
     """Return the content of each picture in view of the others: Gray code, Hadamard matrices."""
-    contents = [each.content for each in seen]
+    contents = _raised_alike([each.content for each in seen], seen)
     rows = {i: each.hadamard for i, each in enumerate(seen) if each.hadamard is not None}
     square = sum(isinstance(seen[i].content, Binary) for i in rows)
     binary = sum(each.is_binary for each in seen)
@@ -151,6 +171,26 @@ def _settle(seen: list[_Seen]) -> list[Content]:
         for i, bit in zip(codes, bits, strict=True):
             contents[i] = bit or contents[i]
     return contents
+
+
+def _raised_alike(contents: list[Content], seen: list[_Seen]) -> list[Content]:
+    """Return fringes of few cycles as raised to the power that others in the set tell."""
+    fringes = [each for each in contents if isinstance(each, Fringes)]
+    powers = [each.exponent for each in fringes if each.exponent != 1.0]
+    if len(powers) < FEWEST_TELLING:
+        return contents
+    power = float(np.median(powers))
+    is_told = [
+        max(each.exponent, power) < SAME_POWER * min(each.exponent, power)
+        for each, its in zip(contents, seen, strict=True)
+        if isinstance(each, Fringes) and (its.samples is None or each.exponent != 1.0)
+    ]
+    if not all(is_told):
+        return contents
+    return [
+        content if its.samples is None else find_raised_fringes(its.samples, power) or content
+        for content, its in zip(contents, seen, strict=True)
+    ]
 
 
 def _inverses(seen: list[_Seen], total: float) -> tuple[int | None, ...]:

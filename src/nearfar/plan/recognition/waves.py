@@ -27,6 +27,9 @@ EXPONENTS = np.geomspace(1 / 3.2, 3.2, 33)
 LEAST_FUNDAMENTAL = 0.5
 # A number of cycles on the picture this close to a whole one is rounded, if that fits as well.
 WHOLE_CYCLES = 0.05
+# Cycles on the picture about those of the highest peak that are tried, and the step between.
+CYCLES_AROUND = 1.0
+CYCLES_STEP = 0.1
 # Misfits that differ by less are as good as each other.
 AS_GOOD = 1.02
 
@@ -73,6 +76,54 @@ def find_fringes(picture: Floats) -> Fringes | None:
         wave = _with_whole_cycles(waves[power], places, samples**power, values.shape)
         return _as_fringes(wave, float(power))
     return None
+
+
+class Samples(NamedTuple):
+    """Values of a picture at some places.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the picture.
+    places : ndarray, shape (s, 2)
+    values : ndarray, shape (s,)
+    start : ndarray, shape (2,)
+        The frequency with the highest peak.
+    """
+
+    shape: tuple[int, ...]
+    places: NDArray[np.float64]
+    values: NDArray[np.float64]
+    start: NDArray[np.float64]
+
+
+def take_samples(picture: Floats) -> Samples | None:
+    """Return the values by which `find_raised_fringes` knows a picture, or None if it is flat."""
+    values = picture.astype(np.float64)
+    start = _first_frequency(values)
+    return None if start is None else Samples(values.shape, *_samples(values), start)
+
+
+def find_raised_fringes(samples: Samples, exponent: float) -> Fringes | None:
+    """Return the sinusoid that values raised to a known power are, or None if they are none.
+
+    The power that many cycles tell serves pictures of one or two, which do not tell it themselves.
+    """
+    places, values, size = samples.places, samples.values, np.array(samples.shape)
+    raised = values**exponent
+    # Of few cycles the peak is shifted, and it is that of the values before.
+    around = [
+        samples.start + step * (samples.start != 0) / size
+        for step in np.arange(-CYCLES_AROUND, CYCLES_AROUND + 0.01, CYCLES_STEP)
+    ]
+    tried = [_fit(places, raised, each) for each in around if (each != 0).any()]
+    if not tried:
+        return None
+    start = min(tried, key=lambda each: each.misfit).frequency
+    wave = _refined(places, raised, start)
+    if _misfit_in_file(wave, places, values, exponent) > LARGEST_MISFIT_OF_POWER:
+        return None
+    return _as_fringes(_with_whole_cycles(wave, places, raised, samples.shape), exponent)
 
 
 def _misfit_in_file(

@@ -81,7 +81,7 @@ class Codes(NamedTuple):
         return max(0, sum(len(each) for each in self.whitening) - 1 - len(self.whitening))
 
 
-def prepare_codes(patterns: Floats, groups: Integers) -> Codes:
+def prepare_codes(patterns: Floats, groups: Integers, steps: tuple[int, int] = (1, 1)) -> Codes:
     """Prepare the codes of all projector pixels, or of all rows or columns.
 
     Parameters
@@ -90,6 +90,8 @@ def prepare_codes(patterns: Floats, groups: Integers) -> Codes:
         Levels from 0 to 1; down or across is 1 for patterns of one axis.
     groups : ndarray of int, shape (N,)
         Patterns of one number share an offset and a d.
+    steps : tuple of int
+        Places down and across from one that is compared to the next.
 
     Returns
     -------
@@ -103,17 +105,19 @@ def prepare_codes(patterns: Floats, groups: Integers) -> Codes:
     number = len(patterns)
     down, across = (_without_repeats(patterns, axis) for axis in (1, 2))
     kept = patterns[:, down.first[:, None], across.first]
-    grid = Size(*kept.shape[1:])
     if kept.size > MOST_CODE_VALUES:
         raise InputError(
-            f"{number} patterns of {grid} are too many to compare every camera pixel with: give "
-            f"patterns of larger blocks, or Gray code or fringes of rows and of columns."
+            f"{number} patterns of {Size(*kept.shape[1:])} are too many to compare every camera "
+            f"pixel with: give patterns of larger blocks, or Gray code or fringes of rows and of "
+            f"columns."
         )
+    thinned = [_every(step, side) for step, side in zip(steps, kept.shape[1:], strict=True)]
+    compared = kept[:, thinned[0][:, None], thinned[1]]
     whitening, units, norms = [], [], []
     for group in np.unique(groups):
         mine = np.flatnonzero(groups == group)
         of_group = _whitening(kept[mine])
-        whitened = kept[mine].reshape(len(mine), -1).T @ of_group.T
+        whitened = compared[mine].reshape(len(mine), -1).T @ of_group.T
         norm = np.linalg.norm(whitened, axis=1)
         # What is as good as the same everywhere tells no place.
         if not len(of_group) or norm.max() <= SAME_CODE:
@@ -134,10 +138,15 @@ def prepare_codes(patterns: Floats, groups: Integers) -> Codes:
         tuple(whitening),
         tuple(units),
         tuple(norms),
-        grid,
-        (down.middle, across.middle),
-        _reach(together.reshape(*grid, -1)),
+        Size(*compared.shape[1:]),
+        (down.middle[thinned[0]], across.middle[thinned[1]]),
+        _reach(together.reshape(*compared.shape[1:], -1)),
     )
+
+
+def _every(step: int, side: int) -> Integers:
+    """Return places about a step from each other, the first and the last among them."""
+    return np.rint(np.linspace(0, side - 1, -(-(side - 1) // step) + 1)).astype(np.int64)
 
 
 class _Repeats(NamedTuple):

@@ -9,14 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.correspondence.candidates import best_places
 from nearfar.correspondence.codes import SAME_CODE, Codes
 from nearfar.parallel import side_by_side
 
 # Places that are compared after they are refined: where two pixels share direct light, neither's
 # code may be the best by itself.
 CANDIDATES = 3
-# Scores held at once.
-SCORES_AT_ONCE = 2**24
+# Scores held at once: few enough for a processor's cache.
+SCORES_AT_ONCE = 2**18
 # Probability above which there is direct light, from that place.
 LEAST_CONFIDENCE = 0.999
 # Direct light over the mean of the photos, below which what responds may be near-range light alone.
@@ -105,7 +106,7 @@ def find_places(sequences: Floats, codes: Sequence[Codes], misfit: float) -> Pla
         for all_of, part in zip(found, mine, strict=True):
             all_of[block] = part
 
-    side_by_side(work, blocks(count, max(64, SCORES_AT_ONCE // largest // 4)))
+    side_by_side(work, blocks(count, max(64, SCORES_AT_ONCE // largest)))
     return found
 
 
@@ -157,20 +158,17 @@ def _surest(compared: Sequence[_Compared], codes: Sequence[Codes], misfit: float
 def _compare(sequences: Floats, codes: Codes) -> _Compared:
     """Compare camera pixels with all places, and refine the best ones."""
     whitened = [sequences @ matrix.T for matrix in codes.whitening]
-    count, (height, width) = len(sequences), codes.grid
-    number = np.arange(count)
-    scores = np.zeros((count, height * width), dtype=np.float32)
-    for mine, unit in zip(whitened, codes.unit, strict=True):
-        scores += np.maximum(mine @ unit.T, 0.0) ** 2
-    shaped = scores.reshape(count, height, width)
-    candidates = []
-    for _ in range(CANDIDATES):
-        y, x = np.divmod(scores.argmax(axis=1), width)
-        candidates.append(_refined(whitened, codes, y, x))
-        # The next is the best of the places whose codes are not alike.
-        is_near_y = np.abs(np.arange(height) - y[:, None]) <= codes.reach[0]
-        is_near_x = np.abs(np.arange(width) - x[:, None]) <= codes.reach[1]
-        np.copyto(shaped, 0.0, where=is_near_y[:, :, None] & is_near_x[:, None, :])
+    number = np.arange(len(sequences))
+    products = np.stack(
+        [
+            np.asarray(mine, dtype=np.float32) @ unit.T
+            for mine, unit in zip(whitened, codes.unit, strict=True)
+        ]
+    )
+    candidates = [
+        _refined(whitened, codes, *np.divmod(places, codes.grid.width))
+        for places in best_places(products, *codes.grid, *codes.reach, CANDIDATES)
+    ]
     explained = np.stack([each.explained for each in candidates])
     order = np.argsort(-explained, axis=0, kind="stable")
     power = sum(np.einsum("cn,cn->c", each, each).astype(np.float64) for each in whitened)

@@ -20,6 +20,8 @@ from nearfar.progress import Report
 TWO_LEVELS = 2
 # Places that camera pixels are compared with one by one, at most.
 MOST_PLACES = 2**16
+# Places in a footprint that are compared, down and across.
+PLACES_IN_FOOTPRINT = 4
 # Levels that differ by less are the same.
 SAME_LEVEL = 1e-6
 
@@ -220,7 +222,12 @@ def _codes(levels: Floats, groups: Integers, seen: Seen) -> list[Codes]:
         for height, width in zip(seen.heights, seen.widths, strict=True)
     )
     return [
-        prepare_codes(_averaged(_averaged(levels, height, 1), width, 2), groups)
+        prepare_codes(
+            _averaged(_averaged(levels, height, 1), width, 2),
+            groups,
+            # Means change by little from one of these places to the next.
+            (max(1, int(height / PLACES_IN_FOOTPRINT)), max(1, int(width / PLACES_IN_FOOTPRINT))),
+        )
         for height, width in list(sizes)[:most]
     ]
 

@@ -14,7 +14,7 @@ from nearfar.progress import progress_bar
 if TYPE_CHECKING:
     from nearfar.arrays import Floats
 
-COMPONENTS = ("direct", "near", "far")
+COMPONENTS = ("direct", "near", "far", "free")
 
 
 def _gains(texts: list[str]) -> dict[str, float]:
@@ -29,7 +29,7 @@ def _gains(texts: list[str]) -> dict[str, float]:
             number = float("nan")
         if name not in COMPONENTS or not isfinite(number):
             raise typer.BadParameter(
-                f"{text!r} is no gain: write direct=1, near=2 or far=0, one per --gain.",
+                f"{text!r} is no gain: write direct=1, near=2, far=0 or free=1, one per --gain.",
                 param_hint="--gain",
             )
         gains[name] = number
@@ -57,7 +57,7 @@ def relight(
     gain: Annotated[
         list[str] | None,
         typer.Option(
-            help="Gain of a component: direct=1, near=2 or far=0; may be repeated.",
+            help="Gain of a component: direct=1, near=2 or far=0, for lamps free=2.",
             metavar="NAME=VALUE",
         ),
     ] = None,

@@ -37,6 +37,7 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "camera": list(stored.camera),
         "channels": stored.channels,
         "light_block": transport.light_block,
+        "parts": list(stored.parts),
         "window": transport.coarse.window,
         "pitch": transport.coarse.pitch,
         "method": stored.provenance.get("method"),

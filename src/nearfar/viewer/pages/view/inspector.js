@@ -3,7 +3,7 @@
 import { get, showingFaults } from './dom.js';
 import { crop, drawLog, drawProfile, drawSpectrum } from './plots.js';
 import { requestMessage } from './protocol.js';
-import { PARTS } from './state.js';
+import { isFree } from './state.js';
 
 export class Inspector {
   #scene;
@@ -50,7 +50,7 @@ export class Inspector {
     const line = (values, errors, colour) =>
       ({ values: values.data.slice(first, first + width), errors: errors.data, colour });
     drawProfile(get('row-profile'), [line(far, farError, '--far'), line(near, nearError, '--near')],
-      'orange: direct and near-range, green: far-range; projector column 0 to ' + (width - 1));
+      `${isFree(this.#scene) ? 'orange: direct, green: each lamp' : 'orange: direct and near-range, green: far-range'}; projector column 0 to ${width - 1}`);
   }
 
   // The row, or null if another one was asked for in the meantime.
@@ -68,11 +68,11 @@ export class Inspector {
 }
 
 function summary({ q, floodlit, confidence, no_errors: noErrors, saturated }) {
-  const total = floodlit.direct + floodlit.near + floodlit.far;
+  const parts = Object.keys(floodlit), total = parts.reduce((sum, name) => sum + floodlit[name], 0);
   const share = name => `${name} ${(100 * floodlit[name] / (total || 1)).toFixed(1)} %`;
   return (q ? `q = (${q[0].toFixed(2)}, ${q[1].toFixed(2)})` : 'no direct light') +
     (confidence === null ? '' : `, confidence ${confidence.toFixed(2)}`) +
-    `; floodlit ${total.toPrecision(3)}: ${PARTS.map(share).join(', ')}` +
+    `; floodlit ${total.toPrecision(3)}: ${parts.map(share).join(', ')}` +
     (noErrors && `; no error bars: ${noErrors}`) +
     (saturated ? '; saturated under white' : '');
 }

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.files import read_picture
 from nearfar.files.codecs import encode_png
 from nearfar.transport.exact import ExactTransport
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
@@ -128,3 +129,59 @@ def test_options_of_the_model_are_refused(folder, tmp_path, option):
     ran = run_nearfar("reconstruct", folder / "random.zarr", tmp_path / "t.zarr", *FREE, *option)
     assert ran.status == 2
     assert option[0] in ran.err
+
+
+@pytest.fixture(scope="module")
+def planned(folder, dense, tmp_path_factory):
+    """The same lamps, planned for, photographed by a simulated rig and reconstructed."""
+    made = tmp_path_factory.mktemp("planned")
+    np.save(made / "T.npy", 3 * dense.reshape(*CAMERA, *LAMPS).astype(np.float32))
+    plan = ("plan", "--projector", LAMPS, "--photos", 40, *FREE, "-o", made / "plan.json")
+    said = check_done(run_nearfar(*plan)).out
+    assert "tell all of them apart" in said
+    check_done(run_nearfar("acquire", made / "plan.json", made / "c.zarr", "--rig", made / "T.npy"))
+    check_done(run_nearfar("reconstruct", made / "c.zarr", made / "t.zarr", *FREE))
+    return made
+
+
+def test_a_plan_of_lamps_goes_all_the_way(planned, folder):
+    said = check_done(run_nearfar("info", planned / "t.zarr")).out
+    assert said.startswith("good: Relit lights of the check photos")
+    out = check_done(
+        run_nearfar("evaluate", planned / "t.zarr", "--truth", planned / "T.npy", "--json")
+    )
+    assert json.loads(out.out)["snr"]["T"] > 25
+
+
+def test_the_patterns_of_a_plan_of_lamps_are_exported_and_its_photos_imported(planned, tmp_path):
+    check_done(run_nearfar("export", planned / "plan.json", tmp_path / "patterns"))
+    shown = sorted((tmp_path / "patterns").glob("*.png"))
+    assert len(shown) == 40
+    light = [read_picture(path).mean() for path in shown]
+    photos = write_pictures(
+        tmp_path / "photos", [np.full((4, 4), 10 + level / 2, np.uint8) for level in light]
+    )
+    check_done(run_nearfar("import", planned / "plan.json", photos, tmp_path / "c.zarr"))
+
+
+@pytest.mark.parametrize("command", ["reconstruct", "correspond"])
+def test_the_model_of_ranges_gets_a_sentence_of_photos_of_lamps(planned, tmp_path, command):
+    out = tmp_path / ("t.zarr" if command == "reconstruct" else "q.npy")
+    check_sentence(run_nearfar(command, planned / "c.zarr", out), "--no-near --no-far")
+
+
+@pytest.mark.parametrize("command", ["plan", "reconstruct"])
+@pytest.mark.parametrize("flag", FREE)
+def test_one_range_alone_is_not_left_out(planned, tmp_path, command, flag):
+    arguments = {
+        "plan": ("--projector", "3x5", "--photos", 40),
+        "reconstruct": (planned / "c.zarr", tmp_path / "t.zarr"),
+    }
+    ran = run_nearfar(command, *arguments[command], flag)
+    assert ran.status == 2
+    assert flag in ran.err
+
+
+def test_a_line_of_lamps_without_order_is_planned_for_too(tmp_path):
+    ran = run_nearfar("plan", "--projector", "1x11", "--photos", 20, *FREE, "--json")
+    assert json.loads(check_done(ran).out)["total_photos"] == 20

@@ -14,8 +14,11 @@ from nearfar.cli.options import (
     AsJson,
     CapturePath,
     Force,
+    NoFar,
+    NoNear,
     Quiet,
     ReportPath,
+    both_ranges_left_out,
     check_report_page,
     keep_input,
 )
@@ -52,20 +55,8 @@ def reconstruct(
             "--square", help="Average the camera pixels of each projector pixel: the paper's T."
         ),
     ] = False,
-    no_near: Annotated[
-        bool,
-        typer.Option(
-            "--no-near",
-            help="Model no near range, as of lamps without neighbours; goes with --no-far.",
-        ),
-    ] = False,
-    no_far: Annotated[
-        bool,
-        typer.Option(
-            "--no-far",
-            help="Model no far range; with --no-near, light from each lamp is a number of its own.",
-        ),
-    ] = False,
+    no_near: NoNear = False,
+    no_far: NoFar = False,
     memory: Annotated[
         str,
         typer.Option(
@@ -118,7 +109,7 @@ def reconstruct(
         check_report_page(report, output, *inputs, force=force)
     check_resumable(output, RESUMABLE_TRANSPORT, resume=resume, force=force)
     opened = open_capture(capture)
-    is_free = _is_free(no_near=no_near, no_far=no_far)
+    is_free = both_ranges_left_out(no_near=no_near, no_far=no_far)
     if is_free or opened.plan.offset == "shown":
         refused = {"--method": method != "joint", "--square": square, "--resume": resume}
         refused |= {"--half": half, "--scheduler": scheduler is not None}
@@ -160,17 +151,6 @@ def reconstruct(
     if as_json:
         print(json.dumps(verdict.as_json()))
     say(str(verdict), quiet=quiet)
-
-
-def _is_free(*, no_near: bool, no_far: bool) -> bool:
-    """Return whether rows are free, and refuse one range alone."""
-    if no_near != no_far:
-        raise typer.BadParameter(
-            "goes with the other of --no-near and --no-far: with a range in the model, the joint "
-            "estimate finds what the other one holds.",
-            param_hint="--no-near" if no_near else "--no-far",
-        )
-    return no_near
 
 
 def _free_rows(

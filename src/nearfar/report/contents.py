@@ -155,10 +155,27 @@ def _describe_transport(path: Path) -> str:
                 if "direct" in transport.parts
                 else []
             ),
+            *_gains_of(transport),
             f"floodlit: {shares or 'black'}",
             f"provenance: {json.dumps(dict(transport.provenance))}",
         ]
     )
+
+
+def _gains_of(transport: Transport) -> list[str]:
+    """Return a line about the lamps of a light stage, none of other transports."""
+    gains, errors = (
+        np.array(transport.provenance.get(name, ()), dtype=np.float64)
+        for name in ("lamp_gains", "lamp_gain_errors")
+    )
+    if "lamps" not in transport.provenance:
+        return []
+    if not len(gains) or len(gains) != len(errors):
+        return ["light stage, a photo under each lamp: gains not fitted"]
+    return [
+        f"light stage, a photo under each lamp: gains from {gains.min():.3g} to {gains.max():.3g}, "
+        f"each +- {errors.mean():.2g}"
+    ]
 
 
 def _model_of(transport: Transport) -> str:

@@ -182,6 +182,7 @@ def factors_of(parts: Parts) -> tuple[str, ...]:
     """Return the factors that a transport of some parts has in a file."""
     has_far = not {"far", "free"}.isdisjoint(parts)
     absent = {"near": "near" not in parts, "far": not has_far}
+    absent |= dict.fromkeys(("correspondence", "direct"), "direct" not in parts)
     return tuple(name for name in FACTORS if not absent.get(name, False))
 
 
@@ -299,9 +300,10 @@ class StoredTransport:
         if self._free is not None:
             ratio = read.pop(_array_name(FREE_POSTERIOR, *FREE_FIELDS))
             free = FreePosterior(**self._free, ratio=ratio)
-        each = read["direct"].shape
-        for name, shape in (("near", (*each, 0, 0)), ("far", (*each, 0))):
+        each = read["black"].shape
+        for name, shape in (("direct", each), ("near", (*each, 0, 0)), ("far", (*each, 0))):
             read.setdefault(name, np.zeros(shape, np.float32))
+        read.setdefault("correspondence", np.full((*each[:2], 2), np.nan, np.float32))
         if posterior is not None:
             last = int(posterior.prior_component.max(initial=0))
             if last >= len(posterior.prior_components):
@@ -376,8 +378,9 @@ def open_transport(path: AnyPath) -> StoredTransport:
             f"({str(error)[:MAXIMUM_REASON]}); reconstruct it again."
         ) from None
     basis = real_basis(frequencies, projector)
-    each = tuple(int(side) for side in arrays["direct"].shape)
+    each = tuple(int(side) for side in arrays["black"].shape)
     shapes = {
+        "direct": each,
         "correspondence": (*each[:2], 2),
         "near": (*each, *near_basis.shape),
         "far": (*each, basis.count),

@@ -72,7 +72,9 @@ def transport_row(transport: Transport, x: int) -> TransportRow:
         # In projector pixels.
         "window": transport.window * transport.pitch,
         "no_errors": _why_no_errors(transport, saturated=saturated),
-        "confidence": None if quality is None else float(quality.confidence[0, x]),
+        "confidence": None
+        if quality is None or "near" not in transport.parts
+        else float(quality.confidence[0, x]),
         "saturated": saturated,
         "floodlit": {
             part: float(row.sum()) for part, row in transport.named(Components(d, n, f)).items()

@@ -185,3 +185,29 @@ def test_one_range_alone_is_not_left_out(planned, tmp_path, command, flag):
 def test_a_line_of_lamps_without_order_is_planned_for_too(tmp_path):
     ran = run_nearfar("plan", "--projector", "1x11", "--photos", 20, *FREE, "--json")
     assert json.loads(check_done(ran).out)["total_photos"] == 20
+
+
+def test_against_a_scene_whose_light_is_known_apart_they_are_compared_as_a_whole(planned, tmp_path):
+    scene = tmp_path / "scene.zarr"
+    size = ("--projector", LAMPS, "--camera", CAMERA)
+    check_done(run_nearfar("render", "cornell", scene, *size))
+    check_done(run_nearfar("acquire", planned / "plan.json", tmp_path / "c.zarr", "--rig", scene))
+    check_done(run_nearfar("reconstruct", tmp_path / "c.zarr", tmp_path / "t.zarr", *FREE))
+    ran = run_nearfar("evaluate", tmp_path / "t.zarr", "--truth", scene, "--json")
+    assert list(json.loads(check_done(ran).out)["snr"]) == ["T"]
+
+
+def test_a_transport_of_lamps_is_converted_and_photographed(planned, dense, tmp_path):
+    check_done(run_nearfar("convert", planned / "t.zarr", tmp_path / "T.npy"))
+    exact = 3 * dense.reshape(*CAMERA, *LAMPS)
+    kept = np.load(tmp_path / "T.npy").reshape(exact.shape)
+    # In units of the photos, whose exposure the rig has chosen.
+    exact *= (kept * exact).sum() / (exact**2).sum()
+    assert np.linalg.norm(kept - exact) < 0.1 * np.linalg.norm(exact)
+    rig = ("--rig", planned / "t.zarr")
+    check_done(run_nearfar("acquire", planned / "plan.json", tmp_path / "c.zarr", *rig))
+
+
+def test_a_plan_is_not_chosen_by_a_look_at_lamps(planned):
+    look = ("--look", planned / "t.zarr")
+    check_sentence(run_nearfar("plan", "--projector", "3x5", "--photos", 30, *look), "t.zarr")

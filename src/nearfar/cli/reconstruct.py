@@ -167,7 +167,7 @@ def _free_rows(
 ) -> None:
     """Reconstruct free rows: lamps without a neighbourhood."""
     from nearfar.correspondence import read_correspondence
-    from nearfar.workflow.free_rows import has_black, reconstruct_free_rows_to_file
+    from nearfar.workflow.free_rows import reconstruct_free_rows_to_file
 
     for option, is_given in {**refused, "--report": report is not None}.items():
         if is_given:
@@ -176,10 +176,10 @@ def _free_rows(
     if correspondence is not None:
         given = read_correspondence(correspondence, capture.camera, capture.plan.projector)
     with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
-        verdict = reconstruct_free_rows_to_file(
+        verdict, has_black = reconstruct_free_rows_to_file(
             capture, output, given, memory=memory, force=force, progress=progress
         )
-    if not has_black(capture):
+    if not has_black:
         warn(
             f"{capture.path} has no photo under black, so that black was taken as 0: what is black "
             f"in the photos stands in T as light."

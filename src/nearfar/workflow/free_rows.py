@@ -6,6 +6,7 @@ Index convention: photos are (C, channels, N), patterns (N, P).
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,20 @@ MOST_PHOTOS = 8192
 # Values in double precision that are held at once, over those of the photos.
 COPIES = 6
 METHOD = "free rows"
+
+
+class FreeSummary(NamedTuple):
+    """What is to be said of a reconstruction of free rows.
+
+    Attributes
+    ----------
+    verdict : KeptVerdict
+    has_black : bool
+        Whether the photos tell the black; else it was taken as 0.
+    """
+
+    verdict: KeptVerdict
+    has_black: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +113,12 @@ def reconstruct_free_rows_to_file(
     memory: int = 2 * 10**9,
     force: bool = False,
     progress: Report = ignore_progress,
-) -> KeptVerdict:
+) -> FreeSummary:
     """Do as `reconstruct_free_rows`, into a file, some rows of the camera at a time.
+
+    Returns
+    -------
+    FreeSummary
 
     Raises
     ------
@@ -110,17 +129,12 @@ def reconstruct_free_rows_to_file(
     """
     job = _prepare(capture, correspondence, memory, progress)
     write_transport(output, _blocks(job, progress), capture.camera.height, force=force)
-    return job.verdict
+    return FreeSummary(job.verdict, job.design.has_black)
 
 
 def free_basis(projector: Size) -> RealBasis:
     """Return the basis of all frequencies of a projector, in which free rows are kept."""
     return real_basis(representatives(far_frequencies(projector, projector)), projector)
-
-
-def has_black(capture: Capture) -> bool:
-    """Return whether the patterns of a capture tell the black."""
-    return design_of(_patterns(capture)[split_photos(capture)[0]]).has_black
 
 
 def _prepare(

@@ -121,17 +121,14 @@ def design_of(patterns: Floats) -> Design:
 def _tells_black(patterns: Floats) -> bool:
     """Return whether photos of patterns (N, P) tell the black from the lamps' light."""
     number, lamps = patterns.shape
-    ones = np.ones((number, 1))
-    rank = np.linalg.matrix_rank(patterns, tol=_tolerance(patterns))
-    both = np.concatenate([ones, patterns], axis=1)
-    if np.linalg.matrix_rank(both, tol=_tolerance(both)) > rank:
+    sequences, strengths, _ = np.linalg.svd(patterns, full_matrices=False)
+    kept = strengths > LEAST_SINGULAR_VALUE * strengths.max(initial=0.0)
+    ones = np.ones(number)
+    beyond = ones - sequences[:, kept] @ (sequences[:, kept].T @ ones)
+    if float(beyond @ beyond) > LEAST_SINGULAR_VALUE * number:
         return True
     # The patterns make up for any black. Where they tell all lamps apart, it must be known; where
     # they do not, the lamps' equal shares tell it, unless every photo has as much light.
     total = patterns.sum(axis=1)
     varies = float(np.ptp(total)) > LEAST_VARIATION * float(total.max(initial=0.0))
-    return bool(rank < lamps and varies)
-
-
-def _tolerance(matrix: Floats) -> float:
-    return LEAST_SINGULAR_VALUE * float(np.linalg.norm(matrix, 2))
+    return bool(np.count_nonzero(kept) < lamps and varies)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
 from nearfar.capture import Capture
-from nearfar.estimate.free_rows.design import design_of
+from nearfar.estimate.free_rows.design import Design, design_of
 from nearfar.estimate.free_rows.error_bars import variance_in_noise
 from nearfar.estimate.free_rows.estimate import FreeRows, estimate_free_rows, posterior_of
 from nearfar.transport.free_posterior import FreePosterior
@@ -20,8 +20,6 @@ HELD_OUT_PIXELS = 512
 # Share of the photos that are held out, and fewest; they are chosen evenly.
 HELD_OUT_SHARE = 0.04
 FEWEST_HELD_OUT = 2
-# Photos that are tried for being held out without one less lamp being told apart.
-TRIES = 16
 # Share of its own light that a held-out photo may tell by itself, where all lamps are told apart.
 MOST_TOLD = 0.8
 # Held-out noise below this share of its power is no error of the transport.
@@ -88,7 +86,7 @@ def judge_free_rows(
     )
     posterior = posterior_of(design, rows.ratio)
     if posterior is not None:
-        expected = float(np.mean([_expected(posterior, rows, light) for light in lights]))
+        expected = float(np.mean([_expected(design, posterior, rows, light) for light in lights]))
         errors = max(measured - hidden, 0.0)
         found = _beside(found, float(np.mean(seen**2)), errors, expected, len(lights))
     if snr >= DOUBTFUL_DECIBELS:
@@ -102,8 +100,19 @@ def judge_free_rows(
     return replace(found, grade=grade, reasons=(reason,))
 
 
-def _expected(posterior: FreePosterior, rows: FreeRows, light: Floats) -> float:
-    """Return the mean square of the errors that the error bars expect under a light."""
+def _expected(design: Design, posterior: FreePosterior, rows: FreeRows, light: Floats) -> float:
+    """Return the mean square of the errors that are expected of a photo under a light.
+
+    They are those of the light and of the black together, which make up for one another.
+    """
+    total = float(light.sum())
+    if design.has_black and total > 0:
+        known = design.from_known[-1] + design.from_known[0] / total
+        posterior = replace(
+            posterior,
+            mean=(known @ design.patterns).astype(np.float32),
+            mean_variance=float((known**2).sum()),
+        )
     variance = variance_in_noise(posterior, rows.lamp, light, 1.0, 1.0)
     return float(np.mean(rows.noise.astype(np.float64) ** 2 * variance[:, None]))
 
@@ -139,25 +148,28 @@ def _held_out(patterns: Floats, used: NDArray[np.int64]) -> NDArray[np.int64]:
     count = max(FEWEST_HELD_OUT, round(HELD_OUT_SHARE * len(structured)))
     if len(structured) <= count:
         return np.array([], dtype=np.int64)
-    if not design_of(patterns[used]).is_complete:
-        places = np.linspace(0, len(structured) - 1, count + 2).round().astype(int)[1:-1]
-        return np.asarray(structured[places])
-    # Left out, a photo that tells much by itself would be foretold worse than any relit picture.
     whole = design_of(patterns[used])
+    if not whole.is_complete:
+        return _evenly(structured, count)
+    # Left out, a photo that tells much by itself would be foretold worse than any relit picture.
     tells = (whole.basis**2).sum(axis=1) + (whole.directions**2).sum(axis=1)
     structured = used[(np.ptp(patterns[used], axis=1) > 0) & (tells < MOST_TOLD)]
     if not len(structured):
         return np.array([], dtype=np.int64)
-    tries = np.unique(np.linspace(0, len(structured) - 1, TRIES).round().astype(int))
-    chosen: list[int] = []
-    for number in structured[tries]:
-        left = np.setdiff1d(used, [*chosen, number])
-        if len(chosen) < count and _is_whole(patterns[left], patterns[used]):
-            chosen.append(int(number))
-    return np.array(chosen, dtype=np.int64)
+    chosen = _evenly(structured, count)
+    # Together they may tell what none of them tells alone.
+    while len(chosen) and not _is_whole(patterns[np.setdiff1d(used, chosen)], whole):
+        chosen = chosen[::2] if len(chosen) > 1 else chosen[:0]
+    return np.asarray(chosen)
 
 
-def _is_whole(left: Floats, of: Floats) -> bool:
+def _evenly(numbers: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return some of the numbers, evenly spread and none twice."""
+    places = np.linspace(0, len(numbers) - 1, count + 2).round().astype(int)[1:-1]
+    return np.asarray(np.unique(numbers[places]))
+
+
+def _is_whole(left: Floats, of: Design) -> bool:
     """Return whether some of the patterns tell apart, and the black, what all of them do."""
-    fewer, all_of_them = design_of(left), design_of(of)
-    return fewer.is_complete and fewer.has_black == all_of_them.has_black
+    fewer = design_of(left)
+    return fewer.is_complete and fewer.has_black == of.has_black

@@ -93,7 +93,7 @@ def test_pixels_that_are_not_there_get_a_sentence(transport, draw):
 def test_other_bad_input(transport):
     with pytest.raises(InputError, match="give 'x' or 'y'"):
         transport.plot.correspondence("z")
-    with pytest.raises(InputError, match="give three"):
+    with pytest.raises(InputError, match="give 3"):
         transport.plot.components(np.ones(transport.projector), ax=[])
 
 

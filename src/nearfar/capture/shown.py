@@ -14,7 +14,9 @@ from nearfar.files import full_scale_of, list_pictures, read_picture
 from nearfar.files.images import PICTURE_KINDS
 from nearfar.plan import Plan
 from nearfar.plan.model import LARGEST_SIDE
+from nearfar.plan.patterns import Shown
 from nearfar.plan.recognition import Recognised, recognise
+from nearfar.plan.recognition.contents import AnyPicture
 from nearfar.plan.recognition.own import plan_of_pictures
 from nearfar.progress import Report, ignore_progress
 
@@ -39,7 +41,15 @@ class ShownPictures:
     def read(self) -> Iterator[NDArray[Any]]:
         """Read the pictures one after the other, as a capture keeps them."""
         for path in self.paths:
-            yield _read(path)
+            picture = _read(path)
+            # Grey ones among colour pictures: a capture keeps all in one array.
+            is_grey = picture.ndim == 2 and self._has_colours
+            yield np.repeat(picture[..., None], 3, axis=2) if is_grey else picture
+
+    @property
+    def _has_colours(self) -> bool:
+        contents = (each.content for each in self.plan.patterns if isinstance(each, Shown))
+        return any(isinstance(each, AnyPicture) and each.is_colour for each in contents)
 
 
 def read_shown(folder: AnyPath, progress: Report = ignore_progress) -> ShownPictures:

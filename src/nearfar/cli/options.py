@@ -93,6 +93,25 @@ def only_report(report: Path | None, old: Path | None, name: str) -> Path | None
     return old
 
 
+def both_ranges_left_out(*, no_near: bool, no_far: bool) -> bool:
+    """Return whether neither range is modelled, and refuse one range alone."""
+    if no_near != no_far:
+        raise typer.BadParameter(
+            "goes with the other of --no-near and --no-far: with one range in the model, the joint "
+            "estimate finds by itself how little the other one holds.",
+            param_hint="--no-near" if no_near else "--no-far",
+        )
+    return no_near
+
+
+NoNear = Annotated[
+    bool,
+    typer.Option("--no-near", help="Lamps without neighbours: no near range. With --no-far."),
+]
+NoFar = Annotated[
+    bool,
+    typer.Option("--no-far", help="No far range either: each lamp is a number of its own."),
+]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print nothing but errors and warnings.")
 ]

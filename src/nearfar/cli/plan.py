@@ -8,7 +8,15 @@ import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.choices import choice
-from nearfar.cli.options import AsJson, Force, Quiet, size
+from nearfar.cli.options import (
+    AsJson,
+    Force,
+    NoFar,
+    NoNear,
+    Quiet,
+    both_ranges_left_out,
+    size,
+)
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
@@ -77,6 +85,8 @@ def plan(
             metavar="TRANSPORT.zarr",
         ),
     ] = None,
+    no_near: NoNear = False,
+    no_far: NoFar = False,
     no_check: Annotated[
         bool,
         typer.Option(
@@ -110,7 +120,9 @@ def plan(
         from nearfar.files import check_output, new_output
 
         check_output(output, force=force)
-    if photos is not None:
+    if both_ranges_left_out(no_near=no_near, no_far=no_far):
+        made = _of_lamps(projector, photos, near, look, no_check=no_check)
+    elif photos is not None:
         _refuse_with_photos(far, drop, offset, correspondence)
         with progress_bar("choosing patterns", quiet=quiet or as_json) as report:
             chosen = _choose(projector, photos, near, look, checks=not no_check, progress=report)
@@ -138,6 +150,20 @@ def plan(
         said += [] if output is None else [f"plan written to {output}"]
         for line in said:
             say(line, quiet=quiet)
+
+
+def _of_lamps(
+    projector: Size, photos: int | None, near: int | None, look: Path | None, *, no_check: bool
+) -> "Plan":
+    """Plan for lamps without a neighbourhood."""
+    from nearfar.plan.lamps import plan_lamps
+
+    if photos is None:
+        raise typer.BadParameter("--no-near and --no-far go with --photos N.")
+    for flag, given in (("--near", near), ("--look", look)):
+        if given is not None:
+            raise typer.BadParameter("is not for --no-near --no-far.", param_hint=flag)
+    return plan_lamps(projector, photos, checked=not no_check)
 
 
 def _on_blocks(projector: Size) -> str:

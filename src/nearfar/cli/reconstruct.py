@@ -14,8 +14,11 @@ from nearfar.cli.options import (
     AsJson,
     CapturePath,
     Force,
+    NoFar,
+    NoNear,
     Quiet,
     ReportPath,
+    both_ranges_left_out,
     check_report_page,
     keep_input,
 )
@@ -52,6 +55,8 @@ def reconstruct(
             "--square", help="Average the camera pixels of each projector pixel: the paper's T."
         ),
     ] = False,
+    no_near: NoNear = False,
+    no_far: NoFar = False,
     memory: Annotated[
         str,
         typer.Option(
@@ -104,10 +109,11 @@ def reconstruct(
         check_report_page(report, output, *inputs, force=force)
     check_resumable(output, RESUMABLE_TRANSPORT, resume=resume, force=force)
     opened = open_capture(capture)
-    if opened.plan.offset == "shown":
+    is_free = both_ranges_left_out(no_near=no_near, no_far=no_far)
+    if is_free or opened.plan.offset == "shown":
         refused = {"--method": method != "joint", "--square": square, "--resume": resume}
         refused |= {"--half": half, "--scheduler": scheduler is not None}
-        _from_patterns(
+        (_free_rows if is_free else _from_patterns)(
             opened,
             output,
             correspondence,
@@ -145,6 +151,47 @@ def reconstruct(
     if as_json:
         print(json.dumps(verdict.as_json()))
     say(str(verdict), quiet=quiet)
+
+
+def _free_rows(
+    capture: "Capture",
+    output: Path,
+    correspondence: Path | None,
+    memory: int,
+    refused: dict[str, bool],
+    *,
+    as_json: bool,
+    force: bool,
+    report: Path | None,
+    quiet: bool,
+) -> None:
+    """Reconstruct free rows: lamps without a neighbourhood."""
+    from nearfar.correspondence import read_correspondence
+    from nearfar.workflow.free_rows import reconstruct_free_rows_to_file
+
+    for option, is_given in {**refused, "--report": report is not None}.items():
+        if is_given:
+            raise typer.BadParameter("is not for --no-near --no-far.", param_hint=option)
+    given = None
+    if correspondence is not None:
+        given = read_correspondence(correspondence, capture.camera, capture.plan.projector)
+    with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
+        verdict, has_black = reconstruct_free_rows_to_file(
+            capture, output, given, memory=memory, force=force, progress=progress
+        )
+    if not has_black:
+        warn(
+            f"{capture.path} has no photo under black, so that black was taken as 0: what is black "
+            f"in the photos stands in T as light."
+        )
+    say(
+        f"transport of {capture.camera} camera pixels and {capture.plan.projector.pixels} lamps "
+        f"written to {output}",
+        quiet=quiet or as_json,
+    )
+    if as_json:
+        print(json.dumps(verdict.as_json()))
+    say(str(verdict), quiet=quiet or as_json)
 
 
 def _from_patterns(

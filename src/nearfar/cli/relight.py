@@ -9,12 +9,14 @@ import typer
 from nearfar.arrays import Size
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.arrays import Floats
+    from nearfar.transport.store import StoredTransport
 
-COMPONENTS = ("direct", "near", "far")
+COMPONENTS = ("direct", "near", "far", "free")
 
 
 def _gains(texts: list[str]) -> dict[str, float]:
@@ -29,7 +31,7 @@ def _gains(texts: list[str]) -> dict[str, float]:
             number = float("nan")
         if name not in COMPONENTS or not isfinite(number):
             raise typer.BadParameter(
-                f"{text!r} is no gain: write direct=1, near=2 or far=0, one per --gain.",
+                f"{text!r} is no gain: write direct=1, near=2, far=0 or free=1, one per --gain.",
                 param_hint="--gain",
             )
         gains[name] = number
@@ -50,14 +52,45 @@ def _resized(light: "Floats", _path: Path, projector: Size) -> "Floats":
     return light if light.shape[:2] == projector else resize_light(light, projector)
 
 
+def _read(path: Path, transport: "StoredTransport", *, srgb: bool) -> "Floats":
+    """Read a light: a picture, or a table of a weight, or red, green and blue, for each lamp."""
+    from nearfar.files import read_light_of_any_size
+    from nearfar.files.arrays import read_arrays
+    from nearfar.files.tables import is_table, read_table
+
+    lamps = transport.projector.pixels
+    is_list = is_table(path) or ("free" in transport.parts and path.suffix.lower() == ".npy")
+    if not is_list:
+        return read_light_of_any_size(path, srgb=srgb)
+    if not is_table(path) and read_arrays(path)["array"].shape[:2] == transport.projector:
+        return read_light_of_any_size(path, srgb=srgb)
+    weights = read_table(path)
+    if weights.shape == (1, lamps):
+        weights = weights.T
+    if weights.shape not in {(lamps, 1), (lamps, 3)}:
+        raise InputError(
+            f"{path} has {len(weights)} rows of {weights.shape[1]} numbers: give a row for each of "
+            f"{lamps} lamps, of one weight or of red, green and blue."
+        )
+    shaped = weights.reshape(*transport.projector, -1)
+    return shaped[..., 0] if shaped.shape[2] == 1 else shaped
+
+
 def relight(
     transport: TransportPath,
-    light: Annotated[Path, typer.Argument(metavar="LIGHT", help="Light, of the projector's size.")],
+    light: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LIGHT",
+            help="Light, of the projector's size; of lamps also a list of weights, .npy, .csv or "
+            ".txt.",
+        ),
+    ],
     output: Annotated[Path, typer.Argument(metavar="OUT", help=".npy, .exr, .tiff or .png.")],
     gain: Annotated[
         list[str] | None,
         typer.Option(
-            help="Gain of a component: direct=1, near=2 or far=0; may be repeated.",
+            help="Gain of a component: direct=1, near=2 or far=0, for lamps free=2.",
             metavar="NAME=VALUE",
         ),
     ] = None,
@@ -85,7 +118,6 @@ def relight(
     from nearfar.files import (
         check_output,
         check_picture_ending,
-        read_light_of_any_size,
         write_picture,
     )
     from nearfar.transport.colour import as_channels_see
@@ -100,7 +132,7 @@ def relight(
         require_reconstructed(transport)
         opened = open_transport(transport)
         warn_if_wrong(transport, opened.verdict)
-        projected = read_light_of_any_size(light, srgb=srgb)
+        projected = _read(light, opened, srgb=srgb)
         given = Size(*projected.shape[:2])
         projected = (_resized if resize else _of_size)(projected, light, opened.projector)
         projected = as_channels_see(projected, opened.channels, opened.provenance)

@@ -3,6 +3,7 @@
 A pattern is (Py, Px), values in [0, 1], 1 = full white.
 """
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
 
@@ -113,3 +114,19 @@ def quantise(pattern: NDArray[np.float64]) -> NDArray[np.uint8]:
 def invert(pattern: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return 255 less the 8-bit pattern, so that a pair sums exactly to white."""
     return np.asarray(255 - pattern, dtype=np.uint8)
+
+
+def is_prime(number: int) -> bool:
+    """Return whether a whole number is prime."""
+    return number > 1 and all(number % factor for factor in range(2, math.isqrt(number) + 1))
+
+
+def s_matrix_row(order: int, row: int, size: Size) -> NDArray[np.float64]:
+    """Draw a row of the cyclic S-matrix of a prime order 4 m + 3 over the pixels, (Py, Px).
+
+    The order + 1 patterns of all rows and black tell as many pixels as the order apart, each with a
+    variance of about 4 / order of that of a photo (Harwit and Sloane 1979).
+    """
+    squares = np.zeros(order, dtype=bool)
+    squares[np.arange(order) ** 2 % order] = True
+    return squares[(row + np.arange(size.pixels)) % order].reshape(size).astype(np.float64)

@@ -28,6 +28,7 @@ from nearfar.plan.patterns import (
     OWN_PATTERNS,
     Exponential,
     Frozen,
+    LampCode,
     Pattern,
     Purpose,
     kinds_of,
@@ -36,8 +37,8 @@ from nearfar.plan.patterns import (
 
 # Also a literal in the model. Version 2 added phase, repeated patterns and check pictures, version
 # 3 Gray code, version 4 half-screens and inverse pictures, version 5 the pitch, version 6 the
-# expected SNR_b, version 7 pictures that were shown. A plan of an earlier version is one of the
-# next as well.
+# expected SNR_b, version 7 pictures that were shown and codes of lamps. A plan of an earlier
+# version is one of the next as well.
 FORMAT_VERSION = 7
 READABLE_VERSIONS = (1, 2, 3, 4, 5, 6, 7)
 
@@ -219,18 +220,28 @@ class Plan(Frozen):
             )
 
     def require_sinusoids(self, what: str) -> None:
-        """Refuse a plan of pictures that were shown and are not recognised as sinusoids of a plan.
+        """Refuse a plan whose patterns are not sinusoids: pictures that were shown, codes of lamps.
 
         Raises
         ------
         PlanError
-            If the plan has offset "shown".
+            If the plan has offset "shown", or codes of lamps.
         """
         if self.offset == "shown":
             raise PlanError(
                 f"these photos are of somebody else's pictures, not of the sinusoids of a plan, so "
                 f"that there is nothing to {what}: go on with `correspond()` or `reconstruct()`."
             )
+        if self.is_of_lamps:
+            raise PlanError(
+                f"these photos are of codes of lamps, not of sinusoids, so that there is nothing "
+                f"to {what}: go on with `reconstruct(no_near=True, no_far=True)`."
+            )
+
+    @property
+    def is_of_lamps(self) -> bool:
+        """Whether the plan shows codes of lamps without a neighbourhood."""
+        return any(isinstance(pattern, LampCode) for pattern in self.patterns)
 
     def draw(self, index: int) -> NDArray[np.uint8]:
         """Draw the 8-bit pattern of photo `index`, shape (Py, Px)."""

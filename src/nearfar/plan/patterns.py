@@ -24,6 +24,9 @@ from nearfar.illumination.frequencies import Frequency, frequency_from_text, fre
 from nearfar.illumination.pictures import natural_picture
 from nearfar.plan.recognition.contents import AnyContent
 
+# Codes of more lamps take longer to read than to be shown one by one.
+MOST_LAMPS_OF_A_CODE = 2**14
+
 Purpose = Literal["direct", "near", "far", "reference", "correspondence", "check", "shown"]
 
 FrequencyField = Annotated[
@@ -225,6 +228,46 @@ class HalfScreen(Pattern):
         return patterns.invert(drawn) if self.inverse else drawn
 
 
+class LampCode(Pattern):
+    """A row of a cyclic S-matrix: about half of the lamps at full white, in no order.
+
+    Attributes
+    ----------
+    order : int
+        A prime of the form 4 m + 3, not below the number of projector pixels.
+    row : int
+        Pixel p, counted row by row, is white where (row + p) modulo the order is a square modulo
+        the order (Harwit and Sloane, Hadamard Transform Optics, 1979).
+    """
+
+    kind: Literal["lamp code"] = "lamp code"
+    order: int = Field(ge=3, le=MOST_LAMPS_OF_A_CODE)
+    row: int = Field(ge=0)
+    purpose: Literal["direct", "check"] = "direct"
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        to_check = " to check by" if self.purpose == "check" else ""
+        return f"code {self.row} of {self.order} lamps{to_check}"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        return patterns.quantise(patterns.s_matrix_row(self.order, self.row, size))
+
+    def require_place_on(self, projector: Size) -> None:
+        """Refuse a code of fewer lamps than a projector has, or a row that it does not have.
+
+        Raises
+        ------
+        ValueError
+        """
+        if self.order % 4 != 3 or not patterns.is_prime(self.order):
+            raise ValueError(f"there are no codes of order {self.order}")
+        if self.order < projector.pixels or self.row >= self.order:
+            raise ValueError(f"{self.description} does not fit the projector")
+
+
 class Shown(Pattern):
     """A picture of somebody else's that was shown; its pixels are kept in the capture.
 
@@ -267,6 +310,7 @@ OWN_PATTERNS: tuple[type[Pattern], ...] = (
     GrayCode,
     Picture,
     HalfScreen,
+    LampCode,
     Shown,
 )
 

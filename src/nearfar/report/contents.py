@@ -142,20 +142,52 @@ def _describe_acquisition(capture: Capture) -> list[str]:
 def _describe_transport(path: Path) -> str:
     transport = load_transport(path)
     floodlit = transport.components(np.ones(transport.projector, dtype=np.float32))
-    sums = {name: float(part.sum()) for name, part in zip(floodlit._fields, floodlit, strict=True)}
+    sums = {name: float(part.sum()) for name, part in transport.named(floodlit).items()}
     total = sum(sums.values())
     shares = ", ".join(f"{name} {value / total:.1%}" for name, value in sums.items() if total)
     return "\n".join(
         [
             _verdict_of(transport),
             f"{TRANSPORT_KIND}: projector {transport.projector}, camera {transport.camera}, "
-            f"{_channels(transport.channels)}, W = {transport.window}"
-            f"{_pitch(transport.pitch)}, {transport.far_basis.count} far coefficients",
-            f"{transport.lit.mean():.1%} of the camera pixels directly lit",
+            f"{_channels(transport.channels)}, {_model_of(transport)}",
+            *(
+                [f"{transport.lit.mean():.1%} of the camera pixels directly lit"]
+                if "direct" in transport.parts
+                else []
+            ),
+            *_gains_of(transport),
             f"floodlit: {shares or 'black'}",
             f"provenance: {json.dumps(dict(transport.provenance))}",
         ]
     )
+
+
+def _gains_of(transport: Transport) -> list[str]:
+    """Return a line about the lamps of a light stage, none of other transports."""
+    gains, errors = (
+        np.array(transport.provenance.get(name, ()), dtype=np.float64)
+        for name in ("lamp_gains", "lamp_gain_errors")
+    )
+    if "lamps" not in transport.provenance:
+        return []
+    if not len(gains) or len(gains) != len(errors):
+        return ["light stage, a photo under each lamp: gains not fitted"]
+    return [
+        f"light stage, a photo under each lamp: gains from {gains.min():.3g} to {gains.max():.3g}, "
+        f"each +- {errors.mean():.2g}"
+    ]
+
+
+def _model_of(transport: Transport) -> str:
+    """Return the ranges of a transport, and how many numbers describe them."""
+    near = f"W = {transport.window}{_pitch(transport.pitch)}"
+    far = f"{transport.far_basis.count} far coefficients"
+    if "free" in transport.parts:
+        lamps = f"{transport.projector.pixels} lamps, each a number of its own at a camera pixel"
+        return f"no near or far range: {lamps}"
+    absent = [f"no {part} range" for part in ("near", "far") if part not in transport.parts]
+    ranges = [text for part, text in (("near", near), ("far", far)) if part in transport.parts]
+    return ", ".join([*ranges, *absent])
 
 
 def _verdict_of(transport: Transport) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.errors import InputError
+from nearfar.estimate.deviations import deviation_of_picture
 from nearfar.estimate.joint import ErrorBars
 from nearfar.illumination.pictures import natural_picture, white
 from nearfar.transport.model import Transport
@@ -104,28 +105,31 @@ def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
         return (transport @ light).reshape(*transport.camera, -1)
 
     def over_error(name: str, light: Floats) -> Map:
-        error = ErrorBars(transport).picture(light).reshape(*transport.camera, -1)
+        error = deviation_of_picture(transport, light).reshape(*transport.camera, -1)
         return ratio(name, relit(light), error)
 
     floodlight = white(transport.projector)
-    maps: dict[str, Callable[[], Map]] = {
-        "column": lambda: plain("column", "px", max(1, width - 1), q[..., 1]),
-        "row": lambda: plain("row", "px", max(1, height - 1), q[..., 0]),
-    }
-    if quality is not None:
+    maps: dict[str, Callable[[], Map]] = {}
+    if "direct" in transport.parts:
+        maps["column"] = lambda: plain("column", "px", max(1, width - 1), q[..., 1])
+        maps["row"] = lambda: plain("row", "px", max(1, height - 1), q[..., 0])
+    if quality is not None and "near" in transport.parts:
         maps["confidence"] = lambda: plain("confidence", "", 1.0, quality.confidence)
-    if transport.posterior is not None:
+    if transport.has_error_bars:
         maps["picture-error"] = lambda: over_error(
             "picture-error", natural_picture(transport.projector, 1)
         )
         maps["error"] = lambda: over_error("error", floodlight)
+    else:
+        maps["noise"] = lambda: ratio("noise", relit(floodlight), transport.noise)
+    if transport.posterior is not None:
         maps["direct-error"] = lambda: ratio(
             "direct-error", transport.direct, ErrorBars(transport).direct()
         )
-    else:
-        maps["noise"] = lambda: ratio("noise", relit(floodlight), transport.noise)
-    maps["near-share"] = lambda: share("near-share", 1)
-    maps["far-share"] = lambda: share("far-share", 2)
+    if "near" in transport.parts:
+        maps["near-share"] = lambda: share("near-share", 1)
+    if "far" in transport.parts:
+        maps["far-share"] = lambda: share("far-share", 2)
     if quality is not None:
         maps["saturated"] = lambda: Map(
             TITLES["saturated"],

@@ -4,6 +4,7 @@ from nearfar.plan import Plan
 from nearfar.plan.choose import can_list_every_frequency, photos_of_every_frequency
 from nearfar.plan.expected_range import ExpectedRange
 from nearfar.plan.look import Look
+from nearfar.plan.patterns import LampCode
 from nearfar.plan.recognition import summarise
 from nearfar.plan.recognition.own import recognised_in
 from nearfar.plan.window import largest_window
@@ -27,6 +28,8 @@ def describe_plan(plan: Plan) -> str:
                 *summarise(recognised_in(plan)),
             ]
         )
+    if plan.is_of_lamps:
+        return _describe_lamps(plan)
     counts = ", ".join(f"{count} {purpose}" for purpose, count in plan.counts.items() if count)
     return "\n".join(
         [
@@ -36,6 +39,29 @@ def describe_plan(plan: Plan) -> str:
             f"{len(plan.patterns)} photos: {counts}",
             f"{_against(plan)}; counting the {plan.transport_photos} of transport alone, "
             f"{plan.savings:.2f} times fewer",
+        ]
+    )
+
+
+def _describe_lamps(plan: Plan) -> str:
+    """Describe a plan of codes of lamps."""
+    codes, checks = plan.counts["direct"], plan.counts["check"]
+    lamps = plan.projector.pixels
+    rows = {
+        pattern.row
+        for pattern in plan.patterns
+        if isinstance(pattern, LampCode) and pattern.purpose == "direct"
+    }
+    tells = (
+        "tell all of them apart" if len(rows) >= lamps else f"are {len(rows) / lamps:.0%} of them"
+    )
+    others = len(plan.patterns) - codes - checks
+    return "\n".join(
+        [
+            f"{lamps} lamps of {plan.projector}, in no order: codes of half of the lamps, which "
+            f"{tells}",
+            f"{len(plan.patterns)} photos: {codes} codes, {checks} to check by, {others} white and "
+            f"black",
         ]
     )
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from nearfar.checks import as_number
+from nearfar.transport.parts import Parts, require_parts
 
 GAINS = "gains"
 
@@ -37,6 +38,21 @@ def as_gains(direct: float, near: float, far: float) -> Gains:
         as_number(near, "the gain of near"),
         as_number(far, "the gain of far"),
     )
+
+
+def gains_on(parts: Parts, direct: float, near: float, far: float, free: float) -> Gains:
+    """Return the gains of the components of a transport; that of free rows stands as `far`.
+
+    Raises
+    ------
+    InputError
+        If one is not a finite number, or changes a part that the transport does not have.
+    """
+    free = as_number(free, "the gain of free")
+    gains = as_gains(direct, near, far)
+    given = {**gains._asdict(), "free": free}
+    require_parts(parts, [name for name, gain in given.items() if gain != 1.0])
+    return gains._replace(far=free) if "free" in parts else gains
 
 
 def gains_of(provenance: Mapping[str, Any]) -> Gains:

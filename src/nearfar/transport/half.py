@@ -39,7 +39,7 @@ def rounding_over_noise(transport: Transport) -> float:
         is rounded, infinite where values are rounded and have no noise.
     """
     noise = float(np.sqrt(np.mean(transport.noise.astype(np.float64) ** 2)))
-    entry_noise = noise * np.sqrt(2.0) / transport.window
+    entry_noise = noise * np.sqrt(2.0) / max(1, transport.window)
     ratios = []
     for values, level in ((transport.near, entry_noise), (transport.far, noise)):
         rounding = _rounding(values)
@@ -50,6 +50,8 @@ def rounding_over_noise(transport: Transport) -> float:
 
 def _rounding(values: Floats) -> float:
     """Return the root mean square of the rounding error in float16."""
+    if not values.size:
+        return 0.0
     flat = values.reshape(-1, values.shape[-1])
     total = 0.0
     for batch in blocks(len(flat), BATCH_PIXELS):

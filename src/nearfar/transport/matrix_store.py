@@ -35,16 +35,17 @@ def read_in_rows(group: Any, name: str, out: Floats) -> None:
 def write_sparse(group: Any, name: str, matrix: sparse.csr_array) -> None:
     """Write a sparse matrix as the arrays NAME-data, NAME-indices and NAME-starts."""
     write_sparse_data(group, name, matrix)
-    _write_padded(group, f"{name}-indices", matrix.indices)
-    _write_padded(group, f"{name}-starts", matrix.indptr)
+    write_padded(group, f"{name}-indices", matrix.indices)
+    write_padded(group, f"{name}-starts", matrix.indptr)
 
 
 def write_sparse_data(group: Any, name: str, matrix: sparse.csr_array) -> None:
     """Write the entries alone, of a matrix that shares its indices with another."""
-    _write_padded(group, f"{name}-data", matrix.data.astype(np.float32, copy=False))
+    write_padded(group, f"{name}-data", matrix.data.astype(np.float32, copy=False))
 
 
-def _write_padded(group: Any, name: str, values: Any) -> None:
+def write_padded(group: Any, name: str, values: Any) -> None:
+    """Write a flat array, which may be empty."""
     # Zarr stores no empty array: append one value, which reading drops.
     write_in_rows(group, name, np.append(values, values.dtype.type(0)))
 
@@ -59,8 +60,8 @@ def read_sparse(group: Any, name: str, shape: tuple[int, int]) -> sparse.csr_arr
     ValueError
         If the arrays are those of no matrix of this shape.
     """
-    indices, starts = (_read_padded(group, f"{name}-{part}") for part in ("indices", "starts"))
-    data = _read_padded(group, f"{name}-data")
+    indices, starts = (read_padded(group, f"{name}-{part}") for part in ("indices", "starts"))
+    data = read_padded(group, f"{name}-data")
     matrix = sparse.csr_array((data, indices, starts), shape=shape)
     matrix.check_format()
     return matrix
@@ -75,11 +76,12 @@ def read_entries(group: Any, name: str, like: sparse.csr_array) -> sparse.csr_ar
     name : str
     like : scipy.sparse.csr_array
     """
-    data = _read_padded(group, f"{name}-data")
+    data = read_padded(group, f"{name}-data")
     if data.shape != like.data.shape:
         raise ValueError(f"{name} has {len(data)} entries instead of {len(like.data)}")
     return sparse.csr_array((data, like.indices, like.indptr), shape=like.shape)
 
 
-def _read_padded(group: Any, name: str) -> Any:
+def read_padded(group: Any, name: str) -> Any:
+    """Read what `write_padded` wrote."""
     return read_array(group, name)[:-1]

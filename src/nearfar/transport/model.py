@@ -31,7 +31,9 @@ from nearfar.transport.adjoint import AdjointTransport
 from nearfar.transport.analysed import AnalysedLight, analysed_light, overlaps_of
 from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
 from nearfar.transport.boxes import BoxAxes, box_axes
-from nearfar.transport.gains import as_gains, with_gains
+from nearfar.transport.free_posterior import FreePosterior
+from nearfar.transport.gains import gains_on, with_gains
+from nearfar.transport.parts import PLACES, USUAL_PARTS, Parts
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
 from nearfar.transport.posterior import Posterior
@@ -71,9 +73,11 @@ class Transport(NoArray):
         d, spread over the 2 x 2 projector pixels around q.
     near : ndarray, shape (Cy, Cx, channels, W, W), float32
         n over the window around the rounded q; 0 beyond the projector's border. Where `pitch` is
-        over 1, (Cy, Cx, channels, J): light under white of each function of `near_basis`.
+        over 1, (Cy, Cx, channels, J): light under white of each function of `near_basis`. W = 0
+        where `parts` has no near-range light.
     far : ndarray, shape (Cy, Cx, channels, M), float32
-        Responses of F to the cosines and sines of `far_basis`.
+        Responses of F to the cosines and sines of `far_basis`; M = 0 where `parts` has no
+        far-range light. Free rows are kept here, as responses to all frequencies of the projector.
     far_basis : RealBasis
         Frequencies of F: of a joint estimate, those of the far band and all others that were
         measured on the DFT grid of the projector.
@@ -87,10 +91,14 @@ class Transport(NoArray):
         The photo under black: ambient light and black level.
     noise : ndarray, shape (Cy, Cx, channels), float32
         Standard deviation of one response to a cosine or sine.
+    parts : tuple of {"direct", "near", "far", "free"}
+        What T is split into; see `nearfar.transport.parts`.
     provenance : mapping
         How it was made: plan, estimator, exposure, version. Of JSON types.
     posterior : Posterior, optional
         State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it.
+    free_posterior : FreePosterior, optional
+        The same of an estimate of free rows.
     quality : Quality, optional
         Confidence in q and saturation of each camera pixel, where the photos show them.
     verdict : KeptVerdict, optional
@@ -127,6 +135,8 @@ class Transport(NoArray):
     posterior: Posterior | None = None
     quality: Quality | None = None
     verdict: KeptVerdict | None = None
+    parts: Parts = USUAL_PARTS
+    free_posterior: FreePosterior | None = None
 
     @property
     def camera(self) -> Size:
@@ -161,6 +171,11 @@ class Transport(NoArray):
         return self.footprint.reshape(-1, 4)
 
     @property
+    def has_error_bars(self) -> bool:
+        """Whether error bars follow from its estimate."""
+        return self.posterior is not None or self.free_posterior is not None
+
+    @property
     def lit(self) -> Booleans:
         """Camera pixels with direct light, shape (Cy, Cx)."""
         return np.isfinite(self.correspondence[..., 0])
@@ -193,7 +208,7 @@ class Transport(NoArray):
         """Show the transport in a notebook, floodlit and taken apart."""
         step = -(-max(self.camera) // THUMBNAIL)
         parts = self.components(np.ones(self.projector, dtype=np.float32))
-        pictures = {"floodlit": np.asarray(sum(parts)), **parts._asdict()}
+        pictures = {"floodlit": np.asarray(sum(parts)), **self.named(parts)}
         brightest = float(np.percentile(pictures["floodlit"], 99.5))
         images = [
             (name, picture(colours(part)[::step, ::step] / max(brightest, 1e-9), name))
@@ -202,10 +217,11 @@ class Transport(NoArray):
         rows = [
             ("projector", str(self.projector)),
             ("camera", f"{self.camera}, {self.channels} channels"),
+            ("parts", " + ".join(self.parts)),
             ("window W, far coefficients", f"{self.window}, {self.far_basis.count}"),
             ("directly lit", f"{self.lit.mean():.1%} of the camera"),
             ("verdict", self.verdict.grade if self.verdict is not None else "not judged"),
-            ("error bars", "yes" if self.posterior is not None else "no"),
+            ("error bars", "yes" if self.has_error_bars else "no"),
             ("method", str(self.provenance.get("method", "unknown"))),
         ]
         return card("transport", rows, images)
@@ -213,9 +229,13 @@ class Transport(NoArray):
     def __matmul__(self, light: Floats) -> Floats:
         return np.asarray(sum(self.components(light)))
 
+    def named(self, components: Components) -> dict[str, Floats]:
+        """Return the components that the transport has, by the names of its `parts`."""
+        return {part: components[PLACES[part]] for part in self.parts}
+
     def __mul__(self, factor: float) -> "Transport":
         scale = as_number(factor, "the factor")
-        scaled = self.with_gains(direct=scale, near=scale, far=scale)
+        scaled = self.with_gains(**dict.fromkeys(self.parts, scale))
         return replace(scaled, noise=self.noise * np.float32(abs(scale)))
 
     __rmul__ = __mul__
@@ -268,13 +288,15 @@ class Transport(NoArray):
         direct: float = 1.0,
         near: float = 1.0,
         far: float = 1.0,
+        free: float = 1.0,
     ) -> Floats:
         """Relight with a gain for each component.
 
         Parameters
         ----------
         light : ndarray, shape (Py, Px) or (Py, Px, channels); or AnalysedLight
-        direct, near, far : float
+        direct, near, far, free : float
+            `free` is for transports of free rows.
 
         Returns
         -------
@@ -284,14 +306,14 @@ class Transport(NoArray):
         Raises
         ------
         InputError
-            As `components`; if a gain is not a finite number.
+            As `components`; if a gain is not a finite number, or of a part that is absent.
         """
-        direct, near, far = as_gains(direct, near, far)
+        direct, near, far = gains_on(self.parts, direct, near, far, free)
         parts = self.components(light)
         return np.asarray(direct * parts.direct + near * parts.near + far * parts.far)
 
     def with_gains(
-        self, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+        self, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0, free: float = 1.0
     ) -> "Transport":
         """Return the transport with its components scaled, without error bars or a verdict.
 
@@ -299,7 +321,8 @@ class Transport(NoArray):
 
         Parameters
         ----------
-        direct, near, far : float
+        direct, near, far, free : float
+            `free` is for transports of free rows.
 
         Returns
         -------
@@ -308,13 +331,14 @@ class Transport(NoArray):
         Raises
         ------
         InputError
-            If a gain is not a finite number.
+            If a gain is not a finite number, or of a part that is absent.
         """
-        gains = as_gains(direct, near, far)
+        gains = gains_on(self.parts, direct, near, far, free)
         return replace(
             self,
             provenance=with_gains(self.provenance, gains),
             posterior=None,
+            free_posterior=None,
             verdict=None,
             direct=self.direct * np.float32(gains.direct),
             near=self.near * np.float32(gains.near),
@@ -401,7 +425,7 @@ class Transport(NoArray):
             )
             low = self.far.reshape(count, channels, -1)[pixels]
             return Components(d, n, self.far_basis.synthesise(low).astype(np.float32, copy=False))
-        flat_far = self.far.reshape(-1, self.channels, self.far_basis.count)[pixels]
+        flat_direct, flat_near, flat_far = (part[pixels] for part in self._flat_factors)
         f = self.far_basis.synthesise(flat_far).astype(np.float32, copy=False)
         number = np.arange(len(f))[:, None]
         corners = self._footprint.pixels[pixels]
@@ -411,14 +435,12 @@ class Transport(NoArray):
         # Entries beyond the border go to a column of their own, which is cut off.
         beyond = self.projector.pixels
         flat = np.where(inside, windows.window_pixels(centres, self.window, self.projector), beyond)
-        direct_values = self.direct.reshape(-1, self.channels)[pixels]
-        near_values = self.near.reshape(-1, self.channels, self.window**2)[pixels]
         d = np.zeros_like(f)
         n = np.zeros((*f.shape[:2], beyond + 1), dtype=np.float32)
         for i in range(self.channels):
             # Corners may coincide at the border: add each on its own.
-            np.add.at(d[:, i], (number, corners), weights * direct_values[:, i, None])
-            n[number, i, flat] = near_values[:, i]
+            np.add.at(d[:, i], (number, corners), weights * flat_direct[:, i, None])
+            n[number, i, flat] = flat_near[:, i]
         return Components(d, n[..., :beyond], f)
 
     def dense(self) -> Floats:
@@ -467,6 +489,7 @@ class Transport(NoArray):
         one = replace(
             self,
             posterior=None,
+            free_posterior=None,
             **{
                 name: getattr(self, name)[:, :, channel : channel + 1]
                 for name in ("direct", "near", "far", "black", "noise")
@@ -544,15 +567,13 @@ class Transport(NoArray):
         return Components(self.direct.reshape(shape), near, far)
 
     def _adjoint_channel(self, image: Floats, channel: int) -> Floats:
-        d = self.direct.reshape(-1, self.channels)[:, channel]
-        n = self.near.reshape(self.camera.pixels, self.channels, -1)[:, channel]
-        f = self.far.reshape(-1, self.channels, self.far_basis.count)[:, channel]
+        d, n, f = (part[:, channel] for part in self._flat_factors)
         if self.pitch > 1:
             back = blurred_adjoint(d, n, image, self.pyramid, self._centres, self.box_axes)
             return back + self.far_basis.synthesise(image @ f).reshape(self.projector)
         back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
         back = back + self.far_basis.synthesise(image @ f).reshape(self.projector)
-        for batch in blocks(self.camera.pixels, BATCH_PIXELS):
+        for batch in blocks(self.camera.pixels, BATCH_PIXELS) if self.window else ():
             values = n[batch] * image[batch, None]
             back += windows.spread(values, self._centres[batch], self.window, self.projector)
         return np.asarray(back)

@@ -4,6 +4,8 @@ Index convention: c runs over camera pixels, i over channels, l over lights, w o
 lights are (L, 1, P) for all channels, or (L, channels, P); pictures are (L, C, channels).
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,9 @@ def near_pictures(
 ) -> Floats:
     """Return the pictures (L, C, channels) of n, shape (C, channels, W^2), around centres."""
     window = round(np.sqrt(near.shape[2]))
-    found = np.empty((len(lights), *near.shape[:2]), dtype=np.result_type(lights, near))
+    found = np.zeros((len(lights), *near.shape[:2]), dtype=np.result_type(lights, near))
+    if not window:
+        return found
     padded = windows.pad(lights.reshape(*lights.shape[:2], *projector), window)
     lit = [windows.reached(light.any(axis=0), centres, window) for light in padded]
 
@@ -73,6 +77,6 @@ def far_pictures(far: Floats, overlaps: Floats) -> Floats:
     """
     overlaps = overlaps.astype(np.result_type(overlaps, far), copy=False)
     if overlaps.shape[1] == 1:
-        flat = far.reshape(-1, far.shape[2]) @ overlaps[:, 0].T
+        flat = far.reshape(math.prod(far.shape[:2]), far.shape[2]) @ overlaps[:, 0].T
         return np.asarray(np.moveaxis(flat.reshape(*far.shape[:2], len(overlaps)), 2, 0))
     return np.asarray(np.einsum("cim,lim->lci", far, overlaps, optimize=True))

@@ -15,6 +15,7 @@ from nearfar.markup import MARK
 from nearfar.transport import near
 from nearfar.transport.apart import Apart
 from nearfar.transport.band import Banded, band_edge
+from nearfar.transport.parts import PLACES, Parts
 from nearfar.transport.posterior import deviation_of_mean
 from nearfar.transport.quality import Quality
 
@@ -27,7 +28,6 @@ COLOUR_SCALE_DECADES = 5.0
 LINE_DECADES = 6.0
 # Behind lines whose errors are unknown.
 UNKNOWN_COLOUR = "0.9"
-PARTS = ("direct", "near", "far")
 
 
 class Drawable(Apart, Banded, Protocol):
@@ -38,6 +38,10 @@ class Drawable(Apart, Banded, Protocol):
         """Which camera pixels are saturated, where the photos show it."""
 
     def __matmul__(self, light: Floats) -> Floats: ...
+
+    @property
+    def parts(self) -> Parts:
+        """What T is split into."""
 
     def components(self, light: Floats) -> Any:
         """Return the pictures of D, N and F."""
@@ -89,17 +93,24 @@ class Plots:
     def components(
         self, light: Floats, *, exposure: float = 1.0, ax: "list[Axes] | None" = None
     ) -> "list[Axes]":
-        """Draw the relit direct, near- and far-range pictures; three axes."""
+        """Draw the relit direct, near- and far-range pictures, on an axis for each part."""
+        components = self._transport.components(light)
+        parts = {name: components[PLACES[name]] for name in self._transport.parts}
         if ax is None:
             from matplotlib import pyplot
 
-            ax = list(pyplot.subplots(1, 3, figsize=(9, 3.2), layout="constrained")[1])
-        if len(ax) != len(PARTS):
-            raise InputError(f"{len(ax)} axes were given for three components: give three.")
-        parts = self._transport.components(light)
+            made = pyplot.subplots(
+                1, len(parts), figsize=(3 * len(parts), 3.2), layout="constrained", squeeze=False
+            )
+            ax = list(made[1][0])
+        if len(ax) != len(parts):
+            raise InputError(
+                f"{len(ax)} axes were given for the components {', '.join(parts)}: give "
+                f"{len(parts)}."
+            )
         return [
             _show(each, exposure * part, name)
-            for each, part, name in zip(ax, parts, PARTS, strict=True)
+            for each, (name, part) in zip(ax, parts.items(), strict=True)
         ]
 
     def correspondence(self, axis: str = "x", *, ax: "Axes | None" = None) -> "Axes":
@@ -147,7 +158,9 @@ class Plots:
         drawn = _axes(ax)
         rows = transport.component_rows(pixel)
         bars = errors.along(pixel.start, line) if errors is not None else None
-        for number, (name, values) in enumerate(zip(PARTS, rows, strict=True)):
+        for name in transport.parts:
+            number = PLACES[name]
+            values = rows[number]
             level = np.abs(values[0].mean(axis=0).reshape(height, width)[line])
             (drawn_line,) = drawn.semilogy(level, label=name)
             if bars is not None and np.isfinite(bars[number]).all():

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Integers, middles
+from nearfar.transport.free_posterior import OF_PIXELS
 from nearfar.transport.model import Transport
 
 # Attributes of a transport with a value for each camera pixel.
@@ -22,8 +23,13 @@ POSTERIOR_FIELDS = (
     "share_of_white",
 )
 QUALITY_FIELDS = ("confidence", "saturated")
+FREE_FIELDS = OF_PIXELS
 # Attributes that may be None, and their own attributes with a value for each camera pixel.
-OPTIONAL_PARTS = {"posterior": POSTERIOR_FIELDS, "quality": QUALITY_FIELDS}
+OPTIONAL_PARTS = {
+    "posterior": POSTERIOR_FIELDS,
+    "quality": QUALITY_FIELDS,
+    "free_posterior": FREE_FIELDS,
+}
 
 
 def of_rows(transport: Transport, rows: slice) -> Transport:

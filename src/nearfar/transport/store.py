@@ -26,13 +26,17 @@ from nearfar.illumination.frequencies import frequency_from_text, frequency_to_t
 from nearfar.illumination.near_basis import basis_of
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent
+from nearfar.transport.free_posterior import FreePosterior
+from nearfar.transport.free_store import shared_of, write_shared
 from nearfar.transport.gains import gains_of
 from nearfar.transport.matrix_store import rows_of_chunk
 from nearfar.transport.model import Transport
+from nearfar.transport.parts import USUAL_PARTS, Parts, parts_from_json
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import (
     FACTORS,
+    FREE_FIELDS,
     OPTIONAL_FACTORS,
     OPTIONAL_PARTS,
     POSTERIOR_FIELDS,
@@ -45,9 +49,9 @@ from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to
 KIND = "nearfar transport"
 # Version 2 added functions of near-range light that are of several projector pixels, and
 # footprints. Transports of single pixels are still written as version 1, which older versions of
-# nearfar read.
-VERSION_OF_PIXELS, VERSION_OF_HATS = 1, 2
-READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS)
+# nearfar read. Version 3 added transports without direct, near- or far-range light.
+VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_PARTS = 1, 2, 3
+READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_PARTS)
 
 # Of a projector or a camera in a file, in pixels.
 LARGEST_SIDE = 2**20
@@ -64,11 +68,17 @@ READ_BYTES = 2**28
 
 # Attribute of the verdict on a transport, which is not there where none was passed.
 VERDICT = "verdict"
+# That of the parts of a transport that has not the usual ones.
+PARTS_OF_T = "parts"
 
 # An optional part of a transport is stored as a mapping in the attributes and as arrays named
 # PART_FIELD. The posterior and some of its fields have older names in the format.
-POSTERIOR, QUALITY = "belief", "quality"
-STORED_PARTS = {"posterior": POSTERIOR, "quality": QUALITY}
+POSTERIOR, QUALITY, FREE_POSTERIOR = "belief", "quality", "free_posterior"
+STORED_PARTS = {
+    "posterior": POSTERIOR,
+    "quality": QUALITY,
+    "free_posterior": FREE_POSTERIOR,
+}
 STORED_FIELDS = {"prior_component": "kind", "prior_scale": "strength"}
 
 
@@ -144,7 +154,10 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
     height : int
         Rows of the whole camera.
     """
-    factors = [*FACTORS, *(name for name in OPTIONAL_FACTORS if getattr(part, name) is not None)]
+    factors = [
+        *factors_of(part.parts),
+        *(name for name in OPTIONAL_FACTORS if getattr(part, name) is not None),
+    ]
     values = {name: _as_stored(getattr(part, name)) for name in factors}
     for optional, names in OPTIONAL_PARTS.items():
         owner = getattr(part, optional)
@@ -152,13 +165,25 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
             part_name = STORED_PARTS[optional]
             values |= {_array_name(part_name, name): getattr(owner, name) for name in names}
     version = VERSION_OF_PIXELS if part.pitch == 1 else VERSION_OF_HATS
+    if part.parts != USUAL_PARTS:
+        version = VERSION_OF_PARTS
     group = add_to_store(folder, KIND, version, _attributes(part))
+    if part.free_posterior is not None and first == 0:
+        write_shared(group, part.free_posterior)
     for name, one in values.items():
         # The chunks of a single block need not divide it.
         most = min(height, rows_of_chunk(one))
         chunk = (most if rows >= height else _dividing(rows, most), *one.shape[1:])
         array = add_array(group, name, (height, *one.shape[1:]), one.dtype, chunk)
         array[first : first + len(one)] = one
+
+
+def factors_of(parts: Parts) -> tuple[str, ...]:
+    """Return the factors that a transport of some parts has in a file."""
+    has_far = not {"far", "free"}.isdisjoint(parts)
+    absent = {"near": "near" not in parts, "far": not has_far}
+    absent |= dict.fromkeys(("correspondence", "direct"), "direct" not in parts)
+    return tuple(name for name in FACTORS if not absent.get(name, False))
 
 
 def _array_name(part: str, field: str) -> str:
@@ -193,6 +218,10 @@ def _attributes(transport: Transport) -> dict[str, Any]:
         attributes[POSTERIOR] = _described(transport.posterior)
     if transport.quality is not None:
         attributes[QUALITY] = {}
+    if transport.parts != USUAL_PARTS:
+        attributes[PARTS_OF_T] = list(transport.parts)
+    if transport.free_posterior is not None:
+        attributes[FREE_POSTERIOR] = {"mean_variance": transport.free_posterior.mean_variance}
     if transport.verdict is not None:
         attributes[VERDICT] = verdict_to_json(transport.verdict)
     return attributes
@@ -228,6 +257,8 @@ class StoredTransport:
         Whether it can be trusted; None if it was not judged.
     pitch : int
         Projector pixels between the functions of near-range light.
+    parts : tuple of str
+        What T is split into.
     """
 
     path: Path
@@ -240,6 +271,8 @@ class StoredTransport:
     pitch: int
     _arrays: Mapping[str, Any]
     _posterior: Mapping[str, Any] | None
+    parts: Parts = USUAL_PARTS
+    _free: Mapping[str, Any] | None = None
 
     def rows(self, rows: slice = slice(None)) -> Transport:
         """Read some rows of the camera.
@@ -263,6 +296,14 @@ class StoredTransport:
             for name in QUALITY_FIELDS
             if f"{QUALITY}_{name}" in read
         }
+        free = None
+        if self._free is not None:
+            ratio = read.pop(_array_name(FREE_POSTERIOR, *FREE_FIELDS))
+            free = FreePosterior(**self._free, ratio=ratio)
+        each = read["black"].shape
+        for name, shape in (("direct", each), ("near", (*each, 0, 0)), ("far", (*each, 0))):
+            read.setdefault(name, np.zeros(shape, np.float32))
+        read.setdefault("correspondence", np.full((*each[:2], 2), np.nan, np.float32))
         if posterior is not None:
             last = int(posterior.prior_component.max(initial=0))
             if last >= len(posterior.prior_components):
@@ -275,6 +316,8 @@ class StoredTransport:
             quality=Quality(**quality_fields) if quality_fields else None,
             verdict=self.verdict,
             pitch=self.pitch,
+            parts=self.parts,
+            free_posterior=free,
             **read,
         )
 
@@ -313,16 +356,20 @@ def open_transport(path: AnyPath) -> StoredTransport:
     """
     path = Path(path)
     group = open_store(path, KIND, *READABLE_VERSIONS)
-    arrays = {name: open_array(group, name) for name in FACTORS}
-    posterior = verdict = None
+    posterior = verdict = free = None
     try:
-        near_basis = basis_of(tuple(arrays["near"].shape[3:]), stored_pitch(group.attrs))
+        parts = parts_from_json(group.attrs.get(PARTS_OF_T, list(USUAL_PARTS)))
+        arrays = {name: open_array(group, name) for name in factors_of(parts)}
+        of_near = tuple(arrays["near"].shape[3:]) if "near" in arrays else (0, 0)
+        near_basis = basis_of(of_near, stored_pitch(group.attrs))
         projector = stored_size(group.attrs["projector"])
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(_mapped(group.attrs["provenance"]))
         gains_of(provenance)
         if POSTERIOR in group.attrs:
             posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
+        if FREE_POSTERIOR in group.attrs:
+            free = shared_of(group, _mapped(group.attrs[FREE_POSTERIOR]), projector)
         if VERDICT in group.attrs:
             verdict = verdict_from_json(_mapped(group.attrs[VERDICT]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -331,8 +378,9 @@ def open_transport(path: AnyPath) -> StoredTransport:
             f"({str(error)[:MAXIMUM_REASON]}); reconstruct it again."
         ) from None
     basis = real_basis(frequencies, projector)
-    each = tuple(int(side) for side in arrays["direct"].shape)
+    each = tuple(int(side) for side in arrays["black"].shape)
     shapes = {
+        "direct": each,
         "correspondence": (*each[:2], 2),
         "near": (*each, *near_basis.shape),
         "far": (*each, basis.count),
@@ -342,12 +390,10 @@ def open_transport(path: AnyPath) -> StoredTransport:
     if near_basis.pitch > 1:
         arrays |= {name: open_array(group, name) for name in OPTIONAL_FACTORS}
         shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 4))
-    for name, shape in shapes.items():
-        if len(each) != 3 or arrays[name].shape != shape:
-            raise UnreadableFileError(
-                f"{path} is damaged: its {name} has shape {arrays[name].shape}, not {shape}; "
-                f"reconstruct it again."
-            )
+    if free is not None:
+        ratio = _array_name(FREE_POSTERIOR, *FREE_FIELDS)
+        arrays[ratio], shapes[ratio] = open_array(group, ratio), each[:2]
+    _require_shapes(path, arrays, shapes)
     if posterior is not None:
         arrays |= {
             _array_name(POSTERIOR, name): open_array(group, _array_name(POSTERIOR, name))
@@ -377,7 +423,21 @@ def open_transport(path: AnyPath) -> StoredTransport:
         near_basis.pitch,
         arrays,
         posterior,
+        parts,
+        free,
     )
+
+
+def _require_shapes(
+    path: Path, arrays: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]
+) -> None:
+    """Refuse arrays of other shapes than a transport has."""
+    for name in shapes.keys() & arrays.keys():
+        if len(shapes["black"]) != 3 or arrays[name].shape != shapes[name]:
+            raise UnreadableFileError(
+                f"{path} is damaged: its {name} has shape {arrays[name].shape}, not "
+                f"{shapes[name]}; reconstruct it again."
+            )
 
 
 def _shared_posterior(described: dict[str, Any]) -> dict[str, Any]:

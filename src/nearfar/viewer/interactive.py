@@ -186,7 +186,9 @@ class InteractiveTransport:
         ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
         """
         channel_light = self._for_channels(light.as_array())
-        gains = {"direct": direct, "near": near, "far": far}
+        # Free rows are in the place of far-range light.
+        slots = {"direct": direct, "near": near, "far": far, "free": far}
+        gains = {part: slots[part] for part in self.stored.parts}
         analysed: AnalysedLight | None = None
         pictures = []
         for block in self.blocks():

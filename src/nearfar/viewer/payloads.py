@@ -37,6 +37,8 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "camera": list(stored.camera),
         "channels": stored.channels,
         "light_block": transport.light_block,
+        "parts": list(stored.parts),
+        "directions": _directions(stored.provenance, stored.projector.pixels),
         "window": transport.coarse.window,
         "pitch": transport.coarse.pitch,
         "method": stored.provenance.get("method"),
@@ -45,6 +47,18 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "scale": SCALE.tolist(),
         "mark": list(MARK),
     }
+
+
+def _directions(provenance: Mapping[str, Any], lamps: int) -> list[list[float]] | None:
+    """Return the directions to the lamps of a light stage; None where they are not known."""
+    try:
+        found = np.array(provenance.get("directions"), dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    if found.shape != (lamps, 3) or not np.isfinite(found).all():
+        return None
+    directions: list[list[float]] = found.tolist()
+    return directions
 
 
 def pack_row(transport: InteractiveTransport, y: int, x: int) -> bytes:

@@ -12,7 +12,7 @@ from nearfar.estimate.joint import ErrorBars
 from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
 from nearfar.transport.band import band_edge
-from nearfar.transport.model import Transport
+from nearfar.transport.model import Components, Transport
 from nearfar.transport.posterior import deviation_of_mean
 
 # Spectra end at this fraction of their largest value (-140 dB).
@@ -72,15 +72,21 @@ def transport_row(transport: Transport, x: int) -> TransportRow:
         # In projector pixels.
         "window": transport.window * transport.pitch,
         "no_errors": _why_no_errors(transport, saturated=saturated),
-        "confidence": None if quality is None else float(quality.confidence[0, x]),
+        "confidence": None
+        if quality is None or "near" not in transport.parts
+        else float(quality.confidence[0, x]),
         "saturated": saturated,
-        "floodlit": {"direct": float(d.sum()), "near": float(n.sum()), "far": float(f.sum())},
+        "floodlit": {
+            part: float(row.sum()) for part, row in transport.named(Components(d, n, f)).items()
+        },
         **_bands(transport),
     }
     return TransportRow(header, window, far, errors[0], errors[1], _spectrum(window + far))
 
 
 def _why_no_errors(transport: Transport, *, saturated: bool | None) -> str:
+    if "free" in transport.parts:
+        return "they are of relit pictures alone"
     if transport.posterior is None:
         return "the joint estimate tells them"
     return "they are unknown" if saturated else ""

@@ -20,6 +20,7 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
+from nearfar.transport.parts import USUAL_PARTS
 
 BLOCK = 128
 # Rows along each side of the camera that are compared with an operator's: all would be C x P.
@@ -256,7 +257,7 @@ def row_snr(
     pixels, projector = transport.camera.pixels, transport.projector
     signal, error = np.zeros(pixels), np.zeros(pixels)
     signal_k, error_k = np.zeros(projector), np.zeros(projector)
-    parts = dict.fromkeys("DNF" if truth.is_apart else "", (0.0, 0.0))
+    parts = dict.fromkeys("DNF" if can_compare_parts(transport, truth) else "", (0.0, 0.0))
     compared = _rows_to_compare(truth)
     for block in compared:
         known = truth.component_rows(block) if truth.is_apart else (truth.rows(block),)
@@ -280,6 +281,11 @@ def row_snr(
         components,
         sum(block.stop - block.start for block in compared),
     )
+
+
+def can_compare_parts(transport: Transport, truth: KnownTransport) -> bool:
+    """Return whether both are split into direct, near- and far-range light."""
+    return truth.is_apart and transport.parts == USUAL_PARTS
 
 
 def _rows_to_compare(truth: KnownTransport) -> list[slice]:

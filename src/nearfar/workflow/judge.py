@@ -15,6 +15,7 @@ from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import (
     Rows,
+    can_compare_parts,
     exposure_of,
     fitted_exposure,
     floodlit_snr,
@@ -103,11 +104,12 @@ def judge_by_truth(
         "snr_t": percentiles(rows.snr_t),
         "snr": {"T": components.pop("T")},
     }
-    if truth.is_apart:
+    is_split = can_compare_parts(transport, truth)
+    if is_split:
         floodlit = floodlit_snr(transport, truth, factor)
         numbers["snr"] |= {"physical": components, "floodlit": floodlit}
     # The model is fitted to every row, of which an operator has too many, by single pixels.
-    if truth.is_apart and isinstance(truth, ExactTransport) and transport.pitch == 1:
+    if is_split and isinstance(truth, ExactTransport) and transport.pitch == 1:
         report("model's truth", 0.0)
         fitted = model_truth(transport, truth, factor)
         ceiling = relighting_snr(fitted, truth, lights, exposure=factor)

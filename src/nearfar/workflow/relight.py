@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.deviations import deviation_of_picture
 from nearfar.transport.analysed import AnalysedLight
+from nearfar.transport.parts import require_parts
 from nearfar.transport.store import StoredTransport
 
 
@@ -19,13 +20,19 @@ def relight_stored(stored: StoredTransport, light: Floats, gains: Mapping[str, f
     light : ndarray, shape (Py, Px) or (Py, Px, channels)
         As `nearfar.Transport.relight` takes it.
     gains : mapping of str to float
-        Gain of each component, ``"direct"``, ``"near"`` or ``"far"``; 1 where left out.
+        Gain of each part, ``"direct"``, ``"near"``, ``"far"`` or ``"free"``; 1 where left out.
 
     Returns
     -------
     ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
         In photo units.
+
+    Raises
+    ------
+    InputError
+        If the transport does not have a part.
     """
+    require_parts(stored.parts, gains)
     analysed: AnalysedLight | None = None
     parts = []
     for rows in stored.blocks():
@@ -42,7 +49,7 @@ def error_bars_of_stored(
     Raises
     ------
     InputError
-        If the transport holds no error bars.
+        If the transport holds no error bars, or does not have a part.
     """
-    parts = (ErrorBars(rows).picture(light, **gains) for rows in stored.blocks())
+    parts = (deviation_of_picture(rows, light, gains) for rows in stored.blocks())
     return np.concatenate([part.astype(np.float32, copy=False) for part in parts])

@@ -11,6 +11,7 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
+from nearfar.workflow.free_rows import reconstruct_free_rows
 from nearfar.workflow.from_patterns import reconstruct_from_patterns
 from nearfar.workflow.reconstruction.executors import (
     Executor,
@@ -34,6 +35,8 @@ def reconstruct(
     memory: int = DEFAULT_MEMORY,
     device: Device = "cpu",
     half: bool = False,
+    no_near: bool = False,
+    no_far: bool = False,
     progress: Report | None = None,
 ) -> tuple[Transport, Correspondence]:
     """Reconstruct the transport of a capture in memory.
@@ -47,6 +50,9 @@ def reconstruct(
         each projector pixel shows.
     method, square, memory, device, half
         As `ReconstructionOptions` describes them.
+    no_near, no_far : bool
+        Both leave out near- and far-range light, as of lamps without a neighbourhood: light from
+        each is a number of its own, and no other option but `memory` is heeded.
     progress : callable, optional
         Called with the step and the share of it that is done, 0 to 1.
 
@@ -74,6 +80,15 @@ def reconstruct(
     _require(capture, correspondence)
     options = ReconstructionOptions(method, square, memory, device, half)
     report, sink = progress or ignore_progress, MemorySink()
+    if no_near != no_far:
+        raise InputError(
+            "one range alone cannot be left out: give both `no_near=True` and `no_far=True`, or "
+            "neither."
+        )
+    if no_near:
+        found = reconstruct_free_rows(capture, correspondence, memory=memory, progress=report)
+        assert found.quality is not None
+        return found, Correspondence(found.correspondence, found.quality.confidence)
     if capture.plan.offset == "shown" and options == ReconstructionOptions(memory=memory):
         found = reconstruct_from_patterns(capture, correspondence, memory=memory, progress=report)
         assert found.quality is not None

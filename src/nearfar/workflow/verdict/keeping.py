@@ -12,6 +12,7 @@ from nearfar.files.kinds import METADATA
 from nearfar.files.output import require_writable, storage_faults
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.gains import why_unjudgeable
+from nearfar.transport.parts import USUAL_PARTS
 from nearfar.transport.store import StoredTransport, open_transport, write_verdict
 from nearfar.workflow.reconstruction.summary import LARGEST_OF_TILES, description_of
 from nearfar.workflow.verdict.verdict import Verdict, judge_reconstruction
@@ -79,10 +80,11 @@ def _require_origin(stored: StoredTransport, capture: Capture) -> None:
         )
     if why := why_unjudgeable(stored.provenance):
         raise InputError(f"{stored.path} {why}")
-    if capture.plan.offset == "shown":
+    if capture.plan.offset == "shown" or stored.parts != USUAL_PARTS:
+        of = "somebody else's patterns" if stored.parts == USUAL_PARTS else "lamps"
         raise InputError(
-            f"{stored.path} is of somebody else's patterns, and was judged by held-out photos when "
-            f"it was reconstructed: reconstruct the capture again to judge it anew."
+            f"{stored.path} is of {of}, and was judged by held-out photos when it was "
+            f"reconstructed: reconstruct the capture again to judge it anew."
         )
     of_transport: dict[str, Any] = {
         "projector": stored.projector,

@@ -4,9 +4,10 @@ import { all, get, set } from './dom.js';
 import { zoomLight } from './light-canvas.js';
 import { ONE_PIXEL } from './painting.js';
 import { canPlay } from './playback.js';
-import { PARTS } from './state.js';
+import { PARTS, hasPart, isFree } from './state.js';
 
 const UNITS = { radius: ' px', width: ' px', brush: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
+const BROADEST = 8;
 const TWO_DECIMALS = [...PARTS, 'gamma', 'soft'];
 
 // What the page is of, and how far its sliders go.
@@ -15,11 +16,20 @@ export function describe(scene) {
   get('name').textContent = scene.name;
   document.title = `${scene.name} · nearfar`;
   get('about').textContent = `camera ${rows}x${columns}, ${scene.channels} channel${scene.channels > 1 ? 's' : ''}; ` +
-    `projector ${height}x${width}; W = ${scene.window}` +
+    (hasPart(scene, 'direct') ? `projector ${height}x${width}` : `${height * width} lamps`) + (scene.parts.includes('near') ? `; W = ${scene.window}` : '') +
     (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') +
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
+  PARTS.forEach((name, i) => { get('part' + i).parentElement.hidden = !hasPart(scene, name); });
+  document.querySelector('.parts').hidden = scene.parts.length === 1;
+  if (isFree(scene)) {
+    document.querySelector('[data-solo=far]').textContent = 'lamp by lamp';
+    get('row-far').nextElementSibling.textContent = 'each lamp, log scale';
+    for (const id of ['row-window', 'row-spectrum']) get(id).parentElement.hidden = true;
+  }
   get('stage').style.setProperty('--aspect', columns / rows);
-  get('pane').style.setProperty('--aspect', width / height);
+  // Lines of lamps and of pixels are drawn broad enough to point at.
+  const isLine = Math.min(height, width) === 1, aspect = width / height;
+  get('pane').style.setProperty('--aspect', isLine ? Math.min(BROADEST, Math.max(1 / BROADEST, aspect)) : aspect);
   const maxima = { radius: side / 2, width: side, side: side / 2, cycles: side / 2, shift: side, brush: side / 4, zoom: Math.max(1, Math.ceil(side / 40)) };
   for (const [name, value] of Object.entries(maxima)) slider(name).max = Math.max(1, value);
 }

@@ -3,7 +3,7 @@
 import { get, showingFaults } from './dom.js';
 import { crop, drawLog, drawProfile, drawSpectrum } from './plots.js';
 import { requestMessage } from './protocol.js';
-import { PARTS } from './state.js';
+import { hasPart, isFree } from './state.js';
 
 export class Inspector {
   #scene;
@@ -49,8 +49,9 @@ export class Inspector {
     const first = header.line * width;
     const line = (values, errors, colour) =>
       ({ values: values.data.slice(first, first + width), errors: errors.data, colour });
-    drawProfile(get('row-profile'), [line(far, farError, '--far'), line(near, nearError, '--near')],
-      'orange: direct and near-range, green: far-range; projector column 0 to ' + (width - 1));
+    const lines = [line(far, farError, '--far'), ...(hasPart(this.#scene, 'direct') ? [line(near, nearError, '--near')] : [])];
+    drawProfile(get('row-profile'), lines,
+      `${isFree(this.#scene) ? `${lines.length > 1 ? 'orange: direct, ' : ''}green: each lamp` : 'orange: direct and near-range, green: far-range'}; projector column 0 to ${width - 1}`);
   }
 
   // The row, or null if another one was asked for in the meantime.
@@ -68,11 +69,12 @@ export class Inspector {
 }
 
 function summary({ q, floodlit, confidence, no_errors: noErrors, saturated }) {
-  const total = floodlit.direct + floodlit.near + floodlit.far;
+  const parts = Object.keys(floodlit), total = parts.reduce((sum, name) => sum + floodlit[name], 0);
   const share = name => `${name} ${(100 * floodlit[name] / (total || 1)).toFixed(1)} %`;
+  if (!('direct' in floodlit)) return `floodlit ${total.toPrecision(3)}` + (saturated ? '; a photo is saturated here' : '');
   return (q ? `q = (${q[0].toFixed(2)}, ${q[1].toFixed(2)})` : 'no direct light') +
     (confidence === null ? '' : `, confidence ${confidence.toFixed(2)}`) +
-    `; floodlit ${total.toPrecision(3)}: ${PARTS.map(share).join(', ')}` +
+    `; floodlit ${total.toPrecision(3)}: ${parts.map(share).join(', ')}` +
     (noErrors && `; no error bars: ${noErrors}`) +
     (saturated ? '; saturated under white' : '');
 }

@@ -1,6 +1,7 @@
 // Keys: what they do depends on the element that has the focus.
 
 import { all, get, nearestPixel } from './dom.js';
+import { hasPart } from './state.js';
 
 const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
 const SHIFT_PIXELS = 8;
@@ -40,7 +41,7 @@ export function bindKeyboard({ scene, store, inspector, playback }) {
   function onPage(event, focused) {
     const kind = all('[data-kind]')[Number(event.key) - 1], solo = SOLOS[event.key];
     if (kind) store.update({ kind: kind.dataset.kind });
-    else if (solo !== undefined) store.update({ solo });
+    else if (solo !== undefined && (!solo || hasPart(scene, solo))) store.update({ solo });
     else if (event.key === ' ' && !['BUTTON', 'SUMMARY'].includes(focused.tagName)) {
       event.preventDefault();
       playback.toggle();

@@ -14,13 +14,15 @@ const REST_MILLISECONDS = 120;
 export class LightCanvas {
   #light;
   #store;
+  #lamps;
   #onDrawn;
   #request = 0;
   #rest = 0;
 
-  constructor({ light, store, onDrawn }) {
+  constructor({ light, store, lamps, onDrawn }) {
     this.#light = light;
     this.#store = store;
+    this.#lamps = lamps;
     this.#onDrawn = onDrawn;
   }
 
@@ -55,6 +57,7 @@ export class LightCanvas {
   #show() {
     const { shown, colour, changed } = this.#light;
     drawLight(get('light'), shown, colour, changed);
+    this.#lamps.draw();
   }
 }
 

@@ -8,6 +8,7 @@ import { bindFiles, restorePictures } from './files.js';
 import { Inspector } from './inspector.js';
 import { bindKeyboard } from './keyboard.js';
 import { LightCanvas, bindPointer } from './light-canvas.js';
+import { Lamps } from './lamps.js';
 import { Light } from './light.js';
 import { Maps } from './maps.js';
 import { Playback } from './playback.js';
@@ -36,7 +37,8 @@ async function open() {
     }
   });
   const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store }), maps = new Maps({ scene, store });
-  const lightCanvas = new LightCanvas({ light, store, onDrawn: () => { show(); connection.lightChanged(); } });
+  const lamps = new Lamps(scene);
+  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); } });
   const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector };
   function show() {
     const { hasReference } = scenePictures, { isPlaying } = playback;
@@ -47,6 +49,7 @@ async function open() {
   describe(scene);
   showVerdict(scene);
   bind(page, show);
+  lamps.bind(store);
   lightCanvas.draw();
   show();
   const connection = new Connection({

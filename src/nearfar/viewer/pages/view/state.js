@@ -1,6 +1,10 @@
 // The page's state, all that its address keeps: replaced by every change, never changed in place.
 
 export const PARTS = ['direct', 'near', 'far'];
+// Rows are free where there is neither a near nor a far range: they take the place of far-range light.
+export const isFree = scene => scene.parts.includes('free');
+// Whether a scene has the part of a place among PARTS.
+export const hasPart = (scene, name) => scene.parts.includes(name) || name === 'far' && isFree(scene);
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
 
 // What a page opens with; the keys are those of the address.

@@ -1,0 +1,97 @@
+"""The viewer's page, in a real browser, of a light stage: lamps, and no part but their light."""
+
+import json
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.transport.model import Transport
+from nearfar.transport.store import save_transport
+from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.payloads import describe_scene
+from nearfar.workflow.free_rows import free_basis
+from tests.viewer.asking import ask
+from tests.viewer.browsing import settled
+from tests.viewer.conftest import served_view
+
+LAMPS, CAMERA = Size(1, 6), Size(12, 16)
+DIRECTIONS = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0.6, 0, 0.8]]
+
+
+@pytest.fixture(scope="module")
+def stage() -> Transport:
+    rows = np.random.default_rng(0).random((*CAMERA, 3, 6)).astype(np.float32) / 6
+    basis, shape = free_basis(LAMPS), (*CAMERA, 3)
+    return Transport(
+        projector=LAMPS,
+        correspondence=np.full((*CAMERA, 2), np.nan, np.float32),
+        direct=np.zeros(shape, np.float32),
+        near=np.zeros((*shape, 0, 0), np.float32),
+        far=rows @ basis.patterns.T,
+        far_basis=basis,
+        black=np.zeros(shape, np.float32),
+        noise=np.zeros(shape, np.float32),
+        parts=("free",),
+        provenance={"method": "light stage", "directions": DIRECTIONS},
+    )
+
+
+@pytest.fixture(scope="module")
+def viewed(stage, tmp_path_factory):
+    path = tmp_path_factory.mktemp("stage") / "stage.zarr"
+    save_transport(stage, path)
+    return InteractiveTransport(path)
+
+
+@pytest.fixture(scope="module")
+def page_of_stage(viewed):
+    with served_view(viewed) as address:
+        yield address
+
+
+def test_the_scene_names_its_parts_and_directions(viewed):
+    described = describe_scene(viewed, [])
+    assert described["parts"] == ["free"]
+    assert described["directions"] == DIRECTIONS
+
+
+@pytest.mark.parametrize("directions", [None, [[1, 0, 0]], "up", [[1, 2], [3]], [[np.nan] * 3] * 6])
+def test_directions_that_are_none_are_not_shown(viewed, directions, monkeypatch):
+    monkeypatch.setitem(viewed.stored.provenance, "directions", directions)
+    assert describe_scene(viewed, [])["directions"] is None
+
+
+def test_maps_are_of_the_parts_that_are_there(viewed, page_of_stage):
+    names = [each["name"] for each in json.loads(ask(page_of_stage, "/scene"))["maps"]]
+    assert not {"near-share", "far-share", "column", "row", "confidence"} & set(names)
+
+
+def test_the_page_shows_lamps_and_no_absent_part(open_page, page_of_stage, stage):
+    page = open_page(page_of_stage, {"kind": "white"})
+    settled(page)
+    assert page.locator(".parts").is_hidden()
+    assert page.locator("#lamps").is_visible()
+    about = page.locator("#about").inner_text()
+    assert "6 lamps" in about
+    assert "W =" not in about
+    # A click in the middle lights the lamp that is straight ahead.
+    page.locator("#lamps").click()
+    settled(page)
+    drawn = page.evaluate("""() => Array.from(document.getElementById('light')
+        .getContext('2d').getImageData(0, 0, 6, 1).data).filter((_, i) => i % 4 === 0)""")
+    assert drawn == [0, 0, 255, 0, 0, 0]
+    box = page.locator("#light").bounding_box()
+    assert box is not None
+    assert box["height"] > 20
+
+
+def test_a_camera_pixel_shows_light_from_each_lamp(open_page, page_of_stage):
+    page = open_page(page_of_stage, {"kind": "white"})
+    settled(page)
+    page.locator("#picture").click()
+    page.locator("#row").wait_for()
+    assert page.locator("#row-window").is_hidden()
+    summary = page.locator("#pixel-summary").inner_text()
+    assert summary.startswith("floodlit")
+    assert "direct" not in summary

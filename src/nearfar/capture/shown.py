@@ -1,6 +1,6 @@
 """Pictures of somebody else's that were shown as patterns: read, recognise, make a plan of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from nearfar.plan.model import LARGEST_SIDE
 from nearfar.plan.recognition import Recognised, recognise
 from nearfar.plan.recognition.own import plan_of_pictures
 from nearfar.progress import Report, ignore_progress
+
+# Photos that are looked at for being patterns.
+FEW = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +75,39 @@ def read_shown(folder: AnyPath, progress: Report = ignore_progress) -> ShownPict
     recognised = recognise(_lights(paths), lambda count: progress("patterns", count / len(paths)))
     plan = plan_of_pictures(recognised, lambda number: _read(paths[number]))
     return ShownPictures(tuple(paths), recognised, plan)
+
+
+def require_photos(shown: ShownPictures, photos: Sequence[Path]) -> None:
+    """Refuse photos that are patterns: the pictures that were shown, or those of swapped folders.
+
+    Parameters
+    ----------
+    shown : ShownPictures
+    photos : sequence of Path
+        A photo for each picture.
+
+    Raises
+    ------
+    InputError
+    """
+    structured = [i for i, each in enumerate(shown.recognised.contents) if each.kind != "uniform"]
+    looked_at = structured[:FEW]
+    pairs = ((_read(shown.paths[i]), _read(photos[i])) for i in looked_at)
+    if looked_at and all(np.array_equal(pattern, photo) for pattern, photo in pairs):
+        raise InputError(
+            f"{photos[looked_at[0]]} is the pattern itself, and no photo of it: name the folder "
+            f"of the photos."
+        )
+    # A photo may be uniform by chance, as under black.
+    if any(each.kind not in {"picture", "uniform"} for each in shown.recognised.contents):
+        return
+    scales = (full_scale_of(_read(path).dtype) for path in photos[:FEW])
+    lights = (_read(path) / np.float32(scale) for path, scale in zip(photos, scales, strict=False))
+    if any(each.kind not in {"picture", "uniform"} for each in recognise(lights).contents):
+        raise InputError(
+            f"{photos[0].parent} holds patterns, and {shown.paths[0].parent} none that are "
+            f"recognised: the folders of patterns and photos seem to be swapped."
+        )
 
 
 def _lights(paths: list[Path]) -> Iterator[Floats]:

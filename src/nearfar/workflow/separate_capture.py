@@ -20,16 +20,17 @@ from nearfar.plan.recognition import Recognised, recognise, summarise
 from nearfar.plan.recognition.own import recognised_in
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
+from nearfar.workflow.pattern_faults import (
+    BRIGHTEST_PERCENTILE,
+    FAULT_SHARE_OF_LIGHT,
+    FAULT_SHARE_OF_PIXELS,
+    LEAST_LIGHT,
+    SumMisfit,
+    misfit_of,
+)
 
 # Values of all photos that are separated at once: some tens of megabytes.
 VALUES_AT_ONCE = 1 << 23
-# Camera pixels with less than this share of the brightest ones' light are not judged.
-LEAST_LIGHT = 0.1
-BRIGHTEST_PERCENTILE = 99.0
-# Share of a camera pixel's light that is no longer noise.
-FAULT_SHARE_OF_LIGHT = 0.05
-# Share of the camera pixels above which a fault is one of the capture.
-FAULT_SHARE_OF_PIXELS = 0.02
 # Level of a uniform pattern from which it counts as white.
 LEAST_WHITE = 0.9
 
@@ -185,8 +186,7 @@ class _Shares(NamedTuple):
 
     saturated: float
     negative: float  # global below zero, which is direct above white
-    unfitted: float | None
-    typical_misfit: float | None  # of those that are not fitted, over their light
+    unfitted: SumMisfit | None
 
 
 def _shares(pictures: Separation, misfit: Floats | None, peaks: Floats) -> _Shares:
@@ -198,15 +198,9 @@ def _shares(pictures: Separation, misfit: Floats | None, peaks: Floats) -> _Shar
             "the photos show no light of the patterns: check that each is of its pattern, and that "
             "the projector was on."
         )
-    light = light[is_lit]
-    negative = float(np.mean(global_[is_lit] < -FAULT_SHARE_OF_LIGHT * light))
+    negative = float(np.mean(global_[is_lit] < -FAULT_SHARE_OF_LIGHT * light[is_lit]))
     saturated = float(np.mean(peaks[is_lit] >= 1.0))
-    if misfit is None:
-        return _Shares(saturated, negative, None, None)
-    share = misfit[is_lit] / light
-    wrong = share > FAULT_SHARE_OF_LIGHT
-    typical = float(np.median(share[wrong])) if wrong.any() else None
-    return _Shares(saturated, negative, float(wrong.mean()), typical)
+    return _Shares(saturated, negative, None if misfit is None else misfit_of(misfit, light))
 
 
 def _numbers(
@@ -230,7 +224,7 @@ def _numbers(
         "saturated_share": float(capture.saturated[list(choice.photos)].mean()),
         "saturated_pixels": shares.saturated,
         "global_below_zero": shares.negative,
-        "misfit_above_limit": shares.unfitted,
+        "not_summing_to_white": None if shares.unfitted is None else shares.unfitted.share,
         "direct_share": direct / total if total > 0 else None,
         "nearfar": version(),
     }
@@ -249,12 +243,8 @@ def _faults(
             f"{path} has no photo that tells black, so ambient light and the camera's black level "
             f"count as global: add a photo under black, or give it as `black`."
         )
-    if shares.unfitted is not None and shares.unfitted > FAULT_SHARE_OF_PIXELS:
-        found.append(
-            f"photos of {path} do not sum to one white at {shares.unfitted:.0%} of the camera "
-            f"pixels, by {shares.typical_misfit:.0%} of their light: projector or camera is not "
-            f"linear, the light changed, something moved, or photos are out of order."
-        )
+    if shares.unfitted is not None:
+        found += shares.unfitted.warning(path)
     if shares.negative > FAULT_SHARE_OF_PIXELS:
         found.append(_say_negative(choice, shares.negative))
     if choice.unchanging > FAULT_SHARE_OF_PIXELS:

@@ -41,6 +41,8 @@ FEWEST_SHIFTED = 4
 
 TOO_SLOW = "vary too slowly, so that global light varies with them"
 COARSER = "are coarser than the finest"
+OTHER_PERIOD = "are of another period"
+TOO_FINE = "are so fine that they blur"
 TOO_LITTLE_WHITE = "light, or leave dark, too few of the pixels"
 TOO_FAINT = "have too little contrast"
 TOO_FEW_PHASES = "have too few phases of their frequency"
@@ -185,7 +187,9 @@ def choose_patterns(
     for measured in candidates:
         if measured.number not in used:
             reason = TOO_FEW_PHASES if isinstance(measured.content, Fringes) else NO_INVERSE
-            reason = COARSER if measured.number in grouped else reason
+            if measured.number in grouped:
+                reason = COARSER if measured.period > SHORTEST_PERIOD else TOO_FINE
+                reason = reason if period is None else OTHER_PERIOD
             left_out.setdefault(reason, []).append(measured.number)
     if not kept or 0 < len(chosen.shifted) < FEWEST_SHIFTED:
         raise InputError(_refusal(left_out, len(chosen.shifted), period))

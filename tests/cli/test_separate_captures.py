@@ -78,7 +78,7 @@ def numbers_of(folder):
         ([*fainter([*BOARDS, WHITE, BLACK])], 10, 35),
         ([*FINE, BLACK], 9, 31),
         ([*GRAY, WHITE, BLACK], 6, 28),
-        ([*random_binary(SIZE, 40), BLACK], 41, 32),
+        ([*random_binary(SIZE, 24), BLACK], 25, 30),
         ([*with_inverses(random_binary(SIZE, 10)), WHITE, BLACK], 22, 32),
     ],
     ids=["checkerboards", "fainter", "fringes", "gray code", "random", "random pairs"],

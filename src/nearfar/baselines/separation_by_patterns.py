@@ -36,13 +36,15 @@ class Solved(NamedTuple):
     Attributes
     ----------
     pictures : Separation
-    misfit : ndarray or None
-        Root mean square deviation of the photos from the light found, channels together; None
-        where as many numbers were found as there are photos.
+    residuals : ndarray, shape (n, rows, Cx), or None
+        Photos less the light found, channels together; None where nothing but this light fits.
+    degrees : int
+        Photos beyond the numbers that were found of each camera pixel.
     """
 
     pictures: Separation
-    misfit: Floats | None
+    residuals: Floats | None = None
+    degrees: int = 0
 
 
 class Solver(Protocol):
@@ -88,11 +90,11 @@ class _LeastSquares:
         by_wave = found[first : first + 2 * self.waves].reshape(-1, 2, *white.shape)
         samples = np.concatenate([_along_phase(by_wave), self._of_pairs(found)])
         direct = direct_of_samples(samples)
-        misfit = None
-        if len(photos) > len(found):
-            left = (photos - np.tensordot(self.design, found, axes=(1, 0))).sum(axis=-1)
-            misfit = np.sqrt((left**2).sum(axis=0) / (len(photos) - len(found)))
-        return Solved(Separation(direct, white - direct), misfit)
+        pictures, degrees = Separation(direct, white - direct), len(photos) - len(found)
+        if degrees <= 0:
+            return Solved(pictures)
+        left = photos - np.tensordot(self.design, found, axes=(1, 0))
+        return Solved(pictures, left.sum(axis=-1), degrees)
 
     def _of_pairs(self, found: Floats) -> Floats:
         """Return +-D of each pair: s = (l(q) - m) D of its first pattern."""
@@ -173,7 +175,7 @@ class _Levels:
         by_dark = (high * dark - low * bright) / determinant
         global_ = by_dark if white is None else white - direct
         single = (np.asarray(part, dtype=np.float32) for part in (direct, global_))
-        return Solved(Separation(*single), None)
+        return Solved(Separation(*single))
 
     def _uniform(self, photos: Floats) -> tuple[Floats, Floats | None]:
         """Return what is seen under black, and under white less black, None if it is not known."""

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 from nearfar.arrays import Floats, blocks
 from nearfar.capture import Capture
@@ -18,7 +19,11 @@ BRIGHTEST_PERCENTILE = 99.0
 # Share of a camera pixel's light that is no longer noise, and share of the camera pixels above
 # which it is a fault of the capture.
 FAULT_SHARE_OF_LIGHT = 0.05
-FAULT_SHARE_OF_PIXELS = 0.02
+FAULT_SHARE_OF_PIXELS = 0.04
+# Noise differs from pixel to pixel, faults less so: means over squares of so many camera pixels are
+# judged, where they keep this share of the deviation.
+SIDE = 5
+LEAST_KEPT_SHARE = 0.4
 # Camera pixels with q that tell which way it runs.
 FEWEST_PIXELS = 16
 
@@ -46,6 +51,31 @@ class SumMisfit(NamedTuple):
             f"by {self.typical:.0%} of their light: projector or camera is not linear, the light "
             f"changed, something moved, or photos are not of their patterns."
         ]
+
+
+def mean_around(pictures: Floats) -> Floats:
+    """Return the mean around each camera pixel of pictures (..., Cy, Cx)."""
+    size = (*(1 for _ in pictures.shape[:-2]), SIDE, SIDE)
+    return np.asarray(uniform_filter(pictures, size, mode="nearest"))
+
+
+def deviation(residuals: Floats, degrees: int) -> Floats:
+    """Return the root mean square of what residuals share with their neighbours, (Cy, Cx).
+
+    Parameters
+    ----------
+    residuals : ndarray, shape (n, Cy, Cx)
+    degrees : int
+        Their degrees of freedom.
+
+    Returns
+    -------
+    ndarray, shape (Cy, Cx)
+        0 where residuals are not of one sign with their neighbours', as of noise.
+    """
+    shared = (mean_around(residuals) ** 2).sum(axis=0) / degrees
+    whole = mean_around((residuals**2).sum(axis=0) / degrees)
+    return np.sqrt(np.where(shared > LEAST_KEPT_SHARE**2 * whole, shared, 0.0))
 
 
 def misfit_of(off: Floats, light: Floats) -> SumMisfit:
@@ -85,7 +115,7 @@ def measure_sums(capture: Capture) -> SumMisfit | None:
         white = sums[uniform] if any(uniform) else sums
         reference = white.mean(axis=0)
         darkest = np.minimum(first, second).min(axis=0)
-        off.append(np.sqrt(((sums - reference) ** 2).mean(axis=0)))
+        off.append(deviation(sums - reference, len(pairs) - 1))
         light.append(np.maximum(reference - 2 * darkest, 0.0))
     return misfit_of(np.concatenate(off), np.concatenate(light))
 

@@ -26,6 +26,8 @@ from nearfar.workflow.pattern_faults import (
     FAULT_SHARE_OF_PIXELS,
     LEAST_LIGHT,
     SumMisfit,
+    deviation,
+    mean_around,
     misfit_of,
 )
 
@@ -139,10 +141,11 @@ def separate_capture(
             photos -= dark.photo[rows]
         solved = solve(photos)
         parts.append(solved.pictures)
-        misfits.append(solved.misfit)
+        if solved.residuals is not None:
+            misfits.append(deviation(solved.residuals, solved.degrees))
         progress("separating", min(rows.stop, height) / height)
     pictures = Separation(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-    misfit = None if misfits[0] is None else np.concatenate([m for m in misfits if m is not None])
+    misfit = np.concatenate(misfits) if misfits else None
     shares = _shares(pictures, misfit, np.concatenate(peaks))
     return SeparatedCapture(
         pictures,
@@ -198,7 +201,9 @@ def _shares(pictures: Separation, misfit: Floats | None, peaks: Floats) -> _Shar
             "the photos show no light of the patterns: check that each is of its pattern, and that "
             "the projector was on."
         )
-    negative = float(np.mean(global_[is_lit] < -FAULT_SHARE_OF_LIGHT * light[is_lit]))
+    # Where there is no global light, noise alone is below zero half of the time.
+    around = mean_around(global_ + FAULT_SHARE_OF_LIGHT * light)
+    negative = float(np.mean(around[is_lit] < 0))
     saturated = float(np.mean(peaks[is_lit] >= 1.0))
     return _Shares(saturated, negative, None if misfit is None else misfit_of(misfit, light))
 

@@ -119,6 +119,26 @@ def test_the_period_of_the_patterns_can_be_chosen(separate, tmp_path):
     assert numbers_of(tmp_path / "fine")["used"] != numbers_of(tmp_path / "coarse")["used"]
 
 
+@pytest.mark.parametrize("projector", [Size(1, 32), Size(1, 1)])
+def test_projectors_of_one_row_or_pixel(tmp_path, projector):
+    pictures = [*fringes(projector, 1, [4], 4), *white_and_black(projector)]
+    light = np.linspace(0.2, 0.9, 16, dtype=np.float32).reshape(4, 4, 1)
+    photos = [float(picture[0, 5 % projector.width]) / 255 * 16383 * light for picture in pictures]
+    (patterns := tmp_path / "p").mkdir()
+    for number, picture in enumerate(pictures):
+        np.save(patterns / f"p{number}.npy", picture / np.float32(255))
+    photos = write_pictures(tmp_path / "f", [photo.astype(np.uint16) for photo in photos])
+    command = ("import", "--patterns", patterns, photos, tmp_path / "c.zarr")
+    assert run_nearfar(*command, "--full-scale", 16383).status == 0
+    ran = run_nearfar("separate", tmp_path / "out", "--capture", tmp_path / "c.zarr")
+    if projector.pixels == 1:
+        assert "all are uniform" in check_sentence(ran)
+        return
+    # All light is direct, and one row has no other.
+    assert check_done(ran).out
+    np.testing.assert_allclose(np.load(tmp_path / "out" / "direct.npy"), light[..., 0], rtol=2e-3)
+
+
 def test_a_capture_of_a_plan_is_separated_too(world, truth, tmp_path):
     plan = paper_plan(SIZE, 5, (5, 5))
     pictures = [plan.draw(i) for i in range(len(plan.patterns))]

@@ -202,7 +202,7 @@ def measure(number: int, content: Content, level: Floats) -> Measured:
     lowest, highest = float(level.min()), float(level.max())
     bright = level > 0.5 * (lowest + highest)
     changes = (np.diff(bright, axis=axis) for axis in (0, 1))
-    cycles = max(0.5 * float(change.mean()) for change in changes if change.size)
+    cycles = max((0.5 * float(each.mean()) for each in changes if each.size), default=0.0)
     axes = (bool(np.ptp(level, axis=0).max() > 0), bool(np.ptp(level, axis=1).max() > 0))
     period = 1 / cycles if cycles else inf
     mean = float(level.mean(dtype=np.float64))

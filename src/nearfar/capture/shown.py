@@ -20,6 +20,8 @@ from nearfar.progress import Report, ignore_progress
 
 # Photos that are looked at for being patterns.
 FEW = 4
+# Share of full scale by which the levels of a pattern differ.
+LEAST_CONTRAST = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +100,16 @@ def require_photos(shown: ShownPictures, photos: Sequence[Path]) -> None:
             f"{photos[looked_at[0]]} is the pattern itself, and no photo of it: name the folder "
             f"of the photos."
         )
+    kinds = [each.kind for each in shown.recognised.contents]
     # A photo may be uniform by chance, as under black.
-    if any(each.kind not in {"picture", "uniform"} for each in shown.recognised.contents):
+    if kinds.count("picture") < FEW or set(kinds) - {"picture", "uniform"}:
         return
-    scales = (full_scale_of(_read(path).dtype) for path in photos[:FEW])
-    lights = (_read(path) / np.float32(scale) for path, scale in zip(photos, scales, strict=False))
-    if any(each.kind not in {"picture", "uniform"} for each in recognise(lights).contents):
+    read = (_read(path) for path in photos[:FEW])
+    lights = [photo / np.float32(full_scale_of(photo.dtype)) for photo in read]
+    found = recognise(lights).contents
+    # So may noise in the dark have two levels, of next to no contrast.
+    has_contrast = max(float(np.ptp(light)) for light in lights) > LEAST_CONTRAST
+    if has_contrast and all(each.kind != "picture" for each in found):
         raise InputError(
             f"{photos[0].parent} holds patterns, and {shown.paths[0].parent} none that are "
             f"recognised: the folders of patterns and photos seem to be swapped."

@@ -168,14 +168,22 @@ def black_over_white_less_black(black_level: float) -> float:
     return black_level / (1.0 - black_level)
 
 
-def _from_samples(samples: Floats, photos: Floats, dark: float) -> Separation:
-    """Turn samples of +-D (n, Cy, Cx, channels) and half-lit photos into direct and global."""
+def direct_of_samples(samples: Floats) -> Floats:
+    """Return direct light from samples of +-D, (n, Cy, Cx, channels): the mean of the larger ones.
+
+    Samples under `STRADDLING_SHARE` of a camera pixel's largest straddle an edge, and are left out.
+    """
     together = samples.sum(axis=-1, keepdims=True)
     size = np.abs(together)
     # Where all is black every sample counts.
     chosen = size >= STRADDLING_SHARE * size.max(axis=0)
     signs = np.where(together < 0, -1, 1) * chosen
-    direct = (signs * samples).sum(axis=0) / chosen.sum(axis=0)
+    return np.asarray((signs * samples).sum(axis=0) / chosen.sum(axis=0))
+
+
+def _from_samples(samples: Floats, photos: Floats, dark: float) -> Separation:
+    """Turn samples of +-D (n, Cy, Cx, channels) and half-lit photos into direct and global."""
+    direct = direct_of_samples(samples)
     return _pictures(direct, photos.mean(axis=0) / (0.5 + dark) - direct)
 
 

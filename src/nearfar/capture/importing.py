@@ -1,5 +1,6 @@
 """Photos that were taken elsewhere: pair them with the patterns of a plan."""
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from nearfar.capture.shown import ShownPictures
+from nearfar.capture.shown import ShownPictures, require_photos
 from nearfar.capture.store import Capture
 from nearfar.capture.writing import write_capture
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
@@ -86,11 +87,26 @@ def pair(
 
 
 def _hint(folder: Path, photos: Sequence[Path]) -> str:
+    if (gap := _gap(photos)) is not None:
+        return f" ({gap})"
     endings = Counter(p.suffix.lower() for p in folder.iterdir() if p not in photos and p.suffix)
     if photos or not endings:
         return ", or name them with `list_file`"
     (ending, number), *_ = endings.most_common(1)
     return f" as {PICTURE_KINDS} (the folder has {number} files that end in {ending})"
+
+
+def _gap(photos: Sequence[Path]) -> str | None:
+    """Say where the numbers in the names skip one, if they do so once."""
+    numbers = [re.findall(r"\d+", photo.stem) for photo in photos]
+    if not all(numbers):
+        return None
+    last = [int(each[-1]) for each in numbers]
+    gaps = [i for i in range(1, len(last)) if last[i] - last[i - 1] != 1]
+    if len(gaps) != 1 or last[gaps[0]] - last[gaps[0] - 1] < 2:
+        return None
+    before, after = (photos[gaps[0] - step].name for step in (1, 0))
+    return f"the numbers skip from {before} to {after}, so that photos between them are missing"
 
 
 def _listed(folder: Path, list_file: Path) -> list[Path]:
@@ -158,6 +174,8 @@ def import_photos(
         As `nearfar.files.read_picture` and `nearfar.capture.write_capture`; a message names the
         photo, and nothing is left behind.
     """
+    if shown is not None:
+        require_photos(shown, photos)
     capture = write_capture(
         plan,
         path,

@@ -1,6 +1,6 @@
 """Pictures of somebody else's that were shown as patterns: read, recognise, make a plan of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,11 @@ from nearfar.plan.recognition import Recognised, recognise
 from nearfar.plan.recognition.contents import AnyPicture
 from nearfar.plan.recognition.own import plan_of_pictures
 from nearfar.progress import Report, ignore_progress
+
+# Photos that are looked at for being patterns.
+FEW = 4
+# Share of full scale by which the levels of a pattern differ.
+LEAST_CONTRAST = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +87,43 @@ def read_shown(folder: AnyPath, progress: Report = ignore_progress) -> ShownPict
     recognised = recognise(_lights(paths), lambda count: progress("patterns", count / len(paths)))
     plan = plan_of_pictures(recognised, lambda number: _read(paths[number]))
     return ShownPictures(tuple(paths), recognised, plan)
+
+
+def require_photos(shown: ShownPictures, photos: Sequence[Path]) -> None:
+    """Refuse photos that are patterns: the pictures that were shown, or those of swapped folders.
+
+    Parameters
+    ----------
+    shown : ShownPictures
+    photos : sequence of Path
+        A photo for each picture.
+
+    Raises
+    ------
+    InputError
+    """
+    structured = [i for i, each in enumerate(shown.recognised.contents) if each.kind != "uniform"]
+    looked_at = structured[:FEW]
+    pairs = ((_read(shown.paths[i]), _read(photos[i])) for i in looked_at)
+    if looked_at and all(np.array_equal(pattern, photo) for pattern, photo in pairs):
+        raise InputError(
+            f"{photos[looked_at[0]]} is the pattern itself, and no photo of it: name the folder "
+            f"of the photos."
+        )
+    kinds = [each.kind for each in shown.recognised.contents]
+    # A photo may be uniform by chance, as under black.
+    if kinds.count("picture") < FEW or set(kinds) - {"picture", "uniform"}:
+        return
+    read = (_read(path) for path in photos[:FEW])
+    lights = [photo / np.float32(full_scale_of(photo.dtype)) for photo in read]
+    found = recognise(lights).contents
+    # So may noise in the dark have two levels, of next to no contrast.
+    has_contrast = max(float(np.ptp(light)) for light in lights) > LEAST_CONTRAST
+    if has_contrast and all(each.kind != "picture" for each in found):
+        raise InputError(
+            f"{photos[0].parent} holds patterns, and {shown.paths[0].parent} none that are "
+            f"recognised: the folders of patterns and photos seem to be swapped."
+        )
 
 
 def _lights(paths: list[Path]) -> Iterator[Floats]:

@@ -43,6 +43,7 @@ def correspond(
     from nearfar.capture import open_capture
     from nearfar.files import check_output, write_array
     from nearfar.workflow.by_codes import correspond_by_codes, on_grid
+    from nearfar.workflow.pattern_faults import find_pattern_faults
     from nearfar.workflow.steps import correspond as by_plan
 
     capture = open_capture(capture_path)
@@ -56,7 +57,8 @@ def correspond(
     with progress_bar("correspondence", quiet=quiet) as report:
         if capture.plan.offset == "shown":
             by_codes = correspond_by_codes(capture, report)
-            found, warnings = by_codes.correspondence, by_codes.warnings()
+            found = by_codes.correspondence
+            warnings = by_codes.warnings() + find_pattern_faults(capture, found.q)
         else:
             found, warnings = by_plan(capture, progress=report), []
     for sentence in warnings:

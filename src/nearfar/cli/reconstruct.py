@@ -210,6 +210,7 @@ def _from_patterns(
     from nearfar.correspondence import read_correspondence
     from nearfar.transport.store import save_transport
     from nearfar.workflow.from_patterns import reconstruct_from_patterns
+    from nearfar.workflow.pattern_faults import find_pattern_faults
 
     for option, is_given in {**refused, "--report": report is not None}.items():
         if is_given:
@@ -223,6 +224,8 @@ def _from_patterns(
     with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
         transport = reconstruct_from_patterns(capture, given, memory=memory, progress=progress)
     save_transport(transport, output, force=force)
+    for fault in find_pattern_faults(capture, transport.correspondence):
+        warn(fault)
     verdict = transport.verdict
     assert verdict is not None
     say(

@@ -11,6 +11,7 @@ from nearfar.cli import separation_steps as steps
 from nearfar.cli.choices import choice
 from nearfar.cli.options import AsJson, Force, Quiet, keep_input, scene_names, size
 from nearfar.cli.saying import say, say_memory, warn
+from nearfar.cli.separation_of_capture import Told, separate_capture
 from nearfar.progress import progress_bar
 from nearfar.scenes import SCENES
 
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 
 Pattern = Literal["checkerboard", "sinusoid", "any"]
+# Where there are photos to separate, and where the patterns are nearfar's.
+TAKEN = ("--rig", "--photos", "--capture")
+DRAWN = ("--rig", "--photos", "--export")
 
 
 def separate(
@@ -40,6 +44,14 @@ def separate(
             metavar="DIR",
         ),
     ] = None,
+    capture: Annotated[
+        Path | None,
+        typer.Option(
+            help="Separate a capture: of anybody's patterns, by those of them that serve, or of a "
+            "plan.",
+            metavar="CAPTURE.zarr",
+        ),
+    ] = None,
     export: Annotated[
         bool,
         typer.Option("--export", help="Write the patterns, and a last one black, to project."),
@@ -53,14 +65,14 @@ def separate(
         ),
     ] = None,
     pattern: Annotated[
-        Pattern,
+        Pattern | None,
         choice(
             get_args(Pattern),
-            help="Shifted checkerboards, which suit projectors that are not linear, too; shifted "
-            "sinusoids; or any fine patterns that light half of the pixels, known by their "
-            "photos only.",
+            help="Shifted checkerboards, which suit projectors that are not linear, too, and are "
+            "taken if left out; shifted sinusoids; or any fine patterns that light half of the "
+            "pixels, known by their photos only.",
         ),
-    ] = "checkerboard",
+    ] = None,
     side: Annotated[
         int | None,
         typer.Option(
@@ -75,7 +87,11 @@ def separate(
     ] = None,
     period: Annotated[
         int | None,
-        typer.Option(help="Period of the sinusoid, pixels; 3 if left out.", metavar="N"),
+        typer.Option(
+            help="Period of the sinusoid, pixels; 3 if left out. With --capture, about the period "
+            "of the patterns to use, if not of the finest.",
+            metavar="N",
+        ),
     ] = None,
     shifts: Annotated[
         int | None,
@@ -135,6 +151,8 @@ def separate(
     is photo(white) - photo(black). OUT/numbers.json says what was used.
 
     Example: nearfar separate separated --rig corner
+
+    Example: nearfar separate separated --capture capture.zarr
     """
     from nearfar.baselines.separation_photos import separate as take_apart
     from nearfar.files import check_output
@@ -146,25 +164,24 @@ def separate(
         write_separation,
     )
 
-    source = _source({"--rig": rig, "--photos": photos, "--export": export or None})
-    taken_only = {"--ambient": ambient, "--black": black, "--black-level": black_level}
-    _refuse(source, ("--photos",), taken_only | {"--full-scale": full_scale})
-    _refuse(source, ("--export",), {"--scale": scale, "--native": native})
-    _refuse(source, ("--rig", "--photos"), {"--truth": truth, "--transport": transport})
-    _refuse(source, ("--rig", "--photos"), {"--json": as_json or None})
+    source = _source(rig=rig, photos=photos, capture=capture, export=export or None)
+    _refuse(source, ("--photos", "--capture"), ambient=ambient, black=black)
+    _refuse(source, ("--photos", "--capture"), black_level=black_level)
+    _refuse(source, ("--photos",), full_scale=full_scale)
+    _refuse(source, ("--export",), scale=scale, native=native)
+    _refuse(source, TAKEN, truth=truth, transport=transport, json=as_json or None)
+    _refuse(source, DRAWN, pattern=pattern, side=side, step=step, shifts=shifts)
     if pattern == "any" and source != "--photos":
         raise typer.BadParameter("any goes with --photos only.", param_hint="--pattern")
-    method = _method(pattern, side=side, step=step, period=period, shifts=shifts)
-    inputs = (
-        photos,
-        ambient,
-        black,
-        truth,
-        transport,
-        Path(rig) if rig and rig not in SCENES else None,
-    )
+    world = Path(rig) if rig and rig not in SCENES else None
+    inputs = (photos, capture, ambient, black, truth, transport, world)
     keep_input(output, *(path for path in inputs if path is not None))
     check_output(output, force=force, replaceable=is_separation)
+    if capture is not None:
+        told = Told(ambient, black, black_level, truth, transport, projector)
+        separate_capture(capture, output, told, period, as_json=as_json, force=force, quiet=quiet)
+        return
+    method = _method(pattern or "checkerboard", side=side, step=step, period=period, shifts=shifts)
     if export:
         steps.export_patterns(output, method, projector, scale, native, force=force, quiet=quiet)
         return
@@ -196,20 +213,20 @@ def separate(
         say(f"{summarise_separation(numbers)}, written to {output}", quiet=quiet)
 
 
-def _source(sources: dict[str, Any]) -> str:
-    given = [name for name, value in sources.items() if value is not None]
+def _source(**sources: Any) -> str:
+    given = [f"--{name}" for name, value in sources.items() if value is not None]
     if len(given) != 1:
-        raise typer.BadParameter(
-            f"give one of {', '.join(sources)}, and only one.", param_hint="--rig"
-        )
+        every = ", ".join(f"--{name}" for name in sources)
+        raise typer.BadParameter(f"give one of {every}, and only one.", param_hint="--rig")
     return given[0]
 
 
-def _refuse(source: str, sources: tuple[str, ...], options: dict[str, Any]) -> None:
+def _refuse(source: str, sources: tuple[str, ...], **options: Any) -> None:
     for name, value in options.items():
         if value is not None and source not in sources:
             raise typer.BadParameter(
-                f"goes with {' or '.join(sources)}, not with {source}.", param_hint=name
+                f"goes with {' or '.join(sources)}, not with {source}.",
+                param_hint=f"--{name.replace('_', '-')}",
             )
 
 

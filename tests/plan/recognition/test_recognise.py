@@ -140,6 +140,7 @@ def test_other_kinds_have_their_names():
         as_picture(column),
         as_picture(block),
         as_picture((y // 4 + x // 8) % 2),
+        as_picture(((y + 1) // 4 + (x + 3) // 8 + 1) % 2),
         as_picture((x + 3) // 5 % 2),
         as_picture(np.tile(random.random(40) < 0.5, (24, 1))),
         as_picture(random.random(SIZE) < 0.3),
@@ -152,6 +153,7 @@ def test_other_kinds_have_their_names():
         Band(axis="columns", start=7, stop=10, is_white=True),
         Block(top=4, left=32, height=4, width=8, is_white=True),
         Checkerboard(height=4, width=8, is_first_white=False),
+        Checkerboard(height=4, width=8, top=3, left=5, is_first_white=True),
         Stripes(axis="columns", width=5, first=2, is_first_white=False),
     ]
     *named, code, binary, picture = _recognised(pictures).contents

@@ -214,12 +214,16 @@ class Checkerboard(Content):
     ----------
     height, width : int
         Of a field.
+    top, left : int or None
+        Height and width of the first field that lies on the picture, where a shift cuts it off.
     is_first_white : bool
     """
 
     kind: Literal["checkerboard"] = "checkerboard"
     height: int = Field(ge=1)
     width: int = Field(ge=1)
+    top: int | None = Field(default=None, ge=1)
+    left: int | None = Field(default=None, ge=1)
     is_first_white: bool
 
     @property

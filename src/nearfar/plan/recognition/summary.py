@@ -133,7 +133,8 @@ def _of_gray_code(recognised: Recognised, contents: Sequence[Content]) -> str:
     missing = sorted(set(range(needed)) - set(shown))
     cells = f" in cells of {cell}" if cell > 1 else ""
     lacks = f", without {_listed(missing)}" if missing else ""
-    return f"Gray code of {axis}{cells}, bits {shown[0]} to {shown[-1]}{lacks}"
+    which = f"bits {shown[0]} to {shown[-1]}" if len(shown) > 1 else f"bit {shown[0]}"
+    return f"Gray code of {axis}{cells}, {which}{lacks}"
 
 
 def _bits(recognised: Recognised, axis: Axis, bit: GrayBit) -> int:

@@ -71,14 +71,13 @@ def name_picture(binary: Booleans) -> Content:
     if (binary[:1] ^ binary[:, :1] ^ binary[0, 0] == binary).all():
         down = name_code(AxisCode("rows", binary[:, 0]))
         across = name_code(AxisCode("columns", binary[0]))
-        if (
-            isinstance(down, Stripes)
-            and isinstance(across, Stripes)
-            and down.first == down.width
-            and across.first == across.width
-        ):
+        if isinstance(down, Stripes) and isinstance(across, Stripes):
             return Checkerboard(
-                height=down.width, width=across.width, is_first_white=bool(binary[0, 0])
+                height=down.width,
+                width=across.width,
+                top=None if down.first == down.width else down.first,
+                left=None if across.first == across.width else across.first,
+                is_first_white=bool(binary[0, 0]),
             )
     return Binary(white_share=float(binary.mean()))
 

@@ -35,22 +35,29 @@ from nearfar.priors.responses import ResponsePrior
 BATCH_PIXELS = 2048
 
 
-def is_cut(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
-    """Return whether the border cuts functions about each rounded q, shape (C,)."""
-    distances = border_distances(centres, near_basis, projector)
+def is_cut(
+    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size, within: int | None = None
+) -> Booleans:
+    """Return whether the border cuts functions about each rounded q, shape (C,).
+
+    `within` is that of `border_distances`.
+    """
+    distances = border_distances(centres, near_basis, projector, within)
     return np.asarray((distances < near_basis.reach).any(axis=1))
 
 
 def border_distances(
-    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size
+    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size, within: int | None = None
 ) -> NDArray[np.int64]:
     """Return projector pixels from the rounded q to each border, at most the reach, (C, 4).
 
     Above, below, to the left and to the right, each rounded to one of those that `_rounded` lists.
+    Distances of at least `within` count as the reach.
     """
     last = np.array(projector) - 1 - centres
     distances = np.stack([centres[:, 0], last[:, 0], centres[:, 1], last[:, 1]], axis=1)
-    return _rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)]
+    found = _rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)]
+    return found if within is None else np.where(distances < within, found, near_basis.reach)
 
 
 @lru_cache(maxsize=16)
@@ -67,12 +74,15 @@ def _rounded(reach: int) -> NDArray[np.int64]:
 
 
 def cut_alike(
-    centres: NDArray[np.int64], centred: CentredBasis
+    centres: NDArray[np.int64], centred: CentredBasis, within: int | None = None
 ) -> Iterator[tuple[Integers, tuple[int, int, int, int]]]:
-    """Yield camera pixels whose functions are cut alike, and their distances from the border."""
+    """Yield camera pixels whose functions are cut alike, and their distances from the border.
+
+    `within` is that of `border_distances`.
+    """
     if not len(centres):
         return
-    distances = border_distances(centres, centred.near_basis, centred.basis.projector)
+    distances = border_distances(centres, centred.near_basis, centred.basis.projector, within)
     # Each four distances as one number.
     code = distances @ (centred.near_basis.reach + 1) ** np.arange(4)
     order = np.argsort(code, kind="stable")
@@ -228,7 +238,7 @@ def solve_cut(
     amplitudes = np.empty(precision.shape)
     near = np.empty((number, channels, centred.near_basis.count), dtype=np.float32)
     far = np.empty((number, channels, count), dtype=np.float32)
-    for part, at in cut_alike(batch.centres, centred):
+    for part, at in cut_alike(batch.centres, centred, prior.reach):
         patterns = cut_responses(centred, at)
         # Hats beyond the border answer nothing.
         inside = np.flatnonzero(patterns.any(axis=0))

@@ -14,10 +14,10 @@ import numpy as np
 from array_api_compat import device, is_numpy_array
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
-from nearfar.estimate.joint.cut import border_distances, near_responses, solve_cut
+from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
 from nearfar.estimate.joint.evidence import most_probable, sums_by_row, sums_by_table
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
@@ -70,7 +70,7 @@ def sweep_once(
     """
     pixels, model = problem.pixels, problem.model
     centred, projector = model.centred, problem.measurements.projector
-    xp, count = namespace(pixels.responses), len(pixels.responses)
+    count = len(pixels.responses)
     rows = _empty_rows(problem)
     start = None
     if before is not None:
@@ -102,11 +102,9 @@ def sweep_once(
         weights = batch.direct_weights * seen[:, None, None]
         batch = batch._replace(lit=seen, direct_weights=weights)
         priors = model.priors
-        for place in np.unique(fetch(component)).tolist():
-            (alike,) = xp.nonzero(component == place)
+        for place, alike, cut in _alike(batch, component, model, clips=clips):
             some = batch.only(alike)
             ratio = variance_ratio(some, scale[alike])
-            cut = clips and place < len(LIT_COMPONENTS)
             ratio = rounded_ratio(ratio) if cut else ratio
             found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
             put(selected[alike], some, found)
@@ -115,6 +113,31 @@ def sweep_once(
 
     side_by_side(estimate, _parts(problem))
     return rows
+
+
+def _alike(
+    batch: PixelBatch, component: Integers, model: Model, *, clips: bool
+) -> Iterator[tuple[int, NDArray[np.int64], bool]]:
+    """Yield each prior component, its camera pixels, and whether the border cuts their windows.
+
+    A component that fades soon does not reach every border that is in reach of the functions.
+    """
+    xp, centred = namespace(component), model.centred
+    for place in np.unique(fetch(component)).tolist():
+        (alike,) = xp.nonzero(component == place)
+        cut = clips and place < len(LIT_COMPONENTS)
+        if not cut or centred.near_basis.pitch == 1:
+            yield place, alike, cut
+            continue
+        at_border = is_cut(
+            batch.centres[alike],
+            centred.near_basis,
+            centred.basis.projector,
+            model.priors[place].reach,
+        )
+        for is_one, some in ((False, alike[~at_border]), (True, alike[at_border])):
+            if len(some):
+                yield place, some, is_one
 
 
 def _explained(

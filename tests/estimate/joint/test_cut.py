@@ -14,12 +14,12 @@ from nearfar.estimate.joint.cut import (
     cut_responses,
     is_cut,
     near_responses,
-    share_on_projector,
     solve_cut,
 )
 from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.seen import box_centres, seen_of_projector
+from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.joint.solve import solve_whole, variance_ratio
 from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives, wrap

@@ -21,18 +21,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, blocks, product
+from nearfar.arrays import Booleans, Floats, Integers, Size, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.cut_solve import solve_alike
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis
-from nearfar.parallel import side_by_side
 from nearfar.priors.responses import ResponsePrior
-
-# Camera pixels of a batch.
-BATCH_PIXELS = 2048
 
 
 def is_cut(
@@ -126,55 +122,6 @@ def cut_responses(centred: CentredBasis, distances: tuple[int, int, int, int]) -
     sines = centred.basis.is_sine
     found[sines] = whole.imag[centred.basis.index[sines]]
     return np.asarray(found)
-
-
-def share_on_projector(
-    centres: NDArray[np.int64], offsets: Integers, pitches: Integers, projector: Size
-) -> Floats:
-    """Return the share of each hat about q that lies on the projector, float32.
-
-    Parameters
-    ----------
-    centres : ndarray of int, shape (C, 2)
-    offsets : ndarray of int, shape (J, 2)
-    pitches : ndarray of int, shape (J,)
-    projector : Size
-
-    Returns
-    -------
-    ndarray, shape (C, J), float32
-    """
-    found = np.ones((len(centres), len(offsets)), dtype=np.float32)
-
-    def work(batch: slice) -> None:
-        _multiply_by_shares(found[batch], centres[batch], offsets, pitches, projector)
-
-    side_by_side(work, blocks(len(centres), BATCH_PIXELS))
-    return found
-
-
-def _multiply_by_shares(
-    found: Floats,
-    centres: NDArray[np.int64],
-    offsets: Integers,
-    pitches: Integers,
-    projector: Size,
-) -> None:
-    for axis in (0, 1):
-        above, below = centres[:, axis], projector[axis] - 1 - centres[:, axis]
-        places, hat = np.unique(
-            np.stack([offsets[:, axis], pitches], axis=1), axis=0, return_inverse=True
-        )
-        along = np.empty((len(centres), len(places)), dtype=np.float32)
-        for number, (offset, pitch) in enumerate(places.tolist()):
-            side = np.arange(-pitch, pitch + 1)
-            summed = np.cumsum(np.maximum(0.0, 1.0 - np.abs(side) / pitch) / pitch)
-            table = np.concatenate([[0.0], summed])
-            # Light at offsets from -above to below.
-            upper = table[np.clip(below - offset + pitch + 1, 0, len(table) - 1)]
-            lower = table[np.clip(-above - offset + pitch, 0, len(table) - 1)]
-            along[:, number] = np.maximum(upper - lower, 0.0)
-        found *= np.take(along, hat.ravel(), axis=1)
 
 
 class _AxisPlaces(NamedTuple):

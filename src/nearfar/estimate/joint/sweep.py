@@ -11,14 +11,14 @@ from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
-from array_api_compat import device, is_numpy_array
+from array_api_compat import device
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
-from nearfar.estimate.joint.evidence import most_probable, sums_by_row, sums_by_table
+from nearfar.estimate.joint.evidence import log_evidence, log_evidence_by_row, most_probable
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Model, Problem
@@ -194,10 +194,10 @@ def _choose(
     # No shift of q has a say; nor has, among functions of several projector pixels, the references'
     # error, which takes a third of the time and changes no choice that matters.
     batch = batch._replace(direct_weights=batch.direct_weights[:, :1])
-    weigh = sums_by_table
+    evidence_of = log_evidence
     if model.centred.near_basis.pitch > 1:
         batch = batch._replace(of_offset=batch.of_offset[:, :0])
-        weigh = sums_by_row if is_numpy_array(batch.white) else sums_by_table
+        evidence_of = log_evidence_by_row
     for selected, candidates in (
         (left & batch.lit, model.lit if is_first else model.lit_differences),
         (left & ~batch.lit, model.unlit),
@@ -206,12 +206,12 @@ def _choose(
         if not len(mine):
             continue
         of_mine = batch if len(mine) == len(left) else batch.only(mine)
-        component, scale, evidence = most_probable(of_mine, candidates, weigh)
+        component, scale, evidence = most_probable(of_mine, candidates, evidence_of)
         if is_first and candidates is model.lit:
             (doubted,) = xp.nonzero(_is_doubtful(of_mine, model.centred))
             if len(doubted):
                 dark_ones = _without_direct(of_mine.only(doubted))
-                unlit, its_scale, without = most_probable(dark_ones, model.unlit, weigh)
+                unlit, its_scale, without = most_probable(dark_ones, model.unlit, evidence_of)
                 # q was chosen among all projector pixels.
                 none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
                 component[doubted] = xp.where(none, unlit, component[doubted])

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, product
+from nearfar.arrays import Booleans, Floats, Integers, Size, product_by_row
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.cut_solve import solve_alike
@@ -167,10 +167,10 @@ def near_responses(
     (cut,), (whole,) = np.nonzero(at_border), np.nonzero(~at_border)
     shape = (*coefficients.shape[:2], centred.basis.count)
     found = np.empty(shape, dtype=np.result_type(coefficients, centred.on_window))
-    found[whole] = product(coefficients[whole], centred.on_window.T)
+    found[whole] = product_by_row(coefficients[whole], centred.on_window.T)
     for part, distances in cut_alike(centres[cut], centred):
         responses = cut_responses(centred, distances).T.astype(np.float32)
-        found[cut[part]] = coefficients[cut[part]] @ responses
+        found[cut[part]] = product_by_row(coefficients[cut[part]], responses)
     return found
 
 
@@ -208,7 +208,7 @@ def solve_cut(
         if not is_definite:
             raise np.linalg.LinAlgError("the covariance of responses is not positive definite")
         amplitudes[of] = found
-        near[of] = rest @ to_near
+        near[of] = product_by_row(rest, to_near)
         far[of] = rest * prior.far_variance
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),

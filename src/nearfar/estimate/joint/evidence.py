@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from array_api_compat import device
 
-from nearfar.arrays import Floats, Integers, beside, fetch, namespace
+from nearfar.arrays import Floats, Integers, beside, fetch, namespace, product_by_row
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.evidence_sums import sum_squares
 from nearfar.estimate.joint.nuisance import DIRECT_PRIOR_DEVIATION
@@ -255,8 +255,8 @@ def log_evidence_by_row(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> 
 
     A compiled loop sums row by row.
     """
-    y = whitened.responses @ eigenbasis.eigenvectors
-    u = whitened.direct_weights @ eigenbasis.of_footprint
+    y = product_by_row(whitened.responses, eigenbasis.eigenvectors)
+    u = product_by_row(whitened.direct_weights, eigenbasis.of_footprint)
     steps = whitened.table_step
     first, last = (int(step) // TABLE_STEPS * TABLE_STEPS for step in (steps[0], steps[-1]))
     direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio[:, 0].astype(np.float64)) ** 2

@@ -19,6 +19,10 @@ from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
 from nearfar.estimate.joint.evidence import log_evidence, log_evidence_by_row, most_probable
+from nearfar.estimate.joint.neighbour_loops import (
+    expect_each_by_pixel,
+    expect_together_by_pixel,
+)
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Model, Problem
@@ -307,14 +311,17 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    far = expect_each(
+    each, together = expect_each, expect_together
+    if problem.near_basis.pitch > 1:
+        each, together = expect_each_by_pixel, expect_together_by_pixel
+    far = each(
         rows.far.reshape((*shape, -1)),
         white,
         variance,
         problem.model.multiplicity,
         beside(np.flatnonzero(cycles >= np.median(cycles)), white),
     )
-    windows = expect_together(
+    windows = together(
         rows.near.reshape((*shape, -1)),
         white,
         rows.near_noise.reshape(shape) / white**2,

@@ -15,6 +15,7 @@ from array_api_compat import device
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
+from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
@@ -86,8 +87,8 @@ def sweep_once(
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
-        rows.near[selected] += found.near
-        rows.far[selected] += centred.uncentre(found.far, batch.centres)
+        add_rows(rows.near, selected, found.near)
+        add_rows(rows.far, selected, centred.uncentre(found.far, batch.centres))
         rows.near_noise[selected] = found.near_noise
 
     done = [0]
@@ -103,8 +104,8 @@ def sweep_once(
         component, scale = _choose(batch, model, given, is_first=start is None)
         choice.prior_component[selected], choice.prior_scale[selected] = component, scale
         seen = component < len(LIT_COMPONENTS)
-        weights = batch.direct_weights * seen[:, None, None]
-        batch = batch._replace(lit=seen, direct_weights=weights)
+        batch.direct_weights[~seen] = 0.0
+        batch = batch._replace(lit=seen)
         priors = model.priors
         for place, alike, cut in _alike(batch, component, model, clips=clips):
             some = batch.only(alike)

@@ -26,6 +26,9 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 Integers = NDArray[np.integer[Any]]
 Booleans = NDArray[np.bool_]
 
+# Multiplications up to which OpenBLAS takes kernels for small matrices.
+FEW_MULTIPLICATIONS = 100**3
+
 
 class Size(NamedTuple):
     """Height and width of a grid of pixels.
@@ -203,6 +206,22 @@ def product(values: Floats, matrix: Floats) -> Floats:
     """Return (..., a) @ (a, b) as one matrix product; NumPy computes one for each leading index."""
     flat = values.reshape((math.prod(values.shape[:-1]), values.shape[-1])) @ matrix
     return flat.reshape((*values.shape[:-1], matrix.shape[1]))
+
+
+def product_by_row(values: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
+    """Return `product` of NumPy arrays; a row's rounding does not depend on the other rows.
+
+    OpenBLAS multiplies by other kernels where there are few multiplications or a single row, so a
+    few rows are followed by zeros.
+    """
+    flat = values.reshape((math.prod(values.shape[:-1]), values.shape[-1]))
+    number, least = len(flat), max(2, FEW_MULTIPLICATIONS // max(1, matrix.size) + 1)
+    if number < least:
+        filled = np.zeros((least, flat.shape[1]), dtype=flat.dtype)
+        filled[:number] = flat
+        flat = filled
+    found = (flat @ matrix)[:number]
+    return np.asarray(found.reshape((*values.shape[:-1], matrix.shape[1])))
 
 
 def blocks(count: int, length: int) -> Iterator[slice]:

@@ -8,17 +8,18 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_scale
+from nearfar.estimate.joint.clipped import rounded_ratio
 from nearfar.estimate.joint.cut import (
     border_distances,
     cut_responses,
     is_cut,
     near_responses,
-    share_on_projector,
     solve_cut,
 )
 from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.seen import box_centres, seen_of_projector
+from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.joint.solve import solve_whole, variance_ratio
 from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives, wrap
@@ -167,6 +168,36 @@ def test_whole_and_cut_agree_where_nothing_is_cut():
     for name in ("amplitudes", "near", "far"):
         one, other = getattr(by_whole, name), getattr(by_cut, name)
         np.testing.assert_allclose(one, other, rtol=0, atol=2e-3 * np.abs(one).max())
+
+
+def test_light_that_fades_before_the_border_is_found_as_well_without_a_cut():
+    component = PriorComponent(1.3, 1.0, 3.0)
+    centred = _centred()
+    prior = response_prior(component, centred, np.ones(centred.basis.count, dtype=np.float32))
+    at_border = np.array([[69 - prior.reach, 45], [40, prior.reach], [35, 45 - prior.reach]])
+    assert prior.reach < BASIS.reach
+    assert is_cut(at_border[:2], BASIS, PROJECTOR).all()
+    assert not is_cut(at_border, BASIS, PROJECTOR, prior.reach).any()
+    centre = np.array([69 - prior.reach, prior.reach])
+    draw, number, scale = np.random.default_rng(2), 300, 0.01
+    size = scale * WHITE
+    truth = size * draw.multivariate_normal(np.zeros(BASIS.count), prior.covariance, number)
+    far = size * np.sqrt(prior.far_variance) * draw.normal(size=(number, centred.basis.count))
+    noise = NOISE * draw.normal(size=far.shape)
+    batch = _batch(np.tile(centre, (number, 1)), centred)
+    direct = 0.3 * centred.of_direct(batch.direct_weights[:, 0])
+    responses = truth @ _by_hand(centred, centre).T + far + direct + noise
+    batch = batch._replace(responses=np.repeat(responses[:, None], 2, axis=1).astype(np.float32))
+    ratio = rounded_ratio(variance_ratio(batch, np.full(number, scale)))
+    places = np.stack(np.meshgrid(*map(np.arange, PROJECTOR), indexing="ij"), axis=-1)
+    values = BASIS.values_at(places.reshape(-1, 2) - centre)
+    by_cut = solve_cut(batch, replace(prior, reach=BASIS.reach), ratio, centred)
+    by_whole = solve_whole(batch, prior, ratio, centred)
+    cut, whole = (
+        np.sum((values @ (found.near[:, 0] - truth).T) ** 2) for found in (by_cut, by_whole)
+    )
+    assert cut < 0.5 * np.sum((values @ truth.T) ** 2)
+    assert whole < 1.01 * cut
 
 
 HIGH = [

@@ -3,10 +3,19 @@
 import numpy as np
 import pytest
 
-from nearfar.estimate.joint.neighbours import expect_each, expect_together
+from nearfar.estimate.joint import neighbour_loops, neighbours
+
+BY_ARRAYS = (neighbours.expect_each, neighbours.expect_together)
+BY_PIXEL = (neighbour_loops.expect_each_by_pixel, neighbour_loops.expect_together_by_pixel)
 
 
-def test_neighbours_that_agree_take_noise_away_and_edges_stay():
+@pytest.fixture(params=[BY_ARRAYS, BY_PIXEL], ids=["by arrays", "by pixel"])
+def filters(request):
+    return request.param
+
+
+def test_neighbours_that_agree_take_noise_away_and_edges_stay(filters):
+    expect_each, expect_together = filters
     generator = np.random.default_rng(0)
     truth = np.zeros((40, 40, 1, 12))
     truth[:, 20:] = 1.0
@@ -22,7 +31,8 @@ def test_neighbours_that_agree_take_noise_away_and_edges_stay():
     assert np.abs((together - truth)[:, 19:21]).max() < 4 * 0.05
 
 
-def test_rows_without_anything_in_common_are_left_as_they_are():
+def test_rows_without_anything_in_common_are_left_as_they_are(filters):
+    expect_each, _ = filters
     generator = np.random.default_rng(0)
     values = generator.normal(size=(20, 20, 1, 40))
     variance = np.full((20, 20, 1), 0.3**2)
@@ -34,7 +44,8 @@ def test_rows_without_anything_in_common_are_left_as_they_are():
     assert np.std((found - values)[..., 20:]) > 0.4 * 0.3
 
 
-def test_neighbours_without_a_say_are_not_heard():
+def test_neighbours_without_a_say_are_not_heard(filters):
+    _, expect_together = filters
     values = np.zeros((9, 9, 1, 2))
     values[4, 4] = 100.0
     known = np.ones((9, 9), dtype=bool)
@@ -44,7 +55,8 @@ def test_neighbours_without_a_say_are_not_heard():
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 1), (5, 6)])
-def test_what_is_alike_everywhere_stays_so_to_the_cameras_border(shape):
+def test_what_is_alike_everywhere_stays_so_to_the_cameras_border(shape, filters):
+    expect_each, expect_together = filters
     # Shares of white are; white itself is not.
     white = 1.0 + np.random.default_rng(1).random((*shape, 2))
     values, variance = 0.7 * white[..., None] * np.ones(3), np.full((*shape, 2), 0.01)

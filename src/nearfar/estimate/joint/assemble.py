@@ -8,9 +8,9 @@ from array_api_compat import device
 
 from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import dc_index
-from nearfar.estimate.joint.cut import share_on_projector
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
+from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.joint.spikes import away_from_q
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency, far_frequencies

@@ -21,36 +21,39 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, blocks, product
+from nearfar.arrays import Booleans, Floats, Integers, Size, product_by_row
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.cut_solve import solve_alike
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis
-from nearfar.parallel import side_by_side
 from nearfar.priors.responses import ResponsePrior
 
-# Camera pixels of a batch.
-BATCH_PIXELS = 2048
 
+def is_cut(
+    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size, within: int | None = None
+) -> Booleans:
+    """Return whether the border cuts functions about each rounded q, shape (C,).
 
-def is_cut(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
-    """Return whether the border cuts functions about each rounded q, shape (C,)."""
-    distances = border_distances(centres, near_basis, projector)
+    `within` is that of `border_distances`.
+    """
+    distances = border_distances(centres, near_basis, projector, within)
     return np.asarray((distances < near_basis.reach).any(axis=1))
 
 
 def border_distances(
-    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size
+    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size, within: int | None = None
 ) -> NDArray[np.int64]:
     """Return projector pixels from the rounded q to each border, at most the reach, (C, 4).
 
     Above, below, to the left and to the right, each rounded to one of those that `_rounded` lists.
+    Distances of at least `within` count as the reach.
     """
     last = np.array(projector) - 1 - centres
     distances = np.stack([centres[:, 0], last[:, 0], centres[:, 1], last[:, 1]], axis=1)
-    return _rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)]
+    found = _rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)]
+    return found if within is None else np.where(distances < within, found, near_basis.reach)
 
 
 @lru_cache(maxsize=16)
@@ -67,12 +70,15 @@ def _rounded(reach: int) -> NDArray[np.int64]:
 
 
 def cut_alike(
-    centres: NDArray[np.int64], centred: CentredBasis
+    centres: NDArray[np.int64], centred: CentredBasis, within: int | None = None
 ) -> Iterator[tuple[Integers, tuple[int, int, int, int]]]:
-    """Yield camera pixels whose functions are cut alike, and their distances from the border."""
+    """Yield camera pixels whose functions are cut alike, and their distances from the border.
+
+    `within` is that of `border_distances`.
+    """
     if not len(centres):
         return
-    distances = border_distances(centres, centred.near_basis, centred.basis.projector)
+    distances = border_distances(centres, centred.near_basis, centred.basis.projector, within)
     # Each four distances as one number.
     code = distances @ (centred.near_basis.reach + 1) ** np.arange(4)
     order = np.argsort(code, kind="stable")
@@ -118,55 +124,6 @@ def cut_responses(centred: CentredBasis, distances: tuple[int, int, int, int]) -
     return np.asarray(found)
 
 
-def share_on_projector(
-    centres: NDArray[np.int64], offsets: Integers, pitches: Integers, projector: Size
-) -> Floats:
-    """Return the share of each hat about q that lies on the projector, float32.
-
-    Parameters
-    ----------
-    centres : ndarray of int, shape (C, 2)
-    offsets : ndarray of int, shape (J, 2)
-    pitches : ndarray of int, shape (J,)
-    projector : Size
-
-    Returns
-    -------
-    ndarray, shape (C, J), float32
-    """
-    found = np.ones((len(centres), len(offsets)), dtype=np.float32)
-
-    def work(batch: slice) -> None:
-        _multiply_by_shares(found[batch], centres[batch], offsets, pitches, projector)
-
-    side_by_side(work, blocks(len(centres), BATCH_PIXELS))
-    return found
-
-
-def _multiply_by_shares(
-    found: Floats,
-    centres: NDArray[np.int64],
-    offsets: Integers,
-    pitches: Integers,
-    projector: Size,
-) -> None:
-    for axis in (0, 1):
-        above, below = centres[:, axis], projector[axis] - 1 - centres[:, axis]
-        places, hat = np.unique(
-            np.stack([offsets[:, axis], pitches], axis=1), axis=0, return_inverse=True
-        )
-        along = np.empty((len(centres), len(places)), dtype=np.float32)
-        for number, (offset, pitch) in enumerate(places.tolist()):
-            side = np.arange(-pitch, pitch + 1)
-            summed = np.cumsum(np.maximum(0.0, 1.0 - np.abs(side) / pitch) / pitch)
-            table = np.concatenate([[0.0], summed])
-            # Light at offsets from -above to below.
-            upper = table[np.clip(below - offset + pitch + 1, 0, len(table) - 1)]
-            lower = table[np.clip(-above - offset + pitch, 0, len(table) - 1)]
-            along[:, number] = np.maximum(upper - lower, 0.0)
-        found *= np.take(along, hat.ravel(), axis=1)
-
-
 class _AxisPlaces(NamedTuple):
     """Hats along one axis of the projector.
 
@@ -210,10 +167,10 @@ def near_responses(
     (cut,), (whole,) = np.nonzero(at_border), np.nonzero(~at_border)
     shape = (*coefficients.shape[:2], centred.basis.count)
     found = np.empty(shape, dtype=np.result_type(coefficients, centred.on_window))
-    found[whole] = product(coefficients[whole], centred.on_window.T)
+    found[whole] = product_by_row(coefficients[whole], centred.on_window.T)
     for part, distances in cut_alike(centres[cut], centred):
         responses = cut_responses(centred, distances).T.astype(np.float32)
-        found[cut[part]] = coefficients[cut[part]] @ responses
+        found[cut[part]] = product_by_row(coefficients[cut[part]], responses)
     return found
 
 
@@ -228,7 +185,7 @@ def solve_cut(
     amplitudes = np.empty(precision.shape)
     near = np.empty((number, channels, centred.near_basis.count), dtype=np.float32)
     far = np.empty((number, channels, count), dtype=np.float32)
-    for part, at in cut_alike(batch.centres, centred):
+    for part, at in cut_alike(batch.centres, centred, prior.reach):
         patterns = cut_responses(centred, at)
         # Hats beyond the border answer nothing.
         inside = np.flatnonzero(patterns.any(axis=0))
@@ -251,7 +208,7 @@ def solve_cut(
         if not is_definite:
             raise np.linalg.LinAlgError("the covariance of responses is not positive definite")
         amplitudes[of] = found
-        near[of] = rest @ to_near
+        near[of] = product_by_row(rest, to_near)
         far[of] = rest * prior.far_variance
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes, batch),

@@ -20,13 +20,13 @@ from nearfar.estimate.joint.batch import (
     RELATIVE_NOISE_FLOOR,
     responses_of_direct,
 )
-from nearfar.estimate.joint.cut import share_on_projector
 from nearfar.estimate.joint.footprint import footprint_weights
 from nearfar.estimate.joint.posterior_variance import (
     Functionals,
     PixelState,
     posterior_variance,
 )
+from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.near_basis import NearBasis

@@ -37,9 +37,9 @@ LARGEST_SHIFT = 0.25
 # The same where footprints are boxes, whose responses are not linear in q.
 LARGEST_SHIFT_AT_PITCH = 0.12
 LARGEST_FROM_CENTRE = 0.499
-# Camera rows on either side of a row that its sweep depends on at a pitch over 1: neighbours, and
-# those that vote for footprints.
-ROWS_OF_SWEEP = 1 + VOTING_ROWS
+# Camera rows on either side of a row that its estimate depends on at a pitch over 1: neighbours in
+# each sweep, and those that vote for footprints before the first sweep and after it.
+ROWS_BESIDE = SWEEPS + 2 * VOTING_ROWS
 
 
 def estimate_jointly(
@@ -152,7 +152,7 @@ def _sweep(
     """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each."""
     found, held = None, slice(0, problem.measurements.camera.height)
     for number, choice in zip_longest(range(sweeps), chosen[:sweeps]):
-        around = _rows_around(problem, held, wanted, sweeps - 1 - number)
+        around = _rows_around(problem, held, wanted, number, sweeps)
         problem, found = _of_rows(problem, found, held, around)
         held = around
 
@@ -167,21 +167,25 @@ def _sweep(
         )
         problem = problem._replace(pixels=pixels)
         if problem.near_basis.pitch > 1 and number < sweeps - 1:
+            # Later sweeps hardly move q: new footprints after each of them change no light's SNR
+            # by more than 0.01 dB.
+            problem = _with_new_footprints(problem) if number == 0 else problem
             problem = _about_new_q(problem)
     problem, found = _of_rows(problem, found, held, wanted)
     assert found is not None
     return problem, found
 
 
-def _rows_around(problem: Problem, held: slice, wanted: slice, sweeps_after: int) -> slice:
+def _rows_around(problem: Problem, held: slice, wanted: slice, number: int, sweeps: int) -> slice:
     """Return the camera rows, of those held, that a sweep estimates for the sake of wanted rows.
 
-    Later sweeps read footprints of the q that it finds, and each reads the rows of neighbours.
-    Where functions are of single pixels there are few of them, and all are estimated.
+    It and those after it read the rows of neighbours, and footprints are voted for with the q that
+    the first finds. Where functions are of single pixels there are few of them, and all are
+    estimated.
     """
     if problem.near_basis.pitch == 1 or held == wanted:
         return held
-    beside = max(1, sweeps_after * ROWS_OF_SWEEP)
+    beside = sweeps - number + (VOTING_ROWS if number == 0 else 0)
     return slice(max(held.start, wanted.start - beside), min(held.stop, wanted.stop + beside))
 
 
@@ -214,17 +218,24 @@ def _pixels(problem: Problem, rows: slice) -> slice:
     return slice(rows.start * width, rows.stop * width)
 
 
-def _about_new_q(problem: Problem) -> Problem:
-    """Return the problem about the q that its last sweep found, with the footprints of these q."""
+def _with_new_footprints(problem: Problem) -> Problem:
+    """Return the problem with the footprints of the q that its last sweep found."""
     pixels, measurements = problem.pixels, problem.measurements
     q = fetch(pixels.correspondence).reshape(*measurements.camera, 2)
     voted = footprint_boxes(measurements, q, problem.near_basis)
     assert voted is not None
     q, footprints = own_footprints(measurements, q, voted, problem.near_basis)
-    changes = (q.reshape(-1, 2), near.centre(q, measurements.projector), footprints)
-    moved, centres, boxes = (beside(values, pixels.white) for values in changes)
-    changed = pixels._replace(correspondence=moved, centres=centres, footprint=boxes)
-    return problem._replace(pixels=changed)
+    changes = (q.reshape(-1, 2), footprints)
+    moved, boxes = (beside(values, pixels.white) for values in changes)
+    return problem._replace(pixels=pixels._replace(correspondence=moved, footprint=boxes))
+
+
+def _about_new_q(problem: Problem) -> Problem:
+    """Return the problem with windows about the q that its last sweep found."""
+    pixels, measurements = problem.pixels, problem.measurements
+    q = fetch(pixels.correspondence).reshape(*measurements.camera, 2)
+    centres = beside(near.centre(q, measurements.projector), pixels.white)
+    return problem._replace(pixels=pixels._replace(centres=centres))
 
 
 def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: bool) -> Floats:

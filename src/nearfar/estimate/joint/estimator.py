@@ -7,7 +7,7 @@ from nearfar.arrays import Floats
 from nearfar.devices import Device
 from nearfar.estimate.base import Estimator, Memory, Model
 from nearfar.estimate.joint.estimate import (
-    ROWS_OF_SWEEP,
+    ROWS_BESIDE,
     SWEEPS,
     Choices,
     estimate_jointly,
@@ -45,7 +45,7 @@ class JointEstimator(Estimator):
 
     def rows_beside(self, plan: Plan) -> int:
         """Return the halo; at a pitch of several pixels, neighbours also vote for footprints."""
-        return SWEEPS * ROWS_OF_SWEEP if plan.pitch > 1 else self.halo
+        return ROWS_BESIDE if plan.pitch > 1 else self.halo
 
     def require(self, plan: Plan) -> None:
         """Refuse a plan of complex patterns."""

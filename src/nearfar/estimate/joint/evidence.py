@@ -3,7 +3,8 @@
 The log evidence of a component at prior scale s, noise sigma and eigenvalues l_i is, up to a
 constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with o and d integrated out.
 v_i depends on s and sigma through their ratio alone, so every camera pixel shares one table over
-variance ratios, and the sums over i are matrix products.
+variance ratios, and the sums over i are matrix products or, where each camera pixel's shall not
+depend on those beside it, compiled loops.
 
 A few screening responses make a shortlist, and all responses choose from it. The screening
 responses alone cost 1.7 dB on the wedge; all responses throughout take three times as long.
@@ -15,14 +16,15 @@ Index convention: arrays are (n, channels, ...); i runs over eigenvectors.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from array_api_compat import device
 
-from nearfar.arrays import Floats, Integers, beside, fetch, namespace
+from nearfar.arrays import Floats, Integers, beside, fetch, namespace, product_by_row
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.evidence_sums import sums_of_products
+from nearfar.estimate.joint.evidence_sums import sum_squares
 from nearfar.estimate.joint.nuisance import DIRECT_PRIOR_DEVIATION
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.fitted import PRIOR_SCALES
@@ -33,6 +35,8 @@ STEPS_PER_SCALE = 4
 # Responses by which the shortlist is made, and components on it.
 SCREENING_RESPONSES = 100
 SHORTLIST_LENGTH = 3
+# Tables of variance ratios begin at multiples of as many steps, so that a few serve all batches.
+TABLE_STEPS = 32
 
 
 class PriorSet(NamedTuple):
@@ -94,7 +98,7 @@ def prior_set(
 
 
 def most_probable(
-    batch: PixelBatch, candidates: PriorSet, weigh: "WeightedSums"
+    batch: PixelBatch, candidates: PriorSet, evidence: "Evidence"
 ) -> tuple[Integers, Floats, Floats]:
     """Choose a prior component and scale for each camera pixel, the same for all channels.
 
@@ -102,8 +106,8 @@ def most_probable(
     ----------
     batch : PixelBatch
     candidates : PriorSet
-    weigh : callable
-        As `log_evidence` takes it.
+    evidence : callable
+        `log_evidence`, or `log_evidence_by_row`.
 
     Returns
     -------
@@ -120,7 +124,7 @@ def most_probable(
     some = whitened._replace(
         responses=whitened.responses[:, screening], of_offset=whitened.of_offset[:, screening]
     )
-    found = [log_evidence(some, screen, weigh) for screen in candidates.screens]
+    found = [evidence(some, screen) for screen in candidates.screens]
     values = xp.stack([xp.max(each, axis=1) for each in found])
     steps = xp.stack([xp.argmax(each, axis=1) for each in found])
     if candidates.screens is not candidates.priors:
@@ -130,7 +134,7 @@ def most_probable(
         for index, prior in enumerate(candidates.priors):
             (mine,) = xp.nonzero(shortlisted[index, :])
             if len(mine):
-                by_all = log_evidence(whitened.only(mine), prior, weigh)
+                by_all = evidence(whitened.only(mine), prior)
                 steps[index, mine] = xp.argmax(by_all, axis=1)
                 values[index, mine] = xp.max(by_all, axis=1)
     best = xp.argmax(values, axis=0)
@@ -205,9 +209,7 @@ def whiten(batch: PixelBatch) -> WhitenedResponses:
     )
 
 
-def log_evidence(
-    whitened: WhitenedResponses, eigenbasis: Eigenbasis, weigh: "WeightedSums"
-) -> Floats:
+def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     """Return the log evidence of one prior component at every prior scale.
 
     Parameters
@@ -215,8 +217,6 @@ def log_evidence(
     whitened : WhitenedResponses
     eigenbasis : Eigenbasis
         Of the component.
-    weigh : callable
-        `sums_by_table`, or `sums_by_row` for NumPy arrays.
 
     Returns
     -------
@@ -227,7 +227,7 @@ def log_evidence(
     u = whitened.direct_weights @ eigenbasis.of_footprint
     v = whitened.of_offset @ eigenbasis.eigenvectors
     xp = namespace(y)
-    sums, log_determinant = weigh(whitened, (y, u, v), eigenbasis)
+    sums, log_determinant = _weighted_sums(whitened, (y, u, v), eigenbasis)
     yy, uy, uu, *of_offset = sums
     if of_offset:
         # Integrate o out first; what is left of y and u is independent of it.
@@ -250,33 +250,42 @@ def log_evidence(
     return total
 
 
-def sums_by_row(
+def log_evidence_by_row(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
+    """Return the same for NumPy arrays without errors of the references, float64.
+
+    A compiled loop sums row by row.
+    """
+    y = product_by_row(whitened.responses, eigenbasis.eigenvectors)
+    u = product_by_row(whitened.direct_weights, eigenbasis.of_footprint)
+    steps = whitened.table_step
+    first, last = (int(step) // TABLE_STEPS * TABLE_STEPS for step in (steps[0], steps[-1]))
+    direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio[:, 0].astype(np.float64)) ** 2
+    squares = np.zeros((len(u), len(PRIOR_SCALES)))
+    factors = np.ones_like(squares)
+    sum_squares(
+        y,
+        u,
+        whitened.pixel,
+        steps - first,
+        STEPS_PER_SCALE,
+        _shared_table(eigenbasis, first, last + TABLE_STEPS),
+        direct_variance,
+        squares,
+        factors,
+    )
+    squares += np.log(factors, out=factors)
+    squares *= -0.5
+    return squares
+
+
+def _weighted_sums(
     whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
 ) -> tuple[list[Floats], Floats]:
-    """Return the weighted sums of products, and the log determinants, each (m, scales).
+    """Return weighted sums of products, by products with each table, and log determinants.
 
     Of y, light u of q and errors v of the references, the sums are yy, uy and uu, and where there
-    are such errors vy, vu and vv.
+    are such errors vy, vu and vv; each (m, scales).
     """
-    (y, u, v), pixel, xp = projected, whitened.pixel, namespace(whitened.responses)
-    scales = STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
-    first, last = whitened.table_step[0], whitened.table_step[-1] + scales[-1]
-    weights, log_determinants = _table(np.arange(first, last + 1), eigenbasis.eigenvalues, xp)
-    steps = whitened.table_step[:, None] - first + scales
-    rows = np.arange(len(y))
-    yy, uy, uu = sums_of_products(y, u, rows, pixel, steps, weights)
-    sums = [yy, uy, uu]
-    if len(v):
-        vv, vy, _ = sums_of_products(v, y, pixel, rows, steps, weights)
-        vu = sums_of_products(v, u, pixel, pixel, steps, weights)[1]
-        sums += [vy, vu, vv]
-    return sums, log_determinants[steps]
-
-
-def sums_by_table(
-    whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
-) -> tuple[list[Floats], Floats]:
-    """Return the same for arrays on any device, by products with each table."""
     y, u, v = projected
     xp, table_step = namespace(y), fetch(whitened.table_step)
     count, shape = 6 if len(v) else 3, (len(y), len(PRIOR_SCALES))
@@ -285,7 +294,8 @@ def sums_by_table(
     first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1)).tolist()
     for start, stop in zip(first, [*first[1:], len(y)], strict=True):
         steps = table_step[start] + STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
-        weights, log_determinants = _table(steps, eigenbasis.eigenvalues, xp)
+        table = _table(steps, eigenbasis.eigenvalues, xp)
+        weights, log_determinants = (xp.astype(values, xp.float32) for values in table)
         of_y, pixel = y[start:stop], whitened.pixel[start:stop]
         of_u = u[pixel]
         pairs = [(of_y, of_y), (of_u, of_y), (of_u, of_u)]
@@ -298,14 +308,19 @@ def sums_by_table(
     return sums, log_determinant
 
 
+# Those of all components, for batches of camera pixels with more and with less noise.
+@lru_cache(maxsize=64)
+def _shared_table(eigenbasis: Eigenbasis, first: int, last: int) -> tuple[Floats, Floats]:
+    """Return the table for rows that begin at steps from `first` to before `last`."""
+    beyond = last + STEPS_PER_SCALE * len(PRIOR_SCALES)
+    return _table(np.arange(first, beyond), eigenbasis.eigenvalues, np)
+
+
 def _table(steps: Integers, eigenvalues: Floats, xp: Any) -> tuple[Floats, Floats]:
     """Return 1 / v_i and the sum of log v_i at steps of the variance ratio: (T, R) and (T,)."""
     ratios = beside(4.0 ** (steps / STEPS_PER_SCALE), eigenvalues)
     variance = 1.0 + ratios[:, None] * xp.astype(eigenvalues, xp.float64)
-    log_determinants = xp.sum(xp.log(variance), axis=1)
-    return xp.astype(1.0 / variance, xp.float32), xp.astype(log_determinants, xp.float32)
+    return 1.0 / variance, xp.sum(xp.log(variance), axis=1)
 
 
-WeightedSums = Callable[
-    [WhitenedResponses, tuple[Floats, Floats, Floats], Eigenbasis], tuple[list[Floats], Floats]
-]
+Evidence = Callable[[WhitenedResponses, Eigenbasis], Floats]

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from nearfar.arrays import Floats, blocks
 from nearfar.parallel import side_by_side
-from nearfar.transport.boxes import box_overlaps, halves
+from nearfar.transport.boxes import halves
 
 # q moves from one camera pixel to the next by the median over a square of this side.
 MEDIAN_SIDE = 3
@@ -91,20 +91,26 @@ def box_centres(correspondence: Floats) -> Floats:
     def work(batch: slice) -> None:
         rounded = np.rint(found[batch])
         wanted, its = found[batch] - rounded, footprints[batch]
-        reach = reach_of(its)
-        pixels = np.arange(-reach, reach + 1)
         middles = wanted.copy()
         for _ in range(CENTRE_STEPS):
             both, widths = halves(middles, its)
-            for axis in (0, 1):
-                overlaps = [box_overlaps(one[:, axis], widths[:, axis], reach) for one in both]
-                off = wanted[:, axis] - (overlaps[0] + overlaps[1]) @ pixels / 2
-                # A centroid moves by at most 1 / width times as much as the middle.
-                middles[:, axis] += off * np.clip(widths[:, axis], 0.0, 1.0)
+            off = wanted - _centroids(both, widths).mean(axis=0)
+            # A centroid moves by at most 1 / width times as much as the middle.
+            middles += off * np.minimum(widths, 1.0)
         found[batch] = rounded + middles
 
     side_by_side(work, blocks(len(q), BATCH_PIXELS))
     return np.where(np.isnan(q), np.nan, found).reshape(correspondence.shape)
+
+
+def _centroids(middles: Floats, widths: Floats) -> Floats:
+    """Return the centroids of boxes' shares in whole pixels, along each axis."""
+    ends = []
+    for end in (middles - 0.5 * widths, middles + 0.5 * widths):
+        pixel = np.floor(end + 0.5)
+        # The integral of the rounded position from 0 to the box's end.
+        ends.append(pixel * (end - 0.5 * pixel))
+    return np.asarray((ends[1] - ends[0]) / widths)
 
 
 def reach_of(footprints: Floats, margin: float = 0.0) -> int:

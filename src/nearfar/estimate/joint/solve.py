@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from array_api_compat import is_numpy_array
 
-from nearfar.arrays import Floats, beside, namespace, product
+from nearfar.arrays import Floats, beside, namespace, product, product_by_row
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.fit import fit_diagonal
@@ -81,14 +81,14 @@ def solve_whole(
     ratio : ndarray, shape (n, channels)
         (s / sigma)^2.
     """
+    if centred.near_basis.pitch > 1:
+        return _of_several_pixels(batch, prior, ratio, centred)
     xp = namespace(batch.responses)
     noise = xp.astype(batch.noise[..., None], xp.float32) ** 2
     prior_variance = xp.astype(ratio[..., None], xp.float32) * noise
     weight = 1.0 / (prior_variance * prior.eigenvalues + noise)
     y = product(batch.responses, prior.eigenvectors)
     per_amplitude = nuisance.projected_amplitude_responses(batch, prior)
-    if centred.near_basis.pitch > 1:
-        return _of_several_pixels(batch, prior, ratio, centred, y, per_amplitude)
     transposed = xp.permute_dims(per_amplitude, (0, 2, 1))
     normal, right = [], []
     for i in range(y.shape[1]):
@@ -115,24 +115,20 @@ def solve_whole(
 
 
 def _of_several_pixels(
-    batch: PixelBatch,
-    prior: ResponsePrior,
-    ratio: Floats,
-    centred: CentredBasis,
-    y: Floats,
-    per_amplitude: Floats,
+    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, centred: CentredBasis
 ) -> PosteriorMean:
     """Return the posterior mean where functions are of several projector pixels.
 
-    y and the responses to amplitudes are projected, and y is overwritten. Spikes are looked for
-    among single projector pixels alone.
+    Spikes are looked for among single projector pixels alone.
     """
-    number, channels, count = y.shape
+    number, channels, count = batch.responses.shape
+    y = product_by_row(batch.responses, prior.eigenvectors)
+    amplitude_responses = nuisance.amplitude_responses(batch, centred)
     noise_variance = batch.noise.ravel() ** 2
     precision = nuisance.prior_precision(batch, centred.near_basis)
     amplitudes = fit_diagonal(
         y.reshape(-1, count),
-        per_amplitude,
+        product_by_row(amplitude_responses, prior.eigenvectors),
         np.repeat(np.arange(number), channels),
         prior.eigenvalues,
         noise_variance,
@@ -141,8 +137,8 @@ def _of_several_pixels(
     )
     return PosteriorMean(
         amplitudes=nuisance.in_full(amplitudes.reshape(precision.shape), batch),
-        near=product(y, prior.to_near),
-        far=product(y, prior.to_far),
+        near=product_by_row(y, prior.to_near),
+        far=product_by_row(y, prior.to_far),
         near_noise=near_noise(batch, prior, ratio),
         score=y[..., :0],
     )

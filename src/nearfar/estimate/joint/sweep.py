@@ -11,14 +11,19 @@ from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
-from array_api_compat import device, is_numpy_array
+from array_api_compat import device
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
+from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
-from nearfar.estimate.joint.cut import border_distances, near_responses, solve_cut
-from nearfar.estimate.joint.evidence import most_probable, sums_by_row, sums_by_table
+from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
+from nearfar.estimate.joint.evidence import log_evidence, log_evidence_by_row, most_probable
+from nearfar.estimate.joint.neighbour_loops import (
+    expect_each_by_pixel,
+    expect_together_by_pixel,
+)
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Model, Problem
@@ -70,7 +75,7 @@ def sweep_once(
     """
     pixels, model = problem.pixels, problem.model
     centred, projector = model.centred, problem.measurements.projector
-    xp, count = namespace(pixels.responses), len(pixels.responses)
+    count = len(pixels.responses)
     rows = _empty_rows(problem)
     start = None
     if before is not None:
@@ -82,8 +87,8 @@ def sweep_once(
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
-        rows.near[selected] += found.near
-        rows.far[selected] += centred.uncentre(found.far, batch.centres)
+        add_rows(rows.near, selected, found.near)
+        add_rows(rows.far, selected, centred.uncentre(found.far, batch.centres))
         rows.near_noise[selected] = found.near_noise
 
     done = [0]
@@ -99,14 +104,12 @@ def sweep_once(
         component, scale = _choose(batch, model, given, is_first=start is None)
         choice.prior_component[selected], choice.prior_scale[selected] = component, scale
         seen = component < len(LIT_COMPONENTS)
-        weights = batch.direct_weights * seen[:, None, None]
-        batch = batch._replace(lit=seen, direct_weights=weights)
+        batch.direct_weights[~seen] = 0.0
+        batch = batch._replace(lit=seen)
         priors = model.priors
-        for place in np.unique(fetch(component)).tolist():
-            (alike,) = xp.nonzero(component == place)
+        for place, alike, cut in _alike(batch, component, model, clips=clips):
             some = batch.only(alike)
             ratio = variance_ratio(some, scale[alike])
-            cut = clips and place < len(LIT_COMPONENTS)
             ratio = rounded_ratio(ratio) if cut else ratio
             found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
             put(selected[alike], some, found)
@@ -115,6 +118,31 @@ def sweep_once(
 
     side_by_side(estimate, _parts(problem))
     return rows
+
+
+def _alike(
+    batch: PixelBatch, component: Integers, model: Model, *, clips: bool
+) -> Iterator[tuple[int, NDArray[np.int64], bool]]:
+    """Yield each prior component, its camera pixels, and whether the border cuts their windows.
+
+    A component that fades soon does not reach every border that is in reach of the functions.
+    """
+    xp, centred = namespace(component), model.centred
+    for place in np.unique(fetch(component)).tolist():
+        (alike,) = xp.nonzero(component == place)
+        cut = clips and place < len(LIT_COMPONENTS)
+        if not cut or centred.near_basis.pitch == 1:
+            yield place, alike, cut
+            continue
+        at_border = is_cut(
+            batch.centres[alike],
+            centred.near_basis,
+            centred.basis.projector,
+            model.priors[place].reach,
+        )
+        for is_one, some in ((False, alike[~at_border]), (True, alike[at_border])):
+            if len(some):
+                yield place, some, is_one
 
 
 def _explained(
@@ -171,10 +199,10 @@ def _choose(
     # No shift of q has a say; nor has, among functions of several projector pixels, the references'
     # error, which takes a third of the time and changes no choice that matters.
     batch = batch._replace(direct_weights=batch.direct_weights[:, :1])
-    weigh = sums_by_table
+    evidence_of = log_evidence
     if model.centred.near_basis.pitch > 1:
         batch = batch._replace(of_offset=batch.of_offset[:, :0])
-        weigh = sums_by_row if is_numpy_array(batch.white) else sums_by_table
+        evidence_of = log_evidence_by_row
     for selected, candidates in (
         (left & batch.lit, model.lit if is_first else model.lit_differences),
         (left & ~batch.lit, model.unlit),
@@ -183,12 +211,12 @@ def _choose(
         if not len(mine):
             continue
         of_mine = batch if len(mine) == len(left) else batch.only(mine)
-        component, scale, evidence = most_probable(of_mine, candidates, weigh)
+        component, scale, evidence = most_probable(of_mine, candidates, evidence_of)
         if is_first and candidates is model.lit:
             (doubted,) = xp.nonzero(_is_doubtful(of_mine, model.centred))
             if len(doubted):
                 dark_ones = _without_direct(of_mine.only(doubted))
-                unlit, its_scale, without = most_probable(dark_ones, model.unlit, weigh)
+                unlit, its_scale, without = most_probable(dark_ones, model.unlit, evidence_of)
                 # q was chosen among all projector pixels.
                 none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
                 component[doubted] = xp.where(none, unlit, component[doubted])
@@ -284,14 +312,17 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    far = expect_each(
+    each, together = expect_each, expect_together
+    if problem.near_basis.pitch > 1:
+        each, together = expect_each_by_pixel, expect_together_by_pixel
+    far = each(
         rows.far.reshape((*shape, -1)),
         white,
         variance,
         problem.model.multiplicity,
         beside(np.flatnonzero(cycles >= np.median(cycles)), white),
     )
-    windows = expect_together(
+    windows = together(
         rows.near.reshape((*shape, -1)),
         white,
         rows.near_noise.reshape(shape) / white**2,

@@ -115,7 +115,7 @@ if TYPE_CHECKING:
         read_correspondence,
     )
     from nearfar.errors import NearfarError
-    from nearfar.estimate.joint import ErrorBars
+    from nearfar.estimate.error_bars import ErrorBars
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.photometry.measurements import Measurements
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
@@ -165,7 +165,7 @@ _HOMES = {
     "reconstruct_to_file": "nearfar.workflow.reconstruction.reconstruct",
     "ReconstructionOptions": "nearfar.workflow.reconstruction.options",
     "Transport": "nearfar.transport.model",
-    "ErrorBars": "nearfar.estimate.joint",
+    "ErrorBars": "nearfar.estimate.error_bars",
     "prepare_transport": "nearfar.transport.prepared",
     "save_transport": "nearfar.transport.store",
     "load_transport": "nearfar.transport.store",

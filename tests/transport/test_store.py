@@ -21,10 +21,16 @@ from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import QUALITY_FIELDS, of_pixels, of_rows, stacked, thinned_blocks
-from nearfar.transport.store import (
+from nearfar.transport.rows import (
     FACTORS,
     POSTERIOR_FIELDS,
+    QUALITY_FIELDS,
+    of_pixels,
+    of_rows,
+    stacked,
+    thinned_blocks,
+)
+from nearfar.transport.store import (
     load_transport,
     open_transport,
     save_transport,
@@ -256,7 +262,7 @@ def test_a_verdict_of_an_earlier_nearfar_is_read(stored):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 9}, "version 9, this nearfar reads versions 1 to 2"),
+        ({"version": 9}, "version 9, this nearfar reads versions 1 to 3"),
         ({"format": "nearfar capture"}, "not a nearfar transport but a nearfar capture"),
         ({"projector": None}, "does not describe a transport"),
         ({"projector": [3]}, "does not describe a transport"),

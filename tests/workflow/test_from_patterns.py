@@ -96,6 +96,14 @@ def test_held_out_photos_tell_how_well_such_patterns_are_relit(world, tmp_path):
     assert transport.verdict.held_out_snr == pytest.approx(np.mean(true), abs=2.0)
 
 
+def test_the_truth_lies_within_one_deviation_as_often_as_it_should(world, tmp_path):
+    transport = reconstruct_from_patterns(_capture(world, SETS["random"](), tmp_path))
+    bars = nearfar.ErrorBars(transport)
+    for light in (natural_picture(SIZE, 1), np.random.default_rng(7).random(SIZE)):
+        error = np.abs(world @ light.astype(np.float32) - transport @ light)
+        assert 0.5 < np.mean(error < bars.picture(light)) < 0.85
+
+
 def test_more_photos_are_better_and_photos_without_noise_better_still(world, tmp_path):
     found = []
     for number, noise in ((30, True), (80, True), (80, False)):

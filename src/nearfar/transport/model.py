@@ -34,7 +34,7 @@ from nearfar.transport.boxes import BoxAxes, box_axes
 from nearfar.transport.gains import as_gains, with_gains
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
-from nearfar.transport.posterior import Posterior
+from nearfar.transport.posterior import PatternPosterior, Posterior
 from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.quality import Quality
 from nearfar.transport.verdict import KeptVerdict
@@ -89,7 +89,7 @@ class Transport(NoArray):
         Standard deviation of one response to a cosine or sine.
     provenance : mapping
         How it was made: plan, estimator, exposure, version. Of JSON types.
-    posterior : Posterior, optional
+    posterior : Posterior or PatternPosterior, optional
         State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it.
     quality : Quality, optional
         Confidence in q and saturation of each camera pixel, where the photos show them.
@@ -124,7 +124,7 @@ class Transport(NoArray):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     pitch: int = 1
     footprint: Floats | None = None
-    posterior: Posterior | None = None
+    posterior: Posterior | PatternPosterior | None = None
     quality: Quality | None = None
     verdict: KeptVerdict | None = None
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.store import StoredTransport
 

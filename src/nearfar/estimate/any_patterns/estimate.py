@@ -30,6 +30,8 @@ from nearfar.priors.fitted import LIT_AT_PITCH, LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.transport import near
 from nearfar.transport.direct import Footprint, footprint
 
+# Prior components, those of camera pixels with direct light first.
+COMPONENTS = (*LIT_COMPONENTS, *UNLIT_COMPONENTS)
 # Variance ratios (s / sigma)^2 that are tried.
 RATIOS = tuple(4.0**power for power in range(-6, 9))
 # Pairs of component and ratio that camera pixels choose from, and camera pixels that settle them.
@@ -59,6 +61,10 @@ class PatternRows:
     noise : ndarray, shape (C, channels), float32
         Standard deviation of a photo.
     lit : ndarray of bool, shape (C,)
+    component : ndarray of uint8, shape (C,)
+        Index into `COMPONENTS`.
+    ratio : ndarray, shape (C,), float32
+        Variance ratio (s / sigma)^2.
     """
 
     black: Floats
@@ -67,6 +73,8 @@ class PatternRows:
     far: Floats
     noise: Floats
     lit: NDArray[np.bool_]
+    component: NDArray[np.uint8]
+    ratio: Floats
 
 
 class _Photos(NamedTuple):
@@ -129,6 +137,8 @@ def estimate_from_patterns(
         far=np.zeros((count, channels, model.far_basis.count), np.float32),
         noise=np.zeros((count, channels), np.float32),
         lit=np.zeros(count, bool),
+        component=np.zeros(count, np.uint8),
+        ratio=np.zeros(count, np.float32),
     )
     seen = _Photos(
         photos, near.centre(correspondence, projector), footprint(correspondence, projector)
@@ -262,6 +272,7 @@ def _estimate_lit(
         windows[:, root.entries] = weights @ over_window[:, root.entries] @ root.root @ root.root.T
         rows.near[at] = windows
         rows.direct[at] = found.solved.amplitudes[found.mine, 1]
+        rows.component[at[0]], rows.ratio[at[0]] = component, ratio
         _put_far(rows, at, found, weights @ model.of_far * _far(model, component, is_lit=True))
 
 
@@ -286,6 +297,8 @@ def _estimate_unlit(
         pixel, channel = np.divmod(mine, channels)
         weights = ratio * solved.weights
         far = weights @ model.of_far * _far(model, component, is_lit=False)
+        rows.component[group[pixel]] = len(LIT_COMPONENTS) + component
+        rows.ratio[group[pixel]] = ratio
         _put_far(rows, (group[pixel], channel), found, far)
     return np.asarray(together.max(axis=0))
 

@@ -52,27 +52,70 @@ def solve(photos: Floats, known: Floats, covariance: Floats, ratio: float) -> So
     ratio : float
         rho.
     """
-    count, number, amplitudes = known.shape
-    matrix = ratio * covariance
-    matrix[np.diag_indices(number)] += 1.0
-    factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
-    columns = np.concatenate([photos[:, :, None], known], axis=2)
-    stacked = np.moveaxis(columns, 1, 0).reshape(number, -1)
-    solved = cho_solve(factor, stacked, check_finite=False)
-    solved = np.moveaxis(solved.reshape(number, count, -1), 0, 1)
-    normal = np.einsum("nkg,nkh->ngh", known, solved[:, :, 1:])
+    number, amplitudes = known.shape[1:]
+    inverse = inverted(covariance, ratio)
+    solved = inverse.of_sequences(np.concatenate([photos[:, :, None], known], axis=2))
+    normal = information(known, solved[:, :, 1:])
     right = np.einsum("nkg,nk->ng", known, solved[:, :, 0])
-    # A camera pixel at which a is constant cannot tell d from b.
-    normal[:, range(amplitudes), range(amplitudes)] *= 1.0 + 1e-9
     found = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
     weights = solved[:, :, 0] - np.einsum("nkg,ng->nk", solved[:, :, 1:], found)
     left = np.einsum("nk,nk->n", photos, weights)
     free = max(1, number - amplitudes)
     variance = np.maximum(left, np.finfo(np.float64).tiny) / free
-    determinant = 2 * np.log(np.diag(factor[0])).sum()
     _, of_known = np.linalg.slogdet(normal)
-    evidence = -0.5 * (free * np.log(variance) + determinant + of_known)
+    evidence = -0.5 * (free * np.log(variance) + inverse.log_determinant + of_known)
     return Solved(evidence, found, weights, variance)
+
+
+class Inverse(NamedTuple):
+    """K^-1 by its Cholesky factor.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (N, N)
+        Lower triangle.
+    """
+
+    factor: Floats
+
+    @property
+    def log_determinant(self) -> float:
+        """log|K|."""
+        return float(2 * np.log(np.diag(self.factor)).sum())
+
+    def of(self, columns: Floats) -> Floats:
+        """Return K^-1 times columns (N, m)."""
+        return np.asarray(cho_solve((self.factor, True), columns, check_finite=False))
+
+    def of_sequences(self, sequences: Floats) -> Floats:
+        """Return K^-1 times the sequences of each camera pixel, (n, N, m)."""
+        count, number, _ = sequences.shape
+        stacked = np.moveaxis(sequences, 1, 0).reshape(number, -1)
+        return np.moveaxis(self.of(stacked).reshape(number, count, -1), 0, 1)
+
+
+def inverted(covariance: Floats, ratio: float) -> Inverse:
+    """Return the inverse of K = rho A + 1.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (N, N)
+        A.
+    ratio : float
+        rho.
+    """
+    matrix = ratio * covariance
+    matrix[np.diag_indices(len(matrix))] += 1.0
+    return Inverse(cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)[0])
+
+
+def information(known: Floats, solved: Floats) -> Floats:
+    """Return G^T K^-1 G, (n, g, g), from G and K^-1 G, both (n, N, g)."""
+    found = np.einsum("nkg,nkh->ngh", known, solved)
+    each = np.arange(known.shape[2])
+    # A camera pixel at which a is constant cannot tell d from b.
+    found[:, each, each] *= 1.0 + 1e-9
+    return np.asarray(found)
 
 
 class Rotated(NamedTuple):

@@ -24,6 +24,8 @@ COMPONENTS = (PriorComponent(1.5, 8.0, 2.0), PriorComponent(0.0, 8.0, 2.0))
 NOISE, RATIO = 2e-3, 16.0
 # q of four camera pixels: two of one rounded q, one whose window the border cuts, and none.
 PLACES = np.array([[3.0, 4.0], [3.25, 4.0], [0.0, 8.5], [np.nan, np.nan]], dtype=np.float32)
+# Of black before any photo: nothing is known of the last.
+BLACK_DEVIATIONS = np.array([1e-3, 2e-3, 0.5, np.inf], dtype=np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +52,7 @@ def transport(patterns):
             patterns,
             np.array([[0, 0, 0, 1]], np.uint8),
             np.full(shape[:2], RATIO, np.float32),
+            BLACK_DEVIATIONS[None, :, None],
         ),
     )
 
@@ -81,8 +84,8 @@ def _posterior(transport, c, patterns):
     near = near_covariance(component, WINDOW, PROJECTOR)
     far = far_variance(transport.far_basis, component)
     prior = np.zeros((2 + len(near) + len(far),) * 2)
-    # Nothing is known of b and d before.
-    prior[[0, 1], [0, 1]] = 10.0
+    # Nothing is known of d before.
+    prior[[0, 1], [0, 1]] = min(BLACK_DEVIATIONS[c] ** 2, 10.0), 10.0
     prior[2 : 2 + len(near), 2 : 2 + len(near)] = scale * near
     prior[2 + len(near) :, 2 + len(near) :] = scale * np.diag(far)
     seen = _parts(transport, c, patterns)

@@ -69,7 +69,8 @@ def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
     capture = _capture(world, SETS[name](), tmp_path)
     transport = reconstruct_from_patterns(capture)
     pictures, _ = _decibels(world, transport)
-    assert pictures > 33
+    # By each camera pixel's own photos they are 40.2, 39.5 and 39.5 dB.
+    assert pictures > 40.5
     assert transport.verdict is not None
     assert transport.verdict.grade == "good"
     assert transport.verdict.held_out_snr is not None

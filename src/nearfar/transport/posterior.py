@@ -59,12 +59,16 @@ class PatternPosterior:
     variance_ratio : ndarray, shape (Cy, Cx), float32
         Square of the prior scale, in photo units, over the variance of a photo's noise, which is
         that of the transport's `noise`.
+    black_deviation : ndarray, shape (Cy, Cx, channels), float32
+        Standard deviation of black before the camera pixel's own photos, by its neighbours;
+        infinite where nothing is known of it.
     """
 
     prior_components: tuple[PriorComponent, ...]
     patterns: Floats
     prior_component: Integers
     variance_ratio: Floats
+    black_deviation: Floats
 
 
 def deviation_of_mean(deviations: Floats) -> Floats:

@@ -24,7 +24,7 @@ POSTERIOR_FIELDS = (
     "share_of_white",
 )
 QUALITY_FIELDS = ("confidence", "saturated")
-PATTERN_POSTERIOR_FIELDS = ("prior_component", "variance_ratio")
+PATTERN_POSTERIOR_FIELDS = ("prior_component", "variance_ratio", "black_deviation")
 # Attributes that may be None, and by their type their own with a value for each camera pixel.
 OPTIONAL_PARTS = ("posterior", "quality")
 FIELDS: dict[type, tuple[str, ...]] = {

@@ -15,7 +15,8 @@ from nearfar.correspondence import Correspondence
 from nearfar.errors import InputError
 from nearfar.estimate.any_patterns import estimate_from_patterns
 from nearfar.estimate.any_patterns.covariance import PatternModel, far_band
-from nearfar.estimate.any_patterns.estimate import COMPONENTS, PatternRows
+from nearfar.estimate.any_patterns.neighbours import REACH
+from nearfar.estimate.any_patterns.sweep import COMPONENTS, PatternRows
 from nearfar.plan.patterns import Shown
 from nearfar.plan.recognition.contents import Uniform
 from nearfar.progress import Report, ignore_progress
@@ -36,8 +37,9 @@ MOST_PROJECTOR_PIXELS = 128**2
 # Share of the photos that are held out, and fewest; they are chosen evenly.
 HELD_OUT_SHARE = 0.04
 FEWEST_HELD_OUT = 2
-# Camera pixels that are estimated without them.
-HELD_OUT_PIXELS = 512
+# Patches of camera pixels that are estimated without them, and the side of each.
+PATCHES_ALONG = 3
+PATCH_SIDE = 10
 # Arrays of a camera pixel that are held at once, over those of its transport.
 COPIES = 2
 
@@ -87,9 +89,8 @@ def reconstruct_from_patterns(
     verdict = _judge(capture, data, progress)
     plan = capture.plan
     model, rows = estimate_from_patterns(
-        data.photos,
-        data.patterns,
-        data.places,
+        *data,
+        capture.camera,
         plan.projector,
         plan.window,
         lambda share: progress("estimate", share),
@@ -160,23 +161,50 @@ def _read(capture: Capture, places: Floats) -> _Data:
 def _judge(capture: Capture, data: _Data, progress: Report) -> KeptVerdict:
     """Judge an estimate of some camera pixels by photos that it does not see."""
     held_out = _held_out(capture.plan.patterns)
-    chosen = np.random.default_rng(0).permutation(len(data.photos))[:HELD_OUT_PIXELS]
     kept = np.setdiff1d(np.arange(len(data.patterns)), held_out)
-    some = _Data(data.photos[chosen][..., kept], data.patterns[kept], data.places[chosen])
+    pixels, camera, inner = _patches(capture.camera)
+    some = _Data(data.photos[pixels][..., kept], data.patterns[kept], data.places[pixels])
     model, rows = estimate_from_patterns(
         *some,
+        camera,
         capture.plan.projector,
         capture.plan.window,
         lambda share: progress("held-out photos", share),
     )
     compared = compare_with_photos(
-        _as_transport(some, model, rows, Size(len(chosen), 1)),
+        _as_transport(some, model, rows, camera),
         data.patterns[held_out],
-        data.photos[chosen][..., held_out],
-        ~_saturated(some),
+        data.photos[pixels][..., held_out],
+        inner & ~_saturated(some),
         [capture.plan.patterns[number].description for number in held_out],
     )
     return judge(compared, ()).kept
+
+
+def _patches(camera: Size) -> tuple[Integers, Size, Booleans]:
+    """Choose patches of camera pixels, one below the other, evenly over the camera.
+
+    Returns
+    -------
+    pixels : ndarray of int, shape (C,)
+    camera : Size
+        Of the patches together.
+    inner : ndarray of bool, shape (C,)
+        Those all of whose neighbours that count are neighbours in the camera too.
+    """
+    side = Size(*(min(PATCH_SIDE, length) for length in camera))
+    numbers = np.arange(camera.pixels).reshape(camera)
+    spans = [
+        np.linspace(0, length - part, PATCHES_ALONG)
+        for length, part in zip(camera, side, strict=True)
+    ]
+    corners = sorted({(round(y), round(x)) for y in spans[0] for x in spans[1]})
+    patches = [numbers[y : y + side.height, x : x + side.width] for y, x in corners]
+    inner = np.zeros(side, dtype=np.bool_)
+    rim = [REACH if part < length else 0 for part, length in zip(side, camera, strict=True)]
+    inner[rim[0] : side.height - rim[0], rim[1] : side.width - rim[1]] = True
+    whole = Size(len(patches) * side.height, side.width)
+    return np.concatenate(patches).ravel(), whole, np.tile(inner, (len(patches), 1)).ravel()
 
 
 def _held_out(patterns: Sequence[object]) -> Integers:
@@ -219,6 +247,7 @@ def _as_transport(data: _Data, model: PatternModel, rows: PatternRows, camera: S
             model.patterns,
             rows.component.reshape(camera),
             rows.ratio.reshape(camera),
+            rows.black_deviation.reshape(shape),
         ),
     )
 

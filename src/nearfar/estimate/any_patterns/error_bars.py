@@ -2,9 +2,10 @@
 
 A linear functional h_d d + h_n.n + h_F.F of a row has, in units of sigma^2, the variance
 
-    rho v - rho^2 c^T K^-1 c + w^T (G^T K^-1 G)^-1 w,   w = (0, h_d) - rho G^T K^-1 c,
+    rho v - rho^2 c^T K^-1 c + w^T (G^T K^-1 G + Q)^-1 w,   w = (0, h_d) - rho G^T K^-1 c,
 
-v its variance at unit prior scale and c = L C h_n + Lf S h_F its covariance with the photos.
+v its variance at unit prior scale, Q the prior precision of b and d, and c = L C h_n + Lf S h_F its
+covariance with the photos.
 
 Index convention: n runs over camera pixels of one rounded q, component and variance ratio, h over
 functionals, k over photos, g over b and d.
@@ -67,6 +68,7 @@ class PatternVariances:
         self._component = posterior.prior_component.ravel().astype(np.int64)
         self._ratio = posterior.variance_ratio.ravel().astype(np.float64)
         self._noise = transport.noise.reshape(-1, transport.channels).astype(np.float64)
+        self._black_deviation = posterior.black_deviation.reshape(self._noise.shape)
         used = np.unique(self._component).tolist()
         components = posterior.prior_components
         self._roots: dict[int, NearRoot] = {n: near_root(self._model, components[n]) for n in used}
@@ -84,7 +86,7 @@ class PatternVariances:
 
         def of_pixels(batch: slice) -> Floats:
             pixels = np.arange(len(self._lit))[batch]
-            found = np.empty(len(pixels))
+            found = np.empty((len(pixels), transport.channels))
 
             def work(members: Integers) -> None:
                 mine = pixels[members]
@@ -96,17 +98,17 @@ class PatternVariances:
                     far,
                     truncated[self._component[one]],
                 )
-                found[members] = self._unit_variances(mine, functionals)[:, 0]
+                found[members] = self._variances(mine, functionals)[:, :, 0]
 
             side_by_side(work, self._alike(pixels))
-            return np.asarray(found[:, None] * self._noise[batch] ** 2)
+            return found
 
         return of_pixels
 
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
         pixels = np.arange(len(self._lit))[batch]
-        found = np.empty(len(pixels))
+        found = np.empty((len(pixels), self._transport.channels))
         nothing = _Functionals(
             np.ones((1, 1)),
             np.zeros((1, self._model.window**2)),
@@ -117,10 +119,10 @@ class PatternVariances:
         def work(members: Integers) -> None:
             mine = pixels[members]
             functionals = nothing._replace(direct=np.ones((len(mine), 1)))
-            found[members] = self._unit_variances(mine, functionals)[:, 0]
+            found[members] = self._variances(mine, functionals)[:, :, 0]
 
         side_by_side(work, self._alike(pixels))
-        return np.asarray(found[:, None] * self._noise[batch] ** 2)
+        return found
 
     def of_window(self, pixel: int, values: Floats) -> Floats:
         """Return those of sums of one camera pixel's window entries, (m, channels)."""
@@ -137,8 +139,7 @@ class PatternVariances:
         """Return the variances of functionals of one camera pixel's n and F, (h, channels)."""
         count = len(far)
         functionals = _Functionals(np.zeros((1, count)), near_range, far, np.zeros(count))
-        found = self._unit_variances(np.array([pixel]), functionals)[0]
-        return np.asarray(found[:, None] * self._noise[pixel] ** 2)
+        return np.asarray(self._variances(np.array([pixel]), functionals)[0].T)
 
     def _alike(self, pixels: NDArray[np.int64]) -> Iterator[Integers]:
         """Yield the camera pixels, by their places, that share their matrices."""
@@ -147,8 +148,8 @@ class PatternVariances:
         changes = [np.diff(key[order]) != 0 for key in keys]
         yield from np.split(order, np.flatnonzero(np.any(changes, axis=0)) + 1)
 
-    def _unit_variances(self, pixels: NDArray[np.int64], functionals: _Functionals) -> Floats:
-        """Return variances over that of the noise, (n, h), of camera pixels that are alike."""
+    def _variances(self, pixels: NDArray[np.int64], functionals: _Functionals) -> Floats:
+        """Return variances, (n, channels, h), of camera pixels that are alike."""
         model, first = self._model, pixels[0]
         component, ratio = int(self._component[first]), float(self._ratio[first])
         variance = far_variance(model.far_basis, self._posterior.prior_components[component])
@@ -169,8 +170,14 @@ class PatternVariances:
                 model.patterns, Footprint(self._where.pixels[pixels], self._where.weights[pixels])
             ).T
             known = np.concatenate([known, of_direct[:, :, None]], axis=2)
-        normal = information(known, inverse.of_sequences(known))
+        noise = self._noise[pixels] ** 2
+        precision = np.zeros((*noise.shape, known.shape[2]))
+        precision[..., 0] = noise / self._black_deviation[pixels] ** 2
+        of_known = inverse.of_sequences(known)
+        normal = np.stack(
+            [information(known, of_known, each) for each in np.moveaxis(precision, 1, 0)], axis=1
+        )
         gradient = own - ratio * np.einsum("nkg,kh->nhg", known, solved)
-        through = np.linalg.solve(normal, np.swapaxes(gradient, 1, 2))
-        variances = given + np.einsum("nhg,ngh->nh", gradient, through)
-        return np.asarray(np.maximum(variances, 0.0))
+        through = np.linalg.solve(normal, np.swapaxes(gradient, 1, 2)[:, None])
+        variances = given + np.einsum("nhg,ncgh->nch", gradient, through)
+        return np.asarray(np.maximum(variances, 0.0) * noise[..., None])

@@ -78,6 +78,29 @@ def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
     np.testing.assert_allclose(transport.black, black, atol=0.02)
 
 
+def test_several_sets_in_one_capture_are_used_together(world, tmp_path):
+    code = [*gray_code(SIZE, 0), *gray_code(SIZE, 1)]
+    waves = [*fringes(SIZE, 0, [8, 5], 3), *fringes(SIZE, 1, [16, 7], 3)]
+    code_and_waves = [*code, *waves, *white_and_black(SIZE)]
+    every = [*code, *waves, *random_binary(SIZE, 24), *white_and_black(SIZE)]
+    found = []
+    for name, pictures in (("some", code_and_waves), ("all", every)):
+        capture = _capture(world, pictures, tmp_path / name)
+        found.append(_decibels(world, reconstruct_from_patterns(capture)))
+    assert found[1][0] > found[0][0] + 2
+    assert found[1][1] > found[0][1] + 2
+
+
+def test_grey_patterns_may_be_colour_files_and_colour_patterns_are_refused(world, tmp_path):
+    pictures = SETS["random"]()
+    grey = [np.repeat(picture[..., None], 3, axis=2) for picture in pictures]
+    capture = _capture(world, grey, tmp_path / "grey")
+    assert reconstruct_from_patterns(capture).verdict.grade == "good"
+    grey[3][..., 1] = 0
+    with pytest.raises(InputError, match=r"c\.zarr has colour patterns.*shoot grey patterns"):
+        reconstruct_from_patterns(_capture(world, grey, tmp_path / "colour"))
+
+
 def test_python_reconstructs_as_any_capture(world, tmp_path):
     capture = _capture(world, SETS["random"](), tmp_path)
     transport, correspondence = nearfar.reconstruct(capture)

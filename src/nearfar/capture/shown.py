@@ -15,6 +15,7 @@ from nearfar.files.images import PICTURE_KINDS
 from nearfar.plan import Plan
 from nearfar.plan.model import LARGEST_SIDE
 from nearfar.plan.recognition import Recognised, recognise
+from nearfar.plan.recognition.contents import AnyPicture
 from nearfar.plan.recognition.own import plan_of_pictures
 from nearfar.progress import Report, ignore_progress
 
@@ -37,9 +38,20 @@ class ShownPictures:
     plan: Plan
 
     def read(self) -> Iterator[NDArray[Any]]:
-        """Read the pictures one after the other, as a capture keeps them."""
+        """Read the pictures one by one, as a capture keeps them: all grey, or all in colour."""
+        has_colours = any(
+            isinstance(content, AnyPicture) and content.is_colour
+            for content in self.recognised.contents
+        )
         for path in self.paths:
-            yield _read(path)
+            picture = _read(path)
+            if has_colours and picture.ndim == 2:
+                yield np.repeat(picture[..., None], 3, axis=2)
+            elif picture.ndim == 3 and not has_colours:
+                # Its channels differ by less than a step of 8 bits.
+                yield picture[..., 1]
+            else:
+                yield picture
 
 
 def read_shown(folder: AnyPath, progress: Report = ignore_progress) -> ShownPictures:

@@ -107,8 +107,10 @@ def _require_small(capture: Capture, memory: int) -> None:
     plan, pixels = capture.plan, capture.plan.projector.pixels
     if capture.shown is not None and capture.shown.ndim == 4:
         raise InputError(
-            f"{capture.path} has colour patterns, of which the correspondence can be found, and no "
-            f"transport: give grey patterns."
+            f"{capture.path} has colour patterns, which tell q, and no transport, as a channel of "
+            f"the camera may see several colours of the projector: shoot grey patterns, such as "
+            f"those of red, green and blue one after the other, and give q of these photos as "
+            f"`correspondence` if the grey ones do not tell it."
         )
     if pixels > MOST_PROJECTOR_PIXELS:
         raise InputError(

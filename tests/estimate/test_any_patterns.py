@@ -8,7 +8,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.errors import UnreadableFileError
-from nearfar.estimate.any_patterns.covariance import pattern_model
+from nearfar.estimate.any_patterns.covariance import near_root, pattern_model
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.priors.component import PriorComponent
@@ -91,6 +91,26 @@ def _posterior(transport, c, patterns):
     seen = _parts(transport, c, patterns)
     gain = prior @ seen.T @ np.linalg.inv(seen @ prior @ seen.T + NOISE**2 * np.eye(PHOTOS))
     return prior - gain @ seen @ prior
+
+
+@pytest.mark.parametrize(
+    "component",
+    [
+        COMPONENTS[0],
+        COMPONENTS[1],
+        PriorComponent(2.2, 16.0, 1.5, direct_spread=3.0),
+        PriorComponent(6.0, 1.0, 3.0, roughness=1.0),
+    ],
+)
+def test_roots_of_covariances(patterns, component):
+    root = near_root(pattern_model(patterns, PROJECTOR, WINDOW), component)
+    full = near_covariance(component, WINDOW, PROJECTOR)
+    found = np.zeros_like(full)
+    found[np.ix_(root.entries, root.entries)] = root.root @ root.root.T
+    np.testing.assert_allclose(found, full, atol=1e-5)
+    over_window = np.random.default_rng(3).random((4, WINDOW**2))
+    seen = root.seen(over_window)
+    np.testing.assert_allclose(seen @ seen.T, over_window @ full @ over_window.T, rtol=1e-4)
 
 
 def test_error_bars_are_those_of_plain_linear_algebra(transport, patterns):

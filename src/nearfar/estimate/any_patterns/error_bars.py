@@ -73,6 +73,7 @@ class PatternVariances:
         components = posterior.prior_components
         self._roots: dict[int, NearRoot] = {n: near_root(self._model, components[n]) for n in used}
         self._far = {n: far_covariance(self._model, components[n]) for n in used}
+        self._far_variance = {n: far_variance(basis, components[n]) for n in used}
 
     def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
         """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
@@ -152,10 +153,9 @@ class PatternVariances:
         """Return variances, (n, channels, h), of camera pixels that are alike."""
         model, first = self._model, pixels[0]
         component, ratio = int(self._component[first]), float(self._ratio[first])
-        variance = far_variance(model.far_basis, self._posterior.prior_components[component])
+        variance = self._far_variance[component]
         root = self._roots[component]
-        over_window = patterns_over_window(model, self._centres[first])[:, root.entries]
-        in_window = over_window @ root.root
+        in_window = root.seen(patterns_over_window(model, self._centres[first]))
         inverse = inverted(in_window @ in_window.T + self._far[component], ratio)
         of_near = functionals.near[:, root.entries] @ root.root
         covariance = of_near @ in_window.T + (functionals.far * variance) @ model.of_far.T

@@ -116,6 +116,7 @@ class Prepared(NamedTuple):
     model: PatternModel
     roots: Mapping[int, NearRoot]
     far: Mapping[int, Floats]
+    far_variance: Mapping[int, Floats]  # of far-range light's responses at unit prior scale
     unlit: Mapping[int, Rotated]
 
 
@@ -127,6 +128,7 @@ def prepare(model: PatternModel) -> Prepared:
         model,
         {n: near_root(model, COMPONENTS[n]) for n in LIT_AT_PITCH},
         far,
+        {n: far_variance(model.far_basis, COMPONENTS[n]) for n in far},
         {n: rotated(far[n]) for n in unlit},
     )
 
@@ -191,7 +193,7 @@ def _covariances(
     found: dict[int, Floats] = {}
     for number in dict.fromkeys(components):
         root = prepared.roots[number]
-        in_window = over_window[:, root.entries] @ root.root
+        in_window = root.seen(over_window)
         found[number] = np.asarray(in_window @ in_window.T + prepared.far[number])
     return found
 
@@ -265,7 +267,7 @@ def estimate_lit(
     is_lit = together.max(axis=0) - np.log(prepared.model.projector.pixels) > without[group]
     rows.lit[group] = is_lit
     best = np.where(is_lit, together.argmax(axis=0), -1)
-    _put_best(rows, prepared.model, group, trials, best, over_window, prepared.roots)
+    _put_best(rows, prepared, group, trials, best, over_window)
 
 
 def refine_lit(
@@ -279,7 +281,7 @@ def refine_lit(
     """Estimate camera pixels of one rounded q anew, from what their neighbours have."""
     trials, over_window = _trials(prepared, photos, group, choices, before)
     best = _evidence(trials, len(group)).argmax(axis=0)
-    _put_best(rows, prepared.model, group, trials, best, over_window, prepared.roots)
+    _put_best(rows, prepared, group, trials, best, over_window)
 
 
 def _trials(
@@ -314,12 +316,11 @@ def _evidence(trials: Sequence[_Trial], count: int) -> Floats:
 
 def _put_best(
     rows: PatternRows,
-    model: PatternModel,
+    prepared: Prepared,
     group: NDArray[np.int64],
     trials: Sequence[_Trial],
     best: Integers,
     over_window: Floats,
-    roots: Mapping[int, NearRoot],
 ) -> None:
     """Keep the best trial of each camera pixel, by its number."""
     channels = rows.direct.shape[1]
@@ -327,16 +328,18 @@ def _put_best(
         choice, given, solved = trials[number]
         (pixels,) = np.nonzero(best == number)
         mine = (pixels[:, None] * channels + np.arange(channels)).ravel()
-        root = roots[choice.component]
+        root = prepared.roots[choice.component]
         weights = choice.ratio * solved.weights[mine]
-        windows = np.zeros((len(mine), model.window**2))
-        windows[:, root.entries] = weights @ over_window[:, root.entries] @ root.root @ root.root.T
+        windows = np.zeros((len(mine), prepared.model.window**2))
+        windows[:, root.entries] = weights @ root.seen(over_window) @ root.root.T
         if given.expected is not None:
             factor = 1.0 + solved.amplitudes[mine, -1, None]
             windows += factor * given.expected.near[pixels].reshape(len(mine), -1)
         rows.near[group[pixels]] = windows.reshape(len(pixels), channels, -1)
         rows.direct[group[pixels]] = solved.amplitudes[mine, 1].reshape(-1, channels)
-        _put_far(rows, model, group, choice, given, Solved._make(p[mine] for p in solved), pixels)
+        _put_far(
+            rows, prepared, group, choice, given, Solved._make(p[mine] for p in solved), pixels
+        )
 
 
 def estimate_unlit(
@@ -363,13 +366,13 @@ def estimate_unlit(
         (pixels,) = np.nonzero(best == number)
         mine = (pixels[:, None] * channels + np.arange(channels)).ravel()
         solved = solve(start.seen.of(mine), prepared.far[choice.component], choice.ratio)
-        _put_far(rows, prepared.model, group, choice, start, solved, pixels)
+        _put_far(rows, prepared, group, choice, start, solved, pixels)
     return np.asarray(together.max(axis=0))
 
 
 def _put_far(
     rows: PatternRows,
-    model: PatternModel,
+    prepared: Prepared,
     group: NDArray[np.int64],
     choice: Choice,
     given: _Given,
@@ -379,8 +382,8 @@ def _put_far(
     """Keep far-range light, black, noise and choice of some camera pixels of a group."""
     shape = (len(pixels), rows.direct.shape[1])
     mine = (pixels[:, None] * shape[1] + np.arange(shape[1])).ravel()
-    variance = far_variance(model.far_basis, COMPONENTS[choice.component])
-    far = choice.ratio * solved.weights @ model.of_far * variance
+    far = choice.ratio * solved.weights @ prepared.model.of_far
+    far *= prepared.far_variance[choice.component]
     if given.expected is not None:
         factor = 1.0 + solved.amplitudes[:, -1, None]
         far += factor * given.expected.far[pixels].reshape(far.shape)

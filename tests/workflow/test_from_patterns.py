@@ -176,6 +176,11 @@ def test_the_command_line_reconstructs_and_relights(world, tmp_path):
     check_done(run_nearfar("relight", output, tmp_path / "light.npy", tmp_path / "out.npy"))
     relit = np.load(tmp_path / "out.npy")
     assert snr(world @ natural_picture(SIZE, 2), relit) > 30
+    deviation = tmp_path / "deviation.npy"
+    check_done(run_nearfar("relight", output, tmp_path / "light.npy", deviation, "--error-bars"))
+    assert (
+        0.5 < np.mean(np.abs(relit - world @ natural_picture(SIZE, 2)) < np.load(deviation)) < 0.9
+    )
     assert "good:" in check_done(run_nearfar("info", output)).out
     again = check_sentence(run_nearfar("info", output, "--capture", capture))
     assert "judged by held-out photos when it was reconstructed" in again
@@ -184,3 +189,6 @@ def test_the_command_line_reconstructs_and_relights(world, tmp_path):
     other = tmp_path / "other.zarr"
     assert run_nearfar("reconstruct", capture, other, "--method", "paper").status == 2
     assert run_nearfar("reconstruct", capture, other, "--square").status == 2
+    page = run_nearfar("reconstruct", capture, other, "--report", tmp_path / "r.html")
+    assert page.status == 2
+    assert "nearfar view" in page.err

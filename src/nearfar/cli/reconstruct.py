@@ -164,9 +164,15 @@ def _from_patterns(
     from nearfar.transport.store import save_transport
     from nearfar.workflow.from_patterns import reconstruct_from_patterns
 
-    for option, is_given in {**refused, "--report": report is not None}.items():
+    for option, is_given in refused.items():
         if is_given:
             raise typer.BadParameter("is for photos of a plan.", param_hint=option)
+    if report is not None:
+        raise typer.BadParameter(
+            "is for photos of a plan: nearfar info says the verdict, and nearfar view shows maps "
+            "and error bars.",
+            param_hint="--report",
+        )
     if output.suffix.lower() == ".npy":
         _invert(capture, output, force=force, quiet=quiet or as_json)
         return

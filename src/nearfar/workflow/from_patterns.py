@@ -41,7 +41,7 @@ FEWEST_HELD_OUT = 2
 PATCHES_ALONG = 3
 PATCH_SIDE = 10
 # Arrays of a camera pixel that are held at once, over those of its transport.
-COPIES = 2
+COPIES = 3
 
 
 class _Data(NamedTuple):

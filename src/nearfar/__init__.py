@@ -45,6 +45,7 @@ Estimate
 Use the transport
     Transport              direct, near- and far-range transport: relights and takes apart
     ErrorBars              standard deviations of a transport and of relit pictures
+    deviation_of_picture   standard deviation of a relit picture, whatever the transport's parts
     prepare_transport      lay a transport out to relight it many times
     save_transport         write a transport
     load_transport         read a transport
@@ -115,7 +116,8 @@ if TYPE_CHECKING:
         read_correspondence,
     )
     from nearfar.errors import NearfarError
-    from nearfar.estimate.joint import ErrorBars
+    from nearfar.estimate.deviations import deviation_of_picture
+    from nearfar.estimate.error_bars import ErrorBars
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.photometry.measurements import Measurements
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
@@ -165,7 +167,8 @@ _HOMES = {
     "reconstruct_to_file": "nearfar.workflow.reconstruction.reconstruct",
     "ReconstructionOptions": "nearfar.workflow.reconstruction.options",
     "Transport": "nearfar.transport.model",
-    "ErrorBars": "nearfar.estimate.joint",
+    "ErrorBars": "nearfar.estimate.error_bars",
+    "deviation_of_picture": "nearfar.estimate.deviations",
     "prepare_transport": "nearfar.transport.prepared",
     "save_transport": "nearfar.transport.store",
     "load_transport": "nearfar.transport.store",
@@ -214,6 +217,7 @@ __all__ = [  # noqa: RUF022
     "ReconstructionOptions",
     "Transport",
     "ErrorBars",
+    "deviation_of_picture",
     "prepare_transport",
     "save_transport",
     "load_transport",

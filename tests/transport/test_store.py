@@ -21,10 +21,16 @@ from nearfar.transport.exact_store import load_exact, save_exact
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import QUALITY_FIELDS, of_pixels, of_rows, stacked, thinned_blocks
-from nearfar.transport.store import (
+from nearfar.transport.rows import (
     FACTORS,
     POSTERIOR_FIELDS,
+    QUALITY_FIELDS,
+    of_pixels,
+    of_rows,
+    stacked,
+    thinned_blocks,
+)
+from nearfar.transport.store import (
     load_transport,
     open_transport,
     save_transport,

@@ -19,7 +19,7 @@ import pytest
 
 from nearfar.arrays import Size, middles
 from nearfar.errors import InputError, MissingFileError
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.files import read_light, read_picture, write_picture
 from nearfar.files.codecs import encode_npy, encode_png, encode_tiff
 from nearfar.markup import MARK

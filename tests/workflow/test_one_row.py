@@ -11,7 +11,8 @@ from nearfar.correspondence import (
     correspond_by_phase,
     correspond_by_stripes,
 )
-from nearfar.estimate.joint import ErrorBars, estimate_jointly
+from nearfar.estimate.error_bars import ErrorBars
+from nearfar.estimate.joint import estimate_jointly
 from nearfar.illumination.pictures import standard_lights
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan, paper_plan, parse_plan

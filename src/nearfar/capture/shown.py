@@ -14,7 +14,6 @@ from nearfar.files import full_scale_of, list_pictures, read_picture
 from nearfar.files.images import PICTURE_KINDS
 from nearfar.plan import Plan
 from nearfar.plan.model import LARGEST_SIDE
-from nearfar.plan.patterns import Shown
 from nearfar.plan.recognition import Recognised, recognise
 from nearfar.plan.recognition.contents import AnyPicture
 from nearfar.plan.recognition.own import plan_of_pictures
@@ -44,17 +43,20 @@ class ShownPictures:
     plan: Plan
 
     def read(self) -> Iterator[NDArray[Any]]:
-        """Read the pictures one after the other, as a capture keeps them."""
+        """Read the pictures one by one, as a capture keeps them: all grey, or all in colour."""
+        has_colours = any(
+            isinstance(content, AnyPicture) and content.is_colour
+            for content in self.recognised.contents
+        )
         for path in self.paths:
             picture = _read(path)
-            # Grey ones among colour pictures: a capture keeps all in one array.
-            is_grey = picture.ndim == 2 and self._has_colours
-            yield np.repeat(picture[..., None], 3, axis=2) if is_grey else picture
-
-    @property
-    def _has_colours(self) -> bool:
-        contents = (each.content for each in self.plan.patterns if isinstance(each, Shown))
-        return any(isinstance(each, AnyPicture) and each.is_colour for each in contents)
+            if has_colours and picture.ndim == 2:
+                yield np.repeat(picture[..., None], 3, axis=2)
+            elif picture.ndim == 3 and not has_colours:
+                # Its channels differ by less than a step of 8 bits.
+                yield picture[..., 1]
+            else:
+                yield picture
 
 
 def read_shown(folder: AnyPath, progress: Report = ignore_progress) -> ShownPictures:

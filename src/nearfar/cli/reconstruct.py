@@ -212,9 +212,15 @@ def _from_patterns(
     from nearfar.workflow.from_patterns import reconstruct_from_patterns
     from nearfar.workflow.pattern_faults import find_pattern_faults
 
-    for option, is_given in {**refused, "--report": report is not None}.items():
+    for option, is_given in refused.items():
         if is_given:
             raise typer.BadParameter("is for photos of a plan.", param_hint=option)
+    if report is not None:
+        raise typer.BadParameter(
+            "is for photos of a plan: nearfar info says the verdict, and nearfar view shows maps "
+            "and error bars.",
+            param_hint="--report",
+        )
     if output.suffix.lower() == ".npy":
         _invert(capture, output, force=force, quiet=quiet or as_json)
         return

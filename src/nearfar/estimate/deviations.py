@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from nearfar.arrays import Floats
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.free_rows.error_bars import FreeErrorBars
-from nearfar.estimate.joint import ErrorBars
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import require_parts
 

@@ -10,6 +10,7 @@ from nearfar.plan.typical import noise_of, typical_of
 from nearfar.plan.window import largest_window, pitch_of
 from nearfar.priors.fitted import FREE
 from nearfar.priors.typical import TypicalScenes
+from nearfar.transport.posterior import Posterior
 
 if TYPE_CHECKING:
     # A plan needs none of what a transport computes with.
@@ -139,7 +140,8 @@ def _reach(transport: "Transport") -> float | None:
     # Beyond a projector of a single row entries are 0.
     entries = [window[(distance == r) & (window != 0)] for r in range(1, transport.window // 2 + 1)]
     light = np.array([float(np.mean(entry)) for entry in entries if entry.size])
-    white = 0.0 if transport.posterior is None else float(transport.posterior.white.mean())
+    posterior = transport.posterior
+    white = float(posterior.white.mean()) if isinstance(posterior, Posterior) else 0.0
     if len(light) < 2 or window.sum() < LEAST_NEAR_SHARE * white or light[0] <= 0:
         return None
     bright = np.maximum(light, 1e-3 * light[0])

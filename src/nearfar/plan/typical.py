@@ -7,11 +7,11 @@ import numpy as np
 from nearfar.errors import InputError
 from nearfar.priors.fitted import PRIOR_SCALES
 from nearfar.priors.typical import TypicalScenes
+from nearfar.transport.posterior import Posterior
 
 if TYPE_CHECKING:
     # A plan needs none of what a transport computes with.
     from nearfar.transport.model import Transport
-    from nearfar.transport.posterior import Posterior
 
 # Prior scales of one component within this many octaves are put together.
 OCTAVES_TOGETHER = 2
@@ -70,8 +70,8 @@ def noise_of(transport: "Transport") -> float:
     return float(np.sqrt(np.mean(noise**2) / np.mean(posterior.white.astype(np.float64) ** 2)))
 
 
-def _posterior_of(transport: "Transport") -> "Posterior":
-    if transport.posterior is None:
+def _posterior_of(transport: "Transport") -> Posterior:
+    if not isinstance(transport.posterior, Posterior):
         raise InputError(
             "this transport holds no prior components to plan for: reconstruct the quick look with "
             "`method='joint'`."

@@ -13,7 +13,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.errors import InputError
 from nearfar.estimate.deviations import deviation_of_picture
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.pictures import natural_picture, white
 from nearfar.transport.model import Transport
 
@@ -44,7 +44,7 @@ READINGS = {
     "direct-error": "The same of the direct light alone. It is less sure than relit pictures where "
     "direct and near-range light can hardly be told apart.",
     "noise": "Light under white over the noise of one measurement: the camera's noise, not the "
-    "estimate's error. Only the joint estimate has error bars.",
+    "estimate's error. The paper's estimate has no error bars.",
     "near-share": "How much of the light comes from projector pixels close by: high on skin, wax "
     "and marble, low on opaque surfaces.",
     "far-share": "How much of the light came by way of other surfaces: high in shadows and "

@@ -36,7 +36,7 @@ from nearfar.transport.gains import gains_on, with_gains
 from nearfar.transport.parts import PLACES, USUAL_PARTS, Parts
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
-from nearfar.transport.posterior import Posterior
+from nearfar.transport.posterior import PatternPosterior, Posterior
 from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.quality import Quality
 from nearfar.transport.verdict import KeptVerdict
@@ -95,7 +95,7 @@ class Transport(NoArray):
         What T is split into; see `nearfar.transport.parts`.
     provenance : mapping
         How it was made: plan, estimator, exposure, version. Of JSON types.
-    posterior : Posterior, optional
+    posterior : Posterior or PatternPosterior, optional
         State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it.
     free_posterior : FreePosterior, optional
         The same of an estimate of free rows.
@@ -132,7 +132,7 @@ class Transport(NoArray):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     pitch: int = 1
     footprint: Floats | None = None
-    posterior: Posterior | None = None
+    posterior: Posterior | PatternPosterior | None = None
     quality: Quality | None = None
     verdict: KeptVerdict | None = None
     parts: Parts = USUAL_PARTS

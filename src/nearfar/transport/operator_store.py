@@ -21,7 +21,8 @@ from nearfar.transport.matrix_store import (
     write_sparse_data,
 )
 from nearfar.transport.mediated import Between, ConvolvedBetween, DenseBetween, Mediated
-from nearfar.transport.store import MAXIMUM_REASON, listed, stored_size
+from nearfar.transport.posterior_store import listed
+from nearfar.transport.store import MAXIMUM_REASON, stored_size
 
 KIND = "nearfar exact operator"
 FORMAT_VERSION = 1

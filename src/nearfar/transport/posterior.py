@@ -1,4 +1,4 @@
-"""The state of a joint estimate's posterior at each camera pixel: error bars follow from it."""
+"""The state of an estimate's posterior at each camera pixel: error bars follow from it."""
 
 from dataclasses import dataclass
 
@@ -43,6 +43,32 @@ class Posterior:
     offset_noise: Floats
     light_noise: Floats
     share_of_white: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PatternPosterior:
+    """Prior components, and variance ratios, of an estimate from photos of any patterns.
+
+    Attributes
+    ----------
+    prior_components : tuple of PriorComponent
+    patterns : ndarray, shape (N, P), float32
+        What was shown, levels from 0 to 1.
+    prior_component : ndarray of uint8, shape (Cy, Cx)
+        Index into `prior_components`.
+    variance_ratio : ndarray, shape (Cy, Cx), float32
+        Square of the prior scale, in photo units, over the variance of a photo's noise, which is
+        that of the transport's `noise`.
+    black_deviation : ndarray, shape (Cy, Cx, channels), float32
+        Standard deviation of black before the camera pixel's own photos, by its neighbours;
+        infinite where nothing is known of it.
+    """
+
+    prior_components: tuple[PriorComponent, ...]
+    patterns: Floats
+    prior_component: Integers
+    variance_ratio: Floats
+    black_deviation: Floats
 
 
 def deviation_of_mean(deviations: Floats) -> Floats:

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Integers, middles
-from nearfar.transport.free_posterior import OF_PIXELS
+from nearfar.transport.free_posterior import OF_PIXELS, FreePosterior
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import PatternPosterior, Posterior
+from nearfar.transport.quality import Quality
 
 # Attributes of a transport with a value for each camera pixel.
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
@@ -23,12 +25,14 @@ POSTERIOR_FIELDS = (
     "share_of_white",
 )
 QUALITY_FIELDS = ("confidence", "saturated")
-FREE_FIELDS = OF_PIXELS
-# Attributes that may be None, and their own attributes with a value for each camera pixel.
-OPTIONAL_PARTS = {
-    "posterior": POSTERIOR_FIELDS,
-    "quality": QUALITY_FIELDS,
-    "free_posterior": FREE_FIELDS,
+PATTERN_POSTERIOR_FIELDS = ("prior_component", "variance_ratio", "black_deviation")
+# Attributes that may be None, and by their type their own with a value for each camera pixel.
+OPTIONAL_PARTS = ("posterior", "quality", "free_posterior")
+FIELDS: dict[type, tuple[str, ...]] = {
+    Posterior: POSTERIOR_FIELDS,
+    PatternPosterior: PATTERN_POSTERIOR_FIELDS,
+    Quality: QUALITY_FIELDS,
+    FreePosterior: OF_PIXELS,
 }
 
 
@@ -66,10 +70,10 @@ def of_pixels(transport: Transport, rows: Integers, columns: Integers) -> Transp
 def _chosen(transport: Transport, choose: Callable[[Any], Any]) -> Transport:
     names = [*FACTORS, *_present(transport)]
     changes = {name: choose(getattr(transport, name)) for name in names}
-    for part, fields in OPTIONAL_PARTS.items():
+    for part in OPTIONAL_PARTS:
         owner: Any = getattr(transport, part)
         if owner is not None:
-            own = {name: choose(getattr(owner, name)) for name in fields}
+            own = {name: choose(getattr(owner, name)) for name in FIELDS[type(owner)]}
             changes[part] = replace(owner, **own)
     return replace(transport, **changes)
 
@@ -87,8 +91,8 @@ def stacked(parts: Sequence[Transport]) -> Transport:
         return {name: np.concatenate([getattr(one, name) for one in owners]) for name in names}
 
     changes = joined(parts, (*FACTORS, *_present(parts[-1])))
-    for name, names in OPTIONAL_PARTS.items():
+    for name in OPTIONAL_PARTS:
         owners: list[Any] = [getattr(part, name) for part in parts]
         if owners[-1] is not None:
-            changes[name] = replace(owners[-1], **joined(owners, names))
+            changes[name] = replace(owners[-1], **joined(owners, FIELDS[type(owners[-1])]))
     return replace(parts[-1], **changes)

@@ -25,21 +25,27 @@ from nearfar.files.stores import (
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.near_basis import basis_of
 from nearfar.illumination.real_basis import RealBasis, real_basis
-from nearfar.priors.component import PriorComponent
 from nearfar.transport.free_posterior import FreePosterior
 from nearfar.transport.free_store import shared_of, write_shared
 from nearfar.transport.gains import gains_of
 from nearfar.transport.matrix_store import rows_of_chunk
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS, Parts, parts_from_json
-from nearfar.transport.posterior import Posterior
+from nearfar.transport.posterior import PatternPosterior
+from nearfar.transport.posterior_store import (
+    SharedPosterior,
+    add_patterns,
+    array_name,
+    described,
+    listed,
+    shared_posterior,
+)
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import (
     FACTORS,
-    FREE_FIELDS,
+    FIELDS,
     OPTIONAL_FACTORS,
     OPTIONAL_PARTS,
-    POSTERIOR_FIELDS,
     QUALITY_FIELDS,
     stacked,
     thinned_blocks,
@@ -48,17 +54,14 @@ from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to
 
 KIND = "nearfar transport"
 # Version 2 added functions of near-range light that are of several projector pixels, and
-# footprints. Transports of single pixels are still written as version 1, which older versions of
-# nearfar read. Version 3 added transports without direct, near- or far-range light.
-VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_PARTS = 1, 2, 3
-READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_PARTS)
+# footprints. Version 3 added transports without direct, near- or far-range light, and the posterior
+# of an estimate from any patterns. Other transports of single pixels are still written as version
+# 1, which older versions of nearfar read.
+VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS = 1, 2, 3
+READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS)
 
 # Of a projector or a camera in a file, in pixels.
 LARGEST_SIDE = 2**20
-
-# Numbers of a prior component, and its lengths but for 0: with others, numbers under- or overflow.
-LARGEST_OF_COMPONENT = 1e6
-LEAST_LENGTH = 0.05
 
 # Characters of a message that are quoted from a file.
 MAXIMUM_REASON = 200
@@ -79,7 +82,6 @@ STORED_PARTS = {
     "quality": QUALITY,
     "free_posterior": FREE_POSTERIOR,
 }
-STORED_FIELDS = {"prior_component": "kind", "prior_scale": "strength"}
 
 
 @path_after_content
@@ -159,15 +161,15 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
         *(name for name in OPTIONAL_FACTORS if getattr(part, name) is not None),
     ]
     values = {name: _as_stored(getattr(part, name)) for name in factors}
-    for optional, names in OPTIONAL_PARTS.items():
+    for optional in OPTIONAL_PARTS:
         owner = getattr(part, optional)
         if owner is not None:
+            names = FIELDS[type(owner)]
             part_name = STORED_PARTS[optional]
-            values |= {_array_name(part_name, name): getattr(owner, name) for name in names}
-    version = VERSION_OF_PIXELS if part.pitch == 1 else VERSION_OF_HATS
-    if part.parts != USUAL_PARTS:
-        version = VERSION_OF_PARTS
-    group = add_to_store(folder, KIND, version, _attributes(part))
+            values |= {array_name(part_name, name): getattr(owner, name) for name in names}
+    group = add_to_store(folder, KIND, _version(part), _attributes(part))
+    if isinstance(part.posterior, PatternPosterior):
+        add_patterns(group, POSTERIOR, part.posterior.patterns)
     if part.free_posterior is not None and first == 0:
         write_shared(group, part.free_posterior)
     for name, one in values.items():
@@ -186,9 +188,10 @@ def factors_of(parts: Parts) -> tuple[str, ...]:
     return tuple(name for name in FACTORS if not absent.get(name, False))
 
 
-def _array_name(part: str, field: str) -> str:
-    """Return the name in the file of a field of an optional part."""
-    return f"{part}_{STORED_FIELDS.get(field, field)}"
+def _version(transport: Transport) -> int:
+    if isinstance(transport.posterior, PatternPosterior) or transport.parts != USUAL_PARTS:
+        return VERSION_OF_OTHERS
+    return VERSION_OF_PIXELS if transport.pitch == 1 else VERSION_OF_HATS
 
 
 def _as_stored(values: Floats) -> Floats:
@@ -215,7 +218,7 @@ def _attributes(transport: Transport) -> dict[str, Any]:
     if transport.pitch > 1:
         attributes["pitch"] = transport.pitch
     if transport.posterior is not None:
-        attributes[POSTERIOR] = _described(transport.posterior)
+        attributes[POSTERIOR] = described(transport.posterior)
     if transport.quality is not None:
         attributes[QUALITY] = {}
     if transport.parts != USUAL_PARTS:
@@ -225,15 +228,6 @@ def _attributes(transport: Transport) -> dict[str, Any]:
     if transport.verdict is not None:
         attributes[VERDICT] = verdict_to_json(transport.verdict)
     return attributes
-
-
-def _described(posterior: Posterior) -> dict[str, Any]:
-    """Return the metadata of a posterior that all camera pixels share, as JSON types."""
-    return {
-        "kinds": [list(component) for component in posterior.prior_components],
-        "frequencies": [frequency_to_text(k) for k in posterior.frequencies],
-        "repeats": [float(count) for count in posterior.multiplicity],
-    }
 
 
 def _dividing(rows: int, most: int) -> int:
@@ -270,7 +264,7 @@ class StoredTransport:
     verdict: KeptVerdict | None
     pitch: int
     _arrays: Mapping[str, Any]
-    _posterior: Mapping[str, Any] | None
+    _posterior: SharedPosterior | None
     parts: Parts = USUAL_PARTS
     _free: Mapping[str, Any] | None = None
 
@@ -283,14 +277,7 @@ class StoredTransport:
             If their chunks are damaged.
         """
         read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
-        posterior_fields: dict[str, Any] = {
-            name: read.pop(_array_name(POSTERIOR, name), None) for name in POSTERIOR_FIELDS
-        }
-        posterior = (
-            Posterior(**self._posterior, **posterior_fields)
-            if self._posterior is not None
-            else None
-        )
+        posterior = None if self._posterior is None else self._posterior.of(read, POSTERIOR)
         quality_fields: dict[str, Any] = {
             name: read.pop(f"{QUALITY}_{name}")
             for name in QUALITY_FIELDS
@@ -298,7 +285,7 @@ class StoredTransport:
         }
         free = None
         if self._free is not None:
-            ratio = read.pop(_array_name(FREE_POSTERIOR, *FREE_FIELDS))
+            ratio = read.pop(array_name(FREE_POSTERIOR, *FIELDS[FreePosterior]))
             free = FreePosterior(**self._free, ratio=ratio)
         each = read["black"].shape
         for name, shape in (("direct", each), ("near", (*each, 0, 0)), ("far", (*each, 0))):
@@ -367,7 +354,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
         provenance = dict(_mapped(group.attrs["provenance"]))
         gains_of(provenance)
         if POSTERIOR in group.attrs:
-            posterior = _shared_posterior(_mapped(group.attrs[POSTERIOR]))
+            posterior = shared_posterior(_mapped(group.attrs[POSTERIOR]), group, POSTERIOR)
         if FREE_POSTERIOR in group.attrs:
             free = shared_of(group, _mapped(group.attrs[FREE_POSTERIOR]), projector)
         if VERDICT in group.attrs:
@@ -391,15 +378,13 @@ def open_transport(path: AnyPath) -> StoredTransport:
         arrays |= {name: open_array(group, name) for name in OPTIONAL_FACTORS}
         shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 4))
     if free is not None:
-        ratio = _array_name(FREE_POSTERIOR, *FREE_FIELDS)
+        ratio = array_name(FREE_POSTERIOR, *FIELDS[FreePosterior])
         arrays[ratio], shapes[ratio] = open_array(group, ratio), each[:2]
     _require_shapes(path, arrays, shapes)
     if posterior is not None:
-        arrays |= {
-            _array_name(POSTERIOR, name): open_array(group, _array_name(POSTERIOR, name))
-            for name in POSTERIOR_FIELDS
-        }
-        if not _posterior_fits(posterior, arrays, basis.projector, each):
+        names = posterior.arrays(POSTERIOR)
+        arrays |= {name: open_array(group, name) for name in names}
+        if not posterior.fits(arrays, POSTERIOR, basis.projector, each):
             raise _misfit(path)
     if QUALITY in group.attrs:
         quality = {
@@ -438,33 +423,6 @@ def _require_shapes(
                 f"{path} is damaged: its {name} has shape {arrays[name].shape}, not "
                 f"{shapes[name]}; reconstruct it again."
             )
-
-
-def _shared_posterior(described: dict[str, Any]) -> dict[str, Any]:
-    """Read what all camera pixels share of a posterior."""
-    return {
-        "prior_components": tuple(map(_prior_component, listed(described["kinds"]))),
-        "frequencies": tuple(frequency_from_text(k) for k in listed(described["frequencies"])),
-        "multiplicity": np.array(_finite(described["repeats"]), dtype=np.float32),
-    }
-
-
-def _posterior_fits(
-    posterior: Mapping[str, Any],
-    arrays: Mapping[str, Any],
-    projector: Size,
-    each: tuple[int, ...],
-) -> bool:
-    count = real_basis(posterior["frequencies"], projector).count
-    component, scale = (arrays[_array_name(POSTERIOR, name)] for name in POSTERIOR_FIELDS[:2])
-    flat = (component.shape, scale.shape) == (each[:2], each[:2])
-    full = all(arrays[_array_name(POSTERIOR, name)].shape == each for name in POSTERIOR_FIELDS[2:])
-    return (
-        flat
-        and full
-        and component.dtype == np.uint8
-        and posterior["multiplicity"].shape == (count,)
-    )
 
 
 def _misfit(path: Path) -> UnreadableFileError:
@@ -515,34 +473,6 @@ def stored_pitch(attributes: Any) -> int:
     if not isinstance(pitch, int) or not 1 <= pitch <= LARGEST_SIDE:
         raise ValueError(f"{pitch!r} is no pitch")
     return pitch
-
-
-def _prior_component(value: Any) -> PriorComponent:
-    """Read a prior component; ValueError or TypeError if there can be none such."""
-    component = PriorComponent(*_finite(value))
-    lengths = {component.near_reach, component.far_decay} - {0.0}
-    if (
-        not 0 <= min(component) <= max(component) <= LARGEST_OF_COMPONENT
-        or component.far_decay == 0
-        or min(lengths) < LEAST_LENGTH
-    ):
-        raise ValueError(f"{component} is no prior component")
-    return component
-
-
-def _finite(value: Any) -> list[float]:
-    """Return the numbers of a JSON list; ValueError or TypeError if it is none, or one is not."""
-    numbers = [float(number) for number in listed(value)]
-    if not all(map(math.isfinite, numbers)):
-        raise ValueError("a number is not finite")
-    return numbers
-
-
-def listed(value: Any) -> list[Any]:
-    """Return a JSON list; TypeError if it is none."""
-    if not isinstance(value, list):
-        raise TypeError(f"{value!r} is no list")
-    return value
 
 
 def _mapped(value: Any) -> dict[str, Any]:

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Size
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
 from nearfar.transport.band import band_edge
 from nearfar.transport.model import Components, Transport
-from nearfar.transport.posterior import deviation_of_mean
+from nearfar.transport.posterior import PatternPosterior, deviation_of_mean
 
 # Spectra end at this fraction of their largest value (-140 dB).
 RELATIVE_SPECTRUM_FLOOR = 1e-7
@@ -88,7 +88,7 @@ def _why_no_errors(transport: Transport, *, saturated: bool | None) -> str:
     if "free" in transport.parts:
         return "they are of relit pictures alone"
     if transport.posterior is None:
-        return "the joint estimate tells them"
+        return "this estimate does not tell them"
     return "they are unknown" if saturated else ""
 
 
@@ -102,8 +102,11 @@ def _spectrum(row: Floats) -> Floats:
 def _bands(transport: Transport) -> dict[str, Any]:
     """Return k_far, k_near and the measured frequencies, in cycles per projector pixel."""
     far = band_edge(transport)
-    if transport.posterior is not None:
-        measured = [(float(k.fy), float(k.fx)) for k in transport.posterior.frequencies]
+    posterior = transport.posterior
+    if posterior is not None:
+        # Other people's patterns measure no frequency by itself: those that the transport holds.
+        held = transport.far_basis if isinstance(posterior, PatternPosterior) else posterior
+        measured = [(float(k.fy), float(k.fx)) for k in held.frequencies]
     else:
         side = Size(transport.window, transport.window)
         measured = [(float(k.fy), float(k.fx)) for k in grid(side, side)]

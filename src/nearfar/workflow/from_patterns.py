@@ -5,27 +5,30 @@ Index convention: photos are (C, channels, N), patterns (N, P).
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers
+from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence
 from nearfar.errors import InputError
 from nearfar.estimate.any_patterns import estimate_from_patterns
 from nearfar.estimate.any_patterns.covariance import PatternModel, far_band
-from nearfar.estimate.any_patterns.estimate import PatternRows
+from nearfar.estimate.any_patterns.neighbours import REACH
+from nearfar.estimate.any_patterns.sweep import COMPONENTS, PatternRows
 from nearfar.plan.patterns import Shown
 from nearfar.plan.recognition.contents import Uniform
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import PatternPosterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.verdict import Grade, KeptVerdict, Reason
+from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.by_codes import AXES, correspond_by_codes
 from nearfar.workflow.reconstruction.summary import description_of
-from nearfar.workflow.verdict.verdict import DOUBTFUL_DECIBELS, WRONG_DECIBELS
+from nearfar.workflow.verdict.by_patterns import compare_with_photos
+from nearfar.workflow.verdict.verdict import judge
 
 # Photos with which the matrices of a camera pixel still take milliseconds, and projector pixels for
 # which the patterns of that many photos fit in memory.
@@ -34,10 +37,11 @@ MOST_PROJECTOR_PIXELS = 128**2
 # Share of the photos that are held out, and fewest; they are chosen evenly.
 HELD_OUT_SHARE = 0.04
 FEWEST_HELD_OUT = 2
-# Camera pixels that are estimated without them.
-HELD_OUT_PIXELS = 512
+# Patches of camera pixels that are estimated without them, and the side of each.
+PATCHES_ALONG = 3
+PATCH_SIDE = 10
 # Arrays of a camera pixel that are held at once, over those of its transport.
-COPIES = 2
+COPIES = 3
 
 
 class _Data(NamedTuple):
@@ -85,22 +89,28 @@ def reconstruct_from_patterns(
     verdict = _judge(capture, data, progress)
     plan = capture.plan
     model, rows = estimate_from_patterns(
-        data.photos,
-        data.patterns,
-        data.places,
+        *data,
+        capture.camera,
         plan.projector,
         plan.window,
         lambda share: progress("estimate", share),
     )
-    return replace(_as_transport(capture, data, model, rows, confidence), verdict=verdict)
+    return replace(
+        _as_transport(data, model, rows, capture.camera),
+        provenance=_provenance(capture),
+        quality=Quality(confidence, _saturated(data).reshape(capture.camera)),
+        verdict=verdict,
+    )
 
 
 def _require_small(capture: Capture, memory: int) -> None:
     plan, pixels = capture.plan, capture.plan.projector.pixels
     if capture.shown is not None and capture.shown.ndim == 4:
         raise InputError(
-            f"{capture.path} has colour patterns, of which the correspondence can be found, and no "
-            f"transport: give grey patterns."
+            f"{capture.path} has colour patterns, which tell q, and no transport, as a channel of "
+            f"the camera may see several colours of the projector: shoot grey patterns, such as "
+            f"those of red, green and blue one after the other, and give q of these photos as "
+            f"`correspondence` if the grey ones do not tell it."
         )
     if pixels > MOST_PROJECTOR_PIXELS:
         raise InputError(
@@ -153,33 +163,50 @@ def _read(capture: Capture, places: Floats) -> _Data:
 def _judge(capture: Capture, data: _Data, progress: Report) -> KeptVerdict:
     """Judge an estimate of some camera pixels by photos that it does not see."""
     held_out = _held_out(capture.plan.patterns)
-    chosen = np.random.default_rng(0).permutation(len(data.photos))[:HELD_OUT_PIXELS]
     kept = np.setdiff1d(np.arange(len(data.patterns)), held_out)
+    pixels, camera, inner = _patches(capture.camera)
+    some = _Data(data.photos[pixels][..., kept], data.patterns[kept], data.places[pixels])
     model, rows = estimate_from_patterns(
-        data.photos[chosen][..., kept],
-        data.patterns[kept],
-        data.places[chosen],
+        *some,
+        camera,
         capture.plan.projector,
         capture.plan.window,
         lambda share: progress("held-out photos", share),
     )
-    lights = data.patterns[held_out]
-    predicted = _relit(model, rows, data.places[chosen], lights)
-    seen = data.photos[chosen][..., held_out] - rows.black[..., None]
-    # The photos' own noise is no error of the transport.
-    noise = float(np.mean(rows.noise.astype(np.float64) ** 2))
-    error = max(float(np.mean((predicted - seen) ** 2)) - noise, 0.05 * noise)
-    snr = float(10 * np.log10(max(float(np.mean(seen**2)), 1e-30) / max(error, 1e-30)))
-    checked_by = "patterns like those shown"
-    if snr >= DOUBTFUL_DECIBELS:
-        return KeptVerdict("good", held_out_snr=snr, checked_by=checked_by)
-    reason = Reason(
-        "too-few-photos",
-        "held-out photos differ from what is relit: give more photos, and check that projector "
-        "and camera are linear and nothing moved.",
+    compared = compare_with_photos(
+        _as_transport(some, model, rows, camera),
+        data.patterns[held_out],
+        data.photos[pixels][..., held_out],
+        inner & ~_saturated(some),
+        [capture.plan.patterns[number].description for number in held_out],
     )
-    grade: Grade = "wrong" if snr < WRONG_DECIBELS else "doubtful"
-    return KeptVerdict(grade, (reason,), snr, checked_by=checked_by)
+    return judge(compared, ()).kept
+
+
+def _patches(camera: Size) -> tuple[Integers, Size, Booleans]:
+    """Choose patches of camera pixels, one below the other, evenly over the camera.
+
+    Returns
+    -------
+    pixels : ndarray of int, shape (C,)
+    camera : Size
+        Of the patches together.
+    inner : ndarray of bool, shape (C,)
+        Those all of whose neighbours that count are neighbours in the camera too.
+    """
+    side = Size(*(min(PATCH_SIDE, length) for length in camera))
+    numbers = np.arange(camera.pixels).reshape(camera)
+    spans = [
+        np.linspace(0, length - part, PATCHES_ALONG)
+        for length, part in zip(camera, side, strict=True)
+    ]
+    corners = sorted({(round(y), round(x)) for y in spans[0] for x in spans[1]})
+    patches = [numbers[y : y + side.height, x : x + side.width] for y, x in corners]
+    inner = np.zeros(side, dtype=np.bool_)
+    rim = [REACH if part < length else 0 for part, length in zip(side, camera, strict=True)]
+    inner[rim[0] : side.height - rim[0], rim[1] : side.width - rim[1]] = True
+    whole = Size(len(patches) * side.height, side.width)
+    return np.concatenate(patches).ravel(), whole, np.tile(inner, (len(patches), 1)).ravel()
 
 
 def _held_out(patterns: Sequence[object]) -> Integers:
@@ -196,33 +223,18 @@ def _held_out(patterns: Sequence[object]) -> Integers:
     return np.asarray(structured[places])
 
 
-def _relit(model: PatternModel, rows: PatternRows, places: Floats, lights: Floats) -> Floats:
-    """Return pictures of camera pixels under lights (L, P), (C, channels, L)."""
-    transport = Transport(
-        projector=model.projector,
-        correspondence=_lit_places(rows, places)[:, None],
-        direct=rows.direct[:, None],
-        near=rows.near.reshape(len(places), 1, -1, model.window, model.window),
-        far=rows.far[:, None],
-        far_basis=model.far_basis,
-        black=rows.black[:, None],
-        noise=rows.noise[:, None],
-    )
-    pictures = [transport @ light.reshape(model.projector) for light in lights]
-    return np.stack([picture.reshape(rows.direct.shape) for picture in pictures], axis=-1)
-
-
 def _lit_places(rows: PatternRows, places: Floats) -> Floats:
     q = places.astype(np.float32).copy()
     q[~rows.lit] = np.nan
     return q
 
 
-def _as_transport(
-    capture: Capture, data: _Data, model: PatternModel, rows: PatternRows, confidence: Floats
-) -> Transport:
-    camera, shape = capture.camera, (*capture.camera, capture.channels)
-    saturated = np.asarray(data.photos.max(axis=(1, 2)) >= 1.0).reshape(camera)
+def _saturated(data: _Data) -> Booleans:
+    return np.asarray(data.photos.max(axis=(1, 2)) >= 1.0)
+
+
+def _as_transport(data: _Data, model: PatternModel, rows: PatternRows, camera: Size) -> Transport:
+    shape = (*camera, rows.direct.shape[1])
     return Transport(
         projector=model.projector,
         correspondence=_lit_places(rows, data.places).reshape(*camera, 2),
@@ -232,14 +244,23 @@ def _as_transport(
         far_basis=model.far_basis,
         black=rows.black.reshape(shape),
         noise=rows.noise.reshape(shape),
-        provenance={
-            "nearfar": version(),
-            "method": "patterns",
-            "square": False,
-            **description_of(capture),
-            "drift": None,
-            "excess_of_sums": 0.0,
-            "rounding": 0.0,
-        },
-        quality=Quality(confidence, saturated),
+        posterior=PatternPosterior(
+            COMPONENTS,
+            model.patterns,
+            rows.component.reshape(camera),
+            rows.ratio.reshape(camera),
+            rows.black_deviation.reshape(shape),
+        ),
     )
+
+
+def _provenance(capture: Capture) -> dict[str, Any]:
+    return {
+        "nearfar": version(),
+        "method": "patterns",
+        "square": False,
+        **description_of(capture),
+        "drift": None,
+        "excess_of_sums": 0.0,
+        "rounding": 0.0,
+    }

@@ -7,9 +7,10 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.errors import InputError
+from nearfar.estimate import error_bars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.fit import fit_model
-from nearfar.estimate.joint import error_bars, estimate_jointly
-from nearfar.estimate.joint.error_bars import ErrorBars
+from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.nuisance import SHIFT_DEVIATION, common_precision
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.near_basis import window_offsets

@@ -5,8 +5,8 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.joint.error_bars import ErrorBars
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.pictures import natural_picture
 from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera

@@ -13,6 +13,7 @@ Index convention: n runs over photos, w over window entries, r over real respons
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,12 @@ from nearfar.illumination.frequencies import far_frequencies, representatives
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.priors.component import PriorComponent
-from nearfar.priors.covariance import far_variance, near_covariance
+from nearfar.priors.covariance import (
+    CORRELATION_LENGTH,
+    far_variance,
+    near_covariance_factors,
+    smooth_covariance,
+)
 
 # Side of the band of frequencies that far-range light is kept at, on large pattern grids.
 FAR_SIDE = 25
@@ -79,29 +85,65 @@ def far_covariance(model: PatternModel, component: PriorComponent) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class NearRoot:
-    """Entries of the window that a component has light at, and a root of their covariance.
+    """A root of the covariance C of window entries that a component has light at.
+
+    C = diag(deviation) (smooth x smooth + diag(independent)) diag(deviation), smooth along one axis
+    and x the Kronecker product.
 
     Attributes
     ----------
     entries : ndarray of int, shape (w,)
-        Of the W x W window.
-    root : ndarray, shape (w, w'), float32
-        C = root root^T.
+        Of the W x W window, a square about q.
+    deviation : ndarray, shape (w,), float64
+    half : ndarray, shape (side, side), float64
+        smooth = half half^T.
+    rough : ndarray of int, shape (v,)
+        Of `entries` those with a part that is independent of the others.
+    rough_deviation : ndarray, shape (v,), float64
+        Square root of that part.
     """
 
     entries: Integers
-    root: Floats
+    deviation: Floats
+    half: Floats
+    rough: Integers
+    rough_deviation: Floats
+
+    def seen(self, over_window: Floats) -> Floats:
+        """Return L root, (N, w + v), of patterns L over the whole window, (N, W^2)."""
+        return self._times(over_window[:, self.entries])
+
+    @cached_property
+    def root(self) -> Floats:
+        """C = root root^T: shape (w, w + v)."""
+        return self._times(np.eye(len(self.entries)))
+
+    def _times(self, over_entries: Floats) -> Floats:
+        """Return values over the entries, (N, w), times the root, an axis at a time."""
+        scaled, side = over_entries * self.deviation, len(self.half)
+        across = scaled.reshape(-1, side) @ self.half
+        turned = np.swapaxes(across.reshape(-1, side, side), 1, 2).reshape(-1, side)
+        smooth = (turned @ self.half).reshape(len(scaled), -1)
+        return np.concatenate([smooth, scaled[:, self.rough] * self.rough_deviation], axis=1)
 
 
 def near_root(model: PatternModel, component: PriorComponent) -> NearRoot:
     """Return the root of the covariance of window entries at unit prior scale."""
-    covariance = near_covariance(component, model.window, model.projector)
-    deviation = np.sqrt(np.diag(covariance))
-    entries = np.flatnonzero(deviation > LEAST_DEVIATION * max(deviation.max(), 1e-30))
-    values, vectors = np.linalg.eigh(covariance[np.ix_(entries, entries)])
-    kept = values > LEAST_DEVIATION**2 * max(values[-1], 1e-30) if len(values) else values > 0
-    root = vectors[:, kept] * np.sqrt(values[kept])
-    return NearRoot(entries, np.asarray(root))
+    factors = near_covariance_factors(component, model.window, model.projector)
+    largest = max(float(factors.deviation.max()), 1e-30)
+    offsets = np.abs(window_offsets(model.window)).max(axis=1)
+    reach = int(offsets[factors.deviation > LEAST_DEVIATION * largest].max(initial=0))
+    entries = np.flatnonzero(offsets <= reach)
+    values, vectors = np.linalg.eigh(smooth_covariance(CORRELATION_LENGTH, 2 * reach + 1))
+    independent = factors.independent[entries]
+    rough = np.flatnonzero(independent)
+    return NearRoot(
+        entries,
+        factors.deviation[entries],
+        vectors * np.sqrt(np.maximum(values, 0.0)),
+        rough,
+        np.sqrt(independent[rough]),
+    )
 
 
 def patterns_over_window(model: PatternModel, centre: NDArray[np.int64]) -> Floats:

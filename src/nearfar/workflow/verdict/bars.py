@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
-from nearfar.estimate.joint import ErrorBars
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import PatternPosterior, Posterior
 
 # Noise is scaled by this to find the error that photos without noise would leave.
 NOISE_FACTOR = 1e-3
@@ -21,7 +22,7 @@ class Bars(NamedTuple):
 
 
 def bars_of(transport: Transport) -> Bars | None:
-    """Return the error bars of a transport; None if it was not estimated jointly.
+    """Return the error bars of a transport; None if its estimate gives none.
 
     A verdict that it has already does not widen them.
     """
@@ -30,15 +31,19 @@ def bars_of(transport: Transport) -> Bars | None:
         return None
     transport = replace(transport, verdict=None)
     without_noise = replace(
-        transport,
-        noise=NOISE_FACTOR * transport.noise,
-        posterior=replace(
-            posterior,
-            offset_noise=NOISE_FACTOR * posterior.offset_noise,
-            light_noise=NOISE_FACTOR * posterior.light_noise,
-        ),
+        transport, noise=NOISE_FACTOR * transport.noise, posterior=_without_noise(posterior)
     )
     return Bars(ErrorBars(transport), ErrorBars(without_noise))
+
+
+def _without_noise(posterior: Posterior | PatternPosterior) -> Posterior | PatternPosterior:
+    if isinstance(posterior, PatternPosterior):
+        return replace(posterior, variance_ratio=posterior.variance_ratio / NOISE_FACTOR**2)
+    return replace(
+        posterior,
+        offset_noise=NOISE_FACTOR * posterior.offset_noise,
+        light_noise=NOISE_FACTOR * posterior.light_noise,
+    )
 
 
 def mean_square(bars: ErrorBars, light: Floats, usable: Booleans) -> float:

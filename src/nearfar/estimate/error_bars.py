@@ -1,0 +1,259 @@
+"""Error bars: the posterior standard deviation of D, of entries of N and F, and of pictures.
+
+All of them are linear functionals of a camera pixel's row, whose posterior is a Gaussian. It is
+that of the joint estimate, or that of the estimate from any patterns.
+
+Index convention: arrays are (n, channels, ...), n camera pixels or functionals of one of them.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers, blocks
+from nearfar.errors import InputError
+from nearfar.estimate.any_patterns.error_bars import PatternVariances
+from nearfar.estimate.joint.error_bars import JointVariances
+from nearfar.transport import near
+from nearfar.transport.boxes import box_axes
+from nearfar.transport.direct import footprint
+from nearfar.transport.gains import Gains
+from nearfar.transport.model import Components, Transport
+from nearfar.transport.posterior import PatternPosterior
+
+# Camera pixels of a batch.
+BATCH_PIXELS = 2048
+# Smaller shares of a footprint are rounding.
+SHARE_FLOOR = 1e-9
+# Entries of a row whose variance is computed at once.
+ENTRIES_AT_ONCE = 2**14
+
+
+class Variances(Protocol):
+    """Posterior variances of a transport's rows, in squares of photo units."""
+
+    def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
+        ...
+
+    def of_direct(self, batch: slice) -> Floats:
+        """Return the variances of d at camera pixels, (n, channels)."""
+        ...
+
+    def of_window(self, pixel: int, values: Floats) -> Floats:
+        """Return those of sums of one camera pixel's near-range functions, (m, channels).
+
+        Parameters
+        ----------
+        pixel : int
+        values : ndarray, shape (m, J)
+            Weights of the functions in each sum.
+        """
+        ...
+
+    def of_far(self, pixel: int, lines: slice) -> Floats:
+        """Return those of one camera pixel's row of F on projector rows, (lines * Px, channels)."""
+        ...
+
+
+class ErrorBars:
+    """Posterior standard deviations of a transport.
+
+    They cover the photos' noise and what was never measured, for rows as the prior components of
+    `nearfar.priors` expect them and q as it was found. Where held-out photos showed larger errors,
+    they are multiplied by the ``widening`` of the transport's verdict. Those of components are of
+    the model's split (d at q, n in the window, f in the band), not of the physical one.
+
+    Where a camera pixel is saturated under white, nothing is known of its light: its standard
+    deviations are infinite. Means over a picture leave such pixels out,
+    ``sigma[numpy.isfinite(sigma)]``, and weights of 1 / sigma^2 are 0 there.
+
+    Parameters
+    ----------
+    transport : Transport
+        From a joint estimate, or from photos of any patterns.
+
+    Raises
+    ------
+    InputError
+        If the transport holds no posterior.
+
+    Examples
+    --------
+    >>> bars = nearfar.ErrorBars(transport)
+    >>> bars.picture(light).shape  # the standard deviation of `transport @ light`
+    (8, 8)
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        posterior = transport.posterior
+        if transport.free_posterior is not None:
+            raise InputError(
+                "error bars of free rows are of relit pictures alone: call "
+                "nearfar.deviation_of_picture."
+            )
+        if posterior is None:
+            raise InputError(
+                "this transport holds no error bars: reconstruct a capture with `method='joint'`."
+            )
+        self._transport = transport
+        self._variances: Variances = (
+            PatternVariances(transport, posterior)
+            if isinstance(posterior, PatternPosterior)
+            else JointVariances(transport, posterior)
+        )
+        self._widening = transport.verdict.widening if transport.verdict is not None else 1.0
+        self._where = footprint(transport.correspondence, transport.projector)
+        self._centres = near.centre(transport.correspondence, transport.projector)
+        quality = transport.quality
+        self._unknown = (
+            np.zeros(transport.camera.pixels, dtype=bool)
+            if quality is None
+            else quality.saturated.ravel()
+        )
+
+    def picture(
+        self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+    ) -> Floats:
+        """Return the standard deviation of a relit picture.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        direct, near, far : float
+            Gains, as `Transport.relight` takes them.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+            Photo units; infinite at saturated camera pixels.
+        """
+        transport = self._transport
+        lights = transport.lights(light)
+        number, channels = transport.camera.pixels, transport.channels
+        found = np.empty((number, channels), dtype=np.float32)
+        for place, flat in enumerate(lights):
+            variances = self._variances.of_picture(flat, Gains(direct, near, far))
+            for batch in blocks(number, BATCH_PIXELS):
+                deviation = self._widening * np.sqrt(variances(batch))
+                if len(lights) == 1:
+                    found[batch] = deviation
+                else:
+                    found[batch, place] = deviation[:, place]
+        found[self._unknown] = np.inf
+        return transport.picture(found)
+
+    def direct(self) -> Floats:
+        """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light.
+
+        Infinite at saturated camera pixels.
+        """
+        transport = self._transport
+        found = np.empty((transport.camera.pixels, transport.channels), dtype=np.float32)
+        for batch in blocks(len(found), BATCH_PIXELS):
+            found[batch] = self._widening * np.sqrt(self._variances.of_direct(batch))
+        found *= transport.lit.reshape(-1, 1)
+        found[self._unknown] = np.inf
+        return found.reshape(*transport.camera, transport.channels)
+
+    def component_rows(self, pixels: slice) -> Components:
+        """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
+
+        N and F are the model's: n in the window, f at the frequencies of the far band that the
+        transport holds. Infinite at saturated camera pixels. Some milliseconds for each thousand
+        projector pixels and camera pixel.
+        """
+        selected = range(*pixels.indices(self._transport.camera.pixels))
+        shape = (0, self._transport.channels, self._transport.projector.pixels)
+        rows = [self._on(c, slice(0, self._transport.projector.height)) for c in selected]
+        if not rows:
+            return Components(*(np.zeros(shape, dtype=np.float32) for _ in Components._fields))
+        return Components(*(np.stack(part) for part in zip(*rows, strict=True)))
+
+    def along(self, pixel: int, line: int) -> Components:
+        """Return standard deviations of one camera pixel along one row of the projector.
+
+        Parameters
+        ----------
+        pixel : int
+            Of the camera, row by row.
+        line : int
+            Row of the projector.
+
+        Returns
+        -------
+        Components
+            Each (channels, Px); as `component_rows`.
+
+        Raises
+        ------
+        InputError
+            If there is no such pixel, or no such row.
+        """
+        camera, projector = self._transport.camera, self._transport.projector
+        if not 0 <= pixel < camera.pixels:
+            raise InputError(
+                f"the camera of {camera} has no pixel {pixel}: choose one that it has."
+            )
+        if not 0 <= line < projector.height:
+            raise InputError(
+                f"the projector of {projector} has no row {line}: choose one that it has."
+            )
+        return self._on(pixel, slice(line, line + 1))
+
+    def _on(self, c: int, lines: slice) -> Components:
+        """Return those of one camera pixel on some projector rows, each (channels, lines * Px)."""
+        transport = self._transport
+        width = transport.projector.width
+        first, last = lines.start * width, lines.stop * width
+        d = np.zeros((transport.channels, last - first), dtype=np.float32)
+        if self._unknown[c]:
+            return Components(*(np.full_like(d, np.inf) for _ in Components._fields))
+        n, f = np.zeros_like(d), np.empty_like(d)
+        if transport.lit.ravel()[c]:
+            deviation = np.sqrt(self._variances.of_direct(slice(c, c + 1)))[0]
+            corners, weights = self._direct_pixels(c)
+            here = (corners >= first) & (corners < last)
+            np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
+            pixels, values = self._window_pixels(c, first, last)
+            n[:, pixels - first] = np.sqrt(self._variances.of_window(c, values)).T
+        for some in blocks(lines.stop - lines.start, max(1, ENTRIES_AT_ONCE // width)):
+            on_grid = slice(lines.start + some.start, lines.start + some.stop)
+            variance = self._variances.of_far(c, on_grid)
+            f[:, some.start * width : some.stop * width] = np.sqrt(variance).T
+        return Components(*(np.float32(self._widening) * part for part in (d, n, f)))
+
+    def _direct_pixels(self, c: int) -> tuple[Integers, Floats]:
+        """Return the projector pixels of one camera pixel's footprint, and their shares."""
+        transport, one = self._transport, slice(c, c + 1)
+        if transport.pitch == 1:
+            return self._where.pixels[c], self._where.weights[c]
+        q = transport.correspondence.reshape(-1, 2)[one]
+        (rows, columns), shares = box_axes(q, transport.boxes[one], transport.projector).shares(0)
+        y, x = np.nonzero(shares > SHARE_FLOOR)
+        pixels = (rows.start + y) * transport.projector.width + columns.start + x
+        return pixels, shares[y, x].astype(np.float32)
+
+    def _window_pixels(self, c: int, first: int, last: int) -> tuple[Integers, Floats]:
+        """Return the projector pixels of a camera pixel's window from `first` to before `last`.
+
+        And the value of each function on each of them, (n, J).
+        """
+        transport, projector = self._transport, self._transport.projector
+        centre = self._centres[c : c + 1]
+        if transport.pitch == 1:
+            inside = near.inside(centre, transport.window, projector)[0]
+            pixels = near.window_pixels(centre, transport.window, projector)[0]
+            entries = np.flatnonzero(inside & (pixels >= first) & (pixels < last))
+            return pixels[entries], np.eye(transport.window**2, dtype=np.float32)[entries]
+        reach = transport.near_basis.reach
+        sides = [
+            np.arange(max(at - reach, 0), min(at + reach + 1, side))
+            for at, side in zip(centre[0].tolist(), projector, strict=True)
+        ]
+        rows = sides[0]
+        rows = rows[(rows >= first // projector.width) & (rows < -(-last // projector.width))]
+        y, x = (axis.ravel() for axis in np.meshgrid(rows, sides[1], indexing="ij"))
+        values = transport.near_basis.values_at(np.stack([y, x], axis=1) - centre)
+        return y * projector.width + x, values.astype(np.float32)

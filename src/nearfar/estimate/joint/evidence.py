@@ -220,13 +220,15 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
 
     Returns
     -------
-    ndarray, shape (n, scales), float32
+    ndarray, shape (n, scales), float64
         The sum over channels, up to a constant of the camera pixel.
     """
-    y = whitened.responses @ eigenbasis.eigenvectors
-    u = whitened.direct_weights @ eigenbasis.of_footprint
-    v = whitened.of_offset @ eigenbasis.eigenvectors
-    xp = namespace(y)
+    xp = namespace(whitened.responses)
+    # In double precision: direct light takes most of the sums out again, and the choice between
+    # components that are nearly as good would hang on rounding.
+    y = _double_product(whitened.responses, eigenbasis.eigenvectors)
+    u = _double_product(whitened.direct_weights, eigenbasis.of_footprint)
+    v = _double_product(whitened.of_offset, eigenbasis.eigenvectors)
     sums, log_determinant = _weighted_sums(whitened, (y, u, v), eigenbasis)
     yy, uy, uu, *of_offset = sums
     if of_offset:
@@ -278,6 +280,12 @@ def log_evidence_by_row(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> 
     return squares
 
 
+def _double_product(rows: Floats, matrix: Floats) -> Floats:
+    xp = namespace(rows)
+    product: Floats = xp.astype(rows, xp.float64) @ xp.astype(matrix, xp.float64)
+    return product
+
+
 def _weighted_sums(
     whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
 ) -> tuple[list[Floats], Floats]:
@@ -289,13 +297,13 @@ def _weighted_sums(
     y, u, v = projected
     xp, table_step = namespace(y), fetch(whitened.table_step)
     count, shape = 6 if len(v) else 3, (len(y), len(PRIOR_SCALES))
-    sums = [xp.empty(shape, dtype=xp.float32, device=device(y)) for _ in range(count)]
-    log_determinant = xp.empty(shape, dtype=xp.float32, device=device(y))
+    sums = [xp.empty(shape, dtype=xp.float64, device=device(y)) for _ in range(count)]
+    log_determinant = xp.empty(shape, dtype=xp.float64, device=device(y))
     first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1)).tolist()
     for start, stop in zip(first, [*first[1:], len(y)], strict=True):
         steps = table_step[start] + STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
         table = _table(steps, eigenbasis.eigenvalues, xp)
-        weights, log_determinants = (xp.astype(values, xp.float32) for values in table)
+        weights, log_determinants = table
         of_y, pixel = y[start:stop], whitened.pixel[start:stop]
         of_u = u[pixel]
         pairs = [(of_y, of_y), (of_u, of_y), (of_u, of_u)]

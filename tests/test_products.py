@@ -6,7 +6,6 @@ from threadpoolctl import threadpool_info
 
 from nearfar.arrays import product, product_by_row
 
-
 # Kernels of other processors round by where a row stands among those of one block.
 ROUNDS_ALIKE = {"SkylakeX", "Cooperlake", "SapphireRapids", "Sandybridge"}
 

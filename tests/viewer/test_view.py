@@ -235,7 +235,7 @@ def test_without_error_bars_noise_is_mapped(stored, tmp_path, transport):
         assert "confidence" not in names
         unpack(ask(address, "/map/noise"))
         header, (_, _, error, _, _) = unpack(ask(address, "/row?y=1&x=2"))
-        assert header["no_errors"] == "the joint estimate tells them"
+        assert header["no_errors"] == "this estimate does not tell them"
         assert not error.any()
 
 

@@ -30,6 +30,11 @@ def deviation_of_picture(
     ------
     InputError
         If the transport holds no error bars, or does not have a part.
+
+    Examples
+    --------
+    >>> nearfar.deviation_of_picture(transport, light).shape
+    (8, 8)
     """
     given = dict(gains or {})
     require_parts(transport.parts, given)

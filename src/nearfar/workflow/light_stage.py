@@ -381,7 +381,9 @@ def _provenance(stage: LightStage, gains: LampGains | None) -> dict[str, Any]:
                 )
             },
         }
-    directions = None if stage.directions is None else stage.directions.round(6).tolist()
+    directions = (
+        None if stage.directions is None else stage.directions.astype(np.float64).round(4).tolist()
+    )
     return {
         "nearfar": version(),
         "method": METHOD,

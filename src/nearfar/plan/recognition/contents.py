@@ -45,6 +45,11 @@ class Uniform(Content):
         return f"grey of {self.level:.3g}"
 
 
+def rounded_period(period: float) -> float:
+    """Return a period as precisely as pictures tell it: 3 digits, or whole pixels."""
+    return float(f"{period:.3g}") if period < 100 else float(round(period))
+
+
 class Fringes(Content):
     """A sinusoid mean + amplitude cos(2 pi k.p + phase).
 
@@ -76,8 +81,8 @@ class Fringes(Content):
     @property
     def description(self) -> str:
         """The content in a few words."""
-        phase = round(self.phase, 3) % 1.0
-        return f"fringes {self.direction}, period {self.period:.5g}, phase {phase:.3f} cycles"
+        phase, period = round(self.phase, 3) % 1.0, rounded_period(self.period)
+        return f"fringes {self.direction}, period {period:g}, phase {phase:.3f} cycles"
 
     @property
     def direction(self) -> str:

@@ -17,6 +17,7 @@ from nearfar.plan.recognition.contents import (
     HadamardRow,
     Stripes,
     Uniform,
+    rounded_period,
 )
 from nearfar.plan.recognition.recognise import Recognised
 
@@ -115,7 +116,7 @@ def _of_fringes(recognised: Recognised, contents: Sequence[Content]) -> str:
     step = f"{steps.pop()}-step fringes" if len(steps) == 1 else "fringes"
     one = fringes[0]
     where = f" {one.direction}" if not one.fy or not one.fx else ""
-    periods = sorted({float(f"{wave[0].period:.4g}") for wave in waves}, reverse=True)
+    periods = sorted({rounded_period(wave[0].period) for wave in waves}, reverse=True)
     if len(waves) > MOST_NAMED:
         named = f"{len(waves)} frequencies, periods from {periods[-1]:g} to {periods[0]:g} pixels"
     else:

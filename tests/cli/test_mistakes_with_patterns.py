@@ -57,7 +57,7 @@ def bring_in(patterns, photos, capture, *options):
 
 
 def told(capture, command):
-    """Return the warnings of a command on a capture."""
+    """Return the warnings of a command on a capture, or the verdict of its transport."""
     there = capture.parent
     arguments = {
         "correspond": ("correspond", capture, there / "q.npy"),
@@ -66,7 +66,7 @@ def told(capture, command):
     }
     ran = run_nearfar(*arguments[command])
     assert ran.status == 0
-    return ran.err
+    return ran.out if command == "reconstruct" else ran.err
 
 
 def change(folder, how):
@@ -202,6 +202,8 @@ def mirrored(patterns, _photos):
         (gamma, "correspond", "projector or camera is not linear"),
         (gamma, "separate", "projector or camera is not linear"),
         (moved_midway, "reconstruct", "something moved"),
+        (gamma, "reconstruct", "projector or camera is not linear"),
+        (another_set, "reconstruct", "wrong: "),
         (upside_down, "correspond", "q runs against the camera's rows: the patterns stand upside"),
         (turned, "correspond", "rows and columns: the patterns are turned by 180 degrees"),
         (mirrored, "correspond", "q runs against the camera's columns: the patterns are mirrored"),

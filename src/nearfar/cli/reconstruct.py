@@ -210,7 +210,7 @@ def _from_patterns(
     from nearfar.correspondence import read_correspondence
     from nearfar.transport.store import save_transport
     from nearfar.workflow.from_patterns import reconstruct_from_patterns
-    from nearfar.workflow.pattern_faults import find_pattern_faults
+    from nearfar.workflow.pattern_faults import find_turns
 
     for option, is_given in refused.items():
         if is_given:
@@ -230,7 +230,7 @@ def _from_patterns(
     with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
         transport = reconstruct_from_patterns(capture, given, memory=memory, progress=progress)
     save_transport(transport, output, force=force)
-    for fault in find_pattern_faults(capture, transport.correspondence):
+    for fault in find_turns(transport.correspondence):
         warn(fault)
     verdict = transport.verdict
     assert verdict is not None

@@ -18,6 +18,7 @@ from nearfar.correspondence.photo_order import (
 )
 from nearfar.correspondence.places import find_places, is_lit, typical_misfit
 from nearfar.progress import Report, ignore_progress
+from nearfar.transport.verdict import Reason
 from nearfar.workflow.pattern_codes import (
     AS_IN_THE_FILE,
     TWO_LEVELS,
@@ -83,28 +84,39 @@ class FoundCorrespondence:
     order: PhotoOrder | None = None
     exponent: float = 1.0
 
-    def warnings(self) -> list[str]:
-        """Return warnings about the photos, one sentence each."""
+    def faults(self) -> list[Reason]:
+        """Return what is wrong with the photos."""
         found = []
-        lit = float(np.isfinite(self.correspondence.q).any(axis=-1).mean())
         if self.explained < FOLLOWED:
             cure = "check that each photo is of its pattern, in the same order"
             if self.order is not None:
                 cure = f"it seems that {self.order.description}: import them in the right order"
             found.append(
-                f"the photos do not follow the patterns: direct light explains "
-                f"{self.explained:.0%} of how they change; {cure}."
-            )
-        elif lit < LEAST_LIT:
-            found.append(
-                f"q was found at {lit:.1%} of the camera pixels alone: check that the camera sees "
-                f"what the projector lights, and is neither saturated nor too dark."
+                Reason(
+                    "order",
+                    f"the photos do not follow the patterns: direct light explains "
+                    f"{self.explained:.0%} of how they change; {cure}.",
+                )
             )
         if self.exponent != 1.0:
             found.append(
-                f"projector or camera is not linear: the photos follow the patterns' levels raised "
-                f"to {self.exponent:.2f}. q allows for that, a transport does not: set the gamma "
-                f"of both to 1, or calibrate."
+                Reason(
+                    "not-linear",
+                    f"projector or camera is not linear: the photos follow the patterns' levels "
+                    f"raised to {self.exponent:.2f}. q allows for that, a transport does not: set "
+                    f"the gamma of both to 1, or calibrate.",
+                )
+            )
+        return found
+
+    def warnings(self) -> list[str]:
+        """Return warnings about the photos, one sentence each."""
+        found = [fault.sentence for fault in self.faults()]
+        lit = float(np.isfinite(self.correspondence.q).any(axis=-1).mean())
+        if lit < LEAST_LIT and self.explained >= FOLLOWED:
+            found.append(
+                f"q was found at {lit:.1%} of the camera pixels alone: check that the camera sees "
+                f"what the projector lights, and is neither saturated nor too dark."
             )
         found += [
             f"no pattern tells {axis} apart: q is NaN on that axis, and no transport can be "

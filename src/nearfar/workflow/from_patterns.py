@@ -24,8 +24,9 @@ from nearfar.release import version
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import PatternPosterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.verdict import KeptVerdict
+from nearfar.transport.verdict import KeptVerdict, Reason
 from nearfar.workflow.by_codes import AXES, correspond_by_codes
+from nearfar.workflow.pattern_faults import sums_of_pairs
 from nearfar.workflow.reconstruction.summary import description_of
 from nearfar.workflow.verdict.by_patterns import compare_with_photos
 from nearfar.workflow.verdict.verdict import judge
@@ -84,9 +85,10 @@ def reconstruct_from_patterns(
         more memory.
     """
     _require_small(capture, memory)
-    confidence, places = _places(capture, correspondence, progress)
+    confidence, places, faults = _places(capture, correspondence, progress)
     data = _read(capture, places)
-    verdict = _judge(capture, data, progress)
+    faults += sums_of_pairs(capture)
+    verdict = _with_faults(_judge(capture, data, progress), faults)
     plan = capture.plan
     model, rows = estimate_from_patterns(
         *data,
@@ -134,10 +136,10 @@ def _require_small(capture: Capture, memory: int) -> None:
 
 def _places(
     capture: Capture, given: Correspondence | None, progress: Report
-) -> tuple[Floats, Floats]:
-    """Return confidence (Cy, Cx), and the most probable q, (C, 2)."""
+) -> tuple[Floats, Floats, list[Reason]]:
+    """Return confidence (Cy, Cx), the most probable q, (C, 2), and what is wrong with photos."""
     if given is not None:
-        return given.confidence, given.q.reshape(-1, 2)
+        return given.confidence, given.q.reshape(-1, 2), []
     found = correspond_by_codes(capture, progress)
     places = found.places.reshape(-1, 2).copy()
     for axis, name in enumerate(AXES):
@@ -149,7 +151,7 @@ def _places(
                 f"axes: add patterns, or give `correspondence`."
             )
         places[:, axis] = 0.0
-    return found.correspondence.confidence, places
+    return found.correspondence.confidence, places, found.faults()
 
 
 def _read(capture: Capture, places: Floats) -> _Data:
@@ -158,6 +160,16 @@ def _read(capture: Capture, places: Floats) -> _Data:
     patterns = np.stack([capture.pattern(number).ravel() for number in range(count)])
     values = np.moveaxis(photos.reshape(count, capture.camera.pixels, -1), 0, 2)
     return _Data(np.ascontiguousarray(values), patterns, places)
+
+
+def _with_faults(verdict: KeptVerdict, faults: Sequence[Reason]) -> KeptVerdict:
+    """Return a verdict with faults of the photos, which held-out ones share, as first reasons."""
+    if not faults:
+        return verdict
+    named = {fault.cause for fault in faults}
+    others = (reason for reason in verdict.reasons if reason.cause not in named)
+    is_wrong = verdict.grade == "wrong" or "order" in named
+    return replace(verdict, grade="wrong" if is_wrong else "doubtful", reasons=(*faults, *others))
 
 
 def _judge(capture: Capture, data: _Data, progress: Report) -> KeptVerdict:

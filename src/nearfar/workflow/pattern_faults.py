@@ -10,6 +10,7 @@ from nearfar.arrays import Floats, blocks
 from nearfar.capture import Capture
 from nearfar.plan.recognition.contents import Uniform
 from nearfar.plan.recognition.own import recognised_in
+from nearfar.transport.verdict import Reason
 
 # Values of photos that are held at once.
 VALUES_AT_ONCE = 1 << 23
@@ -120,6 +121,12 @@ def measure_sums(capture: Capture) -> SumMisfit | None:
     return misfit_of(np.concatenate(off), np.concatenate(light))
 
 
+def sums_of_pairs(capture: Capture) -> list[Reason]:
+    """Return what is wrong where patterns and their inverses do not sum to one white."""
+    sums = measure_sums(capture)
+    return [] if sums is None else [Reason("unknown", each) for each in sums.warning(capture.path)]
+
+
 def find_pattern_faults(capture: Capture, q: Floats) -> list[str]:
     """Return a sentence for each thing that looks wrong, of somebody's patterns and their q.
 
@@ -128,9 +135,12 @@ def find_pattern_faults(capture: Capture, q: Floats) -> list[str]:
     capture : Capture
     q : ndarray, shape (Cy, Cx, 2)
     """
-    sums = measure_sums(capture)
-    found = [] if sums is None else sums.warning(capture.path)
-    return [*found, *_say_directions(_slopes(q))]
+    return [*(fault.sentence for fault in sums_of_pairs(capture)), *find_turns(q)]
+
+
+def find_turns(q: Floats) -> list[str]:
+    """Return a sentence if q, (Cy, Cx, 2), runs otherwise than the camera's rows and columns."""
+    return _say_directions(_slopes(q))
 
 
 def _say_directions(slopes: Floats) -> list[str]:

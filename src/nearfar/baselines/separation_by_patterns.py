@@ -59,7 +59,7 @@ class Solver(Protocol):
 
 
 def solver(choice: Choice, black_level: float | None) -> Solver:
-    """Return what separates the photos of chosen patterns.
+    """Return the solver for direct and global light that the chosen patterns allow.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class _Levels:
         return Solved(Separation(*single))
 
     def _uniform(self, photos: Floats) -> tuple[Floats, Floats | None]:
-        """Return what is seen under black, and under white less black, None if it is not known."""
+        """Return the photo under black, and that of white less black (None if it is unknown)."""
         nothing = np.zeros_like(photos[0])
         means, seen = self.uniform_means, photos[self.uniform]
         if not len(means):

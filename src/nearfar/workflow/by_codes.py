@@ -85,7 +85,7 @@ class FoundCorrespondence:
     exponent: float = 1.0
 
     def faults(self) -> list[Reason]:
-        """Return what is wrong with the photos."""
+        """Return the faults of the photos that the correspondence shows: order, nonlinearity."""
         found = []
         if self.explained < FOLLOWED:
             cure = "check that each photo is of its pattern, in the same order"
@@ -209,7 +209,7 @@ def _fit_seen(capture: Capture, patterns: PatternLevels, sample: Floats) -> Seen
 def _typical(
     seen_by: Callable[[float], Seen], side: int, unexplained: Callable[[Seen], float]
 ) -> Seen:
-    """Return how camera pixels see patterns with the size of footprints that explains most."""
+    """Return the codes seen through footprints of the size that explains the photos best."""
     best, size = seen_by(0.0), SMALLEST_FOOTPRINT
     least = unexplained(best)
     while size <= LARGEST_FOOTPRINT * side:

@@ -122,7 +122,7 @@ def measure_sums(capture: Capture) -> SumMisfit | None:
 
 
 def sums_of_pairs(capture: Capture) -> list[Reason]:
-    """Return what is wrong where patterns and their inverses do not sum to one white."""
+    """Return a fault if photos of patterns and their inverses do not sum to one white photo."""
     sums = measure_sums(capture)
     return [] if sums is None else [Reason("unknown", each) for each in sums.warning(capture.path)]
 

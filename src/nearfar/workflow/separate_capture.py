@@ -157,7 +157,7 @@ def separate_capture(
 
 
 def _recognised(capture: Capture, progress: Report) -> Recognised:
-    """Return what the patterns were recognised as; those of a plan are recognised now."""
+    """Return the recognised contents of the patterns; those of a plan are recognised now."""
     if capture.shown is not None:
         return recognised_in(capture.plan)
     count = len(capture.plan.patterns)
@@ -268,7 +268,7 @@ def _faults(
 
 
 def _say_negative(choice: Choice, share: float) -> str:
-    """Say what direct light above white, or global light below zero, comes of."""
+    """Name the causes of negative global light, which is direct light above white."""
     if any(each.mean >= LEAST_WHITE for each in choice.uniform):
         return (
             f"direct light is above white at {share:.0%} of the camera pixels: white is saturated "

@@ -105,7 +105,7 @@ class Before(NamedTuple):
     neighbours: Integers  # (C, steps)
 
     def expected(self, pixels: NDArray[np.int64]) -> ExpectedRows:
-        """Return what the neighbours of camera pixels have."""
+        """Return the near- and far-range light that neighbours lead to expect."""
         rows = self.rows
         return expect_rows(rows.near, rows.far, self.level, rows.lit, self.neighbours, pixels)
 
@@ -121,7 +121,7 @@ class Prepared(NamedTuple):
 
 
 def prepare(model: PatternModel) -> Prepared:
-    """Return what all camera pixels share, by the number of the prior component."""
+    """Compute the prior covariances of all components, which all camera pixels share."""
     unlit = range(len(LIT_COMPONENTS), len(COMPONENTS))
     far = {n: far_covariance(model, COMPONENTS[n]) for n in (*LIT_AT_PITCH, *unlit)}
     return Prepared(

@@ -75,7 +75,7 @@ class Design:
 
     @property
     def mean(self) -> Floats:
-        """Return what a unit of light from each lamp adds to the estimate of m, (P,)."""
+        """Weights of the lamps' light in the estimate of m, (P,)."""
         return np.asarray(self.from_known[-1] @ self.patterns)
 
     @property

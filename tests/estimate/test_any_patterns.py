@@ -9,6 +9,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import UnreadableFileError
 from nearfar.estimate.any_patterns.covariance import near_root, pattern_model
+from nearfar.estimate.any_patterns.estimate import estimate_from_patterns
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.priors.component import PriorComponent
@@ -167,3 +168,23 @@ def test_a_damaged_posterior_gets_a_sentence(transport, tmp_path):
     rmtree(path / "belief_patterns")
     with pytest.raises(UnreadableFileError, match="belief_patterns"):
         load_transport(path)
+
+
+def test_camera_pixels_without_direct_light_get_none(patterns):
+    generator = np.random.default_rng(4)
+    camera = Size(6, 10)
+    places = np.indices(camera).reshape(2, -1).T.astype(np.float32)
+    # The right half of the camera sees smooth light alone.
+    lit = places[:, 1] < 5
+    y, x = (np.indices(PROJECTOR) / np.array(PROJECTOR).reshape(2, 1, 1)).reshape(2, -1)
+    far = 0.01 * (1 + 0.5 * np.cos(np.pi * y) + 0.3 * np.cos(np.pi * x))
+    pixel = (places @ [PROJECTOR.width, 1]).astype(int)
+    light = patterns @ far + np.where(lit[:, None], 0.4 * patterns[:, pixel].T, 0.0)
+    photos = light + 1e-3 * generator.standard_normal(light.shape)
+    photos = photos[:, None].astype(np.float32)
+    model, rows = estimate_from_patterns(photos, patterns, places, camera, PROJECTOR, WINDOW)
+    np.testing.assert_array_equal(rows.lit, lit)
+    assert not rows.direct[~lit].any()
+    assert not rows.near[~lit].any()
+    assert (rows.direct[lit] > 0.2).all()
+    assert model.far_basis.count == rows.far.shape[2]

@@ -5,8 +5,11 @@ import shutil
 import numpy as np
 import pytest
 
+from nearfar.errors import StorageError
 from nearfar.files.codecs import encode_png
 from nearfar.transport.store import load_transport
+from nearfar.workflow.light_stage import import_light_stage
+from nearfar.workflow.light_stage_photos import read_light_stage
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 
 LAMPS, CAMERA = 12, (40, 30)
@@ -246,3 +249,31 @@ def test_what_belongs_to_lamps_is_refused_with_patterns(folder, tmp_path, option
     )
     assert ran.status == 2
     assert option in ran.err
+
+
+def test_photos_in_a_file_are_those_in_memory(folder, tmp_path):
+    stages = [
+        read_light_stage(
+            folder / "lamps",
+            references=folder / "refs" / "list.txt",
+            black=folder / "black.png",
+            memory=memory,
+            scratch=tmp_path,
+        )
+        for memory in (10**9, 1)
+    ]
+    transports = []
+    for number, stage in enumerate(stages):
+        import_light_stage(stage, tmp_path / f"{number}.zarr")
+        transports.append(load_transport(tmp_path / f"{number}.zarr"))
+    in_memory, in_file = transports
+    np.testing.assert_array_equal(in_file.far, in_memory.far)
+    np.testing.assert_array_equal(in_file.noise, in_memory.noise)
+    assert in_file.provenance == in_memory.provenance
+    # Nothing of the temporary file is left.
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["0.zarr", "1.zarr"]
+
+
+def test_no_room_for_photos_gets_a_sentence(folder, tmp_path):
+    with pytest.raises(StorageError, match=r"cannot be kept in .*nowhere"):
+        read_light_stage(folder / "lamps", memory=1, scratch=tmp_path / "nowhere")

@@ -8,8 +8,6 @@ Index convention: m runs over photos in the order they are shot, i over rows, th
 pixels and channels, p over projector pixels.
 """
 
-import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,8 +17,9 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.callbacks import Report
-from nearfar.errors import InputError, StorageError
-from nearfar.rigs.base import Photo, Rig
+from nearfar.errors import InputError
+from nearfar.files.room import room_for
+from nearfar.rigs.base import Rig
 from nearfar.transport.exact import ExactTransport
 
 # Bytes of photos and of decoded rows in memory at once, the result aside.
@@ -140,7 +139,8 @@ def _shoot(
     for photo in rig.shoot(acquisition.patterns()):
         if kept is None:
             camera = Size(*photo.shape[:2])
-            kept = _room(photo, acquisition.photos, memory, folder)
+            shape = (acquisition.photos, photo.shape[0] * photo.shape[1], photo.shape[2])
+            kept = room_for(shape, photo.dtype, memory // 4, folder)
         kept[taken] = photo.reshape(kept.shape[1:])
         taken += 1
         report("shooting", taken / acquisition.photos)
@@ -150,22 +150,3 @@ def _shoot(
             f"{acquisition.name}: shoot them all."
         )
     return kept, camera
-
-
-def _room(photo: Photo, count: int, memory: int, folder: Path | None) -> NDArray[Any]:
-    """Return an empty array for photos, in memory if they take at most a quarter of `memory`."""
-    shape = (count, photo.shape[0] * photo.shape[1], photo.shape[2])
-    if count * photo.nbytes <= memory // 4:
-        return np.empty(shape, dtype=photo.dtype)
-    try:
-        with tempfile.TemporaryFile(dir=folder) as file:
-            # On a full disk, writing to the map of a sparse file would kill the process.
-            os.posix_fallocate(file.fileno(), 0, count * photo.nbytes)
-            # The file has no name and lives as long as its map.
-            return np.memmap(file, dtype=photo.dtype, mode="w+", shape=shape)
-    except OSError as error:
-        raise StorageError(
-            f"{count} photos of {count * photo.nbytes} bytes in all cannot be kept in "
-            f"{folder or tempfile.gettempdir()} ({error.strerror}): make room or name another "
-            f"folder."
-        ) from error

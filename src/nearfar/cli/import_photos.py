@@ -164,7 +164,8 @@ def _import_lamps(
 ) -> None:
     """Make the transport of a light stage."""
     from nearfar.files import check_output
-    from nearfar.workflow.light_stage import import_light_stage, read_light_stage
+    from nearfar.workflow.light_stage import import_light_stage
+    from nearfar.workflow.light_stage_photos import read_light_stage
 
     if len(paths) != 1:
         raise typer.BadParameter(f"TRANSPORT.zarr alone is needed, {len(paths)} were given.")
@@ -178,6 +179,7 @@ def _import_lamps(
             black=files.black,
             directions=files.directions,
             full_scale=full_scale,
+            scratch=output.parent,
             progress=report,
         )
         gains, verdict = import_light_stage(stage, output, force=force, progress=report)

@@ -93,7 +93,8 @@ def write_pictures(folder: Path, pictures, name="p") -> Path:
     """Write pictures as PNG files, numbered from 0."""
     folder.mkdir(parents=True, exist_ok=True)
     for number, picture in enumerate(pictures):
-        (folder / f"{name}{number}.png").write_bytes(encode_png(np.squeeze(picture)))
+        grey = picture[..., 0] if picture.shape[2:] == (1,) else picture
+        (folder / f"{name}{number}.png").write_bytes(encode_png(grey))
     return folder
 
 

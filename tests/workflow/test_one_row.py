@@ -22,7 +22,10 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from nearfar.workflow.acquire import acquire_in_memory
+from nearfar.workflow.by_codes import correspond_by_codes
 from nearfar.workflow.evaluate import snr
+from nearfar.workflow.from_patterns import reconstruct_from_patterns
+from tests.shown import captured, fringes, white_and_black
 
 CAMERA = Size(12, 20)
 LONG = 24
@@ -120,3 +123,20 @@ def test_photos_of_their_own_find_q_along_the_line(projector, method, find):
     along = 1 - projector.index(1)
     np.testing.assert_allclose(found.q[..., along], q, atol=0.05)
     np.testing.assert_array_equal(found.q[..., 1 - along], 0)
+
+
+@EITHER
+def test_photos_of_anybody_s_fringes_find_q_along_the_line_and_relight(projector, tmp_path):
+    world, q = _world(projector)
+    along = 1 - projector.index(1)
+    pictures = [*fringes(projector, along, [24, 8, 5], 4), *white_and_black(projector)]
+    capture = captured(world, pictures, tmp_path)
+    found = correspond_by_codes(capture)
+    assert found.axes == ("rows", "columns")
+    assert not found.warnings()
+    np.testing.assert_allclose(found.correspondence.q[..., along], q, atol=0.2)
+    np.testing.assert_array_equal(found.correspondence.q[..., 1 - along], 0)
+    light = np.random.default_rng(1).random(projector).astype(np.float32)
+    estimate = reconstruct_from_patterns(capture, found.correspondence)
+    truth, relit = (np.reshape(t @ light, CAMERA) for t in (world, estimate))
+    assert snr(truth, relit) > 30

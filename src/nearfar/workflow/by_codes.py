@@ -62,9 +62,9 @@ class FoundCorrespondence:
     Attributes
     ----------
     correspondence : Correspondence
-        NaN in the axis that no pattern tells.
+        NaN in the axis that no pattern tells; 0 in the axis of a single projector pixel.
     axes : tuple of str
-        Of "rows" and "columns" those that the patterns tell.
+        Of "rows" and "columns" those that are known.
     places : ndarray, shape (Cy, Cx, 2), float32
         The most probable q, whether or not there is direct light; NaN in an axis that no pattern
         tells.
@@ -163,14 +163,15 @@ def correspond_by_codes(
     parts, places = [], []
     for rows in blocks(height, max(1, VALUES_AT_ONCE // (width * len(patterns.along)))):
         sequences = read_sequences(capture, patterns, rows)
-        found, likely = _find(sequences, telling, misfits, _step(capture))
+        found, likely = _find(sequences, capture, telling, misfits)
         parts.append(_as_rows(found, width))
         places.append(likely.reshape(-1, width, 2))
         progress("correspondence", min(rows.stop, height) / height)
-    told = sorted({axis for each in telling for axis in each.axes})
+    known = {axis for each in telling for axis in each.axes}
+    known |= {axis for axis, side in enumerate(capture.plan.projector) if side == 1}
     return FoundCorrespondence(
         joined(parts),
-        tuple(AXES[axis] for axis in told),
+        tuple(AXES[axis] for axis in sorted(known)),
         np.concatenate(places),
         explained,
         order,
@@ -236,11 +237,13 @@ def _step(capture: Capture) -> float:
 
 
 def _find(
-    sequences: Floats, telling: Sequence[Telling], misfits: Sequence[float], step: float
+    sequences: Floats, capture: Capture, telling: Sequence[Telling], misfits: Sequence[float]
 ) -> tuple[Correspondence, Floats]:
     """Return q and confidence as (C, 2) and (C,), and the most probable q of all, (C, 2)."""
-    count = len(sequences)
+    count, step = len(sequences), _step(capture)
     q = np.full((count, 2), np.nan, dtype=np.float32)
+    # There is one place on the axis of a single projector pixel.
+    q[:, np.array(capture.plan.projector) == 1] = 0.0
     confidence = np.ones(count, dtype=np.float32)
     lit = np.ones(count, dtype=np.bool_)
     for each, misfit in zip(telling, misfits, strict=True):

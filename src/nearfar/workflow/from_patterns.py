@@ -141,16 +141,12 @@ def _places(
     if given is not None:
         return given.confidence, given.q.reshape(-1, 2), []
     found = correspond_by_codes(capture, progress)
-    places = found.places.reshape(-1, 2).copy()
-    for axis, name in enumerate(AXES):
-        if name in found.axes:
-            continue
-        if capture.plan.projector[axis] > 1:
-            raise InputError(
-                f"the patterns of {capture.path} tell no {name} apart, and a transport needs both "
-                f"axes: add patterns, or give `correspondence`."
-            )
-        places[:, axis] = 0.0
+    places = found.places.reshape(-1, 2)
+    if unknown := [name for name in AXES if name not in found.axes]:
+        raise InputError(
+            f"the patterns of {capture.path} tell no {unknown[0]} apart, and a transport needs "
+            f"both axes: add patterns, or give `correspondence`."
+        )
     return found.correspondence.confidence, places, found.faults()
 
 

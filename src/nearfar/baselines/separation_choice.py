@@ -234,9 +234,16 @@ def _reason(measured: Measured, level: Floats) -> str | None:
         share = (measured.mean - measured.lowest) / contrast
         if not LEAST_LEVEL_SHARE <= share <= 1 - LEAST_LEVEL_SHARE:
             return TOO_LITTLE_WHITE
+    return TOO_SLOW if _slow_share(content, level) > LARGEST_SLOW_SHARE else None
+
+
+def _slow_share(content: Content, level: Floats) -> float:
+    """Return the share of a pattern's deviation that its mean over an even neighbourhood keeps."""
     size = [max(FEWEST_EVEN_PIXELS, round(EVEN_SHARE * side)) for side in level.shape]
-    slow = float(uniform_filter(level, size, mode="reflect").std())
-    return TOO_SLOW if slow > LARGEST_SLOW_SHARE * float(level.std()) else None
+    if isinstance(content, Fringes):
+        # That of the whole wave, so that all its phases are taken, or none.
+        return float(abs(np.sinc(size[0] * content.fy) * np.sinc(size[1] * content.fx)))
+    return float(uniform_filter(level, size, mode="reflect").std() / level.std())
 
 
 def _tell_black(uniform: Iterable[Measured]) -> bool:

@@ -45,7 +45,6 @@ Estimate
 Use the transport
     Transport              direct, near- and far-range transport: relights and takes apart
     ErrorBars              standard deviations of a transport and of relit pictures
-    deviation_of_picture   standard deviation of a relit picture, whatever the transport's parts
     prepare_transport      lay a transport out to relight it many times
     save_transport         write a transport
     load_transport         read a transport
@@ -116,7 +115,6 @@ if TYPE_CHECKING:
         read_correspondence,
     )
     from nearfar.errors import NearfarError
-    from nearfar.estimate.deviations import deviation_of_picture
     from nearfar.estimate.error_bars import ErrorBars
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.photometry.measurements import Measurements
@@ -168,7 +166,6 @@ _HOMES = {
     "ReconstructionOptions": "nearfar.workflow.reconstruction.options",
     "Transport": "nearfar.transport.model",
     "ErrorBars": "nearfar.estimate.error_bars",
-    "deviation_of_picture": "nearfar.estimate.deviations",
     "prepare_transport": "nearfar.transport.prepared",
     "save_transport": "nearfar.transport.store",
     "load_transport": "nearfar.transport.store",
@@ -217,7 +214,6 @@ __all__ = [  # noqa: RUF022
     "ReconstructionOptions",
     "Transport",
     "ErrorBars",
-    "deviation_of_picture",
     "prepare_transport",
     "save_transport",
     "load_transport",

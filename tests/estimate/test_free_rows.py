@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from nearfar.arrays import Size
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.free_rows.design import design_of
 from nearfar.estimate.free_rows.error_bars import variance_in_noise
 from nearfar.estimate.free_rows.estimate import estimate_free_rows, posterior_of
-from nearfar.transport.free_posterior import FreePosterior
+from nearfar.transport.model import Transport
+from nearfar.transport.posterior import FreePosterior
+from nearfar.transport.verdict import KeptVerdict
+from nearfar.workflow.free_rows import free_basis
 
 LAMPS, PIXELS, BLACK = 32, 200, 0.03
 
@@ -104,12 +109,15 @@ def test_from_few_photos_the_noise_is_told_by_what_was_shot_twice(world):
     assert np.median(found.noise) == pytest.approx(0.01, rel=0.3)
 
 
-def _conditioned(patterns, lamp, ratio, noise):
-    """Return the posterior covariance of a row: flat priors are variances of 1e6 s^2."""
+def _conditioned(patterns, ratio, noise):
+    """Return the posterior covariance of a row and of direct light, which stands behind its lamps.
+
+    Flat priors are variances of 1e6 s^2.
+    """
     flat = 1e6
-    prior = ratio * (np.eye(LAMPS) + flat * np.ones((LAMPS, LAMPS)))
-    if lamp >= 0:
-        prior[lamp, lamp] += ratio * flat
+    prior = np.zeros((LAMPS + 1, LAMPS + 1))
+    prior[:LAMPS, :LAMPS] = ratio * (np.eye(LAMPS) + flat * np.ones((LAMPS, LAMPS)))
+    prior[LAMPS, LAMPS] = ratio * flat
     of_photos = patterns @ prior @ patterns.T + np.eye(len(patterns)) + ratio * flat
     across = prior @ patterns.T
     return noise**2 * (prior - across @ np.linalg.solve(of_photos, across.T))
@@ -122,10 +130,55 @@ def test_error_bars_are_those_of_gaussian_conditioning(name, lamp):
     patterns = {"few": few, **COMPLETE}[name]
     ratio = 3.0
     posterior = posterior_of(design_of(patterns), np.array([ratio], np.float32))
-    covariance = _conditioned(patterns, lamp, ratio, 1.0)
+    own = patterns[:, [lamp]] if lamp >= 0 else np.zeros((len(patterns), 1))
+    covariance = _conditioned(np.concatenate([patterns, own], axis=1), ratio, 1.0)
     for light in (*np.random.default_rng(2).random((3, LAMPS)), np.eye(LAMPS)[5], WHITE[0]):
-        variance = variance_in_noise(posterior, np.array([lamp]), light, 1.0, 1.0)
-        assert variance[0] == pytest.approx(light @ covariance @ light, rel=2e-3)
+        variance = variance_in_noise(posterior, np.array([lamp]), light[None], 1.0, 1.0)
+        both = np.append(light, light[lamp] if lamp >= 0 else 0.0)
+        assert variance[0, 0] == pytest.approx(both @ covariance @ both, rel=2e-3)
+
+
+def test_error_bars_of_a_transport_are_those_of_its_direct_light_and_of_each_lamp():
+    few = np.concatenate([_random(12), DARK, DARK, WHITE, WHITE])
+    lamps, ratio, noise = np.array([5, 9, -1]), 3.0, np.float32([0.1, 0.2, 0.3])
+    projector = Size(4, LAMPS // 4)
+    q = np.stack(np.divmod(lamps, projector.width), axis=-1).astype(np.float32)
+    q[lamps < 0] = np.nan
+    bars = ErrorBars(
+        Transport(
+            projector=projector,
+            correspondence=q[None],
+            direct=np.zeros((1, 3, 1), np.float32),
+            near=np.zeros((1, 3, 1, 0, 0), np.float32),
+            far=np.zeros((1, 3, 1, LAMPS), np.float32),
+            far_basis=free_basis(projector),
+            black=np.zeros((1, 3, 1), np.float32),
+            noise=noise[None, :, None],
+            parts=("direct", "free"),
+            posterior=posterior_of(design_of(few), np.full((1, 3), ratio, np.float32)),
+            verdict=KeptVerdict("doubtful", widening=2.0),
+        )
+    )
+    # Direct light is one lamp more, which shines where the lamp does.
+    rows = bars.component_rows(slice(None))
+    light = np.random.default_rng(2).random(projector).astype(np.float32)
+    relit, free_alone = bars.picture(light)[0], bars.picture(light, direct=0.0)[0]
+    for c, lamp in enumerate(lamps):
+        own = few[:, [lamp]] if lamp >= 0 else np.zeros((len(few), 1))
+        covariance = _conditioned(np.concatenate([few, own], axis=1), ratio, noise[c])
+        known = 2.0 * np.sqrt(np.diag(covariance))
+        direct = known[-1] if lamp >= 0 else 0.0
+        np.testing.assert_allclose(rows.far[c, 0], known[:-1], rtol=2e-3)
+        assert bars.direct()[0, c, 0] == pytest.approx(direct, rel=2e-3)
+        assert rows.direct[c, 0].sum() == rows.direct[c, 0, lamp] == pytest.approx(direct, rel=2e-3)
+        assert not rows.near[c].any()
+        lights = np.append(light, light.ravel()[lamp] if lamp >= 0 else 0.0)
+        both = 2.0 * np.sqrt(lights @ covariance @ lights)
+        assert relit[c] == pytest.approx(both, rel=2e-3)
+        lights[-1] = 0.0
+        alone = 2.0 * np.sqrt(lights @ covariance @ lights)
+        assert free_alone[c] == pytest.approx(alone, rel=2e-3)
+    np.testing.assert_allclose(bars.along(0, 1).far[0], rows.far[0, 0, 8:16], rtol=1e-6)
 
 
 def test_error_bars_hold_for_rows_as_they_are_expected():
@@ -137,7 +190,7 @@ def test_error_bars_hold_for_rows_as_they_are_expected():
     posterior = posterior_of(design, found.ratio)
     assert isinstance(posterior, FreePosterior)
     light = generator.random(LAMPS)
-    variance = variance_in_noise(posterior, found.lamp, light, 1.0, 1.0)
+    (variance,) = variance_in_noise(posterior, found.lamp, light[None], 1.0, 1.0)
     error = (_rows(found) - world) @ light / (found.noise[:, 0] * np.sqrt(variance))
     assert 0.9 < np.sqrt(np.mean(error**2)) < 1.15
 

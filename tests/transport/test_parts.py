@@ -1,6 +1,8 @@
 """Transports that lack parts: nothing is kept of these, and nothing is asked of them."""
 
+import json
 from dataclasses import replace
+from shutil import rmtree
 
 import numpy as np
 import pytest
@@ -9,10 +11,10 @@ import nearfar
 from nearfar.arrays import Size
 from nearfar.errors import InputError, UnreadableFileError
 from nearfar.illumination.real_basis import real_basis
-from nearfar.transport.free_posterior import FreePosterior
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS
 from nearfar.transport.plots import Plots
+from nearfar.transport.posterior import FreePosterior
 from nearfar.transport.store import load_transport, open_transport, save_transport
 from nearfar.workflow.free_rows import free_basis
 from tests.metadata import change_attributes
@@ -45,13 +47,13 @@ def free(rows):
         black=np.zeros(shape, np.float32),
         noise=np.full(shape, 0.01, np.float32),
         parts=("direct", "free"),
-        free_posterior=FreePosterior(
+        posterior=FreePosterior(
             modes=np.linalg.qr(generator.normal(size=(15, 4)))[0].T.astype(np.float32),
             strengths=np.arange(4, 0, -1).astype(np.float32),
             mean=np.full(15, 0.1, np.float32),
             mean_variance=0.5,
             gain_errors=np.zeros((0, 15), np.float32),
-            ratio=generator.random(CAMERA).astype(np.float32),
+            variance_ratio=generator.random(CAMERA).astype(np.float32),
         ),
     )
 
@@ -104,9 +106,32 @@ def test_a_file_holds_nothing_of_an_absent_part(free, tmp_path):
     np.testing.assert_array_equal(kept @ light, free @ light)
     some = open_transport(path).rows(slice(2, 4))
     np.testing.assert_array_equal(some @ light, (free @ light)[2:4])
-    for name in ("modes", "strengths", "mean", "mean_variance", "ratio"):
-        of_file, made = (getattr(each.free_posterior, name) for each in (kept, free))
+    for name in ("modes", "strengths", "mean", "mean_variance", "variance_ratio"):
+        of_file, made = (getattr(each.posterior, name) for each in (kept, free))
         np.testing.assert_array_equal(of_file, made)
+
+
+@pytest.mark.parametrize(
+    "change", [{"of": "glass"}, {"mean_variance": -1.0}, {"mean_variance": float("nan")}]
+)
+def test_a_damaged_posterior_gets_a_sentence(free, tmp_path, change):
+    path = tmp_path / "t.zarr"
+    save_transport(free, path)
+    kept = json.loads((path / "zarr.json").read_text())["attributes"]["belief"]
+    change_attributes(path, belief={**kept, **change})
+    with pytest.raises(UnreadableFileError, match="does not describe a transport"):
+        load_transport(path)
+    change_attributes(path, belief=kept)
+    rmtree(path / "belief_modes")
+    with pytest.raises(UnreadableFileError, match="belief_modes"):
+        load_transport(path)
+
+
+def test_a_posterior_of_another_projector_gets_a_sentence(free, tmp_path):
+    few = replace(free.posterior, strengths=free.posterior.strengths[:-1])
+    save_transport(replace(free, posterior=few), tmp_path / "t.zarr")
+    with pytest.raises(UnreadableFileError, match="is of another projector"):
+        load_transport(tmp_path / "t.zarr")
 
 
 def test_a_transport_without_far_range_has_no_coefficients(tmp_path):

@@ -1,7 +1,7 @@
 """Error bars: the posterior standard deviation of D, of entries of N and F, and of pictures.
 
-All of them are linear functionals of a camera pixel's row, whose posterior is a Gaussian. It is
-that of the joint estimate, or that of the estimate from any patterns.
+All of them are linear functionals of a camera pixel's row, whose posterior is a Gaussian: that of
+the joint estimate, of the estimate from any patterns, or of free rows.
 
 Index convention: arrays are (n, channels, ...), n camera pixels or functionals of one of them.
 """
@@ -14,13 +14,14 @@ import numpy as np
 from nearfar.arrays import Floats, Integers, blocks
 from nearfar.errors import InputError
 from nearfar.estimate.any_patterns.error_bars import PatternVariances
+from nearfar.estimate.free_rows.error_bars import FreeVariances
 from nearfar.estimate.joint.error_bars import JointVariances
 from nearfar.transport import near
 from nearfar.transport.boxes import box_axes
 from nearfar.transport.direct import footprint
-from nearfar.transport.gains import Gains
+from nearfar.transport.gains import Gains, gains_on
 from nearfar.transport.model import Components, Transport
-from nearfar.transport.posterior import PatternPosterior
+from nearfar.transport.posterior import FreePosterior, PatternPosterior
 
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
@@ -53,8 +54,29 @@ class Variances(Protocol):
         ...
 
     def of_far(self, pixel: int, lines: slice) -> Floats:
-        """Return those of one camera pixel's row of F on projector rows, (lines * Px, channels)."""
+        """Return those of one camera pixel's row of F on projector rows, (lines * Px, channels).
+
+        Of free rows, which take the place of F, those of the light from each lamp.
+        """
         ...
+
+
+def _variances_of(transport: Transport) -> Variances:
+    """Return the posterior variances of a transport's rows, of whichever estimate they are."""
+    posterior = transport.posterior
+    if posterior is None:
+        cure = (
+            "its photos do not tell their own noise. Take some patterns twice, such as black and "
+            "white, and reconstruct again."
+            if "free" in transport.parts
+            else "reconstruct a capture with `method='joint'`."
+        )
+        raise InputError(f"this transport holds no error bars: {cure}")
+    if isinstance(posterior, FreePosterior):
+        return FreeVariances(transport, posterior)
+    if isinstance(posterior, PatternPosterior):
+        return PatternVariances(transport, posterior)
+    return JointVariances(transport, posterior)
 
 
 class ErrorBars:
@@ -72,7 +94,7 @@ class ErrorBars:
     Parameters
     ----------
     transport : Transport
-        From a joint estimate, or from photos of any patterns.
+        From a joint estimate, from photos of any patterns, or of free rows.
 
     Raises
     ------
@@ -87,22 +109,8 @@ class ErrorBars:
     """
 
     def __init__(self, transport: Transport) -> None:
-        posterior = transport.posterior
-        if transport.free_posterior is not None:
-            raise InputError(
-                "error bars of free rows are of relit pictures alone: call "
-                "nearfar.deviation_of_picture."
-            )
-        if posterior is None:
-            raise InputError(
-                "this transport holds no error bars: reconstruct a capture with `method='joint'`."
-            )
+        self._variances = _variances_of(transport)
         self._transport = transport
-        self._variances: Variances = (
-            PatternVariances(transport, posterior)
-            if isinstance(posterior, PatternPosterior)
-            else JointVariances(transport, posterior)
-        )
         self._widening = transport.verdict.widening if transport.verdict is not None else 1.0
         self._where = footprint(transport.correspondence, transport.projector)
         self._centres = near.centre(transport.correspondence, transport.projector)
@@ -114,27 +122,39 @@ class ErrorBars:
         )
 
     def picture(
-        self, light: Floats, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0
+        self,
+        light: Floats,
+        *,
+        direct: float = 1.0,
+        near: float = 1.0,
+        far: float = 1.0,
+        free: float = 1.0,
     ) -> Floats:
         """Return the standard deviation of a relit picture.
 
         Parameters
         ----------
         light : ndarray, shape (Py, Px) or (Py, Px, channels)
-        direct, near, far : float
+        direct, near, far, free : float
             Gains, as `Transport.relight` takes them.
 
         Returns
         -------
         ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
             Photo units; infinite at saturated camera pixels.
+
+        Raises
+        ------
+        InputError
+            As `Transport.relight`.
         """
         transport = self._transport
+        gains = gains_on(transport.parts, direct, near, far, free)
         lights = transport.lights(light)
         number, channels = transport.camera.pixels, transport.channels
         found = np.empty((number, channels), dtype=np.float32)
         for place, flat in enumerate(lights):
-            variances = self._variances.of_picture(flat, Gains(direct, near, far))
+            variances = self._variances.of_picture(flat, gains)
             for batch in blocks(number, BATCH_PIXELS):
                 deviation = self._widening * np.sqrt(variances(batch))
                 if len(lights) == 1:
@@ -161,8 +181,8 @@ class ErrorBars:
         """Return standard deviations of dense rows of D, N and F; see `Transport.component_rows`.
 
         N and F are the model's: n in the window, f at the frequencies of the far band that the
-        transport holds. Infinite at saturated camera pixels. Some milliseconds for each thousand
-        projector pixels and camera pixel.
+        transport holds. Free rows take the place of F. Infinite at saturated camera pixels. Some
+        milliseconds for each thousand projector pixels and camera pixel.
         """
         selected = range(*pixels.indices(self._transport.camera.pixels))
         shape = (0, self._transport.channels, self._transport.projector.pixels)

@@ -12,7 +12,6 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.errors import InputError
-from nearfar.estimate.deviations import deviation_of_picture
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.pictures import natural_picture, white
 from nearfar.transport.model import Transport
@@ -105,7 +104,7 @@ def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
         return (transport @ light).reshape(*transport.camera, -1)
 
     def over_error(name: str, light: Floats) -> Map:
-        error = deviation_of_picture(transport, light).reshape(*transport.camera, -1)
+        error = ErrorBars(transport).picture(light).reshape(*transport.camera, -1)
         return ratio(name, relit(light), error)
 
     floodlight = white(transport.projector)
@@ -122,7 +121,7 @@ def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
         maps["error"] = lambda: over_error("error", floodlight)
     else:
         maps["noise"] = lambda: ratio("noise", relit(floodlight), transport.noise)
-    if transport.posterior is not None:
+    if transport.has_error_bars and "direct" in transport.parts:
         maps["direct-error"] = lambda: ratio(
             "direct-error", transport.direct, ErrorBars(transport).direct()
         )

@@ -31,12 +31,11 @@ from nearfar.transport.adjoint import AdjointTransport
 from nearfar.transport.analysed import AnalysedLight, analysed_light, overlaps_of
 from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
 from nearfar.transport.boxes import BoxAxes, box_axes
-from nearfar.transport.free_posterior import FreePosterior
 from nearfar.transport.gains import gains_on, with_gains
 from nearfar.transport.parts import PLACES, USUAL_PARTS, Parts
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.plots import Plots, colours
-from nearfar.transport.posterior import PatternPosterior, Posterior
+from nearfar.transport.posterior import AnyPosterior
 from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.quality import Quality
 from nearfar.transport.verdict import KeptVerdict
@@ -95,10 +94,9 @@ class Transport(NoArray):
         What T is split into; see `nearfar.transport.parts`.
     provenance : mapping
         How it was made: plan, estimator, exposure, version. Of JSON types.
-    posterior : Posterior or PatternPosterior, optional
-        State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it.
-    free_posterior : FreePosterior, optional
-        The same of an estimate of free rows.
+    posterior : Posterior, PatternPosterior or FreePosterior, optional
+        State of the estimate from which `nearfar.ErrorBars` follow, if the estimator gives it: of a
+        joint estimate, of one from any patterns, or of free rows.
     quality : Quality, optional
         Confidence in q and saturation of each camera pixel, where the photos show them.
     verdict : KeptVerdict, optional
@@ -132,11 +130,10 @@ class Transport(NoArray):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     pitch: int = 1
     footprint: Floats | None = None
-    posterior: Posterior | PatternPosterior | None = None
+    posterior: AnyPosterior | None = None
     quality: Quality | None = None
     verdict: KeptVerdict | None = None
     parts: Parts = USUAL_PARTS
-    free_posterior: FreePosterior | None = None
 
     @property
     def camera(self) -> Size:
@@ -173,7 +170,7 @@ class Transport(NoArray):
     @property
     def has_error_bars(self) -> bool:
         """Whether error bars follow from its estimate."""
-        return self.posterior is not None or self.free_posterior is not None
+        return self.posterior is not None
 
     @property
     def lit(self) -> Booleans:
@@ -338,7 +335,6 @@ class Transport(NoArray):
             self,
             provenance=with_gains(self.provenance, gains),
             posterior=None,
-            free_posterior=None,
             verdict=None,
             direct=self.direct * np.float32(gains.direct),
             near=self.near * np.float32(gains.near),
@@ -489,7 +485,6 @@ class Transport(NoArray):
         one = replace(
             self,
             posterior=None,
-            free_posterior=None,
             **{
                 name: getattr(self, name)[:, :, channel : channel + 1]
                 for name in ("direct", "near", "far", "black", "noise")

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Integers, middles
-from nearfar.transport.free_posterior import OF_PIXELS, FreePosterior
 from nearfar.transport.model import Transport
-from nearfar.transport.posterior import PatternPosterior, Posterior
+from nearfar.transport.posterior import FreePosterior, PatternPosterior, Posterior
 from nearfar.transport.quality import Quality
 
 # Attributes of a transport with a value for each camera pixel.
@@ -27,12 +26,12 @@ POSTERIOR_FIELDS = (
 QUALITY_FIELDS = ("confidence", "saturated")
 PATTERN_POSTERIOR_FIELDS = ("prior_component", "variance_ratio", "black_deviation")
 # Attributes that may be None, and by their type their own with a value for each camera pixel.
-OPTIONAL_PARTS = ("posterior", "quality", "free_posterior")
+OPTIONAL_PARTS = ("posterior", "quality")
 FIELDS: dict[type, tuple[str, ...]] = {
     Posterior: POSTERIOR_FIELDS,
     PatternPosterior: PATTERN_POSTERIOR_FIELDS,
+    FreePosterior: ("variance_ratio",),
     Quality: QUALITY_FIELDS,
-    FreePosterior: OF_PIXELS,
 }
 
 

@@ -25,20 +25,18 @@ from nearfar.files.stores import (
 from nearfar.illumination.frequencies import frequency_from_text, frequency_to_text
 from nearfar.illumination.near_basis import basis_of
 from nearfar.illumination.real_basis import RealBasis, real_basis
-from nearfar.transport.free_posterior import FreePosterior
-from nearfar.transport.free_store import shared_of, write_shared
 from nearfar.transport.gains import gains_of
 from nearfar.transport.matrix_store import rows_of_chunk
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS, Parts, parts_from_json
-from nearfar.transport.posterior import PatternPosterior
+from nearfar.transport.posterior import Posterior
 from nearfar.transport.posterior_store import (
     SharedPosterior,
-    add_patterns,
     array_name,
     described,
     listed,
     shared_posterior,
+    write_shared,
 )
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import (
@@ -54,9 +52,9 @@ from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to
 
 KIND = "nearfar transport"
 # Version 2 added functions of near-range light that are of several projector pixels, and
-# footprints. Version 3 added transports without direct, near- or far-range light, and the posterior
-# of an estimate from any patterns. Other transports of single pixels are still written as version
-# 1, which older versions of nearfar read.
+# footprints. Version 3 added transports without direct, near- or far-range light, and posteriors of
+# estimates from any patterns and of free rows. Other transports of single pixels are still written
+# as version 1, which older versions of nearfar read.
 VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS = 1, 2, 3
 READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS)
 
@@ -76,12 +74,8 @@ PARTS_OF_T = "parts"
 
 # An optional part of a transport is stored as a mapping in the attributes and as arrays named
 # PART_FIELD. The posterior and some of its fields have older names in the format.
-POSTERIOR, QUALITY, FREE_POSTERIOR = "belief", "quality", "free_posterior"
-STORED_PARTS = {
-    "posterior": POSTERIOR,
-    "quality": QUALITY,
-    "free_posterior": FREE_POSTERIOR,
-}
+POSTERIOR, QUALITY = "belief", "quality"
+STORED_PARTS = {"posterior": POSTERIOR, "quality": QUALITY}
 
 
 @path_after_content
@@ -168,10 +162,8 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
             part_name = STORED_PARTS[optional]
             values |= {array_name(part_name, name): getattr(owner, name) for name in names}
     group = add_to_store(folder, KIND, _version(part), _attributes(part))
-    if isinstance(part.posterior, PatternPosterior):
-        add_patterns(group, POSTERIOR, part.posterior.patterns)
-    if part.free_posterior is not None and first == 0:
-        write_shared(group, part.free_posterior)
+    if part.posterior is not None and first == 0:
+        write_shared(group, POSTERIOR, part.posterior)
     for name, one in values.items():
         # The chunks of a single block need not divide it.
         most = min(height, rows_of_chunk(one))
@@ -189,7 +181,8 @@ def factors_of(parts: Parts) -> tuple[str, ...]:
 
 
 def _version(transport: Transport) -> int:
-    if isinstance(transport.posterior, PatternPosterior) or transport.parts != USUAL_PARTS:
+    of_other_patterns = not isinstance(transport.posterior, Posterior | None)
+    if of_other_patterns or transport.parts != USUAL_PARTS:
         return VERSION_OF_OTHERS
     return VERSION_OF_PIXELS if transport.pitch == 1 else VERSION_OF_HATS
 
@@ -223,8 +216,6 @@ def _attributes(transport: Transport) -> dict[str, Any]:
         attributes[QUALITY] = {}
     if transport.parts != USUAL_PARTS:
         attributes[PARTS_OF_T] = list(transport.parts)
-    if transport.free_posterior is not None:
-        attributes[FREE_POSTERIOR] = {"mean_variance": transport.free_posterior.mean_variance}
     if transport.verdict is not None:
         attributes[VERDICT] = verdict_to_json(transport.verdict)
     return attributes
@@ -266,7 +257,6 @@ class StoredTransport:
     _arrays: Mapping[str, Any]
     _posterior: SharedPosterior | None
     parts: Parts = USUAL_PARTS
-    _free: Mapping[str, Any] | None = None
 
     def rows(self, rows: slice = slice(None)) -> Transport:
         """Read some rows of the camera.
@@ -277,24 +267,19 @@ class StoredTransport:
             If their chunks are damaged.
         """
         read = {name: read_selection(array, (rows,)) for name, array in self._arrays.items()}
-        posterior = None if self._posterior is None else self._posterior.of(read, POSTERIOR)
+        try:
+            posterior = None if self._posterior is None else self._posterior.of(read, POSTERIOR)
+        except ValueError:
+            raise _misfit(self.path) from None
         quality_fields: dict[str, Any] = {
             name: read.pop(f"{QUALITY}_{name}")
             for name in QUALITY_FIELDS
             if f"{QUALITY}_{name}" in read
         }
-        free = None
-        if self._free is not None:
-            ratio = read.pop(array_name(FREE_POSTERIOR, *FIELDS[FreePosterior]))
-            free = FreePosterior(**self._free, ratio=ratio)
         each = read["black"].shape
         for name, shape in (("direct", each), ("near", (*each, 0, 0)), ("far", (*each, 0))):
             read.setdefault(name, np.zeros(shape, np.float32))
         read.setdefault("correspondence", np.full((*each[:2], 2), np.nan, np.float32))
-        if posterior is not None:
-            last = int(posterior.prior_component.max(initial=0))
-            if last >= len(posterior.prior_components):
-                raise _misfit(self.path)
         return Transport(
             projector=self.projector,
             far_basis=self.far_basis,
@@ -304,7 +289,6 @@ class StoredTransport:
             verdict=self.verdict,
             pitch=self.pitch,
             parts=self.parts,
-            free_posterior=free,
             **read,
         )
 
@@ -343,7 +327,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
     """
     path = Path(path)
     group = open_store(path, KIND, *READABLE_VERSIONS)
-    posterior = verdict = free = None
+    posterior = verdict = None
     try:
         parts = parts_from_json(group.attrs.get(PARTS_OF_T, list(USUAL_PARTS)))
         arrays = {name: open_array(group, name) for name in factors_of(parts)}
@@ -354,9 +338,8 @@ def open_transport(path: AnyPath) -> StoredTransport:
         provenance = dict(_mapped(group.attrs["provenance"]))
         gains_of(provenance)
         if POSTERIOR in group.attrs:
-            posterior = shared_posterior(_mapped(group.attrs[POSTERIOR]), group, POSTERIOR)
-        if FREE_POSTERIOR in group.attrs:
-            free = shared_of(group, _mapped(group.attrs[FREE_POSTERIOR]), projector)
+            described_as = _mapped(group.attrs[POSTERIOR])
+            posterior = shared_posterior(described_as, group, POSTERIOR, projector)
         if VERDICT in group.attrs:
             verdict = verdict_from_json(_mapped(group.attrs[VERDICT]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -377,14 +360,11 @@ def open_transport(path: AnyPath) -> StoredTransport:
     if near_basis.pitch > 1:
         arrays |= {name: open_array(group, name) for name in OPTIONAL_FACTORS}
         shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 4))
-    if free is not None:
-        ratio = array_name(FREE_POSTERIOR, *FIELDS[FreePosterior])
-        arrays[ratio], shapes[ratio] = open_array(group, ratio), each[:2]
     _require_shapes(path, arrays, shapes)
     if posterior is not None:
         names = posterior.arrays(POSTERIOR)
         arrays |= {name: open_array(group, name) for name in names}
-        if not posterior.fits(arrays, POSTERIOR, basis.projector, each):
+        if not posterior.fits(arrays, POSTERIOR, projector, each):
             raise _misfit(path)
     if QUALITY in group.attrs:
         quality = {
@@ -409,7 +389,6 @@ def open_transport(path: AnyPath) -> StoredTransport:
         arrays,
         posterior,
         parts,
-        free,
     )
 
 

@@ -13,7 +13,7 @@ from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
 from nearfar.transport.band import band_edge
 from nearfar.transport.model import Components, Transport
-from nearfar.transport.posterior import PatternPosterior, deviation_of_mean
+from nearfar.transport.posterior import Posterior, deviation_of_mean
 
 # Spectra end at this fraction of their largest value (-140 dB).
 RELATIVE_SPECTRUM_FLOOR = 1e-7
@@ -85,8 +85,6 @@ def transport_row(transport: Transport, x: int) -> TransportRow:
 
 
 def _why_no_errors(transport: Transport, *, saturated: bool | None) -> str:
-    if "free" in transport.parts:
-        return "they are of relit pictures alone"
     if transport.posterior is None:
         return "this estimate does not tell them"
     return "they are unknown" if saturated else ""
@@ -103,9 +101,9 @@ def _bands(transport: Transport) -> dict[str, Any]:
     """Return k_far, k_near and the measured frequencies, in cycles per projector pixel."""
     far = band_edge(transport)
     posterior = transport.posterior
-    if posterior is not None:
+    if posterior is not None and "free" not in transport.parts:
         # Other people's patterns measure no frequency by itself: those that the transport holds.
-        held = transport.far_basis if isinstance(posterior, PatternPosterior) else posterior
+        held = posterior if isinstance(posterior, Posterior) else transport.far_basis
         measured = [(float(k.fy), float(k.fx)) for k in held.frequencies]
     else:
         side = Size(transport.window, transport.window)

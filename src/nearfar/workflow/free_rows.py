@@ -240,7 +240,7 @@ def _as_transport(job: _Job, rows: FreeRows, saturated: NDArray[np.bool_]) -> Tr
         black=rows.black.reshape(shape),
         noise=rows.noise.reshape(shape),
         parts=("direct", "free"),
-        free_posterior=posterior_of(job.design, rows.ratio.reshape(camera)),
+        posterior=posterior_of(job.design, rows.ratio.reshape(camera)),
         provenance={
             "nearfar": version(),
             "method": METHOD,

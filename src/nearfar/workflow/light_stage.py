@@ -15,8 +15,8 @@ from nearfar.errors import InputError
 from nearfar.estimate.light_stage import LampGains, Sums, fit_gains, spread_of, sums_of
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
-from nearfar.transport.free_posterior import LEAST_SQUARES, FreePosterior
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import LEAST_SQUARES, FreePosterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.store import write_transport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
@@ -140,7 +140,7 @@ def _blocks(
             black=stage.black[rows],
             noise=noise[rows].astype(np.float32),
             parts=("free",),
-            free_posterior=None if gains is None else _posterior(stage, gains, camera),
+            posterior=None if gains is None else _posterior(stage, gains, camera),
             provenance=provenance,
             quality=Quality(np.zeros(camera, np.float32), stage.saturated[rows]),
             verdict=verdict,
@@ -165,7 +165,7 @@ def _posterior(stage: LightStage, gains: LampGains, camera: tuple[int, ...]) -> 
         mean=np.zeros(lamps, np.float32),
         mean_variance=0.0,
         gain_errors=relative.astype(np.float32),
-        ratio=np.full(camera, LEAST_SQUARES),
+        variance_ratio=np.full(camera, LEAST_SQUARES),
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.estimate.deviations import deviation_of_picture
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.parts import require_parts
 from nearfar.transport.store import StoredTransport
@@ -51,5 +51,6 @@ def error_bars_of_stored(
     InputError
         If the transport holds no error bars, or does not have a part.
     """
-    parts = (deviation_of_picture(rows, light, gains) for rows in stored.blocks())
+    require_parts(stored.parts, gains)
+    parts = (ErrorBars(rows).picture(light, **gains) for rows in stored.blocks())
     return np.concatenate([part.astype(np.float32, copy=False) for part in parts])

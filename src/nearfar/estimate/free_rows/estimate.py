@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.free_rows.design import Design
-from nearfar.transport.free_posterior import LEAST_SQUARES, FreePosterior
+from nearfar.transport.posterior import LEAST_SQUARES, FreePosterior
 
 # Variance ratios to choose among, times the mean power of the directions.
 RATIOS = np.logspace(-3, 9, 25)
@@ -221,5 +221,5 @@ def posterior_of(design: Design, ratio: Floats) -> FreePosterior | None:
         mean=design.mean.astype(np.float32),
         mean_variance=float((design.from_known[-1] ** 2).sum()),
         gain_errors=np.zeros((0, design.lamps), np.float32),
-        ratio=ratio,
+        variance_ratio=ratio,
     )

@@ -8,7 +8,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.transport.model import Transport
-from nearfar.transport.posterior import PatternPosterior, Posterior
+from nearfar.transport.posterior import AnyPosterior, Posterior
 
 # Noise is scaled by this to find the error that photos without noise would leave.
 NOISE_FACTOR = 1e-3
@@ -36,8 +36,8 @@ def bars_of(transport: Transport) -> Bars | None:
     return Bars(ErrorBars(transport), ErrorBars(without_noise))
 
 
-def _without_noise(posterior: Posterior | PatternPosterior) -> Posterior | PatternPosterior:
-    if isinstance(posterior, PatternPosterior):
+def _without_noise(posterior: AnyPosterior) -> AnyPosterior:
+    if not isinstance(posterior, Posterior):
         return replace(posterior, variance_ratio=posterior.variance_ratio / NOISE_FACTOR**2)
     return replace(
         posterior,

@@ -10,7 +10,7 @@ from nearfar.capture import Capture
 from nearfar.estimate.free_rows.design import Design, design_of
 from nearfar.estimate.free_rows.error_bars import variance_in_noise
 from nearfar.estimate.free_rows.estimate import FreeRows, estimate_free_rows, posterior_of
-from nearfar.transport.free_posterior import FreePosterior
+from nearfar.transport.posterior import FreePosterior
 from nearfar.transport.verdict import LARGEST_WIDENING, Grade, KeptVerdict, Reason
 from nearfar.workflow.verdict.verdict import DOUBTFUL_DECIBELS, WRONG_DECIBELS
 from nearfar.workflow.verdict.widening import SPREAD, SURE_DEVIATIONS
@@ -113,7 +113,7 @@ def _expected(design: Design, posterior: FreePosterior, rows: FreeRows, light: F
             mean=(known @ design.patterns).astype(np.float32),
             mean_variance=float((known**2).sum()),
         )
-    variance = variance_in_noise(posterior, rows.lamp, light, 1.0, 1.0)
+    (variance,) = variance_in_noise(posterior, rows.lamp, light[None], 1.0, 1.0)
     return float(np.mean(rows.noise.astype(np.float64) ** 2 * variance[:, None]))
 
 

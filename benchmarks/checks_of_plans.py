@@ -16,7 +16,7 @@ from nearfar.arrays import Floats
 from nearfar.capture.writing import write_capture
 from nearfar.plan.checks import check_lights
 from nearfar.transport.model import Transport
-from nearfar.transport.store import open_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.verdict.correspondence_lights import correspondence_lights

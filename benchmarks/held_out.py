@@ -30,7 +30,7 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.hostile import hostile_transport
-from nearfar.transport.store import open_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import exposure_of
 from nearfar.workflow.verdict.verdict import judge_reconstruction

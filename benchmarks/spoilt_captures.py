@@ -17,7 +17,7 @@ import numpy as np
 
 from nearfar import NearfarError, Size, natural_picture, paper_plan, reconstruct_to_file
 from nearfar.capture.writing import write_capture
-from nearfar.transport.store import StoredTransport, open_transport
+from nearfar.transport.stored import StoredTransport, open_transport
 from nearfar.workflow.evaluate import decibels
 from nearfar.workflow.verdict.verdict import Verdict, judge_reconstruction
 from spoils import SPOILS, Photos, Shot, shoot, shoot_plan

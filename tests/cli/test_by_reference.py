@@ -9,7 +9,8 @@ import pytest
 
 from nearfar.capture import open_capture
 from nearfar.plan import read_plan
-from nearfar.transport.store import StoredTransport, load_transport
+from nearfar.transport.store import load_transport
+from nearfar.transport.stored import StoredTransport
 from tests.cli.conftest import (
     BY_PAPER,
     PLAN,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from nearfar.transport.store import write_verdict
+from nearfar.transport.store_writing import write_verdict
 from nearfar.transport.verdict import KeptVerdict, Reason
 from tests.cli.conftest import Job, check_done, run_nearfar
 

@@ -15,7 +15,8 @@ from nearfar.report.reconstruction import MAXIMUM_DISPLAYED_PIXELS, reconstructi
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.transport.store import load_transport, open_transport
+from nearfar.transport.store import load_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import check_done, run_nearfar

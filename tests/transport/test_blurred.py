@@ -16,7 +16,7 @@ from nearfar.transport import near as windows
 from nearfar.transport.model import Transport
 from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.rows import of_pixels, of_rows, stacked
-from nearfar.transport.store import StoredTransport, open_transport
+from nearfar.transport.stored import StoredTransport, open_transport
 from nearfar.workflow.relight import relight_stored
 
 PROJECTOR, CAMERA = Size(37, 52), Size(5, 7)

@@ -15,7 +15,8 @@ from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS
 from nearfar.transport.plots import Plots
 from nearfar.transport.posterior import FreePosterior
-from nearfar.transport.store import load_transport, open_transport, save_transport
+from nearfar.transport.store import load_transport, save_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.free_rows import free_basis
 from tests.metadata import change_attributes
 from tests.worlds import model_transport

@@ -30,12 +30,9 @@ from nearfar.transport.rows import (
     stacked,
     thinned_blocks,
 )
-from nearfar.transport.store import (
-    load_transport,
-    open_transport,
-    save_transport,
-    write_verdict,
-)
+from nearfar.transport.store import load_transport, save_transport
+from nearfar.transport.store_writing import write_verdict
+from nearfar.transport.stored import open_transport
 from nearfar.transport.verdict import KeptVerdict, Reason, verdict_to_json
 from tests.metadata import change_attributes, change_metadata
 from tests.transport.test_operators import CAMERA, PROJECTOR, _exact, _transport

@@ -21,7 +21,8 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport.rows import FACTORS, POSTERIOR_FIELDS, of_rows
-from nearfar.transport.store import load_transport, write_transport
+from nearfar.transport.store import load_transport
+from nearfar.transport.store_writing import write_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import relighting_snr, snr
 from nearfar.workflow.judge import judge_by_truth

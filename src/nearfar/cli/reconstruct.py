@@ -274,7 +274,7 @@ def _write_report(
 ) -> None:
     from nearfar.report.page import write_page
     from nearfar.report.reconstruction import reconstruction_page
-    from nearfar.transport.store import open_transport
+    from nearfar.transport.stored import open_transport
     from nearfar.workflow.diagnosis.misfit_maps import measure_misfit
 
     transport = open_transport(output)

@@ -14,7 +14,7 @@ from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.arrays import Floats
-    from nearfar.transport.store import StoredTransport
+    from nearfar.transport.stored import StoredTransport
 
 COMPONENTS = ("direct", "near", "far", "free")
 
@@ -121,7 +121,7 @@ def relight(
         write_picture,
     )
     from nearfar.transport.colour import as_channels_see
-    from nearfar.transport.store import open_transport
+    from nearfar.transport.stored import open_transport
     from nearfar.workflow.relight import error_bars_of_stored, relight_stored
 
     gains = _gains(gain or [])

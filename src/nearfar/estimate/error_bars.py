@@ -18,9 +18,10 @@ from nearfar.estimate.free_rows.error_bars import FreeVariances
 from nearfar.estimate.joint.error_bars import JointVariances
 from nearfar.transport import near
 from nearfar.transport.boxes import box_axes
+from nearfar.transport.components import Components
 from nearfar.transport.direct import footprint
 from nearfar.transport.gains import Gains, gains_on
-from nearfar.transport.model import Components, Transport
+from nearfar.transport.model import Transport
 from nearfar.transport.posterior import FreePosterior, PatternPosterior
 
 # Camera pixels of a batch.

@@ -19,8 +19,8 @@ from nearfar.transport.exact_store import load_exact
 from nearfar.transport.gains import why_unjudgeable
 from nearfar.transport.model import Transport
 from nearfar.transport.operator_store import KIND as OPERATOR_KIND
-from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
+from nearfar.transport.store_format import KIND as TRANSPORT_KIND
 from nearfar.transport.verdict import NOT_JUDGED
 
 

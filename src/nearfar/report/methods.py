@@ -9,7 +9,7 @@ from nearfar.release import version
 from nearfar.report.about import PAPER, Methods, software_reference
 from nearfar.report.plan import describe_window
 from nearfar.transport.model import Transport
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.check import ModelCheck
 from nearfar.workflow.compare import Comparison
 from nearfar.workflow.rivals import RIVALS

@@ -21,7 +21,7 @@ from nearfar.report.misfit import misfit_section
 from nearfar.report.page import colour_map, facts, gallery, listed, page, plot, verdict_box
 from nearfar.report.plan import describe_window
 from nearfar.transport.model import Transport
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps
 from nearfar.workflow.verdict.verdict import Verdict
 

@@ -30,7 +30,7 @@ from nearfar.transport.matrix_store import (
 )
 from nearfar.transport.operator_store import KIND as OPERATOR_KIND
 from nearfar.transport.operator_store import load_operator, save_operator
-from nearfar.transport.store import MAXIMUM_REASON, stored_size
+from nearfar.transport.store_format import MAXIMUM_REASON, stored_size
 
 KIND = "nearfar exact transport"
 FORMAT_VERSION = 1

@@ -1,15 +1,15 @@
 """A measured transport T = D + N + F, kept as factors and applied as a linear operator."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator
 
-from nearfar.arrays import Booleans, Floats, Size, blocks
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.checks import (
     NoArray,
     as_count,
@@ -19,39 +19,24 @@ from nearfar.checks import (
     as_number,
     as_pixels,
     as_place,
-    finite_numbers,
 )
 from nearfar.errors import InputError
 from nearfar.illumination.near_basis import NearBasis, basis_of
 from nearfar.illumination.real_basis import RealBasis
-from nearfar.markup import card, picture
-from nearfar.transport import direct as footprints
-from nearfar.transport import near as windows
 from nearfar.transport.adjoint import AdjointTransport
-from nearfar.transport.analysed import AnalysedLight, analysed_light, overlaps_of
-from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
-from nearfar.transport.boxes import BoxAxes, box_axes
+from nearfar.transport.analysed import AnalysedLight
+from nearfar.transport.boxes import BoxAxes
+from nearfar.transport.components import Components
+from nearfar.transport.factors import Factors
 from nearfar.transport.gains import gains_on, with_gains
+from nearfar.transport.linear_operator import linear_operator
 from nearfar.transport.parts import PLACES, USUAL_PARTS, Parts
-from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
-from nearfar.transport.plots import Plots, colours
+from nearfar.transport.plots import Plots
 from nearfar.transport.posterior import AnyPosterior
 from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.quality import Quality
+from nearfar.transport.summary_card import summary_card
 from nearfar.transport.verdict import KeptVerdict
-
-# Camera pixels of a batch: their windows take some tens of megabytes at W = 19.
-BATCH_PIXELS = 8192
-# Pixels along the longer side of a picture that a notebook shows.
-THUMBNAIL = 256
-
-
-class Components(NamedTuple):
-    """Pictures under one light, each (Cy, Cx) or (Cy, Cx, channels)."""
-
-    direct: Floats
-    near: Floats
-    far: Floats
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -156,9 +141,32 @@ class Transport(NoArray):
         return basis_of(self.near.shape[3:], self.pitch)
 
     @cached_property
+    def factors(self) -> Factors:
+        """d, n and f by camera pixel."""
+        shape = (self.camera.pixels, self.channels)
+        near, far = (
+            factor.reshape(*shape, math.prod(factor.shape[3:])) for factor in (self.near, self.far)
+        )
+        return Factors(
+            projector=self.projector,
+            q=self.correspondence.reshape(-1, 2),
+            direct=self.direct.reshape(shape),
+            near=near,
+            far=far,
+            far_basis=self.far_basis,
+            near_basis=self.near_basis,
+            boxes=self.boxes,
+        )
+
+    @property
     def pyramid(self) -> Pyramid:
         """Where functions of several projector pixels read blurred lights."""
-        return Pyramid(self.near_basis, self.projector)
+        return self.factors.pyramid
+
+    @property
+    def box_axes(self) -> BoxAxes:
+        """Where boxes about q read a summed-area table, where `pitch` is over 1."""
+        return self.factors.box_axes
 
     @property
     def boxes(self) -> Floats:
@@ -177,19 +185,6 @@ class Transport(NoArray):
         """Camera pixels with direct light, shape (Cy, Cx)."""
         return np.isfinite(self.correspondence[..., 0])
 
-    @cached_property
-    def _footprint(self) -> footprints.Footprint:
-        return footprints.footprint(self.correspondence, self.projector)
-
-    @cached_property
-    def box_axes(self) -> BoxAxes:
-        """Where boxes about q read a summed-area table, where `pitch` is over 1."""
-        return box_axes(self.correspondence, self.boxes, self.projector)
-
-    @cached_property
-    def _centres(self) -> NDArray[np.int64]:
-        return windows.centre(self.correspondence, self.projector)
-
     @property
     def plot(self) -> Plots:
         """Drawings of the transport, as matplotlib axes; see `nearfar.transport.plots`."""
@@ -203,25 +198,7 @@ class Transport(NoArray):
 
     def _repr_html_(self) -> str:
         """Show the transport in a notebook, floodlit and taken apart."""
-        step = -(-max(self.camera) // THUMBNAIL)
-        parts = self.components(np.ones(self.projector, dtype=np.float32))
-        pictures = {"floodlit": np.asarray(sum(parts)), **self.named(parts)}
-        brightest = float(np.percentile(pictures["floodlit"], 99.5))
-        images = [
-            (name, picture(colours(part)[::step, ::step] / max(brightest, 1e-9), name))
-            for name, part in pictures.items()
-        ]
-        rows = [
-            ("projector", str(self.projector)),
-            ("camera", f"{self.camera}, {self.channels} channels"),
-            ("parts", " + ".join(self.parts)),
-            ("window W, far coefficients", f"{self.window}, {self.far_basis.count}"),
-            ("directly lit", f"{self.lit.mean():.1%} of the camera"),
-            ("verdict", self.verdict.grade if self.verdict is not None else "not judged"),
-            ("error bars", "yes" if self.has_error_bars else "no"),
-            ("method", str(self.provenance.get("method", "unknown"))),
-        ]
-        return card("transport", rows, images)
+        return summary_card(self)
 
     def __matmul__(self, light: Floats) -> Floats:
         return np.asarray(sum(self.components(light)))
@@ -256,7 +233,7 @@ class Transport(NoArray):
         InputError
             As `components`.
         """
-        return self._analyse(self.lights(light))
+        return self.factors.analyse(self.lights(light))
 
     def components(self, light: Floats | AnalysedLight) -> Components:
         """Relight each component by itself.
@@ -276,7 +253,7 @@ class Transport(NoArray):
             If the light has another size than the pattern grid, or other channels.
         """
         analysed = light if isinstance(light, AnalysedLight) else self.analyse(light)
-        return Components(*(self.picture(flat) for flat in self._relit(analysed)))
+        return Components(*(self.picture(flat) for flat in self.factors.relit(analysed)))
 
     def relight(
         self,
@@ -362,7 +339,7 @@ class Transport(NoArray):
         if not len(checked):
             return np.zeros((0, *self.camera, self.channels), dtype=np.float32)
         flat = np.stack([self._flat(light) for light in checked])
-        direct, near, far = self._components(flat)
+        direct, near, far = self.factors.pictures(flat)
         direct += near
         direct += far
         return direct.reshape(len(flat), *self.camera, self.channels)
@@ -384,7 +361,7 @@ class Transport(NoArray):
             If the image does not hold finite numbers, or is of another shape.
         """
         flat = as_image(image, self.camera, self.channels)
-        back = [self._adjoint_channel(flat[:, i], i) for i in range(self.channels)]
+        back = [self.factors.back(flat[:, i], i) for i in range(self.channels)]
         stacked = np.stack(back, axis=-1)
         return stacked[..., 0] if self.channels == 1 else stacked
 
@@ -409,35 +386,7 @@ class Transport(NoArray):
 
     def component_rows(self, pixels: slice) -> Components:
         """Return dense rows of D, N and F of chosen camera pixels; see `rows`."""
-        pixels = as_pixels(pixels, self.camera.pixels)
-        if self.pitch > 1:
-            count, channels = self.camera.pixels, self.channels
-            d, n = blurred_rows(
-                self.direct.reshape(count, channels)[pixels],
-                self.near.reshape(count, channels, -1)[pixels],
-                self.pyramid,
-                self._centres[pixels],
-                self.box_axes.of(pixels),
-            )
-            low = self.far.reshape(count, channels, -1)[pixels]
-            return Components(d, n, self.far_basis.synthesise(low).astype(np.float32, copy=False))
-        flat_direct, flat_near, flat_far = (part[pixels] for part in self._flat_factors)
-        f = self.far_basis.synthesise(flat_far).astype(np.float32, copy=False)
-        number = np.arange(len(f))[:, None]
-        corners = self._footprint.pixels[pixels]
-        weights = self._footprint.weights[pixels]
-        centres = self._centres[pixels]
-        inside = windows.inside(centres, self.window, self.projector)
-        # Entries beyond the border go to a column of their own, which is cut off.
-        beyond = self.projector.pixels
-        flat = np.where(inside, windows.window_pixels(centres, self.window, self.projector), beyond)
-        d = np.zeros_like(f)
-        n = np.zeros((*f.shape[:2], beyond + 1), dtype=np.float32)
-        for i in range(self.channels):
-            # Corners may coincide at the border: add each on its own.
-            np.add.at(d[:, i], (number, corners), weights * flat_direct[:, i, None])
-            n[number, i, flat] = flat_near[:, i]
-        return Components(d, n[..., :beyond], f)
+        return self.factors.rows(as_pixels(pixels, self.camera.pixels))
 
     def dense(self) -> Floats:
         """Return all of T, shape (C, channels, P), float32: for small transports."""
@@ -482,25 +431,7 @@ class Transport(NoArray):
                 f"channel {channel} is not one of this transport's: give one from 0 to "
                 f"{self.channels - 1}."
             )
-        one = replace(
-            self,
-            posterior=None,
-            **{
-                name: getattr(self, name)[:, :, channel : channel + 1]
-                for name in ("direct", "near", "far", "black", "noise")
-            },
-        )
-
-        def matvec(light: Floats) -> Floats:
-            lights = finite_numbers(light, "the light").reshape(1, 1, -1).astype(np.float64)
-            return np.asarray(sum(one._components(lights)))[0, :, 0]
-
-        def rmatvec(image: Floats) -> Floats:
-            flat = finite_numbers(image, "the image").ravel()
-            return self._adjoint_channel(flat, channel).ravel()
-
-        shape = (self.camera.pixels, self.projector.pixels)
-        return LinearOperator(shape, matvec=matvec, rmatvec=rmatvec, dtype=np.float64)
+        return linear_operator(self.factors.of_channel(channel))
 
     def lights(self, light: Floats) -> Floats:
         """Check a light and flatten it to (1, P) for all channels, or (channels, P).
@@ -523,52 +454,3 @@ class Transport(NoArray):
         """Shape values (C, channels) as a picture: (Cy, Cx), or (Cy, Cx, channels)."""
         picture = flat.reshape(*self.camera, self.channels)
         return picture[..., 0] if self.channels == 1 else picture
-
-    def _analyse(self, flat: Floats) -> AnalysedLight:
-        """Analyse a light (1 or channels, P)."""
-        return analysed_light(flat, self.far_basis, self.pyramid if self.pitch > 1 else None)
-
-    def _relit(self, light: AnalysedLight) -> Components:
-        """Return pictures (C, channels) under a light."""
-        direct, near, far = self._flat_factors
-        (of_far,) = far_pictures(far, light.overlaps[None])
-        if self.pitch > 1:
-            centres, boxes = self._centres, self.box_axes
-            of_direct, of_near = blurred_pictures(
-                direct, near, self.pyramid, centres, boxes, light.blurred
-            )
-        else:
-            (of_direct,) = direct_pictures(direct, self._footprint, light.flat[None])
-            (of_near,) = near_pictures(near, self._centres, self.projector, light.flat[None])
-        return Components(of_direct, of_near, of_far)
-
-    def _components(self, lights: Floats) -> Components:
-        """Return pictures (L, C, channels) under lights (L, 1 or channels, P)."""
-        if self.pitch > 1:
-            pictures = [self._relit(self._analyse(light)) for light in lights]
-            return Components(*(np.stack(parts) for parts in zip(*pictures, strict=True)))
-        direct, near, far = self._flat_factors
-        return Components(
-            direct_pictures(direct, self._footprint, lights),
-            near_pictures(near, self._centres, self.projector, lights),
-            far_pictures(far, overlaps_of(lights, self.far_basis)),
-        )
-
-    @property
-    def _flat_factors(self) -> Components:
-        """d, n and f: (C, channels), (C, channels, J) and (C, channels, M)."""
-        shape = (self.camera.pixels, self.channels)
-        near, far = (factor.reshape(*shape, -1) for factor in (self.near, self.far))
-        return Components(self.direct.reshape(shape), near, far)
-
-    def _adjoint_channel(self, image: Floats, channel: int) -> Floats:
-        d, n, f = (part[:, channel] for part in self._flat_factors)
-        if self.pitch > 1:
-            back = blurred_adjoint(d, n, image, self.pyramid, self._centres, self.box_axes)
-            return back + self.far_basis.synthesise(image @ f).reshape(self.projector)
-        back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
-        back = back + self.far_basis.synthesise(image @ f).reshape(self.projector)
-        for batch in blocks(self.camera.pixels, BATCH_PIXELS) if self.window else ():
-            values = n[batch] * image[batch, None]
-            back += windows.spread(values, self._centres[batch], self.window, self.projector)
-        return np.asarray(back)

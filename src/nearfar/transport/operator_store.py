@@ -22,7 +22,7 @@ from nearfar.transport.matrix_store import (
 )
 from nearfar.transport.mediated import Between, ConvolvedBetween, DenseBetween, Mediated
 from nearfar.transport.posterior_store import listed
-from nearfar.transport.store import MAXIMUM_REASON, stored_size
+from nearfar.transport.store_format import MAXIMUM_REASON, stored_size
 
 KIND = "nearfar exact operator"
 FORMAT_VERSION = 1

@@ -25,7 +25,7 @@ from nearfar.transport.coarse import block_means, in_blocks, size_in_blocks
 from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import FACTORS, of_pixels, of_rows, stacked, thinned_blocks
-from nearfar.transport.store import StoredTransport, open_transport
+from nearfar.transport.stored import StoredTransport, open_transport
 from nearfar.viewer.messages import Light
 from nearfar.viewer.pace import Pace
 

@@ -12,7 +12,8 @@ from nearfar.estimate.error_bars import ErrorBars
 from nearfar.illumination.frequencies import grid
 from nearfar.transport import near
 from nearfar.transport.band import band_edge
-from nearfar.transport.model import Components, Transport
+from nearfar.transport.components import Components
+from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior, deviation_of_mean
 
 # Spectra end at this fraction of their largest value (-140 dB).

@@ -26,7 +26,7 @@ from nearfar.transport import near
 from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import stacked
-from nearfar.transport.store import write_transport
+from nearfar.transport.store_writing import write_transport
 from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.reconstruction.sources import photos_without_drift
 from nearfar.workflow.reconstruction.summary import description_of

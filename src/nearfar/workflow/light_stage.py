@@ -18,7 +18,7 @@ from nearfar.release import version
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import LEAST_SQUARES, FreePosterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.store import write_transport
+from nearfar.transport.store_writing import write_transport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.free_rows import free_basis
 from nearfar.workflow.light_stage_photos import LightStage

@@ -8,7 +8,7 @@ from nearfar.arrays import Floats
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.parts import require_parts
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 
 
 def relight_stored(stored: StoredTransport, light: Floats, gains: Mapping[str, float]) -> Floats:

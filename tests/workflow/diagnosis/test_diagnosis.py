@@ -14,7 +14,7 @@ from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.plan import Sinusoid
 from nearfar.plan.checks import is_reference
 from nearfar.progress import ignore_progress
-from nearfar.transport.store import open_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis import single_photos
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.sample import PATCH, sample_camera, sampled_lines

@@ -8,7 +8,7 @@ from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
 from nearfar.faults.of_photos import ShowsOtherPattern
 from nearfar.plan import paper_plan
-from nearfar.transport.store import open_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 

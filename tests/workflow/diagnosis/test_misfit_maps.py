@@ -14,7 +14,8 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.quality import Quality
-from nearfar.transport.store import open_transport, save_transport
+from nearfar.transport.store import save_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis import misfit_maps
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
 from nearfar.workflow.verdict.verdict import Reason, Verdict, with_worst

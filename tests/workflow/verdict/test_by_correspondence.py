@@ -13,7 +13,7 @@ from nearfar.illumination.frequencies import DC
 from nearfar.photometry.by_inverse import find_pairs
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
-from nearfar.transport.store import open_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.inverse_pairs import find_motion_by_pairs
 from nearfar.workflow.diagnosis.misfit import fit_photos, serves

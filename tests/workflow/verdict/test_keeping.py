@@ -12,7 +12,9 @@ from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
-from nearfar.transport.store import load_transport, open_transport, save_transport, write_verdict
+from nearfar.transport.store import load_transport, save_transport
+from nearfar.transport.store_writing import write_verdict
+from nearfar.transport.stored import open_transport
 from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file

@@ -16,7 +16,8 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
-from nearfar.transport.store import open_transport, save_transport
+from nearfar.transport.store import save_transport
+from nearfar.transport.stored import open_transport
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.evaluate import decibels, exposure_of

@@ -16,7 +16,7 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.hostile import HOSTILE, hostile_transport
-from nearfar.transport.store import open_transport
+from nearfar.transport.stored import open_transport
 from nearfar.transport.verdict import KeptVerdict, verdict_from_json, verdict_to_json
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file

@@ -15,8 +15,8 @@ from nearfar.scenes.mitsuba.photos import RenderedWorld
 from nearfar.transport.exact_store import load_exact
 from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
-from nearfar.transport.store import KIND as TRANSPORT_KIND
 from nearfar.transport.store import load_transport
+from nearfar.transport.store_format import KIND as TRANSPORT_KIND
 
 # An exposure that is chosen brings the brightest camera pixel under full white to this share of
 # full scale.

@@ -11,7 +11,7 @@ from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, S
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.compression import find_compression
 from nearfar.workflow.diagnosis.inverse_pairs import (
     are_linear,

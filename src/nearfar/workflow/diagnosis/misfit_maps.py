@@ -21,7 +21,7 @@ from nearfar.plan import Plan, Sinusoid
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_pixels
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.misfit import (
     fit_photos,
     is_white_or_black,

@@ -15,7 +15,7 @@ from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.plan import Plan
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_pixels, stacked
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 
 # Side of a patch: what estimates and derivatives need around them.
 PATCH = 8

@@ -17,7 +17,7 @@ from nearfar.files.logs import note, read_notes
 from nearfar.release import version
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import stacked
-from nearfar.transport.store import write_provenance, write_rows
+from nearfar.transport.store_writing import write_provenance, write_rows
 from nearfar.workflow.reconstruction.job import ReconstructedTile
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.summary import Summary

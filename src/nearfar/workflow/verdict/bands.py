@@ -6,7 +6,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Size, blocks
 from nearfar.transport.model import Transport
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.verdict.bars import Bars, bars_of
 from nearfar.workflow.verdict.held_out import HeldOutLight, joined
 

@@ -12,7 +12,7 @@ from nearfar.plan.checks import CheckLight, check_lights
 from nearfar.plan.patterns import HalfScreen
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.reconstruction.sources import photos_without_drift
 from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
 from nearfar.workflow.verdict.bars import Bars, mean_square

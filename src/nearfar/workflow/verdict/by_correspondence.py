@@ -8,7 +8,7 @@ from nearfar.photometry.drift import find_references
 from nearfar.photometry.photos import PhotosWithNoise, in_batches, mean_photo
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
 from nearfar.workflow.verdict.bars import Bars, mean_square
 from nearfar.workflow.verdict.correspondence_lights import WeighedLight, correspondence_lights

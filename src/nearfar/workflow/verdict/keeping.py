@@ -13,7 +13,8 @@ from nearfar.files.output import require_writable, storage_faults
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.gains import why_unjudgeable
 from nearfar.transport.parts import USUAL_PARTS
-from nearfar.transport.store import StoredTransport, open_transport, write_verdict
+from nearfar.transport.store_writing import write_verdict
+from nearfar.transport.stored import StoredTransport, open_transport
 from nearfar.workflow.reconstruction.summary import LARGEST_OF_TILES, description_of
 from nearfar.workflow.verdict.verdict import Verdict, judge_reconstruction
 

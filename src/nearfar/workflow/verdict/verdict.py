@@ -14,7 +14,7 @@ from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSat
 from nearfar.plan import Plan
 from nearfar.plan.checks import check_lights
 from nearfar.progress import Report, ignore_progress
-from nearfar.transport.store import StoredTransport
+from nearfar.transport.stored import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit

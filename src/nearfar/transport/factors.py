@@ -1,0 +1,150 @@
+"""The factors of a transport, camera pixel by camera pixel, and products with them.
+
+Index convention: camera pixels c are flattened row by row; lights are (1, P) for all channels, or
+(channels, P).
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nearfar.arrays import Floats, Size, blocks
+from nearfar.illumination.near_basis import NearBasis
+from nearfar.illumination.real_basis import RealBasis
+from nearfar.transport import direct as footprints
+from nearfar.transport import near as windows
+from nearfar.transport.analysed import AnalysedLight, analysed_light, overlaps_of
+from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
+from nearfar.transport.boxes import BoxAxes, box_axes
+from nearfar.transport.components import Components
+from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
+from nearfar.transport.pyramid import Pyramid
+
+# Camera pixels of a batch: their windows take some tens of megabytes at W = 19.
+BATCH_PIXELS = 8192
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """d, n and f of C camera pixels, as `nearfar.Transport` has them.
+
+    Attributes
+    ----------
+    projector : Size
+    q : ndarray, shape (C, 2)
+        Correspondence; NaN without direct light.
+    direct : ndarray, shape (C, channels)
+    near : ndarray, shape (C, channels, J)
+    far : ndarray, shape (C, channels, M)
+    far_basis : RealBasis
+    near_basis : NearBasis
+    boxes : ndarray, shape (C, 4)
+        Footprints of direct light, where functions of near-range light are of several projector
+        pixels.
+    """
+
+    projector: Size
+    q: Floats
+    direct: Floats
+    near: Floats
+    far: Floats
+    far_basis: RealBasis
+    near_basis: NearBasis
+    boxes: Floats
+
+    @property
+    def of_single_pixels(self) -> bool:
+        """Whether near-range light is made of single projector pixels."""
+        return self.near_basis.pitch == 1
+
+    @cached_property
+    def pyramid(self) -> Pyramid:
+        """Where functions of several projector pixels read blurred lights."""
+        return Pyramid(self.near_basis, self.projector)
+
+    @cached_property
+    def box_axes(self) -> BoxAxes:
+        """Where boxes about q read a summed-area table."""
+        return box_axes(self.q, self.boxes, self.projector)
+
+    @cached_property
+    def _footprint(self) -> footprints.Footprint:
+        return footprints.footprint(self.q, self.projector)
+
+    @cached_property
+    def _centres(self) -> NDArray[np.int64]:
+        return windows.centre(self.q, self.projector)
+
+    def of_channel(self, channel: int) -> "Factors":
+        """Return the factors of one channel."""
+        one = slice(channel, channel + 1)
+        return replace(
+            self, direct=self.direct[:, one], near=self.near[:, one], far=self.far[:, one]
+        )
+
+    def analyse(self, light: Floats) -> AnalysedLight:
+        """Analyse a light."""
+        pyramid = None if self.of_single_pixels else self.pyramid
+        return analysed_light(light, self.far_basis, pyramid)
+
+    def relit(self, light: AnalysedLight) -> Components:
+        """Return pictures (C, channels) under a light."""
+        (of_far,) = far_pictures(self.far, light.overlaps[None])
+        if self.of_single_pixels:
+            lights = light.flat[None]
+            (of_direct,) = direct_pictures(self.direct, self._footprint, lights)
+            (of_near,) = near_pictures(self.near, self._centres, self.projector, lights)
+        else:
+            of_direct, of_near = blurred_pictures(
+                self.direct, self.near, self.pyramid, self._centres, self.box_axes, light.blurred
+            )
+        return Components(of_direct, of_near, of_far)
+
+    def pictures(self, lights: Floats) -> Components:
+        """Return pictures (L, C, channels) under lights (L, 1 or channels, P)."""
+        if not self.of_single_pixels:
+            pictures = [self.relit(self.analyse(light)) for light in lights]
+            return Components(*(np.stack(parts) for parts in zip(*pictures, strict=True)))
+        return Components(
+            direct_pictures(self.direct, self._footprint, lights),
+            near_pictures(self.near, self._centres, self.projector, lights),
+            far_pictures(self.far, overlaps_of(lights, self.far_basis)),
+        )
+
+    def back(self, image: Floats, channel: int) -> Floats:
+        """Send one channel of an image (C,) back to the projector, (Py, Px)."""
+        d, n, f = (part[:, channel] for part in (self.direct, self.near, self.far))
+        of_far = self.far_basis.synthesise(image @ f).reshape(self.projector)
+        if not self.of_single_pixels:
+            return of_far + blurred_adjoint(d, n, image, self.pyramid, self._centres, self.box_axes)
+        back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
+        back = back + of_far
+        window = self.near_basis.window
+        for batch in blocks(len(image), BATCH_PIXELS) if window else ():
+            values = n[batch] * image[batch, None]
+            back += windows.spread(values, self._centres[batch], window, self.projector)
+        return np.asarray(back)
+
+    def rows(self, pixels: slice) -> Components:
+        """Return dense rows of D, N and F of camera pixels, (n, channels, P)."""
+        direct, near, far = (part[pixels] for part in (self.direct, self.near, self.far))
+        f = self.far_basis.synthesise(far).astype(np.float32, copy=False)
+        if not self.of_single_pixels:
+            centres, axes = self._centres[pixels], self.box_axes.of(pixels)
+            return Components(*blurred_rows(direct, near, self.pyramid, centres, axes), f)
+        number = np.arange(len(f))[:, None]
+        corners, weights = self._footprint.pixels[pixels], self._footprint.weights[pixels]
+        centres, window = self._centres[pixels], self.near_basis.window
+        inside = windows.inside(centres, window, self.projector)
+        # Entries beyond the border go to a column of their own, which is cut off.
+        beyond = self.projector.pixels
+        flat = np.where(inside, windows.window_pixels(centres, window, self.projector), beyond)
+        d = np.zeros_like(f)
+        n = np.zeros((*f.shape[:2], beyond + 1), dtype=np.float32)
+        for i in range(f.shape[1]):
+            # Corners may coincide at the border: add each on its own.
+            np.add.at(d[:, i], (number, corners), weights * direct[:, i, None])
+            n[number, i, flat] = near[:, i]
+        return Components(d, n[..., :beyond], f)

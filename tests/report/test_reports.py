@@ -11,7 +11,8 @@ from nearfar.arrays import Size
 from nearfar.files import read_picture, write_picture
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.report.maps import READINGS, maps_of
-from nearfar.report.reconstruction import MAXIMUM_DISPLAYED_PIXELS, reconstruction_page
+from nearfar.report.reconstruction import reconstruction_page
+from nearfar.report.transport_page import MAXIMUM_DISPLAYED_PIXELS
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -174,7 +175,7 @@ def test_a_large_camera_is_thinned_out(made, monkeypatch):
     from nearfar.capture import open_capture
 
     monkeypatch.setattr(
-        "nearfar.report.reconstruction.MAXIMUM_DISPLAYED_PIXELS", CAMERA.pixels // 3
+        "nearfar.report.transport_page.MAXIMUM_DISPLAYED_PIXELS", CAMERA.pixels // 3
     )
     stored, capture = open_transport(made / "t.zarr"), open_capture(made / "capture.zarr")
     page = reconstruction_page(stored, capture, judge_reconstruction(stored, capture))

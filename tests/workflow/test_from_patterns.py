@@ -171,6 +171,18 @@ def test_the_command_line_reconstructs_and_relights(world, tmp_path):
     other = tmp_path / "other.zarr"
     assert run_nearfar("reconstruct", capture, other, "--method", "paper").status == 2
     assert run_nearfar("reconstruct", capture, other, "--square").status == 2
-    page = run_nearfar("reconstruct", capture, other, "--report", tmp_path / "r.html")
-    assert page.status == 2
-    assert "nearfar view" in page.err
+
+
+@pytest.mark.parametrize(
+    "option", [("--correspondence", "q.npy"), ("--report", "r.html")], ids=lambda option: option[0]
+)
+def test_what_an_inverted_set_has_no_use_for_is_refused(world, tmp_path, option):
+    captured(world, SETS["random"](), tmp_path)
+    np.save(tmp_path / "q.npy", world.correspondence)
+    output = tmp_path / "T.npy"
+    name, file = option
+    ran = run_nearfar("reconstruct", tmp_path / "c.zarr", output, name, tmp_path / file)
+    assert ran.status == 2
+    assert name in ran.err
+    assert ".npy" in ran.err
+    assert not output.exists()

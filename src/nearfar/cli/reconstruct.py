@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, NamedTuple, cast
 
 import typer
 
@@ -27,7 +27,11 @@ from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.capture import Capture
+    from nearfar.correspondence import Correspondence
     from nearfar.devices import Device
+    from nearfar.transport.verdict import KeptVerdict
+    from nearfar.workflow.reconstruction.options import ReconstructionOptions
+    from nearfar.workflow.verdict.checked import Judged
     from nearfar.workflow.verdict.verdict import Verdict
 
 
@@ -96,13 +100,14 @@ def reconstruct(
     from nearfar.correspondence import read_correspondence
     from nearfar.files import check_resumable
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
-    from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
     from nearfar.workflow.reconstruction.sinks import RESUMABLE_TRANSPORT
-    from nearfar.workflow.verdict.keeping import judge_transport
 
     if device == "cuda" and scheduler is not None:
         raise typer.BadParameter("is not for --scheduler.", param_hint="--device")
-    available = parse_bytes(memory)
+    options = ReconstructionOptions(
+        method, square, parse_bytes(memory), cast("Device", device), half
+    )
+    outputs = _Outputs(output, report, as_json=as_json, force=force, quiet=quiet or as_json)
     inputs = [capture, *([correspondence] if correspondence else [])]
     keep_input(output, *inputs)
     if report is not None:
@@ -110,179 +115,154 @@ def reconstruct(
     check_resumable(output, RESUMABLE_TRANSPORT, resume=resume, force=force)
     opened = open_capture(capture)
     is_free = both_ranges_left_out(no_near=no_near, no_far=no_far)
-    if is_free or opened.plan.offset == "shown":
-        refused = {"--method": method != "joint", "--square": square, "--resume": resume}
-        refused |= {"--half": half, "--scheduler": scheduler is not None}
-        (_free_rows if is_free else _from_patterns)(
-            opened,
-            output,
-            correspondence,
-            available,
-            refused,
-            as_json=as_json,
-            force=force,
-            report=report,
-            quiet=quiet,
+    is_shown = opened.plan.offset == "shown"
+    if is_free or is_shown:
+        _refuse(
+            "is not for --no-near --no-far." if is_free else "is for photos of a plan.",
+            {
+                "--method": method != "joint",
+                "--square": square,
+                "--resume": resume,
+                "--half": half,
+                "--scheduler": scheduler is not None,
+            },
         )
+    if is_shown and not is_free and output.suffix.lower() == ".npy":
+        unused = {"--correspondence": correspondence is not None, "--report": report is not None}
+        _refuse("is not for a .npy, which is inverted without q: choose a .zarr.", unused)
+        _invert(opened, outputs)
         return
     given = None
     if correspondence is not None:
         given = read_correspondence(correspondence, opened.camera, opened.plan.projector)
-    options = ReconstructionOptions(method, square, available, cast("Device", device), half)
-    quiet = quiet or as_json
-    with progress_bar("reconstructing", quiet=quiet) as progress:
+    if is_free or is_shown:
+        _of_any_patterns(opened, given, options.memory, outputs, is_free=is_free)
+    else:
+        _of_plan(opened, given, options, scheduler, outputs, resume=resume)
+
+
+class _Outputs(NamedTuple):
+    """Where the results go, and how they are told."""
+
+    transport: Path
+    report: Path | None
+    as_json: bool
+    force: bool
+    quiet: bool
+
+    def write_report(self, page: str) -> None:
+        """Write the report, if it is wanted."""
+        from nearfar.report.page import write_page
+
+        if self.report is not None:
+            write_page(self.report, page, force=self.force)
+            say(f"report written to {self.report}", quiet=self.quiet)
+
+    def tell(self, verdict: "KeptVerdict") -> None:
+        """Print the verdict."""
+        if self.as_json:
+            print(json.dumps(verdict.as_json()))
+        say(str(verdict), quiet=self.quiet)
+
+
+def _refuse(why: str, options: dict[str, bool]) -> None:
+    """Refuse options that were given although they do not apply."""
+    for option, is_given in options.items():
+        if is_given:
+            raise typer.BadParameter(why, param_hint=option)
+
+
+def _of_plan(
+    capture: "Capture",
+    given: "Correspondence | None",
+    options: "ReconstructionOptions",
+    scheduler: str | None,
+    outputs: _Outputs,
+    *,
+    resume: bool,
+) -> None:
+    """Reconstruct from photos of a plan."""
+    from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
+    from nearfar.workflow.verdict.keeping import judge_transport
+
+    with progress_bar("reconstructing", quiet=outputs.quiet) as progress:
         summary = reconstruct_to_file(
-            opened,
-            output,
+            capture,
+            outputs.transport,
             given,
             options,
             scheduler=scheduler,
             resume=resume,
-            force=force,
+            force=outputs.force,
             progress=progress,
         )
-        verdict = judge_transport(output, opened, progress=progress)
-    say_reconstructed(summary, opened, output, quiet=quiet)
-    if report is not None:
-        _write_report(
-            report, output, opened, verdict, given=given is not None, force=force, quiet=quiet
-        )
-        say(f"report written to {report}", quiet=quiet)
-    if as_json:
-        print(json.dumps(verdict.as_json()))
-    say(str(verdict), quiet=quiet)
+        verdict = judge_transport(outputs.transport, capture, progress=progress)
+    say_reconstructed(summary, capture, outputs.transport, quiet=outputs.quiet)
+    if outputs.report is not None:
+        outputs.write_report(_page_of_plan(capture, verdict, outputs, given=given is not None))
+    outputs.tell(verdict.kept)
 
 
-def _free_rows(
+def _of_any_patterns(
     capture: "Capture",
-    output: Path,
-    correspondence: Path | None,
+    given: "Correspondence | None",
     memory: int,
-    refused: dict[str, bool],
+    outputs: _Outputs,
     *,
-    as_json: bool,
-    force: bool,
-    report: Path | None,
-    quiet: bool,
+    is_free: bool,
 ) -> None:
-    """Reconstruct free rows: lamps without a neighbourhood."""
-    from nearfar.correspondence import read_correspondence
+    """Reconstruct free rows, or from photos of anybody's patterns."""
     from nearfar.workflow.free_rows import reconstruct_free_rows_to_file
+    from nearfar.workflow.from_patterns import reconstruct_from_patterns_to_file
 
-    for option, is_given in {**refused, "--report": report is not None}.items():
-        if is_given:
-            raise typer.BadParameter("is not for --no-near --no-far.", param_hint=option)
-    given = None
-    if correspondence is not None:
-        given = read_correspondence(correspondence, capture.camera, capture.plan.projector)
-    with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
-        verdict, has_black = reconstruct_free_rows_to_file(
-            capture, output, given, memory=memory, force=force, progress=progress
+    reconstruct = reconstruct_free_rows_to_file if is_free else reconstruct_from_patterns_to_file
+    with progress_bar("reconstructing", quiet=outputs.quiet) as progress:
+        found = reconstruct(
+            capture,
+            outputs.transport,
+            given,
+            memory=memory,
+            force=outputs.force,
+            progress=progress,
         )
-    if not has_black:
-        warn(
-            f"{capture.path} has no photo under black, so that black was taken as 0: what is black "
-            f"in the photos stands in T as light."
+    for warning in found.warnings:
+        warn(warning)
+    say(f"transport of {found.described}, written to {outputs.transport}", quiet=outputs.quiet)
+    if outputs.report is not None:
+        outputs.write_report(
+            _page_of_any_patterns(capture, found.judged, outputs, given=given is not None)
         )
-    say(
-        f"transport of {capture.camera} camera pixels and {capture.plan.projector.pixels} lamps "
-        f"written to {output}",
-        quiet=quiet or as_json,
-    )
-    if as_json:
-        print(json.dumps(verdict.as_json()))
-    say(str(verdict), quiet=quiet or as_json)
+    outputs.tell(found.judged.verdict)
 
 
-def _from_patterns(
-    capture: "Capture",
-    output: Path,
-    correspondence: Path | None,
-    memory: int,
-    refused: dict[str, bool],
-    *,
-    as_json: bool,
-    force: bool,
-    report: Path | None,
-    quiet: bool,
-) -> None:
-    """Reconstruct from photos of anybody's patterns."""
-    from nearfar.correspondence import read_correspondence
-    from nearfar.transport.store import save_transport
-    from nearfar.workflow.from_patterns import reconstruct_from_patterns
-    from nearfar.workflow.pattern_faults import find_turns
-
-    for option, is_given in refused.items():
-        if is_given:
-            raise typer.BadParameter("is for photos of a plan.", param_hint=option)
-    if report is not None:
-        raise typer.BadParameter(
-            "is for photos of a plan: nearfar info says the verdict, and nearfar view shows maps "
-            "and error bars.",
-            param_hint="--report",
-        )
-    if output.suffix.lower() == ".npy":
-        _invert(capture, output, force=force, quiet=quiet or as_json)
-        return
-    given = None
-    if correspondence is not None:
-        given = read_correspondence(correspondence, capture.camera, capture.plan.projector)
-    with progress_bar("reconstructing", quiet=quiet or as_json) as progress:
-        transport = reconstruct_from_patterns(capture, given, memory=memory, progress=progress)
-    save_transport(transport, output, force=force)
-    for fault in find_turns(transport.correspondence):
-        warn(fault)
-    verdict = transport.verdict
-    assert verdict is not None
-    say(
-        f"transport of {capture.camera} camera pixels, {transport.lit.mean():.1%} directly lit, "
-        f"written to {output}",
-        quiet=quiet or as_json,
-    )
-    if as_json:
-        print(json.dumps(verdict.as_json()))
-    say(str(verdict), quiet=quiet or as_json)
-
-
-def _invert(capture: "Capture", output: Path, *, force: bool, quiet: bool) -> None:
+def _invert(capture: "Capture", outputs: _Outputs) -> None:
     """Write the dense T of a complete set of patterns."""
     from nearfar.workflow.complete_sets import write_complete
+    from nearfar.workflow.free_rows import black_taken_as_0
 
-    with progress_bar("inverting", quiet=quiet) as progress:
-        found = write_complete(capture, output, force=force, progress=progress)
+    with progress_bar("inverting", quiet=outputs.quiet) as progress:
+        found = write_complete(capture, outputs.transport, force=outputs.force, progress=progress)
     if not found.has_black:
-        warn(
-            f"{capture.path} has no photo under black, so that black was taken as 0: what is black "
-            f"in the photos stands in T as light."
-        )
+        warn(black_taken_as_0(capture))
     say(
-        f"T of {' x '.join(map(str, found.shape))} written to {output}: least squares, without any "
-        f"prior. An entry's noise is {found.noise_gain:.3g} times that of a photo's pixel",
-        quiet=quiet,
+        f"T of {' x '.join(map(str, found.shape))} written to {outputs.transport}: least squares, "
+        f"without any prior. An entry's noise is {found.noise_gain:.3g} times that of a photo's "
+        f"pixel",
+        quiet=outputs.quiet,
     )
 
 
-def _write_report(
-    report: Path,
-    output: Path,
-    capture: "Capture",
-    verdict: "Verdict",
-    *,
-    given: bool,
-    force: bool,
-    quiet: bool,
-) -> None:
-    from nearfar.report.page import write_page
+def _page_of_plan(capture: "Capture", verdict: "Verdict", outputs: _Outputs, *, given: bool) -> str:
     from nearfar.report.reconstruction import reconstruction_page
     from nearfar.transport.stored import open_transport
     from nearfar.workflow.diagnosis.misfit_maps import measure_misfit
 
-    transport = open_transport(output)
+    transport = open_transport(outputs.transport)
     misfit = verdict.misfit
     if misfit is None:
-        with progress_bar("reporting", quiet=quiet) as progress:
+        with progress_bar("reporting", quiet=outputs.quiet) as progress:
             misfit = measure_misfit(transport, capture, progress)
-    text = reconstruction_page(
+    return reconstruction_page(
         transport,
         capture,
         verdict,
@@ -291,4 +271,21 @@ def _write_report(
         correspondence_given=given,
         command=command_line(),
     )
-    write_page(report, text, force=force)
+
+
+def _page_of_any_patterns(
+    capture: "Capture", judged: "Judged", outputs: _Outputs, *, given: bool
+) -> str:
+    from nearfar.report.any_patterns import any_patterns_page
+    from nearfar.transport.stored import open_transport
+
+    with progress_bar("reporting", quiet=outputs.quiet) as progress:
+        return any_patterns_page(
+            open_transport(outputs.transport),
+            capture,
+            judged,
+            with_flags,
+            correspondence_given=given,
+            command=command_line(),
+            progress=progress,
+        )

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from nearfar.markup import numbers, picture
-from nearfar.report.differences import difference_gain
+from nearfar.markup import numbers
+from nearfar.report.beside import pictures_beside
 from nearfar.report.figures.style import new_figure, styled
 from nearfar.report.methods import evaluation_methods
-from nearfar.report.page import colour_map, facts, gallery, listed, page, plot
-from nearfar.report.reconstruction import exposure_of, visible
+from nearfar.report.page import colour_map, facts, listed, page, plot
+from nearfar.report.transport_page import exposure_of
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import HIGHEST, Rows
 from nearfar.workflow.judge import Pair, describe_units, white_last
@@ -71,13 +71,9 @@ def evaluation_page(
         for name, value in white_last(snr_b).items()
     ]
     exposure = exposure_of(transport)
-    gain = difference_gain(exposure * (pair.relit - pair.known) for pair in pairs.values())
     white_says = ""
     if "white" in snr_b:
         white_says = " White was photographed itself, so that it is no measure of relighting."
-    shown = white_last(pairs)
-    gallery_rows = [(name, _cells(name, pair, exposure, gain)) for name, pair in shown.items()]
-    columns = ["light", "relit", "known", f"difference × {gain}"]
     body = f"""
 <h1>How close the transport comes</h1>
 <p>Compared with {escape(source)}. SNR_b is 20 log10 of the known picture over the difference,
@@ -85,9 +81,7 @@ SNR_t the same of a camera pixel's row of the transport.</p>
 {facts(cards)}
 {_remarks(judgement, faults)}
 <h2>Relit beside what is known</h2>
-<p>Differences are shown {f"{gain} times " if gain > 1 else ""}as bright as the pictures beside
-them.</p>
-{gallery(columns, gallery_rows)}
+{pictures_beside(white_last(pairs), exposure, "known")}
 <h2>Figures</h2>
 <p>20 dB are an error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %.{white_says}</p>
 {numbers(head, table)}
@@ -96,14 +90,6 @@ them.</p>
 """
     methods = evaluation_methods(transport.provenance, len(snr_b), by_truth=rows is not None)
     return page("nearfar: evaluation", body, methods=methods, command=command)
-
-
-def _cells(name: str, pair: Pair, exposure: float, gain: int) -> list[str]:
-    difference = gain * np.abs(pair.relit - pair.known)
-    images = {"relit": pair.relit, "known": pair.known, "difference": difference}
-    return [picture(pair.light, f"light: {name}")] + [
-        picture(visible(exposure * image), f"{what} under {name}") for what, image in images.items()
-    ]
 
 
 def _components(judgement: Mapping[str, Any]) -> str:

@@ -119,7 +119,7 @@ def maps_of(transport: Transport) -> Mapping[str, Callable[[], Map]]:
             "picture-error", natural_picture(transport.projector, 1)
         )
         maps["error"] = lambda: over_error("error", floodlight)
-    else:
+    elif transport.noise.any():
         maps["noise"] = lambda: ratio("noise", relit(floodlight), transport.noise)
     if transport.has_error_bars and "direct" in transport.parts:
         maps["direct-error"] = lambda: ratio(

@@ -10,6 +10,7 @@ from nearfar.report.about import PAPER, Methods, software_reference
 from nearfar.report.plan import describe_window
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
+from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.check import ModelCheck
 from nearfar.workflow.compare import Comparison
 from nearfar.workflow.rivals import RIVALS
@@ -55,6 +56,10 @@ ESTIMATES = {
     ),
     "paper": "Each camera pixel's row was estimated by the estimator of [1].",
 }
+ESTIMATE_FROM_PATTERNS = (
+    "Each camera pixel's row was estimated from its photos as the mean of a Gaussian posterior "
+    "whose prior the photos choose [2]; its covariance gives the error bars."
+)
 
 
 def reconstruction_methods(
@@ -87,6 +92,79 @@ def reconstruction_methods(
         _estimate(transport.provenance, describe_window(plan.window, plan.pitch), plan.far),
     ]
     return _methods([*sentences, checked])
+
+
+def any_patterns_methods(
+    transport: StoredTransport | Transport,
+    plan: Plan,
+    verdict: KeptVerdict,
+    *,
+    correspondence_given: bool = False,
+) -> Methods:
+    """Return how a transport of anybody's patterns, or of free rows, was estimated and checked.
+
+    Parameters
+    ----------
+    transport : StoredTransport or Transport
+    plan : Plan
+        Of the photos that it was reconstructed from.
+    verdict : KeptVerdict
+        On the transport.
+    correspondence_given : bool
+        Whether q was given, and not found in the photos.
+    """
+    is_free = "free" in transport.parts
+    lights = "lamps" if is_free else "projector pixels"
+    found = (
+        "The lamp that lights each camera pixel directly, if one stands out,"
+        if is_free
+        else "The projector pixel that lights each camera pixel directly"
+    )
+    how = "was known beforehand" if correspondence_given else "was found by the same photos"
+    sentences = [
+        f"The light transport from {plan.projector.pixels} {lights} ({plan.projector}) to a camera "
+        f"of {transport.camera} pixels ({counted(transport.channels, 'channel')}) was estimated "
+        f"from {counted(len(plan.patterns), 'photo')} of known patterns.",
+        f"{found} {how}.",
+        _estimate_of_free_rows(is_least_squares=not transport.has_error_bars)
+        if is_free
+        else _model(describe_window(plan.window, plan.pitch)) + ESTIMATE_FROM_PATTERNS,
+    ]
+    return _methods([*sentences, _checked_by(verdict)], cites_paper=not is_free)
+
+
+def _estimate_of_free_rows(*, is_least_squares: bool) -> str:
+    by = (
+        "least squares, without any prior."
+        if is_least_squares
+        else "the mean of a Gaussian posterior, before which lamps differ by a variance that the "
+        "photos choose [1]; its covariance gives the error bars."
+    )
+    return (
+        f"Light from each lamp at each camera pixel was estimated as a number of its own, by {by}"
+    )
+
+
+def _model(window: str) -> str:
+    return (
+        f"Light was taken to be the sum of direct light, near-range light from a window of "
+        f"{window} about it, and far-range light of low frequencies, as in [1]. "
+    )
+
+
+def _checked_by(verdict: KeptVerdict) -> str:
+    """Return in a sentence what held-out photos say of a transport, or that there are none."""
+    if verdict.held_out_snr is None:
+        return checked_by_photos(None)
+    beside = ""
+    if verdict.expected_snr is not None:
+        beside = f"; its error bars expect {verdict.expected_snr:.1f} dB"
+    least = "at least " if verdict.is_least else ""
+    return (
+        f"Photos that were left out of an estimate of a sample of camera pixels ("
+        f"{verdict.checked_by}) were foretold with an SNR_b of {least}{verdict.held_out_snr:.1f} "
+        f"dB{beside}."
+    )
 
 
 def checked_by_photos(held_out: HeldOut | None) -> str:
@@ -216,6 +294,9 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
-def _methods(sentences: list[str], further: list[str] | None = None) -> Methods:
-    text = " ".join([*sentences, f"The software was nearfar {version()} [2]."])
-    return Methods(text, (PAPER, software_reference(), *(further or [])))
+def _methods(
+    sentences: list[str], further: list[str] | None = None, *, cites_paper: bool = True
+) -> Methods:
+    references = [*([PAPER] if cites_paper else []), software_reference()]
+    text = " ".join([*sentences, f"The software was nearfar {version()} [{len(references)}]."])
+    return Methods(text, (*references, *(further or [])))

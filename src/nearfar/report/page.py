@@ -69,6 +69,7 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .broad .numbers { max-width: none; }
 .broad .numbers td:first-child { min-width: 14rem; }
 .maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }
+.maps figure { max-width: 26rem; }
 .beside { display: grid; grid-template-columns: repeat(auto-fit, minmax(280px, 1fr)); gap: 1.6rem;
   align-items: start; }
 figure { margin: 0; }

@@ -106,6 +106,11 @@ class StoredTransport:
         )
 
     @property
+    def has_error_bars(self) -> bool:
+        """Whether error bars follow from its estimate."""
+        return self._posterior is not None
+
+    @property
     def nbytes(self) -> int:
         """Bytes that the whole transport takes in memory."""
         return self.camera.height * self._row_bytes

@@ -6,7 +6,6 @@ Index convention: photos are (C, channels, N), patterns (N, P).
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +26,9 @@ from nearfar.transport.model import Transport
 from nearfar.transport.quality import Quality
 from nearfar.transport.rows import stacked
 from nearfar.transport.store_writing import write_transport
-from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.reconstruction.sources import photos_without_drift
 from nearfar.workflow.reconstruction.summary import description_of
+from nearfar.workflow.verdict.checked import Judged, Reconstructed
 from nearfar.workflow.verdict.free_rows import HELD_OUT_PIXELS, judge_free_rows, split_photos
 
 # Lamps whose patterns are taken apart in minutes, and photos of them.
@@ -38,20 +37,6 @@ MOST_PHOTOS = 8192
 # Values in double precision that are held at once, over those of the photos.
 COPIES = 6
 METHOD = "free rows"
-
-
-class FreeSummary(NamedTuple):
-    """What is to be said of a reconstruction of free rows.
-
-    Attributes
-    ----------
-    verdict : KeptVerdict
-    has_black : bool
-        Whether the photos tell the black; else it was taken as 0.
-    """
-
-    verdict: KeptVerdict
-    has_black: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +49,7 @@ class _Job:
     design: Design
     basis: RealBasis
     lamps: NDArray[np.int64] | None  # (Cy, Cx)
-    verdict: KeptVerdict
+    judged: Judged
     height: int  # rows of a block
 
 
@@ -113,12 +98,12 @@ def reconstruct_free_rows_to_file(
     memory: int = 2 * 10**9,
     force: bool = False,
     progress: Report = ignore_progress,
-) -> FreeSummary:
+) -> Reconstructed:
     """Do as `reconstruct_free_rows`, into a file, some rows of the camera at a time.
 
     Returns
     -------
-    FreeSummary
+    Reconstructed
 
     Raises
     ------
@@ -129,7 +114,20 @@ def reconstruct_free_rows_to_file(
     """
     job = _prepare(capture, correspondence, memory, progress)
     write_transport(output, _blocks(job, progress), capture.camera.height, force=force)
-    return FreeSummary(job.verdict, job.design.has_black)
+    lamps = capture.plan.projector.pixels
+    return Reconstructed(
+        job.judged,
+        f"{capture.camera} camera pixels and {lamps} lamps",
+        () if job.design.has_black else (black_taken_as_0(capture),),
+    )
+
+
+def black_taken_as_0(capture: Capture) -> str:
+    """Return the warning that no photo tells the black, a sentence."""
+    return (
+        f"{capture.path} has no photo under black, so that black was taken as 0: what is black in "
+        f"the photos stands in T as light."
+    )
 
 
 def free_basis(projector: Size) -> RealBasis:
@@ -162,9 +160,9 @@ def _prepare(
     height = min(capture.camera.height, max(1, memory // needed))
     sample = _sample(photos, height)
     chosen = None if lamps is None else lamps.ravel()[sample.pixels]
-    verdict = judge_free_rows(sample.values, patterns, used, held_out, chosen)
+    judged = judge_free_rows(sample.values, patterns, used, held_out, chosen)
     basis = free_basis(capture.plan.projector)
-    return _Job(capture, photos, used, design, basis, lamps, verdict, height)
+    return _Job(capture, photos, used, design, basis, lamps, judged, height)
 
 
 def _require_few(capture: Capture) -> None:
@@ -253,5 +251,5 @@ def _as_transport(job: _Job, rows: FreeRows, saturated: NDArray[np.bool_]) -> Tr
         quality=Quality(
             np.isfinite(q[:, 0]).astype(np.float32).reshape(camera), saturated.reshape(camera)
         ),
-        verdict=job.verdict,
+        verdict=job.judged.verdict,
     )

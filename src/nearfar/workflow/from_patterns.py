@@ -5,6 +5,7 @@ Index convention: photos are (C, channels, N), patterns (N, P).
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,11 +25,13 @@ from nearfar.release import version
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import PatternPosterior
 from nearfar.transport.quality import Quality
+from nearfar.transport.store import save_transport
 from nearfar.transport.verdict import KeptVerdict, Reason
 from nearfar.workflow.by_codes import AXES, correspond_by_codes
-from nearfar.workflow.pattern_faults import sums_of_pairs
+from nearfar.workflow.pattern_faults import find_turns, sums_of_pairs
 from nearfar.workflow.reconstruction.summary import description_of
 from nearfar.workflow.verdict.by_patterns import compare_with_photos
+from nearfar.workflow.verdict.checked import CheckedLight, Judged, Reconstructed
 from nearfar.workflow.verdict.verdict import judge
 
 # Photos with which the matrices of a camera pixel still take milliseconds, and projector pixels for
@@ -66,12 +69,9 @@ def reconstruct_from_patterns(
     ----------
     capture : Capture
         Of a plan with offset "shown".
-    correspondence : Correspondence, optional
-        By default found in the photos (`nearfar.workflow.by_codes`).
-    memory : int
-        Bytes to work in.
-    progress : callable
-        Called with the step and the share of it that is done.
+    correspondence, memory, progress
+        As `nearfar.workflow.free_rows.reconstruct_free_rows`; q is found by
+        `nearfar.workflow.by_codes` where it is not given.
 
     Returns
     -------
@@ -84,11 +84,49 @@ def reconstruct_from_patterns(
         If the patterns are too many, too large or in colour, do not tell q, or the estimate takes
         more memory.
     """
+    return _reconstruct(capture, correspondence, memory, progress)[0]
+
+
+def reconstruct_from_patterns_to_file(
+    capture: Capture,
+    output: Path,
+    correspondence: Correspondence | None = None,
+    *,
+    memory: int = 2 * 10**9,
+    force: bool = False,
+    progress: Report = ignore_progress,
+) -> Reconstructed:
+    """Do as `reconstruct_from_patterns`, into a file.
+
+    Returns
+    -------
+    Reconstructed
+
+    Raises
+    ------
+    InputError
+        As `reconstruct_from_patterns`.
+    ExistingOutputError, MissingFileError, StorageError
+        As `nearfar.files.new_output`.
+    """
+    transport, judged = _reconstruct(capture, correspondence, memory, progress)
+    save_transport(transport, output, force=force)
+    return Reconstructed(
+        judged,
+        f"{capture.camera} camera pixels, {transport.lit.mean():.1%} directly lit",
+        tuple(find_turns(transport.correspondence)),
+    )
+
+
+def _reconstruct(
+    capture: Capture, correspondence: Correspondence | None, memory: int, progress: Report
+) -> tuple[Transport, Judged]:
     _require_small(capture, memory)
     confidence, places, faults = _places(capture, correspondence, progress)
     data = _read(capture, places)
     faults += sums_of_pairs(capture)
-    verdict = _with_faults(_judge(capture, data, progress), faults)
+    judged = _judge(capture, data, progress)
+    judged = judged._replace(verdict=_with_faults(judged.verdict, faults))
     plan = capture.plan
     model, rows = estimate_from_patterns(
         *data,
@@ -97,12 +135,13 @@ def reconstruct_from_patterns(
         plan.window,
         lambda share: progress("estimate", share),
     )
-    return replace(
+    transport = replace(
         _as_transport(data, model, rows, capture.camera),
         provenance=_provenance(capture),
         quality=Quality(confidence, _saturated(data).reshape(capture.camera)),
-        verdict=verdict,
+        verdict=judged.verdict,
     )
+    return transport, judged
 
 
 def _require_small(capture: Capture, memory: int) -> None:
@@ -168,7 +207,7 @@ def _with_faults(verdict: KeptVerdict, faults: Sequence[Reason]) -> KeptVerdict:
     return replace(verdict, grade="wrong" if is_wrong else "doubtful", reasons=(*faults, *others))
 
 
-def _judge(capture: Capture, data: _Data, progress: Report) -> KeptVerdict:
+def _judge(capture: Capture, data: _Data, progress: Report) -> Judged:
     """Judge an estimate of some camera pixels by photos that it does not see."""
     held_out = _held_out(capture.plan.patterns)
     kept = np.setdiff1d(np.arange(len(data.patterns)), held_out)
@@ -188,7 +227,11 @@ def _judge(capture: Capture, data: _Data, progress: Report) -> KeptVerdict:
         inner & ~_saturated(some),
         [capture.plan.patterns[number].description for number in held_out],
     )
-    return judge(compared, ()).kept
+    lights = (
+        CheckedLight(int(photo), light.snr, light.expected_snr)
+        for photo, light in zip(held_out, compared.lights, strict=True)
+    )
+    return Judged(judge(compared, ()).kept, tuple(lights))
 
 
 def _patches(camera: Size) -> tuple[Integers, Size, Booleans]:

@@ -12,6 +12,7 @@ from nearfar.estimate.free_rows.error_bars import variance_in_noise
 from nearfar.estimate.free_rows.estimate import FreeRows, estimate_free_rows, posterior_of
 from nearfar.transport.posterior import FreePosterior
 from nearfar.transport.verdict import LARGEST_WIDENING, Grade, KeptVerdict, Reason
+from nearfar.workflow.verdict.checked import CheckedLight, Judged
 from nearfar.workflow.verdict.verdict import DOUBTFUL_DECIBELS, WRONG_DECIBELS
 from nearfar.workflow.verdict.widening import SPREAD, SURE_DEVIATIONS
 
@@ -40,7 +41,7 @@ def judge_free_rows(
     used: NDArray[np.int64],
     checks: NDArray[np.int64],
     lamps: NDArray[np.int64] | None,
-) -> KeptVerdict:
+) -> Judged:
     """Judge free rows by check photos, or by photos held out from those that can be spared.
 
     Parameters
@@ -55,7 +56,7 @@ def judge_free_rows(
 
     Returns
     -------
-    KeptVerdict
+    Judged
     """
     held_out = checks if len(checks) else _held_out(patterns, used)
     if not len(held_out):
@@ -64,40 +65,85 @@ def judge_free_rows(
             "nothing was checked: every photo is needed to tell the lamps apart. Take some "
             "patterns more, such as random ones.",
         )
-        return KeptVerdict("doubtful", (reason,))
+        return Judged(KeptVerdict("doubtful", (reason,)))
     kept = np.setdiff1d(used, held_out)
     design = design_of(patterns[kept])
     rows = estimate_free_rows(photos[..., kept], design, lamps)
     lights = patterns[held_out].astype(np.float64)
     seen = photos[..., held_out] - rows.black[..., None]
-    difference = _relit(rows, lights) - seen
+    squares = ((_relit(rows, lights) - seen) ** 2).reshape(-1, len(lights))
     # The photos' own noise is no error of the transport.
     noise = float(np.mean(rows.noise.astype(np.float64) ** 2))
-    measured = float(np.mean(difference**2)) - noise
-    # What the noise of the held-out photos may be off by hides as much of the errors.
-    hidden = noise * (LEAST_ERROR + SURE_DEVIATIONS * float(np.sqrt(2 / difference.size)))
-    error = max(measured, hidden)
-    snr = float(10 * np.log10(max(float(np.mean(seen**2)), 1e-30) / max(error, 1e-30)))
+    measured = float(np.mean(squares)) - noise
+    hidden = noise * _hidden_share(squares.size)
+    signal = float(np.mean(seen**2))
+    snr = _decibels(signal, max(measured, hidden))
     found = KeptVerdict(
         "good",
-        held_out_snr=min(snr, HIGHEST_DECIBELS),
+        held_out_snr=snr,
         checked_by="lights of the check photos" if len(checks) else "patterns like those shown",
         is_least=measured < hidden,
     )
     posterior = posterior_of(design, rows.ratio)
+    expected: list[float] | None = None
     if posterior is not None:
-        expected = float(np.mean([_expected(design, posterior, rows, light) for light in lights]))
+        expected = [_expected(design, posterior, rows, light) for light in lights]
         errors = max(measured - hidden, 0.0)
-        found = _beside(found, float(np.mean(seen**2)), errors, expected, len(lights))
+        found = _beside(found, signal, errors, float(np.mean(expected)), len(lights))
+    checked = _one_by_one(held_out, seen, squares, noise, expected)
     if snr >= DOUBTFUL_DECIBELS:
-        return found
+        return Judged(found, checked)
     reason = Reason(
         "too-few-photos",
         "held-out photos differ from what is relit: give more photos, and check that lamps and "
         "camera are linear and nothing moved.",
     )
     grade: Grade = "wrong" if snr < WRONG_DECIBELS else "doubtful"
-    return replace(found, grade=grade, reasons=(reason,))
+    return Judged(replace(found, grade=grade, reasons=(reason,)), checked)
+
+
+def _hidden_share(count: int) -> float:
+    """Return the share of the noise's power by which a mean of squares may be off.
+
+    As much of the errors is hidden by it.
+    """
+    return LEAST_ERROR + SURE_DEVIATIONS * float(np.sqrt(2 / count))
+
+
+def _decibels(signal: float, error: float) -> float:
+    return min(float(10 * np.log10(max(signal, 1e-30) / max(error, 1e-30))), HIGHEST_DECIBELS)
+
+
+def _one_by_one(
+    photos: NDArray[np.int64],
+    seen: Floats,
+    squares: Floats,
+    noise: float,
+    expected: list[float] | None,
+) -> tuple[CheckedLight, ...]:
+    """Compare each held-out photo by itself.
+
+    Parameters
+    ----------
+    photos : ndarray of int, shape (L,)
+    seen : ndarray, shape (n, channels, L)
+    squares : ndarray, shape (n * channels, L)
+        Of the differences from what is relit.
+    noise : float
+        Variance of a photo.
+    expected : list of float, optional
+        Mean square of the error that the error bars expect of each.
+    """
+    signals = np.mean(seen**2, axis=(0, 1)).tolist()
+    errors = np.maximum(squares.mean(axis=0) - noise, noise * _hidden_share(len(squares))).tolist()
+    return tuple(
+        CheckedLight(
+            int(photo),
+            _decibels(signals[place], errors[place]),
+            None if expected is None else _decibels(signals[place], expected[place]),
+        )
+        for place, photo in enumerate(photos)
+    )
 
 
 def _expected(design: Design, posterior: FreePosterior, rows: FreeRows, light: Floats) -> float:

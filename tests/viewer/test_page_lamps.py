@@ -1,15 +1,19 @@
 """The viewer's page, in a real browser, of a light stage: lamps, and no part but their light."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from nearfar.arrays import Size
 from nearfar.transport.model import Transport
+from nearfar.transport.posterior import LEAST_SQUARES, FreePosterior
+from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.payloads import describe_scene
+from nearfar.viewer.transport_row import transport_row
 from nearfar.workflow.free_rows import free_basis
 from tests.viewer.asking import ask
 from tests.viewer.browsing import settled
@@ -65,6 +69,27 @@ def test_directions_that_are_none_are_not_shown(viewed, directions, monkeypatch)
 def test_maps_are_of_the_parts_that_are_there(viewed, page_of_stage):
     names = [each["name"] for each in json.loads(ask(page_of_stage, "/scene"))["maps"]]
     assert not {"near-share", "far-share", "column", "row", "confidence"} & set(names)
+
+
+def test_the_row_of_a_camera_pixel_has_the_error_bars_of_its_lamps(stage):
+    gains, noise, off = np.linspace(0.5, 1.5, 6), 0.003, 0.02
+    posterior = FreePosterior(
+        modes=np.eye(6, dtype=np.float32),
+        strengths=(1 / gains).astype(np.float32),
+        mean=np.zeros(6, np.float32),
+        mean_variance=0.0,
+        gain_errors=off * np.eye(6, dtype=np.float32),
+        variance_ratio=np.full(CAMERA, LEAST_SQUARES),
+    )
+    known = replace(stage, noise=np.full_like(stage.noise, noise), posterior=posterior)
+    row = transport_row(of_rows(known, slice(4, 5)), 3)
+    assert row.header["no_errors"] == ""
+    assert not row.window_error.any()
+    # A lamp's photo was multiplied by its gain, and its noise with it.
+    light = stage.rows(slice(4 * 16 + 3, 4 * 16 + 4))[0]
+    of_channels = np.hypot(noise * gains, off * light)
+    np.testing.assert_allclose(row.far_error, np.linalg.norm(of_channels, axis=0) / 3, rtol=1e-4)
+    assert transport_row(of_rows(stage, slice(4, 5)), 3).header["no_errors"] != ""
 
 
 def test_the_page_shows_lamps_and_no_absent_part(open_page, page_of_stage, stage):

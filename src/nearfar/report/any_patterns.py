@@ -96,8 +96,8 @@ def _checked(shown: Displayed, capture: Capture, judged: Judged) -> str:
     more = f" {left_out} more are not listed." if left_out else ""
     return f"""<h2>Checked</h2>
 <p>A sample of the camera pixels was estimated without these photos, and what it foretells was
-compared with them; all in dB. Where that is much worse than expected, the scene or the photos break
-an assumption.{more}</p>
+compared with them; all in dB, and no higher than the noise of the one photo can tell. Where that is
+much worse than expected, the scene or the photos break an assumption.{more}</p>
 {numbers(["photo", "held-out SNR_b", "expected"], rows)}
 <p></p>
 {_beside(shown, capture, judged)}

@@ -53,7 +53,9 @@ def coverage(scene: ExactTransport, found: Transport) -> dict[str, float]:
         for name, part in (("N", "near"), ("F", "far")):
             deviation, mine, truth = (getattr(row, part) for row in rows)
             held = deviation > 0
-            shares[name].append(within((mine - truth)[held], deviation[held]))
+            # A prior component may hold no near-range light at all.
+            if held.any():
+                shares[name].append(within((mine - truth)[held], deviation[held]))
     return {name: float(np.mean(values)) for name, values in shares.items()}
 
 

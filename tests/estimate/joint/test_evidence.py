@@ -8,9 +8,10 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.evidence import (
+    best_of,
     log_evidence,
     log_evidence_by_row,
-    most_probable,
+    log_evidences,
     prior_set,
     whiten,
 )
@@ -31,6 +32,10 @@ from tests.estimate.joint.draws import (
     measured,
 )
 from tests.worlds import model_transport
+
+
+def most_probable(batch, candidates):
+    return best_of(log_evidences(batch, candidates, log_evidence), candidates)
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-3, 1e-2])
@@ -72,17 +77,16 @@ def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():
     component, scale, _ = most_probable(
         batch,
         prior_set(priors, centred, measurements.multiplicity[centred.response_indices]),
-        log_evidence,
     )
     assert np.mean(component == 0) > 0.95
     # Among fewer, it keeps the numbers that they had among all.
     numbered = prior_set(
         priors, centred, measurements.multiplicity[centred.response_indices], (7, 3)
     )
-    again, its_scale, _ = most_probable(batch, numbered, log_evidence)
+    again, its_scale, _ = most_probable(batch, numbered)
     np.testing.assert_array_equal(again, np.array([7, 3])[component])
     np.testing.assert_array_equal(its_scale, scale)
-    only, _, _ = most_probable(batch, numbered.only((3,)), log_evidence)
+    only, _, _ = most_probable(batch, numbered.only((3,)))
     assert np.all(only == 3)
     # 0.02 in photo units, of a white that is 0.5 and a little.
     white = batch.white[:, 0]
@@ -105,8 +109,8 @@ def test_few_responses_make_a_shortlist_and_all_choose(monkeypatch):
     for scale in (0.003, 0.02, 0.1):
         rows, _ = drawn_rows(len(centres), centres, scale)
         batch = batch_of(measured(rows, frequencies, noise=1e-3), centres, centred)
-        _, _, most = most_probable(batch, unscreened, log_evidence)
-        component, _, found = most_probable(batch, narrowed, log_evidence)
+        _, _, most = most_probable(batch, unscreened)
+        component, _, found = most_probable(batch, narrowed)
         # The evidence of the chosen component is that of all responses.
         values = np.stack([log_evidence(whiten(batch), prior).max(axis=1) for prior in priors])
         # Sums of squares are float32, and how they round depends on which pixels stand beside.

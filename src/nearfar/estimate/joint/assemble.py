@@ -65,8 +65,10 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     if problem.near_basis.pitch > 1:
         footprint = fetch(pixels.footprint).reshape(*measurements.camera, 4)
     # Later sweeps estimate small differences from a mean that a camera pixel's own photos are part
-    # of: the first sweep's prior component and scale fit the error (docs/decisions/0011).
-    first = rows.choices[0]
+    # of: prior component and scale by the first sweep's evidence fit the error (docs/decisions/0011
+    # and 0061).
+    of_error_bars = rows.choices.of_error_bars
+    assert of_error_bars is not None
     return Transport(
         projector=measurements.projector,
         correspondence=fetch(pixels.correspondence)
@@ -84,10 +86,10 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
             prior_components=(*LIT_COMPONENTS, *UNLIT_COMPONENTS),
             frequencies=measured.frequencies,
             multiplicity=fetch(problem.model.multiplicity),
-            prior_component=fetch(first.prior_component)
+            prior_component=fetch(of_error_bars.prior_component)
             .astype(np.uint8)
             .reshape(measurements.camera),
-            prior_scale=fetch(first.prior_scale).reshape(measurements.camera),
+            prior_scale=fetch(of_error_bars.prior_scale).reshape(measurements.camera),
             white=fetch(pixels.white).reshape(shape),
             offset_noise=fetch(pixels.offset_noise).reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),

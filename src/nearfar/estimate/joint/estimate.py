@@ -18,7 +18,7 @@ from nearfar.estimate.joint.batch import AllPixels
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.own_footprint import own_footprints
-from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem, lay_out
+from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.seen import box_centres
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.near_basis import NearBasis
@@ -27,8 +27,7 @@ from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.transport import near
 from nearfar.transport.model import Transport
 
-# Prior components and scales of camera pixels, one choice for each sweep.
-Choices = tuple[ComponentChoice, ...]
+NO_CHOICES = Choices()
 # Sweeps: one by each camera pixel's own photos alone, the rest with its neighbours.
 SWEEPS = 3
 # Largest shift of q in one sweep, in projector pixels, and largest distance of q from its rounded
@@ -51,7 +50,7 @@ def estimate_jointly(
     pitch: int,
     rows: slice | None = None,
     sweeps: int = SWEEPS,
-    chosen: Choices = (),
+    chosen: Choices = NO_CHOICES,
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
 ) -> Transport:
@@ -116,12 +115,12 @@ def choose_components(
     Returns
     -------
     Choices
-        One for each sweep.
+        Of each sweep, and of the error bars.
     """
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     every = slice(0, measurements.camera.height)
-    _, found = _sweep(problem, every, SWEEPS, (), report)
+    _, found = _sweep(problem, every, SWEEPS, NO_CHOICES, report)
     return found.choices
 
 
@@ -151,7 +150,7 @@ def _sweep(
 ) -> tuple[Problem, EstimatedRows]:
     """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each."""
     found, held = None, slice(0, problem.measurements.camera.height)
-    for number, choice in zip_longest(range(sweeps), chosen[:sweeps]):
+    for number, choice in zip_longest(range(sweeps), chosen.sweeps[:sweeps]):
         around = _rows_around(problem, held, wanted, number, sweeps)
         problem, found = _of_rows(problem, found, held, around)
         held = around
@@ -161,7 +160,9 @@ def _sweep(
 
         mine = choice and choice.of(_pixels(problem, held))
         found = sweep_once(problem, found, report, mine)
-        lit = found.choices[-1].prior_component < len(LIT_COMPONENTS)
+        if number == 0 and chosen.of_error_bars is not None:
+            found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
+        lit = found.choices.sweeps[-1].prior_component < len(LIT_COMPONENTS)
         pixels = problem.pixels._replace(
             lit=lit, correspondence=_moved(problem, found, lit, is_last=number == sweeps - 1)
         )
@@ -174,6 +175,17 @@ def _sweep(
     problem, found = _of_rows(problem, found, held, wanted)
     assert found is not None
     return problem, found
+
+
+def _with_bars_of(found: EstimatedRows, given: ComponentChoice) -> EstimatedRows:
+    """Return rows with given components of the error bars, where they are lit as estimated."""
+    own = found.choices.sweeps[0]
+    xp, first_unlit = namespace(own.prior_scale), len(LIT_COMPONENTS)
+    is_same = (own.prior_component < first_unlit) == (given.prior_component < first_unlit)
+    bars = ComponentChoice._make(
+        xp.where(is_same, theirs, its) for theirs, its in zip(given, own, strict=True)
+    )
+    return found._replace(choices=found.choices._replace(of_error_bars=bars))
 
 
 def _rows_around(problem: Problem, held: slice, wanted: slice, number: int, sweeps: int) -> slice:
@@ -208,7 +220,7 @@ def _of_rows(
             near=found.near[some],
             far=found.far[some],
             near_noise=found.near_noise[some],
-            choices=tuple(choice.of(some) for choice in found.choices),
+            choices=found.choices.of(some),
         )
     return problem, found
 

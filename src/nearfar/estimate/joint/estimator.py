@@ -7,16 +7,17 @@ from nearfar.arrays import Floats
 from nearfar.devices import Device
 from nearfar.estimate.base import Estimator, Memory, Model
 from nearfar.estimate.joint.estimate import (
+    NO_CHOICES,
     ROWS_BESIDE,
     SWEEPS,
-    Choices,
     estimate_jointly,
 )
+from nearfar.estimate.joint.problem import Choices
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measured_frequencies
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan import Plan
-from nearfar.priors.fitted import LIT_AT_PITCH, LIT_COMPONENTS, UNLIT_COMPONENTS
+from nearfar.priors.fitted import LIT_AT_PITCH, LIT_COMPONENTS, PRIOR_SCALES, UNLIT_COMPONENTS
 from nearfar.priors.responses import VARIANCE_RATIOS
 from nearfar.transport.model import Transport
 
@@ -36,7 +37,7 @@ class JointEstimator(Estimator):
         `nearfar.estimate.joint.choose_components`.
     """
 
-    choices: Choices = ()
+    choices: Choices = NO_CHOICES
 
     @property
     def halo(self) -> int:
@@ -67,10 +68,12 @@ class JointEstimator(Estimator):
         # Responses, re-ordered; and four sets of rows: what a sweep starts from, what is expected
         # from neighbours, what it finds, and their sum.
         each = channels * (2 * responses + 4 * (responses + entries))
+        probabilities = components * len(PRIOR_SCALES)
         # Inverse pairs are in memory while they are measured.
         pairs = channels * len(plan.patterns) if plan.offset == "inverse" else 0
         return Memory(
-            FLOAT32_BYTES * components * component, FLOAT32_BYTES * (each + pairs) + entries
+            FLOAT32_BYTES * components * component,
+            FLOAT32_BYTES * (each + pairs + probabilities) + entries,
         )
 
     def estimate(

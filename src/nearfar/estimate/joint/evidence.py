@@ -97,10 +97,8 @@ def prior_set(
     return PriorSet(priors, screens, screening, numbers)
 
 
-def most_probable(
-    batch: PixelBatch, candidates: PriorSet, evidence: "Evidence"
-) -> tuple[Integers, Floats, Floats]:
-    """Choose a prior component and scale for each camera pixel, the same for all channels.
+def log_evidences(batch: PixelBatch, candidates: PriorSet, evidence: "Evidence") -> Floats:
+    """Return the log evidence of every candidate at every prior scale.
 
     Parameters
     ----------
@@ -111,12 +109,8 @@ def most_probable(
 
     Returns
     -------
-    prior_component : ndarray of int, shape (n,)
-        Number of a candidate.
-    prior_scale : ndarray, shape (n,)
-        s as a share of white.
-    evidence : ndarray, shape (n,)
-        Its logarithm, up to a constant of the camera pixel.
+    ndarray, shape (candidates, n, scales), float64
+        Up to a constant of the camera pixel; minus infinity off its shortlist.
     """
     xp = namespace(batch.white)
     whitened = whiten(batch)
@@ -124,23 +118,44 @@ def most_probable(
     some = whitened._replace(
         responses=whitened.responses[:, screening], of_offset=whitened.of_offset[:, screening]
     )
-    found = [evidence(some, screen) for screen in candidates.screens]
-    values = xp.stack([xp.max(each, axis=1) for each in found])
-    steps = xp.stack([xp.argmax(each, axis=1) for each in found])
-    if candidates.screens is not candidates.priors:
-        least = xp.sort(values, axis=0)[-min(SHORTLIST_LENGTH, len(candidates.priors))]
-        shortlisted = values >= least
-        values[...] = -xp.inf
-        for index, prior in enumerate(candidates.priors):
-            (mine,) = xp.nonzero(shortlisted[index, :])
-            if len(mine):
-                by_all = evidence(whitened.only(mine), prior)
-                steps[index, mine] = xp.argmax(by_all, axis=1)
-                values[index, mine] = xp.max(by_all, axis=1)
-    best = xp.argmax(values, axis=0)
+    values: Floats = xp.stack([evidence(some, screen) for screen in candidates.screens])
+    if candidates.screens is candidates.priors:
+        return values
+    largest = xp.max(values, axis=2)
+    least = xp.sort(largest, axis=0)[-min(SHORTLIST_LENGTH, len(candidates.priors))]
+    shortlisted = largest >= least
+    values[...] = -xp.inf
+    for index, prior in enumerate(candidates.priors):
+        (mine,) = xp.nonzero(shortlisted[index, :])
+        if len(mine):
+            values[index, mine] = evidence(whitened.only(mine), prior)
+    return values
+
+
+def best_of(values: Floats, candidates: PriorSet) -> tuple[Integers, Floats, Floats]:
+    """Return the candidate and scale of the largest log evidence of each camera pixel.
+
+    Parameters
+    ----------
+    values : ndarray, shape (candidates, n, scales)
+        As `log_evidences` returns them.
+    candidates : PriorSet
+
+    Returns
+    -------
+    prior_component : ndarray of int, shape (n,)
+        Number of a candidate.
+    prior_scale : ndarray, shape (n,)
+        s as a share of white.
+    evidence : ndarray, shape (n,)
+        Its logarithm, up to a constant of the camera pixel.
+    """
+    xp = namespace(values)
+    largest, steps = xp.max(values, axis=2), xp.argmax(values, axis=2)
+    best = xp.argmax(largest, axis=0)
     step = xp.take_along_axis(steps, best[None, :], axis=0)[0, :]
     number = beside(np.array(candidates.numbers), values)[best]
-    return number, beside(np.array(PRIOR_SCALES), values)[step], xp.max(values, axis=0)
+    return number, beside(np.array(PRIOR_SCALES), values)[step], xp.max(largest, axis=0)
 
 
 class WhitenedResponses(NamedTuple):

@@ -64,6 +64,28 @@ class ComponentChoice(NamedTuple):
         return ComponentChoice(*(xp.asarray(values[selected], copy=True) for values in self))
 
 
+class Choices(NamedTuple):
+    """Prior components and scales of camera pixels.
+
+    Attributes
+    ----------
+    sweeps : tuple of ComponentChoice
+        Of each sweep so far.
+    of_error_bars : ComponentChoice, optional
+        Those whose posterior the error bars are; None before the first sweep.
+    """
+
+    sweeps: tuple[ComponentChoice, ...] = ()
+    of_error_bars: ComponentChoice | None = None
+
+    def of(self, selected: slice | Integers) -> "Choices":
+        """Return those of some camera pixels, as a copy."""
+        bars = self.of_error_bars
+        return Choices(
+            tuple(choice.of(selected) for choice in self.sweeps), bars and bars.of(selected)
+        )
+
+
 class EstimatedRows(NamedTuple):
     """Estimated rows of all camera pixels, photo units."""
 
@@ -71,7 +93,7 @@ class EstimatedRows(NamedTuple):
     near: Floats  # (C, channels, W^2)
     far: Floats  # (C, channels, R), as measured
     near_noise: Floats  # (C, channels)
-    choices: tuple[ComponentChoice, ...]  # of each sweep so far
+    choices: Choices
 
 
 class Model(NamedTuple):
@@ -93,6 +115,11 @@ class Model(NamedTuple):
     lit: PriorSet
     lit_differences: PriorSet
     unlit: PriorSet
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Number of each prior component, lit ones first: of LIT_COMPONENTS + UNLIT_COMPONENTS."""
+        return (*self.lit.numbers, *self.unlit.numbers)
 
     @property
     def priors(self) -> dict[int, ResponsePrior]:

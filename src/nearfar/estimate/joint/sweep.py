@@ -19,14 +19,30 @@ from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
-from nearfar.estimate.joint.evidence import log_evidence, log_evidence_by_row, most_probable
+from nearfar.estimate.joint.evidence import (
+    best_of,
+    log_evidence,
+    log_evidence_by_row,
+    log_evidences,
+)
 from nearfar.estimate.joint.neighbour_loops import (
     expect_each_by_pixel,
     expect_together_by_pixel,
 )
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
-from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Model, Problem
+from nearfar.estimate.joint.pooled_choice import (
+    no_probabilities,
+    pooled_choice,
+    put_probabilities,
+)
+from nearfar.estimate.joint.problem import (
+    Choices,
+    ComponentChoice,
+    EstimatedRows,
+    Model,
+    Problem,
+)
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
 from nearfar.estimate.joint.spikes import (
     LEAST_GAIN,
@@ -82,8 +98,11 @@ def sweep_once(
         start = _Start(before, _expected(problem, before), _of_quantisation(problem))
         # What is found is added to what was expected: no camera pixel reads another's expectation.
         rows = rows._replace(near=start.expected.near, far=start.expected.far)
-        rows = rows._replace(choices=(*before.choices, *rows.choices))
-    choice = rows.choices[-1]
+        sweeps = (*before.choices.sweeps, *rows.choices.sweeps)
+        rows = rows._replace(choices=before.choices._replace(sweeps=sweeps))
+    choice = rows.choices.sweeps[-1]
+    pools = start is None and chosen is None
+    probability = no_probabilities(count if pools else 0, model, pixels.white)
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
@@ -101,8 +120,11 @@ def sweep_once(
         selected, clips = beside(part[0], pixels.responses), part[1]
         batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
         given = chosen and chosen.of(selected)
-        component, scale = _choose(batch, model, given, is_first=start is None)
+        found, of_batch = _choose(batch, model, given, is_first=start is None)
+        component, scale = found
         choice.prior_component[selected], choice.prior_scale[selected] = component, scale
+        if pools:
+            probability[selected] = of_batch
         seen = component < len(LIT_COMPONENTS)
         batch.direct_weights[~seen] = 0.0
         batch = batch._replace(lit=seen)
@@ -111,12 +133,17 @@ def sweep_once(
             some = batch.only(alike)
             ratio = variance_ratio(some, scale[alike])
             ratio = rounded_ratio(ratio) if cut else ratio
-            found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
-            put(selected[alike], some, found)
+            mean = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
+            put(selected[alike], some, mean)
         done[0] += len(part[0])
         report(done[0] / count)
 
     side_by_side(estimate, _parts(problem))
+    if start is None:
+        of_error_bars = choice
+        if pools:
+            of_error_bars = pooled_choice(probability, model, problem.measurements.camera)
+        rows = rows._replace(choices=rows.choices._replace(of_error_bars=of_error_bars))
     return rows
 
 
@@ -177,16 +204,22 @@ def _empty_rows(problem: Problem) -> EstimatedRows:
         zeros(number, channels, problem.near_basis.count),
         zeros(number, channels, count),
         zeros(number, channels),
-        (ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),),
+        Choices((ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),)),
     )
 
 
 def _choose(
     batch: PixelBatch, model: Model, given: ComponentChoice | None, *, is_first: bool
-) -> ComponentChoice:
+) -> tuple[ComponentChoice, Floats]:
     """Choose prior components where they are not given.
 
     In the first sweep a camera pixel for which q was found may turn out to have no direct light.
+
+    Returns
+    -------
+    choice : ComponentChoice
+    probability : ndarray, shape (n or 0, components, scales)
+        In the first sweep, of all components and scales where they are not given; elsewhere 0.
     """
     xp = namespace(batch.white)
     if given is None:
@@ -196,6 +229,7 @@ def _choose(
     else:
         # Chosen when the camera pixel was lit and is not now, or the reverse.
         left = batch.lit != (given.prior_component < len(LIT_COMPONENTS))
+    probability = no_probabilities(len(left) if is_first else 0, model, batch.white)
     # No shift of q has a say; nor has, among functions of several projector pixels, the references'
     # error, which takes a third of the time and changes no choice that matters.
     batch = batch._replace(direct_weights=batch.direct_weights[:, :1])
@@ -211,19 +245,25 @@ def _choose(
         if not len(mine):
             continue
         of_mine = batch if len(mine) == len(left) else batch.only(mine)
-        component, scale, evidence = most_probable(of_mine, candidates, evidence_of)
+        values = log_evidences(of_mine, candidates, evidence_of)
+        component, scale, evidence = best_of(values, candidates)
+        if is_first:
+            put_probabilities(probability, mine, values, candidates, model)
         if is_first and candidates is model.lit:
             (doubted,) = xp.nonzero(_is_doubtful(of_mine, model.centred))
             if len(doubted):
                 dark_ones = _without_direct(of_mine.only(doubted))
-                unlit, its_scale, without = most_probable(dark_ones, model.unlit, evidence_of)
+                values = log_evidences(dark_ones, model.unlit, evidence_of)
+                unlit, its_scale, without = best_of(values, model.unlit)
                 # q was chosen among all projector pixels.
                 none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
                 component[doubted] = xp.where(none, unlit, component[doubted])
                 scale[doubted] = xp.where(none, its_scale, scale[doubted])
+                dark = mine[doubted[none]]
+                put_probabilities(probability, dark, values[:, none], model.unlit, model)
         given.prior_component[mine] = component
         given.prior_scale[mine] = xp.astype(scale, xp.float32)
-    return given
+    return given, probability
 
 
 def _is_doubtful(batch: PixelBatch, centred: CentredBasis) -> Booleans:

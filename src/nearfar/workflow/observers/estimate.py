@@ -171,7 +171,7 @@ class EstimateObserver:
             raise self._fault
         options = self._options
         photos: PhotosInMemory | None = None
-        choices: Choices = ()
+        choices = Choices()
         if self.photos is not None:
             photos = PhotosInMemory(
                 capture.plan, self.photos.photos[: len(capture.plan.patterns)], self._full_scale

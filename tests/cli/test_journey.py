@@ -39,6 +39,8 @@ photos.mkdir()
 for path in sorted(patterns.glob("pattern-*.png")):
     l = imagecodecs.png_decode(path.read_bytes()) / 255.0
     photo = 0.03 + np.einsum("abpqi,pq->abi", T, l)
+    # Of 30 000 electrons; without noise the model's own error would look like spoilt photos.
+    photo += rng.normal(scale=np.sqrt(photo / 30000))
     photo = np.rint(65535 * photo).astype(np.uint16)
     photo = photo[..., 0] if channels == 1 else photo
     name = f"img{int(path.stem.removeprefix('pattern-'))}"

@@ -22,7 +22,10 @@ PROJECTOR, CAMERA, WINDOW = Size(16, 20), Size(16, 20), 5
 @pytest.fixture(scope="module")
 def torch():
     """PyTorch, which takes seconds to import: not in each process that collects tests."""
-    return pytest.importorskip("torch", reason="PyTorch is not installed")
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    # As for BLAS: more threads than processors wait for one another, and PyTorch's wait busily.
+    torch.set_num_threads(1)
+    return torch
 
 
 @pytest.fixture(scope="module")

@@ -50,10 +50,25 @@ SETS = {
 }
 
 
+@pytest.fixture(scope="module")
+def capture(world, tmp_path_factory):
+    """Return a capture of random patterns, where nobody writes."""
+    return captured(world, SETS["random"](), tmp_path_factory.mktemp("random"))
+
+
+@pytest.fixture(scope="module")
+def transport(capture):
+    """Return the transport of random patterns."""
+    return reconstruct_from_patterns(capture)
+
+
 @pytest.mark.parametrize("name", SETS)
-def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path):
-    capture = captured(world, SETS[name](), tmp_path)
-    transport = reconstruct_from_patterns(capture)
+def test_each_set_of_patterns_gives_a_transport(world, name, tmp_path, request):
+    if name == "random":
+        capture, transport = map(request.getfixturevalue, ("capture", "transport"))
+    else:
+        capture = captured(world, SETS[name](), tmp_path)
+        transport = reconstruct_from_patterns(capture)
     pictures, _ = _decibels(world, transport)
     # By each camera pixel's own photos they are 40.2, 39.5 and 39.5 dB.
     assert pictures > 40.5
@@ -87,8 +102,7 @@ def test_grey_patterns_may_be_colour_files_and_colour_patterns_are_refused(world
         reconstruct_from_patterns(captured(world, grey, tmp_path / "colour"))
 
 
-def test_python_reconstructs_as_any_capture(world, tmp_path):
-    capture = captured(world, SETS["random"](), tmp_path)
+def test_python_reconstructs_as_any_capture(world, capture):
     transport, correspondence = nearfar.reconstruct(capture)
     assert _decibels(world, transport)[0] > 33
     np.testing.assert_array_equal(correspondence.q, transport.correspondence)
@@ -98,16 +112,13 @@ def test_python_reconstructs_as_any_capture(world, tmp_path):
         nearfar.measure(capture)
 
 
-def test_held_out_photos_tell_how_well_such_patterns_are_relit(world, tmp_path):
-    capture = captured(world, SETS["random"](), tmp_path)
-    transport = reconstruct_from_patterns(capture)
+def test_held_out_photos_tell_how_well_such_patterns_are_relit(world, transport):
     lights = np.random.default_rng(9).random((5, *SIZE)) < 0.5
     true = [snr(world @ light, transport @ light) for light in lights.astype(np.float32)]
     assert transport.verdict.held_out_snr == pytest.approx(np.mean(true), abs=2.0)
 
 
-def test_the_truth_lies_within_one_deviation_as_often_as_it_should(world, tmp_path):
-    transport = reconstruct_from_patterns(captured(world, SETS["random"](), tmp_path))
+def test_the_truth_lies_within_one_deviation_as_often_as_it_should(world, transport):
     bars = nearfar.ErrorBars(transport)
     for light in (natural_picture(SIZE, 1), np.random.default_rng(7).random(SIZE)):
         error = np.abs(world @ light.astype(np.float32) - transport @ light)
@@ -149,9 +160,8 @@ def test_what_cannot_be_estimated_is_refused(world, tmp_path):
         reconstruct_from_patterns(capture, memory=1000)
 
 
-def test_the_command_line_reconstructs_and_relights(world, tmp_path):
-    captured(world, SETS["random"](), tmp_path)
-    capture, output = tmp_path / "c.zarr", tmp_path / "t.zarr"
+def test_the_command_line_reconstructs_and_relights(world, capture, tmp_path):
+    capture, output = capture.path, tmp_path / "t.zarr"
     said = check_done(run_nearfar("reconstruct", capture, output)).out
     assert "good: Relit patterns like those shown are off by" in said
     np.save(tmp_path / "light.npy", natural_picture(SIZE, 2))

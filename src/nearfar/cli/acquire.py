@@ -105,8 +105,6 @@ def acquire(
     from nearfar.files import check_resumable
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire as shoot
-    from nearfar.workflow.observers.estimate import EstimateObserver
-    from nearfar.workflow.observers.quality import QualityObserver
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
     if reshoot is not None:
@@ -140,10 +138,15 @@ def acquire(
         for note in opened.notes:
             warn(note)
         check = estimate = None
+        # Estimates take long to import, and most captures are made without them.
         if until is not None:
+            from nearfar.workflow.observers.quality import QualityObserver
+
             said = partial(_say_quality, quiet=quiet)
             check = QualityObserver(made, until, opened.full_scale, said)
         if transport is not None:
+            from nearfar.workflow.observers.estimate import EstimateObserver
+
             estimate = stack.enter_context(EstimateObserver(made, opened.full_scale, options))
         taken = shoot(
             made,

@@ -137,8 +137,8 @@ def _estimate_of_free_rows(*, is_least_squares: bool) -> str:
     by = (
         "least squares, without any prior."
         if is_least_squares
-        else "the mean of a Gaussian posterior whose prior lets lamps differ by a variance that the "
-        "photos choose [1]; its covariance gives the error bars."
+        else "the mean of a Gaussian posterior whose prior lets lamps differ by a variance that "
+        "the photos choose [1]; its covariance gives the error bars."
     )
     return (
         f"Light from each lamp at each camera pixel was estimated as a number of its own, by {by}"

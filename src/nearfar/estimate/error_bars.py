@@ -68,7 +68,7 @@ def _variances_of(transport: Transport) -> Variances:
     if posterior is None:
         cure = (
             "its photos do not tell their own noise. Take some patterns twice, such as black and "
-            "white, and reconstruct again."
+            "white, or give reference photos of several lamps, and make the transport again."
             if "free" in transport.parts
             else "reconstruct a capture with `method='joint'`."
         )

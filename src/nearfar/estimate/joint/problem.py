@@ -214,6 +214,7 @@ def lay_out(
         white=white,
         spike_expected=expected_spikes(correspondence, near_basis),
         footprint=np.zeros((len(lit), 4), dtype=np.float32) if footprint is None else footprint,
+        is_even=(np.indices(measurements.camera).sum(axis=0) % 2 == 0).ravel(),
     )
     move = mover(device)
     pixels = AllPixels._make(map(move, pixels))

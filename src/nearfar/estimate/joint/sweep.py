@@ -7,8 +7,9 @@ Index convention: arrays are (C, channels, ...); r runs over real responses, w o
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from math import log
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from array_api_compat import device
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
+from nearfar.estimate.joint.chessboard import Part
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
 from nearfar.estimate.joint.evidence import log_evidence, log_evidence_by_row, most_probable
@@ -47,61 +49,56 @@ CERTAIN_SHARE = 0.5
 BATCH_PIXELS = 2048
 
 
-class _Start(NamedTuple):
-    """The state that a later sweep starts from."""
-
-    before: EstimatedRows
-    expected: EstimatedRows  # from the neighbours
-    of_quantisation: Callable[[slice | NDArray[np.int64]], Floats]  # see `_of_quantisation`
-
-
 def sweep_once(
     problem: Problem,
     before: EstimatedRows | None,
     report: Callable[[float], None],
     chosen: ComponentChoice | None = None,
+    part: Part | None = None,
 ) -> EstimatedRows:
-    """Estimate every camera pixel once.
+    """Estimate camera pixels once.
 
     Parameters
     ----------
     problem : Problem
     before : EstimatedRows, optional
-        Of the sweep before; None in the first.
+        Of the sweep before, whose arrays are overwritten; None in the first.
     report : callable
         Called with the share done.
     chosen : ComponentChoice, optional
         Prior components and scales, if they are chosen already.
+    part : Part, optional
+        Camera pixels to estimate; by default all.
     """
     pixels, model = problem.pixels, problem.model
     centred, projector = model.centred, problem.measurements.projector
-    count = len(pixels.responses)
-    rows = _empty_rows(problem)
-    start = None
-    if before is not None:
-        start = _Start(before, _expected(problem, before), _of_quantisation(problem))
-        # What is found is added to what was expected: no camera pixel reads another's expectation.
-        rows = rows._replace(near=start.expected.near, far=start.expected.far)
-        rows = rows._replace(choices=(*before.choices, *rows.choices))
+    rows = _empty_rows(problem) if before is None else _from_neighbours(problem, before, part)
     choice = rows.choices[-1]
+    of_quantisation = _of_quantisation(problem)
+    # In the second sweep over half of the camera pixels, these are estimated for the first time.
+    is_new = part is not None and not part.known.all()
+
+    def gathered(selected: NDArray[np.int64], *, starts: bool) -> PixelBatch:
+        known = None if starts else _explained(problem, rows, of_quantisation, selected)
+        return gather(pixels, selected, centred, projector, known)
 
     def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
+        # What is found is added to what was expected.
         add_rows(rows.near, selected, found.near)
         add_rows(rows.far, selected, centred.uncentre(found.far, batch.centres))
         rows.near_noise[selected] = found.near_noise
 
-    done = [0]
     solve_lit = {False: solve_whole, True: solve_clipped}
     if problem.near_basis.pitch > 1:
         solve_lit[True] = solve_cut
 
-    def estimate(part: tuple[NDArray[np.int64], bool]) -> None:
+    def solve(
+        selected: NDArray[np.int64], batch: PixelBatch, *, clips: bool, is_first: bool
+    ) -> None:
         """Choose prior components, and estimate camera pixels whose windows are whole or not."""
-        selected, clips = beside(part[0], pixels.responses), part[1]
-        batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
         given = chosen and chosen.of(selected)
-        component, scale = _choose(batch, model, given, is_first=start is None)
+        component, scale = _choose(batch, model, given, is_first=is_first)
         choice.prior_component[selected], choice.prior_scale[selected] = component, scale
         seen = component < len(LIT_COMPONENTS)
         batch.direct_weights[~seen] = 0.0
@@ -113,10 +110,27 @@ def sweep_once(
             ratio = rounded_ratio(ratio) if cut else ratio
             found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
             put(selected[alike], some, found)
-        done[0] += len(part[0])
+
+    def estimate(some: tuple[NDArray[np.int64], bool]) -> None:
+        selected, clips = beside(some[0], pixels.responses), some[1]
+        batch = gathered(selected, starts=before is None)
+        if is_new:
+            # Where there may be no direct light, what neighbours lead to expect has no say.
+            doubted = batch.lit & _is_doubtful(batch, centred)
+            (alone,), (rest,) = np.nonzero(doubted), np.nonzero(~doubted)
+            if len(alone):
+                afresh = selected[alone]
+                rows.near[afresh], rows.far[afresh] = 0.0, 0.0
+                solve(afresh, gathered(afresh, starts=True), clips=clips, is_first=True)
+                selected, batch = selected[rest], batch.only(rest)
+        if len(selected):
+            solve(selected, batch, clips=clips, is_first=before is None)
+        done[0] += len(some[0])
         report(done[0] / count)
 
-    side_by_side(estimate, _parts(problem))
+    done, parts = [0], list(_parts(problem, part))
+    count = sum(len(selected) for selected, _ in parts)
+    side_by_side(estimate, parts)
     return rows
 
 
@@ -146,21 +160,22 @@ def _alike(
 
 
 def _explained(
-    problem: Problem, start: _Start | None, selected: slice | NDArray[np.int64]
-) -> Floats | None:
+    problem: Problem,
+    expected: EstimatedRows,
+    of_quantisation: Callable[[NDArray[np.int64]], Floats],
+    selected: NDArray[np.int64],
+) -> Floats:
     """Return the expected responses, plus those of direct light to the quantisation error."""
-    if start is None:
-        return None
     centred = problem.model.centred
     centres = problem.pixels.centres[selected]
     if centred.near_basis.pitch == 1:
-        responses = product(start.expected.near[selected], centred.on_window.T)
+        responses = product(expected.near[selected], centred.on_window.T)
     else:
-        responses = near_responses(start.expected.near[selected], centres, centred)
+        responses = near_responses(expected.near[selected], centres, centred)
     responses = centred.uncentre(responses, centres)
-    responses += start.expected.far[selected]
-    direct = start.before.amplitudes[selected, :, 1, None]
-    responses += direct * start.of_quantisation(selected)[:, None]
+    responses += expected.far[selected]
+    direct = expected.amplitudes[selected, :, 1, None]
+    responses += direct * of_quantisation(selected)[:, None]
     return responses
 
 
@@ -240,25 +255,29 @@ def _without_direct(batch: PixelBatch) -> PixelBatch:
     return batch._replace(direct_weights=batch.direct_weights[:, :1] * 0.0)
 
 
-def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
+def _parts(problem: Problem, part: Part | None) -> Iterator[tuple[NDArray[np.int64], bool]]:
     """Yield batches of camera pixels, and whether the border clips their windows.
 
     Windows clipped alike are next to each other.
     """
+    selects = np.ones(len(problem.pixels.lit), dtype=bool)
+    if part is not None:
+        selects[:] = False
+        selects[part.selected] = True
     pixels, near_basis = problem.pixels, problem.near_basis
     projector = problem.measurements.projector
     clipped = fetch(pixels.lit & is_clipped(pixels.centres, near_basis, projector))
-    (selected,) = np.nonzero(clipped)
+    (selected,) = np.nonzero(selects & clipped)
     places = fetch(pixels.centres)[selected]
     if near_basis.pitch > 1:
         places = border_distances(places, near_basis, projector)
     ordered = selected[np.lexsort(places.T[::-1])]
-    for part, clips in ((np.flatnonzero(~clipped), False), (ordered, True)):
-        for batch in blocks(len(part), BATCH_PIXELS):
-            yield part[batch], clips
+    for some, clips in ((np.flatnonzero(selects & ~clipped), False), (ordered, True)):
+        for batch in blocks(len(some), BATCH_PIXELS):
+            yield some[batch], clips
 
 
-def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
+def _of_quantisation(problem: Problem) -> Callable[[NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
     errors = problem.quantisation_error
     if not len(errors):
@@ -301,8 +320,28 @@ def _with_spikes(
     return mean
 
 
-def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
-    """Return the expectation of each camera pixel's rows from its neighbours."""
+def _from_neighbours(problem: Problem, before: EstimatedRows, part: Part | None) -> EstimatedRows:
+    """Return the rows that a later sweep starts from: those expected from neighbours."""
+    windows, far = _expected(problem, before, part)
+    rows = before._replace(choices=(*before.choices, before.choices[-1].of(slice(None))))
+    if part is None:
+        return rows._replace(near=windows, far=far)
+
+    def put(some: slice) -> None:
+        rows.near[part.selected[some]], rows.far[part.selected[some]] = windows[some], far[some]
+
+    side_by_side(put, blocks(len(part.selected), BATCH_PIXELS))
+    if not part.known.all():
+        pixels, shape = problem.pixels, (*problem.measurements.camera, -1)
+        direct = np.ascontiguousarray(rows.amplitudes[..., 1]).reshape((*shape, 1))
+        white, lit = pixels.white.reshape(shape), pixels.lit.reshape(shape[:2])
+        expected = expect_together_by_pixel(direct, white, np.ones_like(white), lit, part)
+        rows.amplitudes[part.selected, :, 1] = expected[..., 0]
+    return rows
+
+
+def _expected(problem: Problem, rows: EstimatedRows, part: Part | None) -> tuple[Floats, Floats]:
+    """Return n and f of camera pixels as their neighbours lead to expect."""
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     xp, shape = namespace(rows.near), (*camera, channels)
@@ -312,9 +351,11 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    each, together = expect_each, expect_together
-    if problem.near_basis.pitch > 1:
-        each, together = expect_each_by_pixel, expect_together_by_pixel
+    each: Callable[..., Floats] = expect_each
+    together: Callable[..., Floats] = expect_together
+    if part is not None:
+        each = partial(expect_each_by_pixel, part=part)
+        together = partial(expect_together_by_pixel, part=part)
     far = each(
         rows.far.reshape((*shape, -1)),
         white,
@@ -328,8 +369,8 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
         rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(camera),
     )
-    windows = windows.reshape(rows.near.shape)
+    windows = windows.reshape((-1, *rows.near.shape[1:]))
     if problem.near_basis.pitch == 1:
         inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
         windows *= inside[:, None]
-    return rows._replace(near=windows, far=far.reshape(rows.far.shape))
+    return windows, far.reshape((-1, *rows.far.shape[1:]))

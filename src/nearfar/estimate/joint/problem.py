@@ -26,6 +26,7 @@ from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
+from nearfar.priors.covariance import FAINT_DIFFERENCE, reach_of_near
 from nearfar.priors.fitted import (
     LIT_AT_PITCH,
     LIT_COMPONENTS,
@@ -99,6 +100,15 @@ class Model(NamedTuple):
         """Each prior component by its index into LIT_COMPONENTS + UNLIT_COMPONENTS."""
         sets = (self.lit, self.unlit)
         return {n: one for each in sets for n, one in zip(each.numbers, each.priors, strict=True)}
+
+    @property
+    def difference_priors(self) -> dict[int, ResponsePrior]:
+        """The same for differences from neighbours, which borders cut less far away."""
+        found, near_basis = self.priors, self.centred.near_basis
+        for n in self.lit_differences.numbers:
+            reach = reach_of_near(EVERY_COMPONENT[n], near_basis, FAINT_DIFFERENCE)
+            found[n] = replace(found[n], reach=reach)
+        return found
 
 
 class Problem(NamedTuple):

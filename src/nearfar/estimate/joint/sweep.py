@@ -47,6 +47,8 @@ from nearfar.transport.direct import footprint, look_up_each
 CERTAIN_SHARE = 0.5
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
+# The same where functions are of several projector pixels, whose batches fall into more groups.
+BATCH_PIXELS_AT_PITCH = 4096
 
 
 def sweep_once(
@@ -89,6 +91,7 @@ def sweep_once(
         add_rows(rows.far, selected, centred.uncentre(found.far, batch.centres))
         rows.near_noise[selected] = found.near_noise
 
+    by_themselves, of_differences = model.priors, model.difference_priors
     solve_lit = {False: solve_whole, True: solve_clipped}
     if problem.near_basis.pitch > 1:
         solve_lit[True] = solve_cut
@@ -103,8 +106,8 @@ def sweep_once(
         seen = component < len(LIT_COMPONENTS)
         batch.direct_weights[~seen] = 0.0
         batch = batch._replace(lit=seen)
-        priors = model.priors
-        for place, alike, cut in _alike(batch, component, model, clips=clips):
+        priors = by_themselves if is_first else of_differences
+        for place, alike, cut in _alike(batch, component, centred, priors, clips=clips):
             some = batch.only(alike)
             ratio = variance_ratio(some, scale[alike])
             ratio = rounded_ratio(ratio) if cut else ratio
@@ -135,13 +138,18 @@ def sweep_once(
 
 
 def _alike(
-    batch: PixelBatch, component: Integers, model: Model, *, clips: bool
+    batch: PixelBatch,
+    component: Integers,
+    centred: CentredBasis,
+    priors: dict[int, ResponsePrior],
+    *,
+    clips: bool,
 ) -> Iterator[tuple[int, NDArray[np.int64], bool]]:
     """Yield each prior component, its camera pixels, and whether the border cuts their windows.
 
     A component that fades soon does not reach every border that is in reach of the functions.
     """
-    xp, centred = namespace(component), model.centred
+    xp = namespace(component)
     for place in np.unique(fetch(component)).tolist():
         (alike,) = xp.nonzero(component == place)
         cut = clips and place < len(LIT_COMPONENTS)
@@ -152,7 +160,7 @@ def _alike(
             batch.centres[alike],
             centred.near_basis,
             centred.basis.projector,
-            model.priors[place].reach,
+            priors[place].reach,
         )
         for is_one, some in ((False, alike[~at_border]), (True, alike[at_border])):
             if len(some):
@@ -272,8 +280,9 @@ def _parts(problem: Problem, part: Part | None) -> Iterator[tuple[NDArray[np.int
     if near_basis.pitch > 1:
         places = border_distances(places, near_basis, projector)
     ordered = selected[np.lexsort(places.T[::-1])]
+    length = BATCH_PIXELS if near_basis.pitch == 1 else BATCH_PIXELS_AT_PITCH
     for some, clips in ((np.flatnonzero(selects & ~clipped), False), (ordered, True)):
-        for batch in blocks(len(some), BATCH_PIXELS):
+        for batch in blocks(len(some), length):
             yield some[batch], clips
 
 

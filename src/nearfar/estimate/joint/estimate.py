@@ -176,12 +176,14 @@ def _sweep(
             # by more than 0.01 dB.
             problem = _with_new_footprints(problem) if number == 1 else problem
             problem = _about_new_q(problem)
-    problem, found = _of_rows(problem, found, held, wanted)
     assert found is not None
     if halves:
+        # Of the rows beside the wanted ones as well, which some take their choice from.
         pixels, camera = problem.pixels, problem.measurements.camera
         first = every_choice(found.choices[0], pixels.is_even, pixels.lit, camera)
         found = found._replace(choices=(first, *found.choices[1:]))
+    problem, found = _of_rows(problem, found, held, wanted)
+    assert found is not None
     return problem, found
 
 

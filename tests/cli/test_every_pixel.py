@@ -109,6 +109,10 @@ def test_a_tile_with_the_rows_beside_it_is_that_of_the_whole(job):
     np.testing.assert_array_equal(part.footprint[same], whole.footprint[same])
     light = natural_picture(PROJECTOR, 5)
     np.testing.assert_allclose((part @ light)[same], (whole @ light)[same], rtol=1e-3, atol=1e-5)
+    wanted = estimate_jointly(tile, q[:rows], *sizes, pitch=plan.pitch, rows=same)
+    for name in ("prior_component", "prior_scale"):
+        found, expected = (getattr(one.posterior, name) for one in (wanted, whole))
+        np.testing.assert_array_equal(found, expected[same])
 
 
 def test_rows_that_are_not_wanted_are_left_out_without_changing_those_that_are(job):

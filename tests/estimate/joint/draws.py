@@ -83,6 +83,7 @@ def batch_of(measurements, centres, centred):
         white=white_scale(measurements),
         spike_expected=np.zeros((count, WINDOW**2), dtype=bool),
         footprint=np.zeros(count, dtype=np.float32),
+        is_even=np.ones(count, dtype=bool),
     )
     return gather(pixels, slice(None), centred, PROJECTOR)
 

@@ -75,6 +75,7 @@ def _batch(centres, centred):
         white=white_scale(measurements),
         spike_expected=np.zeros((len(centres), 0), dtype=bool),
         footprint=np.tile(np.float32([1.4, 1.4, 0.3, -0.2]), (len(centres), 1)),
+        is_even=np.ones(len(centres), dtype=bool),
     )
     return gather(pixels, slice(None), centred, PROJECTOR)
 

@@ -4,9 +4,24 @@ import numpy as np
 import pytest
 
 from nearfar.estimate.joint import neighbour_loops, neighbours
+from nearfar.estimate.joint.chessboard import Part
 
 BY_ARRAYS = (neighbours.expect_each, neighbours.expect_together)
-BY_PIXEL = (neighbour_loops.expect_each_by_pixel, neighbour_loops.expect_together_by_pixel)
+
+
+def _of_every_pixel(expect):
+    def found(values, *more):
+        shape = values.shape[:2]
+        every = Part(np.arange(np.prod(shape)), np.ones(shape, dtype=bool))
+        return expect(values, *more, every).reshape(values.shape)
+
+    return found
+
+
+BY_PIXEL = (
+    _of_every_pixel(neighbour_loops.expect_each_by_pixel),
+    _of_every_pixel(neighbour_loops.expect_together_by_pixel),
+)
 
 
 @pytest.fixture(params=[BY_ARRAYS, BY_PIXEL], ids=["by arrays", "by pixel"])
@@ -65,3 +80,24 @@ def test_what_is_alike_everywhere_stays_so_to_the_cameras_border(shape, filters)
     np.testing.assert_allclose(
         expect_together(values, white, variance, np.ones(shape, dtype=bool)), values, rtol=1e-12
     )
+
+
+def test_a_camera_pixel_that_is_not_known_is_the_mean_of_its_neighbours():
+    generator = np.random.default_rng(2)
+    values, white = generator.normal(size=(6, 7, 1, 5)), 1.0 + generator.random((6, 7, 1))
+    known = np.indices((6, 7)).sum(axis=0) % 2 == 0
+    values[~known] = 1e6
+    part, variance = Part(np.flatnonzero(~known), known), np.full((6, 7, 1), 0.01)
+    each = neighbour_loops.expect_each_by_pixel(
+        values, white, variance, np.ones(5), np.array([3, 4]), part
+    )
+    every = np.ones((6, 7), dtype=bool)
+    together = neighbour_loops.expect_together_by_pixel(values, white, variance, every, part)
+    y, x = np.unravel_index(part.selected, known.shape)
+    inner = (y > 0) & (y < 5) & (x > 0) & (x < 6)
+    shares = values / white[..., None]
+    mean = (shares[y[inner] - 1, x[inner]] + shares[y[inner] + 1, x[inner]]) / 4
+    mean += (shares[y[inner], x[inner] - 1] + shares[y[inner], x[inner] + 1]) / 4
+    expected = mean * white[y[inner], x[inner], :, None]
+    np.testing.assert_allclose(each[inner], expected, rtol=1e-12)
+    np.testing.assert_allclose(together[inner], expected, rtol=1e-12)

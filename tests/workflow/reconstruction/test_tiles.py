@@ -68,3 +68,7 @@ def test_tiles_cover_the_camera_and_their_halo_ends_at_its_border():
     ]  # fmt: skip
     around = [tiling.with_halo(tile) for tile in tiling.tiles()]
     assert [(rows.start, rows.stop) for rows in around] == [(0, 20), (12, 36), (28, 52), (44, 60)]
+    # Chessboards of tiles are those of the whole camera, so that an odd halo is a row more above.
+    odd = tiling._replace(halo=5)
+    around = [odd.with_halo(tile) for tile in odd.tiles()]
+    assert [(rows.start, rows.stop) for rows in around] == [(0, 21), (10, 37), (26, 53), (42, 60)]

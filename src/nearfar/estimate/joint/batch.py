@@ -139,6 +139,9 @@ class AllPixels(NamedTuple):
     footprint : ndarray, shape (C, 4), float32
         Direct light's footprint, as `nearfar.transport.boxes` describes it, where the functions of
         near-range light are of several projector pixels.
+    is_even : ndarray of bool, shape (C,)
+        Whether the camera pixel is of a chessboard's even fields: its row and column add up to an
+        even number.
     """
 
     responses: Floats
@@ -150,6 +153,7 @@ class AllPixels(NamedTuple):
     white: Floats
     spike_expected: Booleans
     footprint: Floats
+    is_even: Booleans
 
 
 def gather(

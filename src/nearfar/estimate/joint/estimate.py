@@ -15,6 +15,7 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.batch import AllPixels
+from nearfar.estimate.joint.chessboard import Part, every_choice, part_of_sweep
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.own_footprint import own_footprints
@@ -36,9 +37,11 @@ LARGEST_SHIFT = 0.25
 # The same where footprints are boxes, whose responses are not linear in q.
 LARGEST_SHIFT_AT_PITCH = 0.12
 LARGEST_FROM_CENTRE = 0.499
+# At a pitch over 1 each sweep but the last is two, of half of the camera pixels each.
+HALF_SWEEPS = 2 * SWEEPS - 1
 # Camera rows on either side of a row that its estimate depends on at a pitch over 1: neighbours in
-# each sweep, and those that vote for footprints before the first sweep and after it.
-ROWS_BESIDE = SWEEPS + 2 * VOTING_ROWS
+# sweeps, and those that vote for footprints before the first sweep and after the second.
+ROWS_BESIDE = HALF_SWEEPS - 2 + 2 * VOTING_ROWS
 
 
 def estimate_jointly(
@@ -76,6 +79,7 @@ def estimate_jointly(
         and are estimated only as far as these depend on them.
     sweeps : int
         Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
+        At a pitch over 1 each but the last is two sweeps, of half of the camera pixels each.
     chosen : Choices
         Prior components and scales that `choose_components` chose by some of the photos.
     device : {"cpu", "cuda", "torch"}
@@ -150,6 +154,9 @@ def _sweep(
 ) -> tuple[Problem, EstimatedRows]:
     """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each."""
     found, held = None, slice(0, problem.measurements.camera.height)
+    halves = problem.near_basis.pitch > 1
+    # Where each is of half of the camera pixels, one alone would leave out the others.
+    sweeps = max(2, 2 * sweeps - 1) if halves else sweeps
     for number, choice in zip_longest(range(sweeps), chosen.sweeps[:sweeps]):
         around = _rows_around(problem, held, wanted, number, sweeps)
         problem, found = _of_rows(problem, found, held, around)
@@ -159,19 +166,24 @@ def _sweep(
             progress((number + share) / sweeps)
 
         mine = choice and choice.of(_pixels(problem, held))
-        found = sweep_once(problem, found, report, mine)
+        part = part_of_sweep(problem, number) if halves else None
+        found = sweep_once(problem, found, report, mine, part)
         if number == 0 and chosen.of_error_bars is not None:
             found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
-        lit = found.choices.sweeps[-1].prior_component < len(LIT_COMPONENTS)
-        pixels = problem.pixels._replace(
-            lit=lit, correspondence=_moved(problem, found, lit, is_last=number == sweeps - 1)
-        )
-        problem = problem._replace(pixels=pixels)
-        if problem.near_basis.pitch > 1 and number < sweeps - 1:
+        is_last = number >= sweeps - (2 if halves else 1)
+        problem = _with_new_q(problem, found, part, is_last=is_last)
+        if halves and number < sweeps - 1:
             # Later sweeps hardly move q: new footprints after each of them change no light's SNR
             # by more than 0.01 dB.
-            problem = _with_new_footprints(problem) if number == 0 else problem
+            problem = _with_new_footprints(problem) if number == 1 else problem
             problem = _about_new_q(problem)
+    assert found is not None
+    if halves:
+        # Of the rows beside the wanted ones as well, which some take their choice from.
+        pixels, camera = problem.pixels, problem.measurements.camera
+        first = found.choices.sweeps[0]
+        bars = every_choice(first, pixels.is_even, pixels.lit, camera)
+        found = found._replace(choices=found.choices._replace(of_error_bars=bars))
     problem, found = _of_rows(problem, found, held, wanted)
     assert found is not None
     return problem, found
@@ -192,12 +204,12 @@ def _rows_around(problem: Problem, held: slice, wanted: slice, number: int, swee
     """Return the camera rows, of those held, that a sweep estimates for the sake of wanted rows.
 
     It and those after it read the rows of neighbours, and footprints are voted for with the q that
-    the first finds. Where functions are of single pixels there are few of them, and all are
+    the first two find. Where functions are of single pixels there are few of them, and all are
     estimated.
     """
     if problem.near_basis.pitch == 1 or held == wanted:
         return held
-    beside = sweeps - number + (VOTING_ROWS if number == 0 else 0)
+    beside = sweeps - 2 + VOTING_ROWS if number < 2 else sweeps - number
     return slice(max(held.start, wanted.start - beside), min(held.stop, wanted.stop + beside))
 
 
@@ -248,6 +260,20 @@ def _about_new_q(problem: Problem) -> Problem:
     q = fetch(pixels.correspondence).reshape(*measurements.camera, 2)
     centres = beside(near.centre(q, measurements.projector), pixels.white)
     return problem._replace(pixels=pixels._replace(centres=centres))
+
+
+def _with_new_q(
+    problem: Problem, found: EstimatedRows, part: Part | None, *, is_last: bool
+) -> Problem:
+    """Return the problem with the q, and the direct light, that a sweep found."""
+    pixels = problem.pixels
+    lit = found.choices.sweeps[-1].prior_component < len(LIT_COMPONENTS)
+    moved = _moved(problem, found, lit, is_last=is_last)
+    if part is not None:
+        kept = np.ones(len(lit), dtype=bool)
+        kept[part.selected] = False
+        lit[kept], moved[kept] = pixels.lit[kept], pixels.correspondence[kept]
+    return problem._replace(pixels=pixels._replace(lit=lit, correspondence=moved))
 
 
 def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: bool) -> Floats:

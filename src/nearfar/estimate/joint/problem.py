@@ -26,6 +26,7 @@ from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
+from nearfar.priors.covariance import FAINT_DIFFERENCE, reach_of_near
 from nearfar.priors.fitted import (
     LIT_AT_PITCH,
     LIT_COMPONENTS,
@@ -126,6 +127,15 @@ class Model(NamedTuple):
         """Each prior component by its index into LIT_COMPONENTS + UNLIT_COMPONENTS."""
         sets = (self.lit, self.unlit)
         return {n: one for each in sets for n, one in zip(each.numbers, each.priors, strict=True)}
+
+    @property
+    def difference_priors(self) -> dict[int, ResponsePrior]:
+        """The same for differences from neighbours, which borders cut less far away."""
+        found, near_basis = self.priors, self.centred.near_basis
+        for n in self.lit_differences.numbers:
+            reach = reach_of_near(EVERY_COMPONENT[n], near_basis, FAINT_DIFFERENCE)
+            found[n] = replace(found[n], reach=reach)
+        return found
 
 
 class Problem(NamedTuple):
@@ -241,6 +251,7 @@ def lay_out(
         white=white,
         spike_expected=expected_spikes(correspondence, near_basis),
         footprint=np.zeros((len(lit), 4), dtype=np.float32) if footprint is None else footprint,
+        is_even=(np.indices(measurements.camera).sum(axis=0) % 2 == 0).ravel(),
     )
     move = mover(device)
     pixels = AllPixels._make(map(move, pixels))

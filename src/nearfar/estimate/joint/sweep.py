@@ -7,40 +7,31 @@ Index convention: arrays are (C, channels, ...); r runs over real responses, w o
 """
 
 from collections.abc import Callable, Iterator
-from math import log
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from array_api_compat import device
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Floats, Integers, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
+from nearfar.estimate.joint.chessboard import Part
+from nearfar.estimate.joint.choose import choose, is_doubtful
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
-from nearfar.estimate.joint.evidence import (
-    best_of,
-    log_evidence,
-    log_evidence_by_row,
-    log_evidences,
-)
 from nearfar.estimate.joint.neighbour_loops import (
     expect_each_by_pixel,
     expect_together_by_pixel,
 )
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
-from nearfar.estimate.joint.pooled_choice import (
-    no_probabilities,
-    pooled_choice,
-    put_probabilities,
-)
+from nearfar.estimate.joint.pooled_choice import no_probabilities, pooled_choice
 from nearfar.estimate.joint.problem import (
     Choices,
     ComponentChoice,
     EstimatedRows,
-    Model,
     Problem,
 )
 from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
@@ -57,18 +48,10 @@ from nearfar.priors.responses import ResponsePrior
 from nearfar.transport import near
 from nearfar.transport.direct import footprint, look_up_each
 
-# Where direct light explains this share of the power of the responses, it is there.
-CERTAIN_SHARE = 0.5
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
-
-
-class _Start(NamedTuple):
-    """The state that a later sweep starts from."""
-
-    before: EstimatedRows
-    expected: EstimatedRows  # from the neighbours
-    of_quantisation: Callable[[slice | NDArray[np.int64]], Floats]  # see `_of_quantisation`
+# The same where functions are of several projector pixels, whose batches fall into more groups.
+BATCH_PIXELS_AT_PITCH = 4096
 
 
 def sweep_once(
@@ -76,85 +59,137 @@ def sweep_once(
     before: EstimatedRows | None,
     report: Callable[[float], None],
     chosen: ComponentChoice | None = None,
+    part: Part | None = None,
 ) -> EstimatedRows:
-    """Estimate every camera pixel once.
+    """Estimate camera pixels once.
 
     Parameters
     ----------
     problem : Problem
     before : EstimatedRows, optional
-        Of the sweep before; None in the first.
+        Of the sweep before, whose arrays are overwritten; None in the first.
     report : callable
         Called with the share done.
     chosen : ComponentChoice, optional
         Prior components and scales, if they are chosen already.
+    part : Part, optional
+        Camera pixels to estimate; by default all.
     """
-    pixels, model = problem.pixels, problem.model
-    centred, projector = model.centred, problem.measurements.projector
-    count = len(pixels.responses)
-    rows = _empty_rows(problem)
-    start = None
-    if before is not None:
-        start = _Start(before, _expected(problem, before), _of_quantisation(problem))
-        # What is found is added to what was expected: no camera pixel reads another's expectation.
-        rows = rows._replace(near=start.expected.near, far=start.expected.far)
-        sweeps = (*before.choices.sweeps, *rows.choices.sweeps)
-        rows = rows._replace(choices=before.choices._replace(sweeps=sweeps))
-    choice = rows.choices.sweeps[-1]
-    pools = start is None and chosen is None
-    probability = no_probabilities(count if pools else 0, model, pixels.white)
+    rows = _empty_rows(problem) if before is None else _from_neighbours(problem, before, part)
+    # Half of the camera pixels do not tell what neighbours say.
+    pools = before is None and chosen is None and part is None
+    probability = no_probabilities(
+        len(problem.pixels.responses) if pools else 0, problem.model, problem.pixels.white
+    )
+    sweep = _Sweep(
+        problem,
+        rows,
+        _of_quantisation(problem),
+        chosen,
+        probability,
+        problem.model.priors,
+        problem.model.difference_priors,
+    )
+    # In the second sweep over half of the camera pixels, these are estimated for the first time.
+    is_new = part is not None and not part.known.all()
+    estimate = sweep.estimate_new if is_new else partial(sweep.estimate, starts=before is None)
+    done, parts = [0], list(_parts(problem, part))
+    count = sum(len(selected) for selected, _ in parts)
 
-    def put(selected: NDArray[np.int64], batch: PixelBatch, found: PosteriorMean) -> None:
-        rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
-        add_rows(rows.near, selected, found.near)
-        add_rows(rows.far, selected, centred.uncentre(found.far, batch.centres))
-        rows.near_noise[selected] = found.near_noise
-
-    done = [0]
-    solve_lit = {False: solve_whole, True: solve_clipped}
-    if problem.near_basis.pitch > 1:
-        solve_lit[True] = solve_cut
-
-    def estimate(part: tuple[NDArray[np.int64], bool]) -> None:
-        """Choose prior components, and estimate camera pixels whose windows are whole or not."""
-        selected, clips = beside(part[0], pixels.responses), part[1]
-        batch = gather(pixels, selected, centred, projector, _explained(problem, start, selected))
-        given = chosen and chosen.of(selected)
-        found, of_batch = _choose(batch, model, given, is_first=start is None)
-        component, scale = found
-        choice.prior_component[selected], choice.prior_scale[selected] = component, scale
-        if pools:
-            probability[selected] = of_batch
-        seen = component < len(LIT_COMPONENTS)
-        batch.direct_weights[~seen] = 0.0
-        batch = batch._replace(lit=seen)
-        priors = model.priors
-        for place, alike, cut in _alike(batch, component, model, clips=clips):
-            some = batch.only(alike)
-            ratio = variance_ratio(some, scale[alike])
-            ratio = rounded_ratio(ratio) if cut else ratio
-            mean = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
-            put(selected[alike], some, mean)
-        done[0] += len(part[0])
+    def work(some: tuple[NDArray[np.int64], bool]) -> None:
+        estimate(beside(some[0], problem.pixels.responses), clips=some[1])
+        done[0] += len(some[0])
         report(done[0] / count)
 
-    side_by_side(estimate, _parts(problem))
-    if start is None:
-        of_error_bars = choice
+    side_by_side(work, parts)
+    if before is None:
+        of_error_bars = rows.choices.sweeps[-1]
         if pools:
-            of_error_bars = pooled_choice(probability, model, problem.measurements.camera)
+            of_error_bars = pooled_choice(probability, problem.model, problem.measurements.camera)
         rows = rows._replace(choices=rows.choices._replace(of_error_bars=of_error_bars))
     return rows
 
 
+class _Sweep(NamedTuple):
+    """What a sweep estimates from, and what it fills."""
+
+    problem: Problem
+    rows: EstimatedRows  # with what neighbours lead to expect, if there is a sweep before
+    of_quantisation: Callable[[NDArray[np.int64]], Floats]
+    chosen: ComponentChoice | None
+    probability: Floats  # of components and scales, or of no camera pixels
+    by_themselves: dict[int, ResponsePrior]
+    of_differences: dict[int, ResponsePrior]
+
+    def estimate(self, selected: NDArray[np.int64], *, clips: bool, starts: bool) -> None:
+        """Estimate some camera pixels by their own photos alone, or from what is expected."""
+        self._solve(selected, self._gathered(selected, starts=starts), clips=clips, starts=starts)
+
+    def estimate_new(self, selected: NDArray[np.int64], *, clips: bool) -> None:
+        """Estimate camera pixels from what is expected that no sweep has estimated before.
+
+        Where there may be no direct light, what neighbours lead to expect has no say.
+        """
+        batch = self._gathered(selected, starts=False)
+        doubted = batch.lit & is_doubtful(batch, self.problem.model.centred)
+        (alone,), (rest,) = np.nonzero(doubted), np.nonzero(~doubted)
+        if len(alone):
+            afresh = selected[alone]
+            self.rows.near[afresh], self.rows.far[afresh] = 0.0, 0.0
+            self.estimate(afresh, clips=clips, starts=True)
+        if len(rest):
+            self._solve(selected[rest], batch.only(rest), clips=clips, starts=False)
+
+    def _gathered(self, selected: NDArray[np.int64], *, starts: bool) -> PixelBatch:
+        problem = self.problem
+        known = None if starts else _explained(problem, self.rows, self.of_quantisation, selected)
+        projector = problem.measurements.projector
+        return gather(problem.pixels, selected, problem.model.centred, projector, known)
+
+    def _solve(
+        self, selected: NDArray[np.int64], batch: PixelBatch, *, clips: bool, starts: bool
+    ) -> None:
+        """Choose prior components, and estimate camera pixels whose windows are whole or not."""
+        model, rows = self.problem.model, self.rows
+        given = self.chosen and self.chosen.of(selected)
+        (component, scale), probability = choose(batch, model, given, is_first=starts)
+        choice = rows.choices.sweeps[-1]
+        choice.prior_component[selected], choice.prior_scale[selected] = component, scale
+        if len(self.probability):
+            self.probability[selected] = probability
+        seen = component < len(LIT_COMPONENTS)
+        batch.direct_weights[~seen] = 0.0
+        batch = batch._replace(lit=seen)
+        centred = model.centred
+        priors = self.by_themselves if starts else self.of_differences
+        solve_lit = {False: solve_whole, True: solve_clipped}
+        if centred.near_basis.pitch > 1:
+            solve_lit[True] = solve_cut
+        for place, alike, cut in _alike(batch, component, centred, priors, clips=clips):
+            some, of_some = batch.only(alike), selected[alike]
+            ratio = variance_ratio(some, scale[alike])
+            ratio = rounded_ratio(ratio) if cut else ratio
+            found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
+            rows.amplitudes[of_some] = found.amplitudes[..., :COMMON_AMPLITUDES]
+            # What is found is added to what was expected.
+            add_rows(rows.near, of_some, found.near)
+            add_rows(rows.far, of_some, centred.uncentre(found.far, some.centres))
+            rows.near_noise[of_some] = found.near_noise
+
+
 def _alike(
-    batch: PixelBatch, component: Integers, model: Model, *, clips: bool
+    batch: PixelBatch,
+    component: Integers,
+    centred: CentredBasis,
+    priors: dict[int, ResponsePrior],
+    *,
+    clips: bool,
 ) -> Iterator[tuple[int, NDArray[np.int64], bool]]:
     """Yield each prior component, its camera pixels, and whether the border cuts their windows.
 
     A component that fades soon does not reach every border that is in reach of the functions.
     """
-    xp, centred = namespace(component), model.centred
+    xp = namespace(component)
     for place in np.unique(fetch(component)).tolist():
         (alike,) = xp.nonzero(component == place)
         cut = clips and place < len(LIT_COMPONENTS)
@@ -165,7 +200,7 @@ def _alike(
             batch.centres[alike],
             centred.near_basis,
             centred.basis.projector,
-            model.priors[place].reach,
+            priors[place].reach,
         )
         for is_one, some in ((False, alike[~at_border]), (True, alike[at_border])):
             if len(some):
@@ -173,21 +208,22 @@ def _alike(
 
 
 def _explained(
-    problem: Problem, start: _Start | None, selected: slice | NDArray[np.int64]
-) -> Floats | None:
+    problem: Problem,
+    expected: EstimatedRows,
+    of_quantisation: Callable[[NDArray[np.int64]], Floats],
+    selected: NDArray[np.int64],
+) -> Floats:
     """Return the expected responses, plus those of direct light to the quantisation error."""
-    if start is None:
-        return None
     centred = problem.model.centred
     centres = problem.pixels.centres[selected]
     if centred.near_basis.pitch == 1:
-        responses = product(start.expected.near[selected], centred.on_window.T)
+        responses = product(expected.near[selected], centred.on_window.T)
     else:
-        responses = near_responses(start.expected.near[selected], centres, centred)
+        responses = near_responses(expected.near[selected], centres, centred)
     responses = centred.uncentre(responses, centres)
-    responses += start.expected.far[selected]
-    direct = start.before.amplitudes[selected, :, 1, None]
-    responses += direct * start.of_quantisation(selected)[:, None]
+    responses += expected.far[selected]
+    direct = expected.amplitudes[selected, :, 1, None]
+    responses += direct * of_quantisation(selected)[:, None]
     return responses
 
 
@@ -208,97 +244,30 @@ def _empty_rows(problem: Problem) -> EstimatedRows:
     )
 
 
-def _choose(
-    batch: PixelBatch, model: Model, given: ComponentChoice | None, *, is_first: bool
-) -> tuple[ComponentChoice, Floats]:
-    """Choose prior components where they are not given.
-
-    In the first sweep a camera pixel for which q was found may turn out to have no direct light.
-
-    Returns
-    -------
-    choice : ComponentChoice
-    probability : ndarray, shape (n or 0, components, scales)
-        In the first sweep, of all components and scales where they are not given; elsewhere 0.
-    """
-    xp = namespace(batch.white)
-    if given is None:
-        left = xp.ones_like(batch.lit)
-        number = xp.zeros(left.shape, dtype=xp.int64, device=device(left))
-        given = ComponentChoice(number, xp.zeros_like(batch.white[:, 0]))
-    else:
-        # Chosen when the camera pixel was lit and is not now, or the reverse.
-        left = batch.lit != (given.prior_component < len(LIT_COMPONENTS))
-    probability = no_probabilities(len(left) if is_first else 0, model, batch.white)
-    # No shift of q has a say; nor has, among functions of several projector pixels, the references'
-    # error, which takes a third of the time and changes no choice that matters.
-    batch = batch._replace(direct_weights=batch.direct_weights[:, :1])
-    evidence_of = log_evidence
-    if model.centred.near_basis.pitch > 1:
-        batch = batch._replace(of_offset=batch.of_offset[:, :0])
-        evidence_of = log_evidence_by_row
-    for selected, candidates in (
-        (left & batch.lit, model.lit if is_first else model.lit_differences),
-        (left & ~batch.lit, model.unlit),
-    ):
-        (mine,) = xp.nonzero(selected)
-        if not len(mine):
-            continue
-        of_mine = batch if len(mine) == len(left) else batch.only(mine)
-        values = log_evidences(of_mine, candidates, evidence_of)
-        component, scale, evidence = best_of(values, candidates)
-        if is_first:
-            put_probabilities(probability, mine, values, candidates, model)
-        if is_first and candidates is model.lit:
-            (doubted,) = xp.nonzero(_is_doubtful(of_mine, model.centred))
-            if len(doubted):
-                dark_ones = _without_direct(of_mine.only(doubted))
-                values = log_evidences(dark_ones, model.unlit, evidence_of)
-                unlit, its_scale, without = best_of(values, model.unlit)
-                # q was chosen among all projector pixels.
-                none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
-                component[doubted] = xp.where(none, unlit, component[doubted])
-                scale[doubted] = xp.where(none, its_scale, scale[doubted])
-                dark = mine[doubted[none]]
-                put_probabilities(probability, dark, values[:, none], model.unlit, model)
-        given.prior_component[mine] = component
-        given.prior_scale[mine] = xp.astype(scale, xp.float32)
-    return given, probability
-
-
-def _is_doubtful(batch: PixelBatch, centred: CentredBasis) -> Booleans:
-    """Return at which camera pixels direct light explains little of the responses, shape (n,)."""
-    xp = namespace(batch.responses)
-    direct = centred.of_direct(batch.direct_weights[:, :1])
-    along = xp.sum(batch.responses * direct, axis=-1) ** 2
-    power = xp.sum(batch.responses**2, axis=-1) * xp.sum(direct**2, axis=-1)
-    doubtful: Booleans = xp.sum(along, axis=1) < CERTAIN_SHARE * xp.sum(power, axis=1)
-    return doubtful
-
-
-def _without_direct(batch: PixelBatch) -> PixelBatch:
-    return batch._replace(direct_weights=batch.direct_weights[:, :1] * 0.0)
-
-
-def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
+def _parts(problem: Problem, part: Part | None) -> Iterator[tuple[NDArray[np.int64], bool]]:
     """Yield batches of camera pixels, and whether the border clips their windows.
 
     Windows clipped alike are next to each other.
     """
+    selects = np.ones(len(problem.pixels.lit), dtype=bool)
+    if part is not None:
+        selects[:] = False
+        selects[part.selected] = True
     pixels, near_basis = problem.pixels, problem.near_basis
     projector = problem.measurements.projector
     clipped = fetch(pixels.lit & is_clipped(pixels.centres, near_basis, projector))
-    (selected,) = np.nonzero(clipped)
+    (selected,) = np.nonzero(selects & clipped)
     places = fetch(pixels.centres)[selected]
     if near_basis.pitch > 1:
         places = border_distances(places, near_basis, projector)
     ordered = selected[np.lexsort(places.T[::-1])]
-    for part, clips in ((np.flatnonzero(~clipped), False), (ordered, True)):
-        for batch in blocks(len(part), BATCH_PIXELS):
-            yield part[batch], clips
+    length = BATCH_PIXELS if near_basis.pitch == 1 else BATCH_PIXELS_AT_PITCH
+    for some, clips in ((np.flatnonzero(selects & ~clipped), False), (ordered, True)):
+        for batch in blocks(len(some), length):
+            yield some[batch], clips
 
 
-def _of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
+def _of_quantisation(problem: Problem) -> Callable[[NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
     errors = problem.quantisation_error
     if not len(errors):
@@ -341,8 +310,29 @@ def _with_spikes(
     return mean
 
 
-def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
-    """Return the expectation of each camera pixel's rows from its neighbours."""
+def _from_neighbours(problem: Problem, before: EstimatedRows, part: Part | None) -> EstimatedRows:
+    """Return the rows that a later sweep starts from: those expected from neighbours."""
+    windows, far = _expected(problem, before, part)
+    sweeps = (*before.choices.sweeps, before.choices.sweeps[-1].of(slice(None)))
+    rows = before._replace(choices=before.choices._replace(sweeps=sweeps))
+    if part is None:
+        return rows._replace(near=windows, far=far)
+
+    def put(some: slice) -> None:
+        rows.near[part.selected[some]], rows.far[part.selected[some]] = windows[some], far[some]
+
+    side_by_side(put, blocks(len(part.selected), BATCH_PIXELS))
+    if not part.known.all():
+        pixels, shape = problem.pixels, (*problem.measurements.camera, -1)
+        direct = np.ascontiguousarray(rows.amplitudes[..., 1]).reshape((*shape, 1))
+        white, lit = pixels.white.reshape(shape), pixels.lit.reshape(shape[:2])
+        expected = expect_together_by_pixel(direct, white, np.ones_like(white), lit, part)
+        rows.amplitudes[part.selected, :, 1] = expected[..., 0]
+    return rows
+
+
+def _expected(problem: Problem, rows: EstimatedRows, part: Part | None) -> tuple[Floats, Floats]:
+    """Return n and f of camera pixels as their neighbours lead to expect."""
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     xp, shape = namespace(rows.near), (*camera, channels)
@@ -352,9 +342,11 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
     variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    each, together = expect_each, expect_together
-    if problem.near_basis.pitch > 1:
-        each, together = expect_each_by_pixel, expect_together_by_pixel
+    each: Callable[..., Floats] = expect_each
+    together: Callable[..., Floats] = expect_together
+    if part is not None:
+        each = partial(expect_each_by_pixel, part=part)
+        together = partial(expect_together_by_pixel, part=part)
     far = each(
         rows.far.reshape((*shape, -1)),
         white,
@@ -368,8 +360,8 @@ def _expected(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
         rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(camera),
     )
-    windows = windows.reshape(rows.near.shape)
+    windows = windows.reshape((-1, *rows.near.shape[1:]))
     if problem.near_basis.pitch == 1:
         inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
         windows *= inside[:, None]
-    return rows._replace(near=windows, far=far.reshape(rows.far.shape))
+    return windows, far.reshape((-1, *rows.far.shape[1:]))

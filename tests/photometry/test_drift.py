@@ -247,6 +247,16 @@ def test_a_lamp_that_failed_is_told(world, shoot):
         measure(replace(photos, photos=failed))
 
 
+@pytest.mark.parametrize("which", [0, 2, -1])
+def test_a_black_that_shows_white_is_told_from_a_lamp_that_failed(world, shoot, which):
+    photos = _drifting(shoot, world, STEADY, STEADY)
+    whites, blacks = find_references(PLAN)
+    late = photos.photos.copy()
+    late[blacks[which]] = late[whites[which]]
+    with pytest.raises(InputError, match=f"photo {blacks[which]}, of black, shows light"):
+        measure(replace(photos, photos=late))
+
+
 def test_robust_fits_are_exact_and_deaf():
     generator = np.random.default_rng(0)
     shapes = np.stack([np.ones(2000), generator.uniform(size=2000)])

@@ -33,6 +33,9 @@ SAMPLED_PIXELS = 2**17
 LARGEST_GAIN_ERROR = 0.02
 # Gain of the lamp, over its mean, below which it has failed.
 LEAST_LAMP = 0.1
+# Where it is that weak, and a black holds this much more of white's light than another, the black
+# shows white.
+LARGEST_BLACK = 0.5
 
 
 class References(NamedTuple):
@@ -230,18 +233,36 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
             for photo in lit
         ]
         report(len(whites) + 2 * len(blacks) + len(gains))
-    return replace(drift, lamp=_lamp(np.array(gains), whites))
+    return replace(drift, lamp=_lamp(np.array(gains), ambient[:, 2], references))
 
 
-def _lamp(gains: NDArray[np.float64], whites: Integers) -> NDArray[np.float64]:
-    """Return the lamp at each white from gains and their errors, (whites, channels, 2)."""
+def _lamp(
+    gains: NDArray[np.float64], of_white: NDArray[np.float64], references: References
+) -> NDArray[np.float64]:
+    """Return the lamp at each white.
+
+    Parameters
+    ----------
+    gains : ndarray, shape (whites, channels, 2)
+        With their errors.
+    of_white : ndarray, shape (blacks, channels)
+        How much of white's light each black holds, less their mean.
+    references : References
+    """
     gain, error = gains[..., 0], gains[..., 1]
     known = np.all(error < LARGEST_GAIN_ERROR, axis=0)
     lamp: NDArray[np.float64] = np.where(known, gain, 1.0)
     if lamp.min() < LEAST_LAMP:
+        # A black that shows white takes its light from the whites beside it.
+        if np.ptp(of_white, axis=0).max() > LARGEST_BLACK:
+            raise InputError(
+                f"photo {references.blacks[of_white.max(axis=1).argmax()]}, of black, shows light "
+                f"as white does: put the photos in the order of the plan, or shoot again."
+            )
+        weakest = references.whites[lamp.min(axis=1).argmin()]
         raise InputError(
-            f"photo {whites[lamp.min(axis=1).argmin()]}, of white, shows under {LEAST_LAMP:.0%} of "
-            f"the light of the others: shoot again with the projector on throughout."
+            f"photo {weakest}, of white, shows under {LEAST_LAMP:.0%} of the light of the others: "
+            f"shoot again with the projector on throughout."
         )
     return np.asarray(lamp / lamp.mean(axis=0))
 

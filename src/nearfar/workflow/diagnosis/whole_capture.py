@@ -51,6 +51,9 @@ LEAST_OF_WHITE = 0.3
 # A bend of the response has to explain at least this, and this share of the misfits beyond 1.
 LEAST_BEND = 0.5
 LEAST_SHARE_OF_BEND = 0.02
+# It explains no more than all of them: with much noise estimates are shrunk, and what is left is in
+# proportion to the light.
+LARGEST_SHARE_OF_BEND = 1.01
 # Exposure explains this many times what a bend does where it changes from photo to photo.
 EXPOSURE_OVER_BEND = 7.0
 # Above this, light changes from photo to photo, not in a few.
@@ -154,7 +157,8 @@ def find_changes(
     bend = _explained(whole.matrix.sum(axis=(0, 1)), whole.vector.sum(axis=(0, 1)), [BEND])
     bend /= whole.values
     least_bend = max(LEAST_BEND, LEAST_SHARE_OF_BEND * beyond_noise)
-    if bend > least_bend and (light is None or light[0] < EXPOSURE_OVER_BEND * bend):
+    is_bent = least_bend < bend < LARGEST_SHARE_OF_BEND * beyond_noise
+    if is_bent and (light is None or light[0] < EXPOSURE_OVER_BEND * bend):
         found.append((light[0] if light else bend, NotLinear("")))
     elif light is not None and light[0] > least:
         found.append(light)

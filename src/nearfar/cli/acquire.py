@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from nearfar.plan import Plan
     from nearfar.rigs.base import Rig
     from nearfar.workflow.observers.estimate import EstimateObserver
-    from nearfar.workflow.observers.quality import CaptureQuality
+    from nearfar.workflow.observers.quality import CaptureQuality, QualityObserver
+    from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
 # No photo of a real camera reaches this SNR.
 MAXIMUM_DECIBELS = 120.0
@@ -137,17 +138,10 @@ def acquire(
         stack.enter_context(opened)
         for note in opened.notes:
             warn(note)
-        check = estimate = None
-        # Estimates take long to import, and most captures are made without them.
-        if until is not None:
-            from nearfar.workflow.observers.quality import QualityObserver
-
-            said = partial(_say_quality, quiet=quiet)
-            check = QualityObserver(made, until, opened.full_scale, said)
+        check = None if until is None else _quality_observer(made, until, opened, quiet=quiet)
+        estimate = None
         if transport is not None:
-            from nearfar.workflow.observers.estimate import EstimateObserver
-
-            estimate = stack.enter_context(EstimateObserver(made, opened.full_scale, options))
+            estimate = stack.enter_context(_estimate_observer(made, opened, options))
         taken = shoot(
             made,
             output,
@@ -174,6 +168,23 @@ def _plan_to_shoot(plan_file: Path, *, with_check_photos: bool) -> "Plan":
     made = read_plan(plan_file)
     made.require_real("shoot")
     return with_checks(made) if with_check_photos else made
+
+
+# Estimates take long to import, and most captures are made without them.
+def _quality_observer(made: "Plan", until: float, rig: "Rig", *, quiet: bool) -> "QualityObserver":
+    """Return what stops a capture as soon as it is good enough."""
+    from nearfar.workflow.observers.quality import QualityObserver
+
+    return QualityObserver(made, until, rig.full_scale, partial(_say_quality, quiet=quiet))
+
+
+def _estimate_observer(
+    made: "Plan", rig: "Rig", options: "ReconstructionOptions"
+) -> "EstimateObserver":
+    """Return what estimates the transport while photos are taken."""
+    from nearfar.workflow.observers.estimate import EstimateObserver
+
+    return EstimateObserver(made, rig.full_scale, options)
 
 
 def _finish(

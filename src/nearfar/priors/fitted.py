@@ -56,6 +56,8 @@ UNLIT_COMPONENTS = tuple(
 # the corner at 256x256 from 200 photos.
 LIT_AT_PITCH = (18, 3, 0, 14, 24)
 LIT_DIFFERENCES_AT_PITCH = (18, 24)
+# Indices of the lit components that the estimate from any patterns chooses from.
+LIT_OF_PATTERNS = (18, 3, 13, 0, 14, 24, 2, 20)
 # Prior scales that are tried: standard deviations of near-range light at q, as shares of the
 # camera pixel's white.
 PRIOR_SCALES = tuple(2e-4 * 2.0**step for step in range(11))

@@ -129,7 +129,7 @@ def test_the_transport_is_as_good_as_if_made_afterwards(scene, rig, afterwards, 
 
 def test_components_are_those_of_the_early_choice(rig, tmp_path):
     part, estimate, _ = _follow(_plan("reference"), rig, tmp_path / "c.zarr")
-    chosen = estimate._choice.components[0]
+    chosen = estimate._choice.components.of_error_bars
     np.testing.assert_array_equal(
         part.transport.posterior.prior_component.ravel(), chosen.prior_component
     )

@@ -33,7 +33,7 @@ from nearfar.estimate.any_patterns.solve import (
 )
 from nearfar.parallel import side_by_side
 from nearfar.priors.covariance import far_variance
-from nearfar.priors.fitted import LIT_AT_PITCH, LIT_COMPONENTS, UNLIT_COMPONENTS
+from nearfar.priors.fitted import LIT_COMPONENTS, LIT_OF_PATTERNS, UNLIT_COMPONENTS
 from nearfar.transport.direct import Footprint
 
 # Prior components, those of camera pixels with direct light first.
@@ -123,10 +123,10 @@ class Prepared(NamedTuple):
 def prepare(model: PatternModel) -> Prepared:
     """Compute the prior covariances of all components, which all camera pixels share."""
     unlit = range(len(LIT_COMPONENTS), len(COMPONENTS))
-    far = {n: far_covariance(model, COMPONENTS[n]) for n in (*LIT_AT_PITCH, *unlit)}
+    far = {n: far_covariance(model, COMPONENTS[n]) for n in (*LIT_OF_PATTERNS, *unlit)}
     return Prepared(
         model,
-        {n: near_root(model, COMPONENTS[n]) for n in LIT_AT_PITCH},
+        {n: near_root(model, COMPONENTS[n]) for n in LIT_OF_PATTERNS},
         far,
         {n: far_variance(model.far_basis, COMPONENTS[n]) for n in far},
         {n: rotated(far[n]) for n in unlit},
@@ -209,17 +209,17 @@ def choose(
     One by one: each raises the evidence of those that choose it over the ones before.
     """
     sample = np.random.default_rng(0).permutation(candidates)[:SAMPLE_PIXELS]
-    pairs = [Choice(number, ratio) for number in LIT_AT_PITCH for ratio in RATIOS]
+    pairs = [Choice(number, ratio) for number in LIT_OF_PATTERNS for ratio in RATIOS]
     evidence = np.empty((len(pairs), len(sample)))
 
     def work(place: int) -> None:
         pixel = sample[place : place + 1]
         over_window = patterns_over_window(prepared.model, photos.centres[pixel[0]])
         seen = _given(prepared, photos, pixel, before, over_window).seen
-        covariances = _covariances(prepared, over_window, LIT_AT_PITCH)
+        covariances = _covariances(prepared, over_window, LIT_OF_PATTERNS)
         found = [
             log_evidence(seen, rotated(covariances[component]), RATIOS).sum(axis=1)
-            for component in LIT_AT_PITCH
+            for component in LIT_OF_PATTERNS
         ]
         evidence[:, place] = np.concatenate(found)
 

@@ -5,12 +5,13 @@ from scipy import integrate
 from nearfar.arrays import Size
 from nearfar.scenes import SCENES
 from nearfar.scenes.cornell import WAX
-from nearfar.scenes.dipole import diffuse_profile, diffuse_reflectance, dipole, subsurface
+from nearfar.scenes.dipole import dipole, subsurface
 from nearfar.scenes.geometry import Material, View, quadrilateral
 from nearfar.scenes.optics import pinhole
 from nearfar.scenes.patches import build_patches, with_medium
 from nearfar.scenes.rays import surface
 from nearfar.scenes.render import body_of
+from nearfar.transport.dipole import diffuse_profile, diffuse_reflectance
 
 
 @pytest.mark.parametrize("channel", range(3))

@@ -9,11 +9,12 @@ from nearfar.errors import InputError
 from nearfar.scenes import cache
 from nearfar.scenes.cornell import WAX
 from nearfar.scenes.description import SceneDescription
-from nearfar.scenes.dipole import diffuse_profile, dipole
+from nearfar.scenes.dipole import dipole
 from nearfar.scenes.native import sizes
 from nearfar.scenes.native.near import Lattice, dipoles_between, step_of
 from nearfar.scenes.optics import pinhole, sub_rays
 from nearfar.scenes.rays import hit, surface
+from nearfar.transport.dipole import diffuse_profile
 from nearfar.transport.exact_operator import ExactOperator
 from nearfar.workflow.evaluate import snr
 

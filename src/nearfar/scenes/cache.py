@@ -13,6 +13,7 @@ from nearfar.callbacks import Report
 from nearfar.errors import NearfarError
 from nearfar.scenes import SCENES, build, build_operator, sizes
 from nearfar.scenes.description import ByRadiosity
+from nearfar.transport import dipole as dipole_profiles
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_operator import ExactOperator
 from nearfar.transport.exact_store import load_matrices, save_exact
@@ -240,7 +241,8 @@ def _fingerprint(name: str) -> str:
     """
     digest = hashlib.sha256()
     folder = Path(__file__).parent
-    for source in (*sorted(folder.glob("*.py")), *sorted(folder.glob("native/*.py"))):
+    profiles = Path(dipole_profiles.__file__)
+    for source in (*sorted(folder.glob("*.py")), *sorted(folder.glob("native/*.py")), profiles):
         digest.update(source.read_bytes())
     entry = SCENES.entry(name)
     if entry.dist is not None:

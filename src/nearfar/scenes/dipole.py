@@ -4,78 +4,33 @@
 patch-to-patch matrix over straight distances. All lengths in metres.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from nearfar.arrays import Floats, blocks
 from nearfar.parallel import side_by_side
 from nearfar.scenes.geometry import Medium
 from nearfar.scenes.patches import Patches
+from nearfar.transport.dipole import (
+    Dipole,
+    boundary_mismatch,
+    diffuse_profile,
+    diffuse_reflectance,
+)
 
 ROWS_AT_ONCE = 16
-
-
-@dataclass(frozen=True)
-class Dipole:
-    """The two sources of one colour channel.
-
-    Attributes
-    ----------
-    reduced_albedo : float
-        alpha' = sigma_s' / (sigma_s' + sigma_a).
-    attenuation : float
-        sigma_tr, effective, per metre.
-    real, virtual : float
-        Depth of the real and height of the virtual source, in metres.
-    """
-
-    reduced_albedo: float
-    attenuation: float
-    real: float
-    virtual: float
 
 
 def dipole(medium: Medium, channel: int) -> Dipole:
     """Place the two sources of a medium in one channel."""
     scattering, absorption = medium.scattering[channel], medium.absorption[channel]
     extinction = scattering + absorption
-    eta = medium.index
-    # Diffuse Fresnel reflectance inside, Egan and Hilgeman's fit as quoted by Jensen et al.
-    fresnel = -1.440 / eta**2 + 0.710 / eta + 0.668 + 0.0636 * eta
-    mismatch = (1 + fresnel) / (1 - fresnel)
+    mismatch = boundary_mismatch(medium.index)
     return Dipole(
         reduced_albedo=scattering / extinction,
         attenuation=float(np.sqrt(3 * absorption * extinction)),
         real=1 / extinction,
         virtual=(1 + 4 * mismatch / 3) / extinction,
     )
-
-
-def diffuse_reflectance(source: Dipole, radius: Floats | float = np.inf) -> Floats:
-    """Share of light that leaves within `radius` (metres) of where it entered a flat surface.
-
-    The integral of R_d(r) 2 pi r up to the radius, in closed form.
-    """
-    radius = np.asarray(radius, dtype=float)
-    total = np.zeros_like(radius)
-    for depth in (source.real, source.virtual):
-        far = np.hypot(radius, depth)
-        total += np.exp(-source.attenuation * depth)
-        total -= depth / far * np.exp(-source.attenuation * far)
-    return source.reduced_albedo / 2 * total
-
-
-def diffuse_profile(source: Dipole, square: Floats) -> Floats:
-    """R_d at squared distances, per square metre (Jensen et al., equation 4)."""
-    total = np.zeros_like(square)
-    for depth in (source.real, source.virtual):
-        far = np.sqrt(square + depth**2)
-        # Products, since a power of 3 takes many times as long.
-        cube = far * far * far
-        far *= -source.attenuation
-        total += depth * (1 - far) / cube * np.exp(far)
-    return source.reduced_albedo / (4 * np.pi) * total
 
 
 def subsurface(patches: Patches, source: Dipole) -> Floats:

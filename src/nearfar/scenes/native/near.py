@@ -13,7 +13,7 @@ import numpy as np
 from scipy import fft
 
 from nearfar.arrays import Floats, Integers
-from nearfar.scenes.dipole import Dipole, diffuse_profile
+from nearfar.transport.dipole import Dipole, diffuse_profile
 from nearfar.transport.mediated import ConvolvedBetween
 
 # Step of the lattice over the smallest depth of a real source, the scale of R_d's peak.

@@ -12,12 +12,13 @@ import numpy as np
 from scipy import sparse
 
 from nearfar.arrays import Booleans, Floats, Integers
-from nearfar.scenes.dipole import Dipole, dipole
+from nearfar.scenes.dipole import dipole
 from nearfar.scenes.geometry import Part
 from nearfar.scenes.native.interpolation import PatchGrid, weights_at
 from nearfar.scenes.native.near import Lattice, step_of
 from nearfar.scenes.native.points import Points, spots_of, texture_at
 from nearfar.scenes.patches import texture
+from nearfar.transport.dipole import Dipole
 
 # Cells within which points of a pixel are taken together, per step of the lattice.
 CELLS_PER_STEP = 2

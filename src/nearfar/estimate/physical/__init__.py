@@ -1,0 +1,5 @@
+"""The physical split of a transport: direct light, subsurface light and inter-reflection."""
+
+from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, split_physically
+
+__all__ = ["PhysicalComponents", "PhysicalSplit", "split_physically"]

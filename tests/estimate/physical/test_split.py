@@ -1,0 +1,159 @@
+"""Synthetic translucent bodies, whose kernel and direct light are known, and scenes without."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar import Size, Transport
+from nearfar.errors import InputError
+from nearfar.estimate.physical import split_physically
+from nearfar.estimate.physical.kernels import kernel, source_at
+from nearfar.illumination.frequencies import DC
+from nearfar.illumination.near_basis import window_offsets
+from nearfar.illumination.pictures import random_pattern
+from nearfar.illumination.real_basis import real_basis
+from nearfar.transport.dipole import diffuse_reflectance
+
+PROJECTOR = Size(32, 32)
+WINDOW = 13
+DEPTH, ATTENUATION = 1.1, 0.9
+AMPLITUDE = 2.5
+
+
+def transport_of(near, direct, *, shift=0.0):
+    """Return a transport of two channels without far-range light, q at each camera pixel."""
+    y, x = np.mgrid[: PROJECTOR.height, : PROJECTOR.width].astype(np.float32)
+    q = np.clip(np.stack([y + shift, x + shift], axis=-1), 0, PROJECTOR.height - 1)
+    basis = real_basis([DC], PROJECTOR)
+    shape = (*PROJECTOR, 2)
+    return Transport(
+        projector=PROJECTOR,
+        correspondence=q,
+        direct=direct.astype(np.float32),
+        near=near.astype(np.float32),
+        far=np.zeros((*shape, basis.count), np.float32),
+        far_basis=basis,
+        black=np.zeros(shape, np.float32),
+        noise=np.full(shape, 1e-3, np.float32),
+    )
+
+
+def window_light(coverage, *, attenuations):
+    """Return the window of light under a body, (Py, Px, 2, W, W), and all of it under white."""
+    steps = window_offsets(WINDOW)
+    middle = WINDOW // 2
+    padded = np.pad(coverage, middle)
+    y, x = np.mgrid[: PROJECTOR.height, : PROJECTOR.width]
+    reached = padded[y[..., None] + middle + steps[:, 0], x[..., None] + middle + steps[:, 1]]
+    near = np.zeros((*PROJECTOR, 2, WINDOW, WINDOW))
+    for channel, attenuation in enumerate(attenuations):
+        flat = kernel(source_at(DEPTH, attenuation), middle).ravel()
+        entries = AMPLITUDE * flat * reached * coverage[..., None]
+        near[:, :, channel] = entries.reshape(*PROJECTOR, WINDOW, WINDOW)
+    return near
+
+
+@pytest.fixture(scope="module")
+def wax():
+    """Return a disc of wax with specks of paint on it, its coverage and its direct light."""
+    y, x = np.mgrid[: PROJECTOR.height, : PROJECTOR.width]
+    coverage = (np.hypot(y - 15, x - 16) < 10).astype(float)
+    rng = np.random.default_rng(4)
+    direct = np.repeat(rng.uniform(0.05, 0.3, (*PROJECTOR, 1)), 2, axis=2)
+    near = window_light(coverage, attenuations=(ATTENUATION, 1.5 * ATTENUATION))
+    return transport_of(near, direct), coverage > 0, direct, near.sum(axis=(-2, -1))
+
+
+def test_what_is_moved_between_components_changes_no_picture(wax):
+    transport, *_ = wax
+    split = split_physically(transport)
+    assert split.bodies
+    for light in (
+        random_pattern(PROJECTOR, 1),
+        np.random.default_rng(2).random((*PROJECTOR, 2)).astype(np.float32),
+    ):
+        parts = split.components(light)
+        np.testing.assert_allclose(sum(parts), transport @ light, atol=1e-6)
+
+
+def test_light_under_a_surface_is_known_at_q_where_all_of_a_body_shares_its_kernel(wax):
+    """The transport calls a part of it direct; the split takes it back, speck by speck."""
+    transport, body, direct, under = wax
+    taken = 0.3 * transport.near[..., WINDOW // 2, WINDOW // 2]
+    near = transport.near.copy()
+    near[..., WINDOW // 2, WINDOW // 2] -= taken
+    mixed = transport_of(near, direct + taken)
+    split = split_physically(mixed)
+    (found,) = split.bodies
+    for medium, attenuation in zip(found.media, (ATTENUATION, 1.5 * ATTENUATION), strict=True):
+        assert medium.source.real == pytest.approx(DEPTH, rel=0.1)
+        assert medium.source.attenuation == pytest.approx(attenuation, rel=0.15)
+    y, x = np.mgrid[: PROJECTOR.height, : PROJECTOR.width]
+    inner = np.hypot(y - 15, x - 16) < 7
+    parts = split.components(np.ones(PROJECTOR, np.float32))
+    assert np.abs(parts.direct - direct)[inner].mean() < 0.02 * direct[inner].mean()
+    assert np.abs(taken)[inner].mean() > 0.08 * direct[inner].mean()
+    assert np.abs(parts.subsurface - under)[inner].mean() < 0.06 * under[inner].mean()
+    assert np.abs(parts.subsurface[~body]).mean() < 0.02 * under[body].mean()
+
+
+@pytest.mark.parametrize("shift", [0.25, 0.45])
+def test_places_between_projector_pixels_have_the_same_medium(shift):
+    """A camera pixel between two projector pixels sees the mean of their kernels."""
+    reach = WINDOW // 2
+    flat = kernel(source_at(DEPTH, ATTENUATION), reach + 1)
+    weights = np.outer([1 - shift, shift], [1 - shift, shift])
+    rounded = int(np.rint(shift))
+    near = np.zeros((*PROJECTOR, 2, WINDOW, WINDOW))
+    for i in range(2):
+        for j in range(2):
+            first = (1 + rounded - i, 1 + rounded - j)
+            part = flat[first[0] : first[0] + WINDOW, first[1] : first[1] + WINDOW]
+            near += AMPLITUDE * weights[i, j] * part
+    direct = np.full((*PROJECTOR, 2), 0.2)
+    split = split_physically(transport_of(near, direct, shift=shift))
+    (found,) = split.bodies
+    for medium in found.media:
+        assert medium.source.real == pytest.approx(DEPTH, rel=0.1)
+    np.testing.assert_allclose(split.direct[8:24, 8:24], 0.2, atol=0.01)
+
+
+def test_light_from_one_side_is_inter_reflection():
+    near = window_light(np.ones(PROJECTOR), attenuations=(ATTENUATION, ATTENUATION))
+    near[..., : WINDOW // 2 + 1, :] = 0
+    transport = transport_of(near, np.full((*PROJECTOR, 2), 0.3))
+    split = split_physically(transport)
+    assert not split.bodies
+    parts = split.components(np.ones(PROJECTOR, np.float32))
+    assert not parts.subsurface.any()
+    np.testing.assert_allclose(parts.interreflection, near.sum(axis=(-2, -1)), atol=1e-4)
+
+
+def test_a_kernel_holds_all_the_light_of_a_flat_surface():
+    source = source_at(DEPTH, ATTENUATION)
+    flat = kernel(source, 30)
+    assert flat.sum() == pytest.approx(float(diffuse_reflectance(source)), rel=0.01)
+    np.testing.assert_allclose(flat, flat.T, rtol=1e-9)
+    np.testing.assert_allclose(flat, flat[::-1], rtol=1e-9)
+    slanted = kernel(source, 30, (0.0, 1.3))
+    assert slanted[30, 33] < 0.7 * flat[30, 33]
+    assert slanted[33, 30] < flat[33, 30]
+    assert slanted[33, 30] > slanted[30, 33]
+
+
+def test_other_things_than_transports_are_refused():
+    with pytest.raises(InputError, match="transport"):
+        split_physically(np.eye(4))
+
+
+def test_near_range_light_of_several_projector_pixels_is_refused(wax):
+    transport, *_ = wax
+    coarse = replace(
+        transport,
+        near=np.zeros((*PROJECTOR, 2, 9 + 8), np.float32),
+        pitch=2,
+        footprint=np.ones((*PROJECTOR, 4), np.float32),
+    )
+    with pytest.raises(InputError, match="single projector pixels"):
+        split_physically(coarse)

@@ -1,7 +1,7 @@
-"""Where light falls on a translucent body, and how its kernel meets the rows of camera pixels.
+"""Where light falls on a translucent body, and how its camera pixels respond to waves.
 
-Index convention: c runs over the body's camera pixels, o over `offsets`, j over the 3 x 3 projector
-pixels about the rounded q.
+Index convention: c runs over the body's camera pixels, o over `kernel_offsets`, j over the 3 x 3
+projector pixels about the rounded q, r over real responses.
 """
 
 from dataclasses import dataclass
@@ -10,19 +10,27 @@ import numpy as np
 from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats, Integers, Size
-from nearfar.estimate.physical.rows_about import REACH, offsets, on_projector, rows_about_q
+from nearfar.estimate.physical.responses import Waves, responses_about_q
+from nearfar.estimate.physical.rows_about import on_projector
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.transport.direct import direct_weights, footprint, spread
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
 
-# Projector pixels from q that kernels need to meet rows about it.
+# Projector pixels from q up to which light under a surface is compared with responses.
+REACH = 8
+# A kernel is needed one further, for places between projector pixels.
 KERNEL_RADIUS = REACH + 1
 # A projector pixel lights the body if more than this share of it does.
 LEAST_COVERAGE = 0.5
 # What the outline's pixels, of which the body covers a part, are worth at least.
 OUTLINE_COVERAGE = 0.7
 SQUARE = np.ones((3, 3), dtype=bool)
+
+
+def kernel_offsets() -> Integers:
+    """Return the offsets (y, x) from the rounded q that kernels are compared at, shape (O, 2)."""
+    return window_offsets(2 * REACH + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,58 +41,60 @@ class Body:
     ----------
     camera : Size
     pixels : ndarray of int, shape (n,)
-        Its camera pixels, those at its outline included.
+        Its camera pixels, those at its outline included, rising.
     inner : ndarray of bool, shape (n,)
         Those that see nothing else.
     coverage : ndarray, shape (Py, Px)
         Share of each projector pixel that lights it.
+    covered : ndarray, shape (n, O)
+        The same at `kernel_offsets`; 0 beyond the projector's border.
     weights : ndarray, shape (n, 9)
         Bilinear weights of q over the 3 x 3 projector pixels about the rounded q.
-    entries : ndarray, shape (n, channels, O)
-        Rows about q.
-    covered : ndarray, shape (n, O)
-        `coverage` at the same places; 0 beyond the projector's border.
+    frequency : ndarray, shape (R,)
+        Cycles per projector pixel of each response.
+    at_offsets : ndarray, shape (O, R)
+        Waves at `kernel_offsets`.
+    to_direct : ndarray, shape (n, R)
+        Responses to unit direct light.
+    responses : ndarray, shape (n, channels, R)
     reach : int
-        Camera pixels on each side among which slope and amplitude are shared.
+        Camera pixels on each side among which slopes are shared.
     """
 
     camera: Size
     pixels: Integers
     inner: Booleans
     coverage: Floats
-    weights: Floats
-    entries: Floats
     covered: Floats
+    weights: Floats
+    frequency: Floats
+    at_offsets: Floats
+    to_direct: Floats
+    responses: Floats
     reach: int
 
-    def meet(self, kernel: Floats) -> Floats:
-        """Return a kernel at the offsets of each row, shape (n, O).
+    def to_kernel(self, kernel: Floats, chosen: Integers) -> Floats:
+        """Return the responses of chosen camera pixels to a kernel of unit amplitude.
 
         Parameters
         ----------
-        kernel : ndarray, shape (2 r + 1, 2 r + 1)
-            With r at least `KERNEL_RADIUS`.
+        kernel : ndarray, shape (2 KERNEL_RADIUS + 1, 2 KERNEL_RADIUS + 1)
+        chosen : ndarray of int, shape (m,)
+            Indices into `pixels`.
+
+        Returns
+        -------
+        ndarray, shape (m, R)
         """
-        middle = kernel.shape[0] // 2
-        steps = middle + offsets()[None] - window_offsets(3)[:, None]
-        return np.asarray(self.weights @ kernel[steps[..., 0], steps[..., 1]]) * self.covered
+        steps = KERNEL_RADIUS + kernel_offsets() - window_offsets(3)[:, None]
+        rows = self.weights[chosen] @ kernel[steps[..., 0], steps[..., 1]]
+        return np.asarray((rows * self.covered[chosen]) @ self.at_offsets)
 
-    @property
-    def footprint(self) -> Booleans:
-        """Offsets that have direct light, shape (n, O)."""
-        steps = offsets()
-        near = np.all(np.abs(steps) <= 1, axis=1)
-        found = np.zeros(self.covered.shape, dtype=bool)
-        places = (steps[near] + 1) @ np.array([3, 1])
-        found[:, near] = self.weights[:, places] > 0
-        return found
-
-    def share(self, values: Floats, counted: Booleans | None = None) -> Floats:
+    def share(self, values: Floats) -> Floats:
         """Return means of values (n,) over the body's camera pixels about each, shape (n,)."""
-        weight = np.ones(len(values)) if counted is None else counted.astype(np.float64)
         sums = [np.zeros(self.camera) for _ in range(2)]
-        sums[0].ravel()[self.pixels] = values * weight
-        sums[1].ravel()[self.pixels] = weight
+        sums[0].ravel()[self.pixels] = values
+        sums[1].ravel()[self.pixels] = 1.0
         side = 2 * self.reach + 1
         total, count = (ndimage.uniform_filter(one, side, mode="constant") for one in sums)
         mean = total / np.maximum(count, 0.5 / side**2)
@@ -108,16 +118,17 @@ def coverage_of(transport: Transport, seen: Booleans) -> Floats:
     return np.asarray(share[tuple(nearest)])
 
 
-def body_at(transport: Transport, seen: Booleans) -> Body:
-    """Gather a body's rows.
+def body_at(transport: Transport, seen: Booleans, waves: Waves) -> Body:
+    """Gather a body's responses.
 
     Parameters
     ----------
     transport : Transport
     seen : ndarray of bool, shape (Cy, Cx)
         Camera pixels that see it, with direct light.
+    waves : Waves
     """
-    projector, camera, lit = transport.projector, transport.camera, transport.lit
+    projector, lit = transport.projector, transport.lit
     places = transport.correspondence[lit]
     extent = np.prod(np.ptp(places, axis=0) + 1.0)
     finer = max(1, int(np.ceil(np.sqrt(lit.sum() / extent) - 0.25)))
@@ -126,21 +137,23 @@ def body_at(transport: Transport, seen: Booleans) -> Body:
     inside = coverage_of(transport, seen)
     about = OUTLINE_COVERAGE * (coverage_of(transport, grown) > LEAST_COVERAGE)
     coverage = np.maximum(inside, about)
-    parts = list(rows_about_q(transport, grown.ravel()))
-    pixels = np.concatenate([pixels for pixels, _ in parts])
-    entries = np.concatenate([entries for _, entries in parts])
+    pixels = np.flatnonzero(grown)
     centres = centre(transport.correspondence, projector)[pixels]
-    around = centres[:, None] + offsets()
+    around = centres[:, None] + kernel_offsets()
     on = on_projector(around, transport)
     held = np.where(on[..., None], around, 0)
     q = transport.correspondence.reshape(-1, 2)[pixels].astype(np.float64)
+    weights = direct_weights(np.clip(q, 0, np.array(projector) - 1), centres)[:, 0]
     return Body(
-        camera=camera,
+        camera=transport.camera,
         pixels=pixels,
         inner=seen.ravel()[pixels],
         coverage=coverage,
-        weights=np.asarray(direct_weights(np.clip(q, 0, np.array(projector) - 1), centres)[:, 0]),
-        entries=entries,
         covered=coverage[held[..., 0], held[..., 1]] * on,
+        weights=np.asarray(weights),
+        frequency=waves.frequency,
+        at_offsets=waves.at(kernel_offsets()),
+        to_direct=np.asarray(weights @ waves.at(window_offsets(3))),
+        responses=responses_about_q(transport, pixels, waves),
         reach=finer,
     )

@@ -1,156 +1,236 @@
-"""The medium that a body's camera pixels share, the slope of each, and how much light comes back.
+"""The medium that a body's camera pixels share, and direct and subsurface light of each.
 
-At offsets o about q that have no direct light, a row is s S(o), where S is the kernel of the medium
-on a surface of some slope, cut off where light falls beside the body. Two numbers of each channel
-are fitted for the whole body: depth of the source and attenuation. With them shared, s and S(0)
-are known where a camera pixel alone could not tell its subsurface light at q from direct light.
+Responses to waves, with the phase at q taken out, are d e(k) + s S(k) + g(k): direct light through
+its footprint, the kernel of the medium on a surface of some slope, cut off where light falls beside
+the body, and inter-reflection. Of g only its power over frequencies is known, and that from what is
+left of the responses. Two numbers of each channel are fitted for the whole body: depth of the
+source and attenuation. With them shared, d and s are told apart where a camera pixel alone could
+not tell its subsurface light at q from direct light.
+
+Index convention: c runs over the body's camera pixels, r over real responses.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize
+from numpy.typing import NDArray
+from scipy import ndimage, optimize
 
-from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.arrays import Floats, Integers
 from nearfar.estimate.physical.body import KERNEL_RADIUS, Body
-from nearfar.estimate.physical.kernels import Slope, kernel, slopes, source_at
-from nearfar.estimate.physical.rows_about import offsets
+from nearfar.estimate.physical.kernels import kernel, slopes, source_at
 from nearfar.transport.dipole import Dipole
 
-# Distances up to which rows are compared with the kernel.
-COMPARED = 4.1
-# Entries count by 1 / (S / S(0) + this): errors grow with the light, down to those of darkness.
-DARK_ENTRY = 0.01
-# Entries of projector pixels that light the body at least so far are compared.
-LEAST_COVERAGE = 0.6
-# First guesses of depth and attenuation.
+# First guesses of depth and attenuation, in projector pixels.
 DEPTHS = (0.5, 1.0, 2.0)
 ATTENUATIONS = (0.15, 0.4, 1.0)
-# Least and largest that rows about q can tell.
+# Least and largest that responses can tell.
 RANGES = ((0.2, 6.0), (0.02, 6.0))
+# Logarithms this close to them are at them.
+AT_BOUND = 0.01
 # Camera pixels that the medium is fitted to, and how far a misfit may stand out from the median.
 SAMPLE = 500
-OUTLYING = 3.0
+OUTLYING = 9.0
 SLOPES = slopes((0.6, 1.3), 4)
 # A slope must fit better than a flat surface by this factor.
-FLAT_PREFERENCE = 0.9
+FLAT_PREFERENCE = 0.97
+# Power of inter-reflection over that of fast waves, before any fit: at DC, and the cycles per
+# projector pixel by which it has fallen to half.
+SLOW_POWER = 10.0
+SLOW = 0.03
+# Responses whose frequencies are next to each other have the same power.
+LIKE_RESPONSES = 7
+# Of a squared Gaussian, median over mean.
+MEDIAN_OF_SQUARES = 0.455
+# No response is known better than the mean by this factor in power.
+LEAST_POWER = 1e-3
+ROUNDS = 3
 ITERATIONS = 60
 
 
 class Amplitudes(NamedTuple):
-    """What a kernel makes of each row, shape (n,) each: its amplitude, and the misfit."""
-
-    amplitude: Floats
-    misfit: Floats
-
-
-class Medium(NamedTuple):
-    """One channel of a body.
+    """Direct and subsurface light fitted to responses.
 
     Attributes
     ----------
-    source : Dipole
-        Lengths in projector pixels.
-    slope : ndarray of int, shape (n,)
-        Which of `SLOPES` each camera pixel sees.
-    amplitude : ndarray, shape (n,)
-        s, of a kernel of unit albedo.
-    explained : float
-        Share of the weighed light about q that the kernel explains, 1 at best.
+    direct, subsurface : ndarray, shape (m,)
+        d, and s of a kernel of unit albedo, at least 0.
+    left : ndarray, shape (m, R)
+        Responses less both.
     """
 
-    source: Dipole
+    direct: Floats
+    subsurface: Floats
+    left: Floats
+
+
+class Media(NamedTuple):
+    """What a body is made of.
+
+    Attributes
+    ----------
+    sources : tuple of Dipole
+        One for each channel; lengths in projector pixels.
+    slope : ndarray of int, shape (n,)
+        Which of `SLOPES` each camera pixel sees.
+    direct, amplitude : ndarray, shape (n, channels)
+        d and s.
+    explained : ndarray, shape (n,)
+        Share that the kernels explain of what direct light leaves, 1 at best.
+    """
+
+    sources: tuple[Dipole, ...]
     slope: Integers
+    direct: Floats
     amplitude: Floats
-    explained: float
+    explained: Floats
 
 
-def compared(body: Body) -> Booleans:
-    """Return which entries tell of light under the surface alone, shape (n, O)."""
-    distance = np.hypot(*offsets().T)
-    covered = body.covered > LEAST_COVERAGE
-    return np.asarray(~body.footprint & covered & (distance < COMPARED))
-
-
-def _weights(body: Body, used: Booleans, source: Dipole) -> Floats:
-    """Return the weights of entries, shape (n, O); 0 where they are not used."""
-    flat = body.meet(kernel(source, KERNEL_RADIUS))
-    return np.asarray(used / (flat / max(flat.max(), np.finfo(float).tiny) + DARK_ENTRY))
-
-
-def _amplitudes(
-    body: Body, rows: Floats, weights: Floats, source: Dipole, slope: Slope
-) -> Amplitudes:
-    """Fit the amplitude of one kernel in each row by weighted least squares."""
-    shape = body.meet(kernel(source, KERNEL_RADIUS, slope))
-    power = np.einsum("co,co,co->c", weights, shape, shape)
-    overlap = np.einsum("co,co,co->c", weights, shape, rows)
-    tiny = np.finfo(float).tiny
-    amplitude = np.maximum(overlap / np.maximum(power, tiny), 0.0)
-    misfit = np.einsum("co,co->c", weights, (rows - amplitude[:, None] * shape) ** 2)
-    return Amplitudes(amplitude, misfit)
-
-
-def medium_of(body: Body, channel: int) -> Medium:
-    """Fit the medium of a body in one channel.
+def media_of(body: Body) -> Media:
+    """Fit the media of a body, one for each channel, and the slopes they have in common.
 
     Parameters
     ----------
     body : Body
-    channel : int
 
     Returns
     -------
-    Medium
+    Media
     """
-    rows = body.entries[:, channel].astype(np.float64)
-    used = compared(body)
+    channels = range(body.responses.shape[1])
+    everywhere = np.arange(len(body.pixels))
+    sample = np.random.default_rng(0).permutation(np.flatnonzero(body.inner))[:SAMPLE]
+    slope: Integers = np.zeros(len(everywhere), dtype=np.int64)
+    power = np.tile(1 + SLOW_POWER / (1 + (body.frequency / SLOW) ** 3), (len(channels), 1))
+    sources = [
+        min(_guesses(), key=lambda one: _misfit(body, i, one, slope, power[i], sample))
+        for i in channels
+    ]
+    fits: list[Amplitudes] = []
+    for _ in range(ROUNDS):
+        sources = [
+            _refined(body, i, source, slope, power[i], sample) for i, source in enumerate(sources)
+        ]
+        slope = _slopes(body, sources, power)
+        fits = [
+            _fit_slopes(body, i, source, slope, power[i], everywhere)
+            for i, source in enumerate(sources)
+        ]
+        power = np.stack([_power(body, fit) for fit in fits])
+    return Media(
+        tuple(sources),
+        slope,
+        np.stack([fit.direct for fit in fits], axis=1),
+        np.stack([fit.subsurface for fit in fits], axis=1),
+        _explained(body, fits, power),
+    )
 
-    def source_of(logarithms: Floats) -> Dipole:
+
+def out_of_range(media: Media) -> bool:
+    """Return whether a medium ended where responses about q tell no more of it."""
+    least, most = np.log(RANGES).T
+    found = np.log([[source.real, source.attenuation] for source in media.sources])
+    return bool(np.any((found < least + AT_BOUND) | (found > most - AT_BOUND)))
+
+
+def _guesses() -> list[Dipole]:
+    return [source_at(depth, rate) for depth in DEPTHS for rate in ATTENUATIONS]
+
+
+def _fit(body: Body, channel: int, shape: Floats, power: Floats, chosen: Integers) -> Amplitudes:
+    """Fit d and s to responses of some power of what they leave, by weighted least squares."""
+    responses, unit = body.responses[chosen, channel], body.to_direct[chosen]
+    of_direct, of_both, of_shape = (
+        np.einsum("cr,cr,r->c", one, other, 1 / power)
+        for one, other in ((unit, unit), (unit, shape), (shape, shape))
+    )
+    with_direct, with_shape = (
+        np.einsum("cr,cr,r->c", responses, one, 1 / power) for one in (unit, shape)
+    )
+    determinant = of_direct * of_shape - of_both**2
+    tiny = np.finfo(float).tiny
+    subsurface = (of_direct * with_shape - of_both * with_direct) / np.maximum(determinant, tiny)
+    subsurface = np.maximum(subsurface, 0.0)
+    direct = (with_direct - subsurface * of_both) / of_direct
+    left = responses - direct[:, None] * unit - subsurface[:, None] * shape
+    return Amplitudes(direct, subsurface, left)
+
+
+def _fit_slopes(
+    body: Body, channel: int, source: Dipole, slope: Integers, power: Floats, chosen: Integers
+) -> Amplitudes:
+    """Fit chosen camera pixels, each on its own slope."""
+    shape = np.empty((len(chosen), len(power)))
+    for number in np.unique(slope[chosen]):
+        here = slope[chosen] == number
+        shape[here] = body.to_kernel(kernel(source, KERNEL_RADIUS, SLOPES[number]), chosen[here])
+    return _fit(body, channel, shape, power, chosen)
+
+
+def _weighed(left: Floats, power: Floats) -> Floats:
+    """Return the sum of squares over power, shape (m,)."""
+    return np.asarray(np.einsum("cr,cr,r->c", left, left, 1 / power))
+
+
+def _misfit(
+    body: Body, channel: int, source: Dipole, slope: Integers, power: Floats, sample: Integers
+) -> float:
+    left = _fit_slopes(body, channel, source, slope, power, sample).left
+    found = _weighed(left, power)
+    return float(np.minimum(found, OUTLYING * np.median(found)).sum())
+
+
+def _refined(
+    body: Body, channel: int, source: Dipole, slope: Integers, power: Floats, sample: Integers
+) -> Dipole:
+    """Return the source that fits best, from one that is near."""
+
+    def source_of(logarithms: NDArray[np.float64]) -> Dipole:
         depth, attenuation = np.exp(np.clip(logarithms, *np.log(RANGES).T))
         return source_at(float(depth), float(attenuation))
 
-    inner = np.flatnonzero(body.inner)
-    chosen = np.random.default_rng(0).permutation(inner)[:SAMPLE]
-    sample = _part(body, chosen)
+    def misfit(logarithms: NDArray[np.float64]) -> float:
+        return _misfit(body, channel, source_of(logarithms), slope, power, sample)
 
-    def misfit(logarithms: Floats) -> float:
-        source = source_of(logarithms)
-        weights = _weights(sample, used[chosen], source)
-        found = _amplitudes(sample, rows[chosen], weights, source, SLOPES[0]).misfit
-        return float(np.minimum(found, OUTLYING * np.median(found)).sum())
-
-    starts = [np.log([depth, rate]) for depth in DEPTHS for rate in ATTENUATIONS]
     best = optimize.minimize(
         misfit,
-        min(starts, key=misfit),
+        np.log([source.real, source.attenuation]),
         method="Nelder-Mead",
         options={"maxiter": ITERATIONS, "xatol": 0.01, "fatol": 1e-9},
     )
-    source = source_of(best.x)
-    weights = _weights(body, used, source)
-    of_slopes = [_amplitudes(body, rows, weights, source, slope) for slope in SLOPES]
-    misfits = np.stack([body.share(one.misfit) for one in of_slopes])
+    return source_of(best.x)
+
+
+def _slopes(body: Body, sources: list[Dipole], power: Floats) -> Integers:
+    """Choose the slope that fits each camera pixel and those about it in all channels."""
+    everywhere = np.arange(len(body.pixels))
+    misfits = np.zeros((len(SLOPES), len(everywhere)))
+    for number, slope in enumerate(SLOPES):
+        for i, source in enumerate(sources):
+            shape = body.to_kernel(kernel(source, KERNEL_RADIUS, slope), everywhere)
+            left = _fit(body, i, shape, power[i], everywhere).left
+            misfits[number] += body.share(_weighed(left, power[i]))
     misfits[0] *= FLAT_PREFERENCE
-    slope = misfits.argmin(axis=0)
-    own = np.stack([one.amplitude for one in of_slopes])[slope, np.arange(len(slope))]
-    # At the outline a camera pixel sees some of the body only.
-    outline = np.minimum(own, np.median(own[body.inner]))
-    shared = body.share(own, body.inner)
-    left = misfits.min(axis=0)[body.inner].sum()
-    light = np.einsum("co,co->c", weights, rows**2)[body.inner].sum()
-    explained = 1.0 - left / light if light > 0 else 0.0
-    return Medium(source, slope, np.where(body.inner, shared, outline), float(explained))
+    return np.asarray(misfits.argmin(axis=0))
 
 
-def _part(body: Body, chosen: Integers) -> Body:
-    """Return a body of some of its camera pixels."""
-    return replace(
-        body,
-        pixels=body.pixels[chosen],
-        inner=body.inner[chosen],
-        weights=body.weights[chosen],
-        entries=body.entries[chosen],
-        covered=body.covered[chosen],
-    )
+def _power(body: Body, fit: Amplitudes) -> Floats:
+    """Return the power of what a fit leaves, smooth over frequencies, shape (R,)."""
+    own = np.median(fit.left[body.inner] ** 2, axis=0) / MEDIAN_OF_SQUARES
+    rising = np.argsort(body.frequency, kind="stable")
+    power = np.empty_like(own)
+    power[rising] = ndimage.uniform_filter1d(own[rising], LIKE_RESPONSES, mode="nearest")
+    return np.asarray(power + LEAST_POWER * power.mean() + np.finfo(float).tiny)
+
+
+def _explained(body: Body, fits: list[Amplitudes], power: Floats) -> Floats:
+    """Return the share of what direct light leaves that kernels explain, over all channels."""
+    left, without = np.zeros(len(body.pixels)), np.zeros(len(body.pixels))
+    unit = body.to_direct
+    for i, fit in enumerate(fits):
+        responses = body.responses[:, i]
+        overlap = np.einsum("cr,cr,r->c", unit, responses, 1 / power[i])
+        alone = overlap / np.einsum("cr,cr,r->c", unit, unit, 1 / power[i])
+        left += _weighed(fit.left, power[i])
+        without += _weighed(responses - alone[:, None] * unit, power[i])
+    return np.asarray(1 - left / np.maximum(without, np.finfo(float).tiny))

@@ -15,16 +15,19 @@ from scipy import ndimage, signal
 from nearfar.arrays import Floats, Integers
 from nearfar.checks import require_instance
 from nearfar.errors import InputError
-from nearfar.estimate.physical.body import KERNEL_RADIUS, Body, body_at
+from nearfar.estimate.physical.body import body_at
+from nearfar.estimate.physical.creases import Settled, settled
 from nearfar.estimate.physical.kernels import kernel
-from nearfar.estimate.physical.medium import SLOPES, Medium, medium_of
+from nearfar.estimate.physical.medium import SLOPES, media_of, out_of_range
+from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.translucent import SQUARE, translucent
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import Footprint, footprint, look_up
 from nearfar.transport.model import Transport
 
-# A body whose light about q the kernels explain to a lesser share is not translucent.
-LEAST_EXPLAINED = 0.7
+# Where kernels explain a lesser share of what direct light leaves, nothing is translucent: a whole
+# body, or camera pixels at its outline.
+LEAST_EXPLAINED = 0.8
 # Kernels end where the light is down by exp(-FADED), or at the size of the projector.
 FADED = 7.0
 
@@ -46,13 +49,19 @@ class Translucent(NamedTuple):
         Its camera pixels, flattened row by row.
     coverage : ndarray, shape (Py, Px)
         Share of each projector pixel that lights it.
-    media : tuple of Medium
-        One for each channel.
+    sources : tuple of Dipole
+        The medium in each channel; lengths in projector pixels.
+    slope : ndarray of int, shape (n,)
+        Which of `SLOPES` each camera pixel sees.
+    amplitude : ndarray, shape (n, channels)
+        Of a kernel of unit albedo.
     """
 
     pixels: Integers
     coverage: Floats
-    media: tuple[Medium, ...]
+    sources: tuple[Dipole, ...]
+    slope: Integers
+    amplitude: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +75,14 @@ class PhysicalSplit:
         Direct light under white, less what subsurface light adds at q.
     bodies : tuple of Translucent
         Empty where nothing is translucent.
+    creases : Settled
+        Camera pixels whose direct light is that of another q.
     """
 
     transport: Transport
     direct: Floats
     bodies: tuple[Translucent, ...]
+    creases: Settled
 
     def components(self, light: Floats) -> PhysicalComponents:
         """Relight each component by itself.
@@ -97,29 +109,34 @@ class PhysicalSplit:
             where = footprint(
                 transport.correspondence.reshape(-1, 2)[body.pixels], transport.projector
             )
-            for channel, medium in enumerate(body.media):
+            for channel, source in enumerate(body.sources):
                 picture = flat[min(channel, len(flat) - 1)].reshape(transport.projector)
-                lit = picture * body.coverage
-                subsurface[body.pixels, channel] = _under(medium, lit, where)
+                spread = _spread(source, body.slope, picture * body.coverage, where)
+                subsurface[body.pixels, channel] = body.amplitude[:, channel] * spread
         # A part of D is moved, of the same footprint.
         with np.errstate(divide="ignore", invalid="ignore"):
             kept = np.where(transport.direct != 0, self.direct / transport.direct, 0.0)
         direct = model.direct * transport.picture(kept)
+        elsewhere = footprint(self.creases.places, transport.projector)
+        at_creases = direct.reshape(-1, transport.channels)
+        for channel in range(transport.channels):
+            light = flat[min(channel, len(flat) - 1)]
+            own = self.direct.reshape(-1, transport.channels)[self.creases.pixels, channel]
+            at_creases[self.creases.pixels, channel] = own * look_up(light, elsewhere)
         under = transport.picture(subsurface)
         rest = model.direct + model.near + model.far - direct - under
         return PhysicalComponents(direct, under, rest)
 
 
-def _under(medium: Medium, lit: Floats, where: Footprint) -> Floats:
-    """Return one channel of subsurface light at a body's camera pixels, shape (n,)."""
-    found = np.zeros(len(medium.amplitude))
-    radius = _radius(medium.source, max(lit.shape))
-    for number in np.unique(medium.slope):
-        seen = medium.slope == number
-        spread = signal.fftconvolve(lit, kernel(medium.source, radius, SLOPES[number]), mode="same")
-        chosen = Footprint(where.pixels[seen], where.weights[seen])
-        found[seen] = look_up(spread.ravel(), chosen)
-    return found * medium.amplitude
+def _spread(source: Dipole, slope: Integers, lit: Floats, where: Footprint) -> Floats:
+    """Return light under a surface at a body's camera pixels for unit amplitude, shape (n,)."""
+    found = np.zeros(len(slope))
+    radius = _radius(source, max(lit.shape))
+    for number in np.unique(slope):
+        seen = slope == number
+        spread = signal.fftconvolve(lit, kernel(source, radius, SLOPES[number]), mode="same")
+        found[seen] = look_up(spread.ravel(), Footprint(where.pixels[seen], where.weights[seen]))
+    return found
 
 
 def _radius(source: Dipole, longest: int) -> int:
@@ -151,26 +168,19 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         )
     labels, count = ndimage.label(translucent(transport), SQUARE)
     direct = transport.direct.reshape(-1, transport.channels).copy()
-    bodies = []
+    bodies, waves = [], waves_of(transport)
     for number in range(1, count + 1):
-        body = body_at(transport, labels == number)
-        media = tuple(medium_of(body, channel) for channel in range(transport.channels))
-        if np.mean([medium.explained for medium in media]) < LEAST_EXPLAINED:
+        body = body_at(transport, labels == number, waves)
+        media = media_of(body)
+        if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or out_of_range(media):
             continue
-        direct[body.pixels] = np.stack(
-            [_direct_beside(body, medium, i) for i, medium in enumerate(media)], axis=1
-        )
-        bodies.append(Translucent(body.pixels, body.coverage, media))
-    return PhysicalSplit(transport, direct.reshape(transport.direct.shape), tuple(bodies))
-
-
-def _direct_beside(body: Body, medium: Medium, channel: int) -> Floats:
-    """Return the light of the footprint's projector pixels, less subsurface light there."""
-    there = body.footprint
-    total = np.where(there, body.entries[:, channel], 0.0).sum(axis=1)
-    under = np.zeros(len(total))
-    for number in np.unique(medium.slope):
-        seen = medium.slope == number
-        shape = body.meet(kernel(medium.source, KERNEL_RADIUS, SLOPES[number]))[seen]
-        under[seen] = np.where(there[seen], shape, 0.0).sum(axis=1)
-    return np.asarray(total - medium.amplitude * under)
+        kept = body.inner | (media.explained >= LEAST_EXPLAINED)
+        direct[body.pixels[kept]] = media.direct[kept]
+        found = media.slope[kept], media.amplitude[kept]
+        bodies.append(Translucent(body.pixels[kept], body.coverage, media.sources, *found))
+    opaque = transport.lit.copy()
+    for one in bodies:
+        opaque.ravel()[one.pixels] = False
+    creases = settled(transport, opaque)
+    direct[creases.pixels] *= creases.kept[:, None]
+    return PhysicalSplit(transport, direct.reshape(transport.direct.shape), tuple(bodies), creases)

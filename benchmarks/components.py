@@ -22,8 +22,15 @@ from nearfar.estimate.physical import split_physically
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 
-# W, of scenes whose near-range light is of single projector pixels.
-WINDOWS = {"cornell": 11, "cornell-aside": 11, "wedge": 19, "alcove": 11, "shelf": 13}
+# W, where it is not the plan's own choice.
+WINDOWS = {
+    "cornell": 11,
+    "cornell-aside": 11,
+    "wedge": 19,
+    "corner": None,
+    "alcove": 11,
+    "shelf": 13,
+}
 
 
 def decibels(truth: tuple[Floats, ...], found: tuple[Floats, ...]) -> str:

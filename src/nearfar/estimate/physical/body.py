@@ -1,26 +1,29 @@
 """Where light falls on a translucent body, and how its camera pixels respond to waves.
 
-Index convention: c runs over the body's camera pixels, o over `kernel_offsets`, j over the 3 x 3
-projector pixels about the rounded q, r over real responses.
+Lengths are in cells: squares of projector pixels, a quarter as wide as the coarsest functions of
+near-range light are apart; single pixels where these are.
+
+Index convention: c runs over the body's camera pixels, o over `kernel_offsets`, k over waves, r
+over real responses.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
 
-from nearfar.arrays import Booleans, Floats, Integers, Size
-from nearfar.estimate.physical.responses import Waves, responses_about_q
-from nearfar.estimate.physical.rows_about import on_projector
+from nearfar.arrays import Booleans, Complexes, Floats, Integers, Size
+from nearfar.estimate.physical.kernels import Slope, enlarged, kernel
+from nearfar.estimate.physical.responses import Waves, responses
 from nearfar.illumination.near_basis import window_offsets
-from nearfar.transport.direct import direct_weights, footprint, spread
+from nearfar.transport.dipole import Dipole
+from nearfar.transport.direct import footprint, spread
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
 
-# Projector pixels from q up to which light under a surface is compared with responses.
+# Cells from q up to which light under a surface is compared with responses.
 REACH = 8
-# A kernel is needed one further, for places between projector pixels.
-KERNEL_RADIUS = REACH + 1
 # A projector pixel lights the body if more than this share of it does.
 LEAST_COVERAGE = 0.5
 # What the outline's pixels, of which the body covers a part, are worth at least.
@@ -28,8 +31,13 @@ OUTLINE_COVERAGE = 0.7
 SQUARE = np.ones((3, 3), dtype=bool)
 
 
+def cell_side(transport: Transport) -> int:
+    """Return the projector pixels along each side of a cell."""
+    return max(1, transport.pitch // 4)
+
+
 def kernel_offsets() -> Integers:
-    """Return the offsets (y, x) from the rounded q that kernels are compared at, shape (O, 2)."""
+    """Return the offsets (y, x) of cells from q, shape (O, 2)."""
     return window_offsets(2 * REACH + 1)
 
 
@@ -47,16 +55,15 @@ class Body:
     coverage : ndarray, shape (Py, Px)
         Share of each projector pixel that lights it.
     covered : ndarray, shape (n, O)
-        The same at `kernel_offsets`; 0 beyond the projector's border.
-    weights : ndarray, shape (n, 9)
-        Bilinear weights of q over the 3 x 3 projector pixels about the rounded q.
-    frequency : ndarray, shape (R,)
-        Cycles per projector pixel of each response.
-    at_offsets : ndarray, shape (O, R)
+        Mean of the same in the cells at `kernel_offsets`; 0 beyond the projector's border.
+    waves : Waves
+    at_offsets : ndarray, shape (O, K), complex
         Waves at `kernel_offsets`.
-    to_direct : ndarray, shape (n, R)
+    of_footprint : ndarray, shape (n, K), complex
         Responses to unit direct light.
     responses : ndarray, shape (n, channels, R)
+    cell_side : int
+        Projector pixels along each side of a cell.
     reach : int
         Camera pixels on each side among which slopes are shared.
     """
@@ -66,19 +73,23 @@ class Body:
     inner: Booleans
     coverage: Floats
     covered: Floats
-    weights: Floats
-    frequency: Floats
-    at_offsets: Floats
-    to_direct: Floats
+    waves: Waves
+    at_offsets: Complexes
+    of_footprint: Complexes
     responses: Floats
+    cell_side: int
     reach: int
 
-    def to_kernel(self, kernel: Floats, chosen: Integers) -> Floats:
+    def to_kernel(self, source: Dipole, slope: Slope, chosen: Integers) -> Floats:
         """Return the responses of chosen camera pixels to a kernel of unit amplitude.
+
+        A camera pixel sees it from all of its footprint.
 
         Parameters
         ----------
-        kernel : ndarray, shape (2 KERNEL_RADIUS + 1, 2 KERNEL_RADIUS + 1)
+        source : Dipole
+            Lengths in cells.
+        slope : (float, float)
         chosen : ndarray of int, shape (m,)
             Indices into `pixels`.
 
@@ -86,9 +97,30 @@ class Body:
         -------
         ndarray, shape (m, R)
         """
-        steps = KERNEL_RADIUS + kernel_offsets() - window_offsets(3)[:, None]
-        rows = self.weights[chosen] @ kernel[steps[..., 0], steps[..., 1]]
-        return np.asarray((rows * self.covered[chosen]) @ self.at_offsets)
+        flat = kernel(source, REACH, slope).ravel()
+        at_q = (flat * self.covered[chosen]) @ self.at_offsets
+        seen = at_q * self.of_footprint[chosen]
+        if self.cell_side > 1:
+            seen = seen * self._of_pixels(source, slope) / (flat @ self.at_offsets)
+        return self.waves.real(np.asarray(seen))
+
+    def _of_pixels(self, source: Dipole, slope: Slope) -> Complexes:
+        """Return the responses to a kernel over single projector pixels, shape (K,)."""
+        radius = REACH * self.cell_side + self.cell_side // 2
+        single = kernel(enlarged(source, self.cell_side), radius, slope)
+        waves = self.waves.at(window_offsets(2 * radius + 1))
+        return np.asarray(single.ravel() @ waves)
+
+    @cached_property
+    def to_direct(self) -> Floats:
+        """Responses to unit direct light, shape (n, R)."""
+        found: Floats = self.waves.real(self.of_footprint)
+        return found
+
+    @cached_property
+    def frequency(self) -> Floats:
+        """Cycles per cell of each response, shape (R,)."""
+        return np.asarray(self.cell_side * np.hypot(*self.waves.of_responses.T))
 
     def share(self, values: Floats) -> Floats:
         """Return means of values (n,) over the body's camera pixels about each, shape (n,)."""
@@ -128,32 +160,44 @@ def body_at(transport: Transport, seen: Booleans, waves: Waves) -> Body:
         Camera pixels that see it, with direct light.
     waves : Waves
     """
-    projector, lit = transport.projector, transport.lit
+    projector, lit, side = transport.projector, transport.lit, cell_side(transport)
     places = transport.correspondence[lit]
-    extent = np.prod(np.ptp(places, axis=0) + 1.0)
+    extent = np.prod(np.ptp(places, axis=0) / side + 1.0)
     finer = max(1, int(np.ceil(np.sqrt(lit.sum() / extent) - 0.25)))
-    # Outlines cross camera pixels as large as the projector's.
+    # Outlines cross camera pixels as large as a cell.
     grown = ndimage.binary_dilation(seen, SQUARE, iterations=finer) & lit
     inside = coverage_of(transport, seen)
     about = OUTLINE_COVERAGE * (coverage_of(transport, grown) > LEAST_COVERAGE)
     coverage = np.maximum(inside, about)
+    of_cells = _means(coverage, side)
     pixels = np.flatnonzero(grown)
-    centres = centre(transport.correspondence, projector)[pixels]
-    around = centres[:, None] + kernel_offsets()
-    on = on_projector(around, transport)
-    held = np.where(on[..., None], around, 0)
-    q = transport.correspondence.reshape(-1, 2)[pixels].astype(np.float64)
-    weights = direct_weights(np.clip(q, 0, np.array(projector) - 1), centres)[:, 0]
+    rounded = centre(transport.correspondence, projector)[pixels]
+    # Cells about the rounded q; at the border they may reach beyond it.
+    around = rounded[:, None] + side * kernel_offsets()
+    inside = np.all((around >= 0) & (around < np.array(projector)), axis=-1)
+    down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
+    found = responses(transport, pixels, rounded, waves)
     return Body(
         camera=transport.camera,
         pixels=pixels,
         inner=seen.ravel()[pixels],
         coverage=coverage,
-        covered=coverage[held[..., 0], held[..., 1]] * on,
-        weights=np.asarray(weights),
-        frequency=waves.frequency,
-        at_offsets=waves.at(kernel_offsets()),
-        to_direct=np.asarray(weights @ waves.at(window_offsets(3))),
-        responses=responses_about_q(transport, pixels, waves),
+        covered=of_cells[down, across] * inside,
+        waves=waves,
+        at_offsets=waves.at(side * kernel_offsets()),
+        of_footprint=found.to_direct,
+        responses=found.total,
+        cell_side=side,
         reach=finer,
     )
+
+
+def _means(picture: Floats, side: int) -> Floats:
+    """Return means over cells; at the border, over as much of a cell as there is."""
+    height, width = (-(-length // side) for length in picture.shape)
+    down, across = (
+        np.arange(length) // side == np.arange(cells)[:, None]
+        for length, cells in zip(picture.shape, (height, width), strict=True)
+    )
+    sums = down @ picture @ across.T
+    return np.asarray(sums / np.outer(down.sum(axis=1), across.sum(axis=1)))

@@ -62,7 +62,11 @@ def settled(transport: Transport, opaque: Booleans) -> Settled:
     Returns
     -------
     Settled
+        Empty where functions of near-range light are of several projector pixels: footprints of
+        direct light are estimated there.
     """
+    if transport.pitch > 1:
+        return Settled(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty(0))
     told, disagreement = _told_by_neighbours(transport)
     off = np.abs(transport.correspondence - told).max(axis=-1)
     # Comparisons with NaN are false: where neighbours tell nothing.

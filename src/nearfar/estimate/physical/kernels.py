@@ -7,6 +7,7 @@ depth, in projector pixels a projector pixel.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
@@ -34,6 +35,16 @@ def source_at(depth: float, attenuation: float) -> Dipole:
     """Return the dipole of a real source at a depth, both in projector pixels, of unit albedo."""
     ratio = 1 + 4 * boundary_mismatch(REFRACTIVE_INDEX) / 3
     return Dipole(reduced_albedo=1.0, attenuation=attenuation, real=depth, virtual=ratio * depth)
+
+
+def enlarged(source: Dipole, factor: float) -> Dipole:
+    """Return a dipole whose lengths are in a unit of 1/factor of those it has."""
+    return replace(
+        source,
+        attenuation=source.attenuation / factor,
+        real=source.real * factor,
+        virtual=source.virtual * factor,
+    )
 
 
 def kernel(source: Dipole, radius: int, slope: Slope = FLAT) -> Floats:

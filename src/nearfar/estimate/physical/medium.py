@@ -17,19 +17,20 @@ from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
 from nearfar.arrays import Floats, Integers
-from nearfar.estimate.physical.body import KERNEL_RADIUS, Body
-from nearfar.estimate.physical.kernels import kernel, slopes, source_at
+from nearfar.estimate.physical.body import Body
+from nearfar.estimate.physical.kernels import slopes, source_at
 from nearfar.transport.dipole import Dipole
 
-# First guesses of depth and attenuation, in projector pixels.
+# First guesses of the source's depth in cells, and of attenuation times depth.
 DEPTHS = (0.5, 1.0, 2.0)
-ATTENUATIONS = (0.15, 0.4, 1.0)
-# Least and largest that responses can tell.
-RANGES = ((0.2, 6.0), (0.02, 6.0))
+PRODUCTS = (0.1, 0.4, 1.0)
+# Least and largest: depths that responses can tell, and products sqrt(3 (1 - a')) of media that
+# scatter.
+RANGES = ((0.2, 6.0), (0.01, 1.7))
 # Logarithms this close to them are at them.
 AT_BOUND = 0.01
 # Camera pixels that the medium is fitted to, and how far a misfit may stand out from the median.
-SAMPLE = 500
+SAMPLE = 300
 OUTLYING = 9.0
 SLOPES = slopes((0.6, 1.3), 4)
 # A slope must fit better than a flat surface by this factor.
@@ -70,7 +71,7 @@ class Media(NamedTuple):
     Attributes
     ----------
     sources : tuple of Dipole
-        One for each channel; lengths in projector pixels.
+        One for each channel; lengths in cells.
     slope : ndarray of int, shape (n,)
         Which of `SLOPES` each camera pixel sees.
     direct, amplitude : ndarray, shape (n, channels)
@@ -129,12 +130,17 @@ def media_of(body: Body) -> Media:
 def out_of_range(media: Media) -> bool:
     """Return whether a medium ended where responses about q tell no more of it."""
     least, most = np.log(RANGES).T
-    found = np.log([[source.real, source.attenuation] for source in media.sources])
+    found = np.stack([_logarithms(source) for source in media.sources])
     return bool(np.any((found < least + AT_BOUND) | (found > most - AT_BOUND)))
 
 
 def _guesses() -> list[Dipole]:
-    return [source_at(depth, rate) for depth in DEPTHS for rate in ATTENUATIONS]
+    return [source_at(depth, product / depth) for depth in DEPTHS for product in PRODUCTS]
+
+
+def _logarithms(source: Dipole) -> NDArray[np.float64]:
+    """Return logarithms of the depth, and of attenuation times depth."""
+    return np.log([source.real, source.attenuation * source.real])
 
 
 def _fit(body: Body, channel: int, shape: Floats, power: Floats, chosen: Integers) -> Amplitudes:
@@ -163,7 +169,7 @@ def _fit_slopes(
     shape = np.empty((len(chosen), len(power)))
     for number in np.unique(slope[chosen]):
         here = slope[chosen] == number
-        shape[here] = body.to_kernel(kernel(source, KERNEL_RADIUS, SLOPES[number]), chosen[here])
+        shape[here] = body.to_kernel(source, SLOPES[number], chosen[here])
     return _fit(body, channel, shape, power, chosen)
 
 
@@ -186,15 +192,15 @@ def _refined(
     """Return the source that fits best, from one that is near."""
 
     def source_of(logarithms: NDArray[np.float64]) -> Dipole:
-        depth, attenuation = np.exp(np.clip(logarithms, *np.log(RANGES).T))
-        return source_at(float(depth), float(attenuation))
+        depth, product = np.exp(np.clip(logarithms, *np.log(RANGES).T))
+        return source_at(float(depth), float(product / depth))
 
     def misfit(logarithms: NDArray[np.float64]) -> float:
         return _misfit(body, channel, source_of(logarithms), slope, power, sample)
 
     best = optimize.minimize(
         misfit,
-        np.log([source.real, source.attenuation]),
+        _logarithms(source),
         method="Nelder-Mead",
         options={"maxiter": ITERATIONS, "xatol": 0.01, "fatol": 1e-9},
     )
@@ -207,7 +213,7 @@ def _slopes(body: Body, sources: list[Dipole], power: Floats) -> Integers:
     misfits = np.zeros((len(SLOPES), len(everywhere)))
     for number, slope in enumerate(SLOPES):
         for i, source in enumerate(sources):
-            shape = body.to_kernel(kernel(source, KERNEL_RADIUS, slope), everywhere)
+            shape = body.to_kernel(source, slope, everywhere)
             left = _fit(body, i, shape, power[i], everywhere).left
             misfits[number] += body.share(_weighed(left, power[i]))
     misfits[0] *= FLAT_PREFERENCE

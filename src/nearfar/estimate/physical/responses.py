@@ -1,4 +1,4 @@
-"""Responses of camera pixels to waves, with the phase at q taken out.
+"""Responses of camera pixels to waves, with the phase of a place taken out.
 
 What was measured is responses to waves, so they are what an estimate knows best of a row. Far-range
 light tells in the slow ones, light under a surface in all of them, and direct light alike in every
@@ -8,23 +8,23 @@ Index convention: c runs over chosen camera pixels, r over real responses: the c
 then the sines of those that have one.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.arrays import Booleans, Complexes, Floats, Integers, blocks
 from nearfar.illumination.frequencies import as_array
 from nearfar.transport.model import Transport
-from nearfar.transport.near import centre
 from nearfar.transport.posterior import Posterior
 
 # Waves that a transport is asked for where nothing says which were measured.
 SPREAD_WAVES = 96
-# The plastic number and its square: multiples of their inverses fill a square evenly
+# The plastic number: multiples of its inverse and of that of its square fill a square evenly
 # (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
 PLASTIC = 1.32471795724474602596
-# Numbers of a block of dense rows.
-BLOCK_NUMBERS = 1 << 25
+# Waves that light a transport at a time.
+WAVES_AT_ONCE = 16
 
 
 class Waves(NamedTuple):
@@ -42,21 +42,38 @@ class Waves(NamedTuple):
     has_sine: Booleans
 
     @property
-    def frequency(self) -> Floats:
-        """Cycles per projector pixel of each real response, shape (R,)."""
-        lengths = np.hypot(*self.cycles.T)
-        return np.concatenate([lengths, lengths[self.has_sine]])
+    def of_responses(self) -> Floats:
+        """Cycles per projector pixel of each real response, shape (R, 2)."""
+        return np.concatenate([self.cycles, self.cycles[self.has_sine]])
 
-    def at(self, offsets: Integers) -> Floats:
-        """Return the waves at offsets (..., 2), shape (..., R)."""
-        phase = 2 * np.pi * (offsets @ self.cycles.T)
-        return np.concatenate([np.cos(phase), np.sin(phase[..., self.has_sine])], axis=-1)
+    def at(self, places: Integers) -> Complexes:
+        """Return exp(j 2 pi k.p) at places p (..., 2), shape (..., K)."""
+        return np.asarray(np.exp(2j * np.pi * (places @ self.cycles.T)))
+
+    def real(self, values: Complexes) -> Floats:
+        """Return complex responses (..., K) as real ones, (..., R)."""
+        return np.concatenate([values.real, values.imag[..., self.has_sine]], axis=-1)
+
+
+class Responses(NamedTuple):
+    """Responses with the phase of a place taken out.
+
+    Attributes
+    ----------
+    to_direct : ndarray, shape (n, K), complex
+        Of unit direct light.
+    total : ndarray, shape (n, channels, R)
+        Of rows.
+    """
+
+    to_direct: Complexes
+    total: Floats
 
 
 def waves_of(transport: Transport) -> Waves:
     """Return the waves that a transport was measured by, DC excluded.
 
-    Where it does not tell, they are spread over all frequencies.
+    Where it does not say what was measured, waves are spread over all frequencies.
     """
     if isinstance(transport.posterior, Posterior):
         measured = transport.posterior.frequencies
@@ -68,37 +85,52 @@ def waves_of(transport: Transport) -> Waves:
     return Waves(cycles, np.ones(SPREAD_WAVES, dtype=bool))
 
 
-def responses_about_q(transport: Transport, pixels: Integers, waves: Waves) -> Floats:
-    """Return responses with the phase at the rounded q taken out.
+def responses(transport: Transport, pixels: Integers, places: Integers, waves: Waves) -> Responses:
+    """Return responses of chosen camera pixels.
 
     Parameters
     ----------
     transport : Transport
     pixels : ndarray of int, shape (n,)
-        Camera pixels with direct light, rising.
+    places : ndarray of int, shape (n, 2)
+        Projector pixels whose phase is taken out of them.
     waves : Waves
 
     Returns
     -------
-    ndarray, shape (n, channels, R), float64
-        The sum of a row times `Waves.at` the offset from q.
+    Responses
     """
-    projector = transport.projector
-    centres = centre(transport.correspondence, projector)[pixels]
-    y, x = np.divmod(np.arange(projector.pixels), projector.width)
-    phase = 2 * np.pi * (np.stack([y, x], axis=-1) @ waves.cycles.T)
-    exponentials = np.exp(1j * phase)
-    length = len(waves.frequency)
-    found = np.empty((len(pixels), transport.channels, length))
-    at_once = max(1, BLOCK_NUMBERS // (transport.channels * projector.pixels))
-    for block in blocks(transport.camera.pixels, at_once):
-        here = np.flatnonzero((pixels >= block.start) & (pixels < block.stop))
-        if not len(here):
-            continue
-        first, last = int(pixels[here[0]]), int(pixels[here[-1]])
-        rows = transport.rows(slice(first, last + 1))[pixels[here] - first]
-        turned = np.exp(-2j * np.pi * (centres[here] @ waves.cycles.T))
-        values = (rows @ exponentials) * turned[:, None]
-        sines = values.imag[..., waves.has_sine]
-        found[here] = np.concatenate([values.real, sines], axis=-1)
-    return found
+    whole = transport.factors
+    total = replace(
+        whole,
+        q=whole.q[pixels],
+        direct=whole.direct[pixels],
+        near=whole.near[pixels],
+        far=whole.far[pixels],
+        boxes=whole.boxes[pixels],
+    )
+    unit = replace(
+        total,
+        direct=np.ones((len(pixels), 1), dtype=np.float32),
+        near=np.zeros((len(pixels), 1, whole.near.shape[2]), dtype=np.float32),
+        far=np.zeros((len(pixels), 1, whole.far.shape[2]), dtype=np.float32),
+    )
+    height, width = transport.projector
+    down, across = (
+        np.exp(2j * np.pi * np.outer(along, np.arange(side)))
+        for along, side in zip(waves.cycles.T, (height, width), strict=True)
+    )
+    to_direct = np.empty((len(pixels), len(waves.cycles)), dtype=np.complex128)
+    of_rows = np.empty((len(pixels), transport.channels, len(waves.cycles)), dtype=np.complex128)
+    for block in blocks(len(waves.cycles), WAVES_AT_ONCE):
+        drawn = down[block, :, None] * across[block, None, :]
+        parts = np.concatenate([drawn.real, drawn.imag]).reshape(-1, 1, height * width)
+        lights = parts.astype(np.float32)
+        half = len(lights) // 2
+        direct = unit.pictures(lights).direct[..., 0]
+        of_direct, of_near, of_far = total.pictures(lights)
+        rows = of_direct + of_near + of_far
+        to_direct[:, block] = (direct[:half] + 1j * direct[half:]).T
+        of_rows[..., block] = np.moveaxis(rows[:half] + 1j * rows[half:], 0, -1)
+    turned = np.exp(-2j * np.pi * (places @ waves.cycles.T))
+    return Responses(to_direct * turned, waves.real(of_rows * turned[:, None]))

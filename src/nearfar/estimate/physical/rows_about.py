@@ -1,4 +1,7 @@
-"""Rows of a transport about q, on a grid of offsets.
+"""Near- and far-range light about q, on a grid of offsets.
+
+Offsets are in steps of half the distance between the coarsest functions of near-range light, of
+single projector pixels where these are.
 
 Index convention: c runs over chosen camera pixels, o over a square of (2 REACH + 1)^2 offsets from
 the rounded q, row by row.
@@ -16,23 +19,17 @@ from nearfar.transport.near import centre
 
 # Offsets reach as far as light under a surface is told from what else is there.
 REACH = 6
-# Dense rows of a block take this many numbers.
-BLOCK_NUMBERS = 1 << 25
+# Camera pixels of a block.
+BLOCK_PIXELS = 4096
 
 
 def offsets() -> NDArray[np.int64]:
-    """Return the offsets (y, x) from the rounded q, shape (O, 2)."""
+    """Return the offsets (y, x) from the rounded q in steps, shape (O, 2)."""
     return window_offsets(2 * REACH + 1)
 
 
-def on_projector(places: Integers, transport: Transport) -> Booleans:
-    """Return whether places (..., 2) are projector pixels, shape (...)."""
-    inside: Booleans = np.all((places >= 0) & (places < np.array(transport.projector)), axis=-1)
-    return inside
-
-
 def rows_about_q(transport: Transport, chosen: Booleans) -> Iterator[tuple[Integers, Floats]]:
-    """Read rows about q, block by block.
+    """Read near- and far-range light about q, block by block.
 
     Parameters
     ----------
@@ -45,19 +42,20 @@ def rows_about_q(transport: Transport, chosen: Booleans) -> Iterator[tuple[Integ
     pixels : ndarray of int, shape (n,)
         The chosen camera pixels of a block.
     entries : ndarray, shape (n, channels, O), float32
-        Their rows at `offsets`; 0 beyond the projector's border.
+        Light of step x step projector pixels at `offsets`; 0 beyond the projector's border.
     """
-    projector = transport.projector
+    projector, factors = transport.projector, transport.factors
     centres = centre(transport.correspondence, projector)
-    steps = offsets()
-    length = BLOCK_NUMBERS // (transport.channels * projector.pixels)
-    for block in blocks(len(chosen), length):
-        pixels = block.start + np.flatnonzero(chosen[block])
-        if not len(pixels):
-            continue
-        rows = transport.rows(slice(int(pixels[0]), int(pixels[-1]) + 1))[pixels - pixels[0]]
+    step = max(1, transport.pitch // 2)
+    steps = step * offsets()
+    functions = transport.near_basis.values_at(steps).T.astype(np.float32)
+    basis = factors.far_basis
+    waves = basis.weights[:, None] * basis.patterns_at(steps)
+    every = np.flatnonzero(chosen)
+    for block in blocks(len(every), BLOCK_PIXELS):
+        pixels = every[block]
+        far = basis.recentre(factors.far[pixels], centres[pixels])
+        entries = factors.near[pixels] @ functions + far @ waves.astype(np.float32)
         places = centres[pixels, None] + steps
-        inside = on_projector(places, transport)
-        flat = np.where(inside, places[..., 0] * projector.width + places[..., 1], 0)
-        entries = np.take_along_axis(rows, flat[:, None], axis=2)
-        yield pixels, entries * inside[:, None]
+        inside: Booleans = np.all((places >= 0) & (places < np.array(projector)), axis=-1)
+        yield pixels, step**2 * entries * inside[:, None]

@@ -15,9 +15,9 @@ from scipy import ndimage, signal
 from nearfar.arrays import Floats, Integers
 from nearfar.checks import require_instance
 from nearfar.errors import InputError
-from nearfar.estimate.physical.body import body_at
+from nearfar.estimate.physical.body import body_at, cell_side
 from nearfar.estimate.physical.creases import Settled, settled
-from nearfar.estimate.physical.kernels import kernel
+from nearfar.estimate.physical.kernels import enlarged, kernel
 from nearfar.estimate.physical.medium import SLOPES, media_of, out_of_range
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.translucent import SQUARE, translucent
@@ -158,13 +158,13 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     Raises
     ------
     InputError
-        If it is not a transport, or one whose near-range light is not of single projector pixels.
+        If it is not a transport, or one without near-range light.
     """
     require_instance(transport, Transport, "transport", "nearfar.load_transport")
-    if transport.pitch > 1 or "near" not in transport.parts:
+    if "near" not in transport.parts:
         raise InputError(
-            "the transport cannot be split physically: its near-range light is not of single "
-            "projector pixels. Plan a smaller pattern grid, of 64x64 say."
+            "the transport cannot be split physically: it has no near-range light. Estimate it "
+            "with near-range light, from patterns of a projector."
         )
     labels, count = ndimage.label(translucent(transport), SQUARE)
     direct = transport.direct.reshape(-1, transport.channels).copy()
@@ -177,7 +177,8 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]
         found = media.slope[kept], media.amplitude[kept]
-        bodies.append(Translucent(body.pixels[kept], body.coverage, media.sources, *found))
+        sources = tuple(enlarged(source, cell_side(transport)) for source in media.sources)
+        bodies.append(Translucent(body.pixels[kept], body.coverage, sources, *found))
     opaque = transport.lit.copy()
     for one in bodies:
         opaque.ravel()[one.pixels] = False

@@ -15,6 +15,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Complexes, Floats, Integers, blocks
 from nearfar.illumination.frequencies import as_array
+from nearfar.transport.factors import Factors
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 
@@ -85,6 +86,17 @@ def waves_of(transport: Transport) -> Waves:
     return Waves(cycles, np.ones(SPREAD_WAVES, dtype=bool))
 
 
+def unit_direct(factors: Factors) -> Factors:
+    """Return factors of the same footprints with direct light of 1 in one channel, and no other."""
+    pixels = len(factors.q)
+    return replace(
+        factors,
+        direct=np.ones((pixels, 1), dtype=np.float32),
+        near=np.zeros((pixels, 1, factors.near.shape[2]), dtype=np.float32),
+        far=np.zeros((pixels, 1, factors.far.shape[2]), dtype=np.float32),
+    )
+
+
 def responses(transport: Transport, pixels: Integers, places: Integers, waves: Waves) -> Responses:
     """Return responses of chosen camera pixels.
 
@@ -109,12 +121,7 @@ def responses(transport: Transport, pixels: Integers, places: Integers, waves: W
         far=whole.far[pixels],
         boxes=whole.boxes[pixels],
     )
-    unit = replace(
-        total,
-        direct=np.ones((len(pixels), 1), dtype=np.float32),
-        near=np.zeros((len(pixels), 1, whole.near.shape[2]), dtype=np.float32),
-        far=np.zeros((len(pixels), 1, whole.far.shape[2]), dtype=np.float32),
-    )
+    unit = unit_direct(total)
     height, width = transport.projector
     down, across = (
         np.exp(2j * np.pi * np.outer(along, np.arange(side)))

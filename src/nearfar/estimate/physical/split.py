@@ -55,6 +55,8 @@ class Translucent(NamedTuple):
         Which of `SLOPES` each camera pixel sees.
     amplitude : ndarray, shape (n, channels)
         Of a kernel of unit albedo.
+    explained : ndarray, shape (n,)
+        Share that the kernels explain of what direct light leaves, 1 at best.
     """
 
     pixels: Integers
@@ -62,6 +64,7 @@ class Translucent(NamedTuple):
     sources: tuple[Dipole, ...]
     slope: Integers
     amplitude: Floats
+    explained: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +179,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
             continue
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]
-        found = media.slope[kept], media.amplitude[kept]
+        found = media.slope[kept], media.amplitude[kept], media.explained[kept]
         sources = tuple(enlarged(source, cell_side(transport)) for source in media.sources)
         bodies.append(Translucent(body.pixels[kept], body.coverage, sources, *found))
     opaque = transport.lit.copy()

@@ -1,0 +1,80 @@
+"""The physical split of a Cornell box with a candle, against the scene's own components."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar import choose_plan, natural_picture, snr
+from nearfar.correspondence import correspond_by_phase
+from nearfar.errors import InputError
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.physical import physical_error_bars, split_physically
+from nearfar.photometry.measure import measure
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.acquire import acquire_in_memory
+
+PHOTOS = 117
+# In dB of direct light, subsurface light and inter-reflection, floodlit.
+WANTED = (32.0, 21.0, 21.0)
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return cached_scene("cornell")
+
+
+@pytest.fixture(scope="module")
+def split(scene):
+    plan, _ = choose_plan(scene.projector, PHOTOS, window=11)
+    rig = SimulatedRig(scene, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    measurements = measure(acquire_in_memory(plan, rig))
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+    return split_physically(found)
+
+
+def test_floodlit_components_are_those_of_the_scene(scene, split):
+    white = np.ones(scene.projector, np.float32)
+    truth, found = scene.component_pictures(white), split.components(white)
+    for wanted, true, part in zip(WANTED, truth, found, strict=True):
+        assert snr(true, part) > wanted
+    np.testing.assert_allclose(sum(found), split.transport @ white, atol=1e-5)
+    candle = truth[1].any(axis=-1) & split.transport.lit
+    ratio = found.direct[candle].std(axis=0) / truth[0][candle].std(axis=0)
+    assert np.all((ratio > 1 / 1.3) & (ratio < 1.3))
+
+
+def test_error_bars_of_components_hold_as_often_as_they_should(scene, split):
+    candle = np.zeros(split.transport.camera.pixels, bool)
+    for body in split.bodies:
+        candle[body.pixels] = True
+    opaque = split.transport.lit & ~candle.reshape(split.transport.camera)
+    for light in (np.ones(scene.projector, np.float32), natural_picture(scene.projector, 3)):
+        truth, found = scene.component_pictures(light), split.components(light)
+        bars = physical_error_bars(split, light)
+        for part in ("direct", "subsurface", "interreflection"):
+            i = found._fields.index(part)
+            within = np.abs(found[i] - truth[i]) < bars[i]
+            assert 0.45 < within[candle.reshape(opaque.shape)].mean() < 0.9, part
+            if part == "subsurface":
+                assert not bars[i][opaque].any()
+            else:
+                assert 0.6 < within[opaque].mean() < 0.85, part
+
+
+def test_bars_grow_with_the_light(scene, split):
+    light = natural_picture(scene.projector, 3)
+    once, twice = (physical_error_bars(split, factor * light) for factor in (0.25, 0.5))
+    for one, two in zip(once[:2], twice[:2], strict=True):
+        np.testing.assert_allclose(two, 2 * one, rtol=1e-4, atol=1e-9)
+
+
+def test_a_transport_without_error_bars_says_so(split):
+    without = replace(split, transport=replace(split.transport, posterior=None))
+    with pytest.raises(InputError, match="holds no error bars"):
+        physical_error_bars(without, np.ones(split.transport.projector, np.float32))

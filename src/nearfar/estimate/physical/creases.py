@@ -5,17 +5,15 @@ estimate that has direct light between projector pixels may take that for direct
 is off by some tenths of a pixel. Where the places about it agree on another q, and the light so
 taken falls off on that side as light of a crease does, it is inter-reflection.
 
-Index convention: c runs over camera pixels, e over the eight directions to the next ones.
+Index convention: c runs over camera pixels.
 """
 
-import warnings
 from typing import NamedTuple
 
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.physical.rows_about import REACH, rows_about_q
-from nearfar.illumination.near_basis import window_offsets
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
@@ -23,14 +21,18 @@ from nearfar.transport.near import centre
 # In projector pixels: how far a q is off, at least and at most.
 OFF = (0.03, 0.3)
 # Places about it differ among each other by less than this share of that.
-AGREEMENT = 0.25
+AGREEMENT = 0.3
 # Light beyond the one taken, over it: at least, or it does not fall off but stands alone, and at
 # most, or it is direct light of another place.
-LEAST_BEYOND = 0.05
+LEAST_BEYOND = 0.03
 MOST_BEYOND = 0.6
 # Light on that side over light on the other.
-ONE_SIDED = 3.0
-DIRECTIONS = np.delete(window_offsets(3), 4, axis=0)
+ONE_SIDED = 2.0
+# Wider footprints are of several projector pixels.
+SINGLE_PIXEL = 1.2
+# Camera pixels about one, in turn; each with those before and after it is a side.
+RING = np.array([[-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1], [1, 0], [1, -1], [0, -1]])
+SIDES = RING[(np.arange(8)[:, None] + np.arange(-1, 2)) % 8]
 
 
 class Settled(NamedTuple):
@@ -62,15 +64,13 @@ def settled(transport: Transport, opaque: Booleans) -> Settled:
     Returns
     -------
     Settled
-        Empty where functions of near-range light are of several projector pixels: footprints of
-        direct light are estimated there.
     """
-    if transport.pitch > 1:
-        return Settled(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty(0))
     told, disagreement = _told_by_neighbours(transport)
     off = np.abs(transport.correspondence - told).max(axis=-1)
-    # Comparisons with NaN are false: where neighbours tell nothing.
+    # Comparisons with NaN are false: where no side tells anything.
     chosen = opaque & (off > OFF[0]) & (off < OFF[1]) & (disagreement < AGREEMENT * off)
+    if transport.footprint is not None:
+        chosen &= np.all(transport.footprint[..., :2] < SINGLE_PIXEL, axis=-1)
     pixels = np.flatnonzero(chosen)
     last = np.array(transport.projector) - 1
     places = np.clip(told.reshape(-1, 2)[pixels], 0, last)
@@ -84,9 +84,11 @@ def settled(transport: Transport, opaque: Booleans) -> Settled:
 
 
 def _told_by_neighbours(transport: Transport) -> tuple[Floats, Floats]:
-    """Return the median q (Cy, Cx, 2) that pairs of camera pixels tell, and their disagreement.
+    """Return the q (Cy, Cx, 2) that camera pixels on one side tell, and how much they disagree.
 
-    Each pair lies on a line through the camera pixel and continues it.
+    Two camera pixels on a line through a third tell its q by going on as far again. Of the eight
+    sides it is the one from which q is drawn away, and where they agree the best. NaN where there
+    is none.
     """
     height, width = transport.camera
     lit = transport.lit[..., None]
@@ -97,13 +99,23 @@ def _told_by_neighbours(transport: Transport) -> tuple[Floats, Floats]:
         y, x = 2 + step
         return np.asarray(padded[y : y + height, x : x + width])
 
-    told = np.stack([2 * moved(step) - moved(2 * step) for step in DIRECTIONS])
-    with warnings.catch_warnings():
-        # Camera pixels without any pair about them stay NaN.
-        warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
-        median = np.nanmedian(told, axis=0)
-        spread = np.nanmedian(np.abs(told - median), axis=0).max(axis=-1)
-    return median, spread
+    best, least = np.full(q.shape, np.nan), np.full(q.shape[:2], np.inf)
+    for side in SIDES:
+        next_ones = np.stack([moved(step) for step in side])
+        told = 2 * next_ones - np.stack([moved(2 * step) for step in side])
+        known: Booleans = np.isfinite(told).all(axis=-1)
+        several = known.sum(axis=0) > 1
+        # Those that are not known take no part in the mean, nor disagree with it.
+        told = np.where(known[..., None] & several[..., None], told, 0.0)
+        count = np.where(several, known.sum(axis=0), np.nan)
+        middle = told.sum(axis=0) / count[..., None]
+        apart = np.abs(told - middle).max(axis=-1)
+        disagreement = np.where(known, apart, 0.0).max(axis=0)
+        inwards = np.where(known[..., None], next_ones, middle).mean(axis=0)
+        away = ((q - middle) * (middle - inwards)).sum(axis=-1) > 0
+        better = away & (disagreement < least)
+        best[better], least[better] = middle[better], disagreement[better]
+    return best, least
 
 
 def _falls_off(
@@ -116,7 +128,7 @@ def _falls_off(
     side[rows, axis] = np.sign(drawn[rows, axis]).astype(np.int64)
     along = np.zeros_like(side)
     along[rows, 1 - axis] = 1
-    parts = [entries.mean(axis=1) for _, entries in rows_about_q(transport, chosen.ravel())]
+    parts = [entries.mean(axis=1) for _, entries in rows_about_q(transport, chosen.ravel(), 1)]
     entries = np.concatenate([np.empty((0, (2 * REACH + 1) ** 2)), *parts])
     shift = centres - centre(transport.correspondence, transport.projector)[chosen.ravel()]
 

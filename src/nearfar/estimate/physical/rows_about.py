@@ -1,8 +1,5 @@
 """Near- and far-range light about q, on a grid of offsets.
 
-Offsets are in steps of half the distance between the coarsest functions of near-range light, of
-single projector pixels where these are.
-
 Index convention: c runs over chosen camera pixels, o over a square of (2 REACH + 1)^2 offsets from
 the rounded q, row by row.
 """
@@ -28,7 +25,9 @@ def offsets() -> NDArray[np.int64]:
     return window_offsets(2 * REACH + 1)
 
 
-def rows_about_q(transport: Transport, chosen: Booleans) -> Iterator[tuple[Integers, Floats]]:
+def rows_about_q(
+    transport: Transport, chosen: Booleans, step: int
+) -> Iterator[tuple[Integers, Floats]]:
     """Read near- and far-range light about q, block by block.
 
     Parameters
@@ -36,6 +35,8 @@ def rows_about_q(transport: Transport, chosen: Booleans) -> Iterator[tuple[Integ
     transport : Transport
     chosen : ndarray of bool, shape (C,)
         Camera pixels with direct light.
+    step : int
+        Projector pixels between offsets.
 
     Yields
     ------
@@ -46,7 +47,6 @@ def rows_about_q(transport: Transport, chosen: Booleans) -> Iterator[tuple[Integ
     """
     projector, factors = transport.projector, transport.factors
     centres = centre(transport.correspondence, projector)
-    step = max(1, transport.pitch // 2)
     steps = step * offsets()
     functions = transport.near_basis.values_at(steps).T.astype(np.float32)
     basis = factors.far_basis

@@ -16,7 +16,7 @@ from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.rows_about import offsets, rows_about_q
 from nearfar.transport.model import Transport
 
-# Distances from q: where light under a surface is seen beside direct light,
+# Distances from q in steps: where light under a surface is seen beside direct light,
 # and where it has faded.
 NEXT_TO_Q = (1.4, 3.2)
 FADED = (4.5, 6.1)
@@ -77,8 +77,9 @@ def translucent(transport: Transport) -> Booleans:
 
 def _sides(transport: Transport) -> Sides:
     """Return light next to q on the darkest sides."""
-    steps = offsets()
-    down, across = steps.T
+    # Half the distance of the coarsest functions of near-range light.
+    step = max(1, transport.pitch // 2)
+    down, across = offsets().T
     distance = np.hypot(down, across)
     near = (distance >= NEXT_TO_Q[0]) & (distance <= NEXT_TO_Q[1])
     faded = (distance >= FADED[0]) & (distance <= FADED[1])
@@ -95,7 +96,7 @@ def _sides(transport: Transport) -> Sides:
     white = np.asarray(transport @ np.ones(transport.projector, dtype=np.float32))
     white = white.reshape(-1, transport.channels).mean(axis=1)
     found = np.zeros((transport.camera.pixels, 2))
-    for pixels, entries in rows_about_q(transport, transport.lit.ravel()):
+    for pixels, entries in rows_about_q(transport, transport.lit.ravel(), step):
         mean = entries.mean(axis=1)
         light = mean @ next_to_q.T - np.maximum(mean @ background.T, 0.0)
         light *= ENTRIES / (white[pixels, None] + DARK)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import ndimage, signal
 
 from nearfar.arrays import Floats, Integers
-from nearfar.checks import require_instance
+from nearfar.checks import as_number, require_instance
 from nearfar.errors import InputError
 from nearfar.estimate.physical.body import body_at
 from nearfar.estimate.physical.creases import Settled, settled
@@ -126,6 +126,36 @@ class PhysicalSplit:
         under = transport.picture(subsurface)
         rest = model.direct + model.near + model.far - direct - under
         return PhysicalComponents(direct, under, rest)
+
+    def relight(
+        self,
+        light: Floats,
+        *,
+        direct: float = 1.0,
+        subsurface: float = 1.0,
+        interreflection: float = 1.0,
+    ) -> Floats:
+        """Relight with a gain for each component.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        direct, subsurface, interreflection : float
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
+            Photo units.
+
+        Raises
+        ------
+        InputError
+            As `components`; if a gain is not a finite number.
+        """
+        given = {"direct": direct, "subsurface": subsurface, "interreflection": interreflection}
+        gains = [as_number(gain, f"the gain of {name}") for name, gain in given.items()]
+        parts = self.components(light)
+        return np.asarray(sum(gain * part for gain, part in zip(gains, parts, strict=True)))
 
 
 def _spread(source: Dipole, slope: Integers, lit: Floats, where: Footprint) -> Floats:

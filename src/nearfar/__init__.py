@@ -48,6 +48,8 @@ Use the transport
     prepare_transport      lay a transport out to relight it many times
     save_transport         write a transport
     load_transport         read a transport
+    split_physically       split a transport into direct light, subsurface light, inter-reflection
+    PhysicalSplit          a transport so split: relights and takes apart
 
 Lights to relight under
     white                  full white
@@ -116,6 +118,7 @@ if TYPE_CHECKING:
     )
     from nearfar.errors import NearfarError
     from nearfar.estimate.error_bars import ErrorBars
+    from nearfar.estimate.physical import PhysicalSplit, split_physically
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.photometry.measurements import Measurements
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
@@ -169,6 +172,8 @@ _HOMES = {
     "prepare_transport": "nearfar.transport.prepared",
     "save_transport": "nearfar.transport.store",
     "load_transport": "nearfar.transport.store",
+    "split_physically": "nearfar.estimate.physical",
+    "PhysicalSplit": "nearfar.estimate.physical",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -217,6 +222,8 @@ __all__ = [  # noqa: RUF022
     "prepare_transport",
     "save_transport",
     "load_transport",
+    "split_physically",
+    "PhysicalSplit",
     "white",
     "natural_picture",
     "penguin",

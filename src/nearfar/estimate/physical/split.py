@@ -77,6 +77,14 @@ class PhysicalSplit:
         Empty where nothing is translucent.
     creases : Settled
         Camera pixels whose direct light is that of another q.
+
+    Examples
+    --------
+    >>> split = nearfar.split_physically(transport)
+    >>> direct, subsurface, interreflection = split.components(light)
+    >>> bool(np.allclose(direct + subsurface + interreflection, transport @ light, atol=1e-6))
+    True
+    >>> glowing = split.relight(light, subsurface=2.0)  # a gain for each component
     """
 
     transport: Transport
@@ -177,6 +185,9 @@ def _radius(source: Dipole, longest: int) -> int:
 def split_physically(transport: Transport) -> PhysicalSplit:
     """Split a transport into direct light, subsurface light and inter-reflection.
 
+    The model's own split, which `Transport.components` gives, has light of creases in near-range
+    light, and some subsurface light in direct light.
+
     Parameters
     ----------
     transport : Transport
@@ -189,6 +200,12 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     ------
     InputError
         If it is not a transport, or one whose near-range light is not of single projector pixels.
+
+    Examples
+    --------
+    >>> split = nearfar.split_physically(transport)
+    >>> split.bodies  # nothing in this scene is translucent
+    ()
     """
     require_instance(transport, Transport, "transport", "nearfar.load_transport")
     if transport.pitch > 1 or "near" not in transport.parts:

@@ -11,16 +11,17 @@ alcove and shelf took no part in any choice that the split made.
 """
 
 import argparse
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from accuracy import shoot
 from fewer_photos import jointly
-from nearfar import choose_plan, snr
-from nearfar.arrays import Floats
-from nearfar.estimate.physical import split_physically
+from nearfar import choose_plan, split_physically
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.evaluate import HIGHEST, floodlit_snr
+from nearfar.workflow.physical_split import physical_snr
 
 # W, where it is not the plan's own choice.
 WINDOWS = {
@@ -33,13 +34,10 @@ WINDOWS = {
 }
 
 
-def decibels(truth: tuple[Floats, ...], found: tuple[Floats, ...]) -> str:
+def line(found: Mapping[str, float], names: Sequence[str]) -> str:
     """Write the SNR of each component that the scene has."""
-    values = [
-        f"{snr(t, np.reshape(f, t.shape)):6.2f}" if t.any() else "     -"
-        for t, f in zip(truth, found, strict=True)
-    ]
-    return " ".join(values)
+    known = {name: value for name, value in found.items() if value > -HIGHEST}
+    return " ".join(f"{known[name]:6.2f}" if name in known else "     -" for name in names)
 
 
 def run(name: str, photos: int) -> None:
@@ -49,11 +47,15 @@ def run(name: str, photos: int) -> None:
     transport = jointly(plan, shoot(plan, scene, SimulatedCamera()))
     white = np.ones(scene.projector, dtype=np.float32)
     truth = scene.component_pictures(white)
-    physical = split_physically(transport).components(white)
-    share = physical.subsurface.sum() / sum(part.sum() for part in physical)
+    split = split_physically(transport)
+    found = physical_snr(split, scene)
+    physical = split.components(white)
     print(f"{name}, {len(plan.patterns)} photos; direct, subsurface, inter-reflection")
-    print(f"  model's split    {decibels(truth, transport.components(white))}")
-    print(f"  physical split   {decibels(truth, physical)}  subsurface {100 * share:.1f} %")
+    share = 100 * found.subsurface_share
+    print(f"  model's split    {line(floodlit_snr(transport, scene, 1.0), 'DNF')}")
+    print(
+        f"  physical split   {line(found.components, physical._fields)}  subsurface {share:.1f} %"
+    )
     translucent = truth[1].any(axis=-1) & transport.lit
     if translucent.any():
         direct = np.reshape(physical.direct, truth[0].shape)

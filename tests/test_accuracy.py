@@ -77,5 +77,8 @@ def test_the_demo_ends_in_a_page_and_is_as_accurate(tmp_path: Path, monkeypatch,
     assert "117</b><span>photos in all" in text
     assert "35.0×</b><span>fewer than 4096" in text
     _check_accuracy(judged, 40.3, 48.0)
+    assert min(judged["physical_split"].values()) > 20
+    assert f"{judged['physical_split']['interreflection']:.1f} dB" in text
+    assert text.index("those of the physical split") < text.index("The model's split")
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"plan.json", "capture.zarr", "transport.zarr", "report.html", "numbers.json"}

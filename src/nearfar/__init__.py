@@ -48,6 +48,9 @@ Use the transport
     prepare_transport      lay a transport out to relight it many times
     save_transport         write a transport
     load_transport         read a transport
+    split_physically       split a transport into direct light, subsurface light, inter-reflection
+    PhysicalSplit          a transport so split: relights and takes apart
+    physical_error_bars    standard deviations of its components
 
 Lights to relight under
     white                  full white
@@ -116,6 +119,7 @@ if TYPE_CHECKING:
     )
     from nearfar.errors import NearfarError
     from nearfar.estimate.error_bars import ErrorBars
+    from nearfar.estimate.physical import PhysicalSplit, physical_error_bars, split_physically
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.photometry.measurements import Measurements
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
@@ -169,6 +173,9 @@ _HOMES = {
     "prepare_transport": "nearfar.transport.prepared",
     "save_transport": "nearfar.transport.store",
     "load_transport": "nearfar.transport.store",
+    "split_physically": "nearfar.estimate.physical",
+    "PhysicalSplit": "nearfar.estimate.physical",
+    "physical_error_bars": "nearfar.estimate.physical",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -217,6 +224,9 @@ __all__ = [  # noqa: RUF022
     "prepare_transport",
     "save_transport",
     "load_transport",
+    "split_physically",
+    "PhysicalSplit",
+    "physical_error_bars",
     "white",
     "natural_picture",
     "penguin",

@@ -142,6 +142,14 @@ def test_gains_of_absent_parts_get_a_sentence(folder, tmp_path, gain):
     check_sentence(ran, gain.split("=")[0])
 
 
+def test_what_cannot_be_split_physically_gets_a_sentence(folder, tmp_path):
+    np.save(tmp_path / "light.npy", np.ones(LAMPS))
+    light, out = tmp_path / "light.npy", tmp_path / "o.npy"
+    ran = run_nearfar("relight", folder / "stage.zarr", light, out, "--gain", "subsurface=2")
+    check_sentence(ran, "cannot be split physically")
+    assert not out.exists()
+
+
 def test_without_references_gains_are_1_and_nothing_is_checked(folder, tmp_path):
     ran = check_done(run_nearfar(*_import(folder, tmp_path / "t.zarr", references=None)))
     assert "doubtful: Nothing was checked" in ran.out

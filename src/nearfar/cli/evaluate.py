@@ -19,6 +19,15 @@ from nearfar.cli.options import (
 from nearfar.cli.saying import say, warn, warn_if_wrong
 from nearfar.progress import progress_bar
 
+# What is compared, where the key alone does not tell which split it is of.
+EXPLAINED = {
+    "snr": "T, and the model's split D, N, F",
+    "physical": "rows beside the scene's components",
+    "floodlit": "pictures under white beside the scene's components",
+    "model": "rows beside the model's split of the scene",
+    "physical_split": "pictures under white beside the scene's components",
+}
+
 
 def evaluate(
     transport: TransportPath,
@@ -105,8 +114,9 @@ def _lines(found: dict[str, Any], indent: str = "") -> str:
     lines = []
     for name, value in found.items():
         if isinstance(value, dict):
-            lines += [f"{indent}{name}", _lines(value, indent + "  ")]
+            heading = f"{name}: {EXPLAINED[name]}" if name in EXPLAINED else name
+            lines += [f"{indent}{heading}", _lines(value, indent + "  ")]
         else:
             shown = f"{value:8.2f} dB" if isinstance(value, float) else str(value)
-            lines.append(f"{indent}{name:<14}{shown}")
+            lines.append(f"{indent}{name:<16}{shown}")
     return "\n".join(lines)

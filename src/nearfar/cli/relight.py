@@ -1,5 +1,6 @@
 """``nearfar relight``."""
 
+from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
     from nearfar.arrays import Floats
     from nearfar.transport.stored import StoredTransport
 
-COMPONENTS = ("direct", "near", "far", "free")
+    Relighting = Callable[[StoredTransport, Floats, Mapping[str, float]], Floats]
+
+MODEL = ("direct", "near", "far", "free")
+PHYSICAL = ("direct", "subsurface", "interreflection")
 
 
 def _gains(texts: list[str]) -> dict[str, float]:
@@ -29,13 +33,42 @@ def _gains(texts: list[str]) -> dict[str, float]:
             number = float(value)
         except ValueError:
             number = float("nan")
-        if name not in COMPONENTS or not isfinite(number):
+        if name not in MODEL + PHYSICAL or not isfinite(number):
             raise typer.BadParameter(
-                f"{text!r} is no gain: write direct=1, near=2, far=0 or free=1, one per --gain.",
+                f"{text!r} is no gain: write direct=1, near=2, far=0, subsurface=2, "
+                f"interreflection=0 or free=1, one per --gain.",
                 param_hint="--gain",
             )
         gains[name] = number
     return gains
+
+
+def _relighting(gains: dict[str, float], *, error_bars: bool) -> "Relighting":
+    """Return the function that relights by the split that gains are of.
+
+    Direct light alone is the model's. Gains of both splits are refused, and error bars of the
+    physical one.
+    """
+    from nearfar.workflow import relight as workflow
+
+    physical = [name for name in gains if name not in MODEL]
+    others = [name for name in gains if name not in PHYSICAL]
+    if physical and others:
+        raise typer.BadParameter(
+            f"{others[0]} and {physical[0]} are components of two splits: give gains of the "
+            f"model's split (direct, near, far; free for lamps) or of the physical split (direct, "
+            f"subsurface, interreflection).",
+            param_hint="--gain",
+        )
+    if physical and error_bars:
+        raise typer.BadParameter(
+            f"{physical[0]} is a component of the physical split, which has no error bars: leave "
+            f"out --error-bars, or give gains of the model's split (direct, near, far).",
+            param_hint="--gain",
+        )
+    if physical:
+        return workflow.relight_stored_physically
+    return workflow.error_bars_of_stored if error_bars else workflow.relight_stored
 
 
 def _of_size(light: "Floats", path: Path, projector: Size) -> "Floats":
@@ -90,7 +123,8 @@ def relight(
     gain: Annotated[
         list[str] | None,
         typer.Option(
-            help="Gain of a component: direct=1, near=2 or far=0, for lamps free=2.",
+            help="Gain of a component: direct=1, near=2 or far=0 of the model's split, for lamps "
+            "free=2; or direct=1, subsurface=2 or interreflection=0 of the physical split.",
             metavar="NAME=VALUE",
         ),
     ] = None,
@@ -122,9 +156,9 @@ def relight(
     )
     from nearfar.transport.colour import as_channels_see
     from nearfar.transport.stored import open_transport
-    from nearfar.workflow.relight import error_bars_of_stored, relight_stored
 
     gains = _gains(gain or [])
+    make = _relighting(gains, error_bars=error_bars)
     check_picture_ending(output)
     keep_input(output, transport, light)
     check_output(output, force=force)
@@ -136,7 +170,6 @@ def relight(
         given = Size(*projected.shape[:2])
         projected = (_resized if resize else _of_size)(projected, light, opened.projector)
         projected = as_channels_see(projected, opened.channels, opened.provenance)
-        make = error_bars_of_stored if error_bars else relight_stored
         picture = make(opened, projected, gains)
         write_picture(output, picture, force=force, may_be_infinite=error_bars)
     if given != opened.projector:

@@ -7,6 +7,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.correspondence import Correspondence
+from nearfar.estimate.physical import PhysicalSplit, split_physically
 from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
 from nearfar.report.differences import difference_gain
@@ -14,6 +15,7 @@ from nearfar.report.evaluation import FREQUENCIES_READING, ROWS_READING
 from nearfar.report.maps import READINGS
 from nearfar.report.methods import reconstruction_methods
 from nearfar.report.page import colour_map, facts, gallery, page
+from nearfar.report.splits import PHYSICAL_NAMES, splits_section
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import Rows
@@ -62,25 +64,17 @@ def demo_page(
         ]
     )
     gain = difference_gain((transport @ light) - (truth @ light) for light in lights.values())
-    columns = ["light", "direct", "near-range", "far-range", "sum: relit", "photo (exact)"]
+    columns = ["light", *PHYSICAL_NAMES.values(), "sum: relit", "photo (exact)"]
     columns.append(f"difference × {gain}")
+    split = split_physically(transport)
     rows_of_pictures = [
-        (name, _row(name, light, transport, truth, gain)) for name, light in lights.items()
+        (name, _row(name, light, split, truth, gain)) for name, light in lights.items()
     ]
     galleries = gallery(columns, rows_of_pictures)
     ceiling = judgement["ceiling"]["snr_b"]
     table = numbers(
         ["light", "SNR_b", "ceiling of the model, no noise"],
         [[name, f"{value:.1f} dB", f"{ceiling[name]:.1f} dB"] for name, value in snr_b.items()],
-    )
-    split = judgement["snr"]
-    parts = numbers(
-        ["component", "its floodlit picture", "its rows, by physics", "its rows, by the model"],
-        [
-            [name, *(f"{split[how][key]:.1f} dB" for how in ("floodlit", "physical", "model"))]
-            for name, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
-        ]
-        + [["all together", f"{snr_b['white']:.1f} dB", f"{split['T']:.1f} dB", ""]],
     )
     times = ", ".join(f"{name} {value:.1f} s" for name, value in seconds.items())
     body = f"""
@@ -91,16 +85,16 @@ noise. Every camera pixel's transport was reconstructed from {photos} of them, w
 projector pixel that lights it, and the scene relit under light that was never projected.</p>
 {cards}
 <h2>Relighting, components apart</h2>
-<p>Direct light holds the highlights; light under the candle's skin is near-range; the walls' red
-and green on candle and cup are far-range. Near-range is shown twice as bright. The exact picture
-stands beside the sum, and their difference, {gain} times as bright.</p>
+<p>These components are those of the physical split. Direct light holds the highlights, subsurface
+light is what travels under the candle's skin, and inter-reflection brings the walls' red and green
+to candle and cup. Subsurface light is shown twice as bright. The exact picture stands beside the
+sum, and their difference, {gain} times as bright.</p>
 {galleries}
 <h2>How close</h2>
 <p>SNR_b compares relit pictures with exact ones. The ceiling is the best that direct light, a
 window of {transport.window} × {transport.window} and the far band could do on this scene.</p>
 {table}
-<p></p>
-{parts}
+{splits_section(judgement)}
 <h2>Where it is good, and where less</h2>
 <div class="maps">{_maps(transport, correspondence, rows)}</div>
 <p></p>
@@ -113,13 +107,13 @@ window of {transport.window} × {transport.window} and the far band could do on 
 
 
 def _row(
-    name: str, light: Floats, transport: Transport, truth: ExactTransport, gain: int
+    name: str, light: Floats, split: PhysicalSplit, truth: ExactTransport, gain: int
 ) -> list[str]:
-    parts = transport.components(light)
-    relit, exact = parts.direct + parts.near + parts.far, truth @ light
+    direct, subsurface, rest = split.components(light)
+    relit, exact = split.transport @ light, truth @ light
     difference = gain * np.abs(relit - exact)
-    images = [light, parts.direct, 2 * parts.near, parts.far, relit, exact, difference]
-    names = ["light", "direct", "near-range", "far-range", "relit", "exact", "difference"]
+    images = [light, direct, 2 * subsurface, rest, relit, exact, difference]
+    names = ["light", *PHYSICAL_NAMES.values(), "relit", "exact", "difference"]
     return [
         picture(image, f"{part} under {name}") for image, part in zip(images, names, strict=True)
     ]

@@ -11,9 +11,10 @@ from nearfar.report.beside import pictures_beside
 from nearfar.report.figures.style import new_figure, styled
 from nearfar.report.methods import evaluation_methods
 from nearfar.report.page import colour_map, facts, listed, page, plot
+from nearfar.report.splits import splits_section
 from nearfar.report.transport_page import exposure_of
 from nearfar.transport.model import Transport
-from nearfar.workflow.evaluate import HIGHEST, Rows
+from nearfar.workflow.evaluate import Rows
 from nearfar.workflow.judge import Pair, describe_units, white_last
 
 # How to read the maps.
@@ -85,38 +86,17 @@ SNR_t the same of a camera pixel's row of the transport.</p>
 <h2>Figures</h2>
 <p>20 dB are an error of 10 %, 40 dB of 1 %, 60 dB of 0.1 %.{white_says}</p>
 {numbers(head, table)}
-{_components(judgement)}
+{splits_section(judgement)}
 {_row_section(rows, transport)}
 """
     methods = evaluation_methods(transport.provenance, len(snr_b), by_truth=rows is not None)
     return page("nearfar: evaluation", body, methods=methods, command=command)
 
 
-def _components(judgement: Mapping[str, Any]) -> str:
-    split = judgement.get("snr", {})
-    if "physical" not in split:
-        return ""
-    heads = {
-        "floodlit": "its floodlit picture",
-        "physical": "its rows, by physics",
-        "model": "its rows, by the model",
-    }
-    shown = [how for how in heads if how in split]
-    rows = [
-        [what, *(_decibels(split[how][key]) for how in shown)]
-        for what, key in (("direct", "D"), ("near-range", "N"), ("far-range", "F"))
-    ]
-    return f"<p></p>{numbers(['component', *(heads[how] for how in shown)], rows)}"
-
-
 def _remarks(judgement: Mapping[str, Any], faults: Sequence[str]) -> str:
     units = [f"{text[0].upper()}{text[1:]}." for text in describe_units(judgement)]
     sentences = [*faults, *units]
     return listed(sentences) if sentences else ""
-
-
-def _decibels(value: float) -> str:
-    return f"{value:.1f} dB" if value > -HIGHEST else "the scene has none"
 
 
 def _row_section(rows: Rows | None, transport: Transport) -> str:

@@ -219,7 +219,10 @@ def _names(transport: Transport) -> list[str]:
 def _sources(transport: Transport) -> str:
     sources = [SOURCES[part] for part in transport.parts]
     together = "; together they are the relit picture" if len(sources) > 1 else ""
-    text = f"{', '.join(sources)}{together}."
+    whose = " These are parts of the model's split, not of the physical one." * (
+        "near" in transport.parts
+    )
+    text = f"{', '.join(sources)}{together}.{whose}"
     return text[0].upper() + text[1:]
 
 

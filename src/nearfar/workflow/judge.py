@@ -8,6 +8,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.errors import InputError, MissingFileError
+from nearfar.estimate.physical import split_physically
 from nearfar.files import full_scale_of, list_pictures, luminance, read_light, read_picture
 from nearfar.illumination.pictures import standard_lights
 from nearfar.transport.exact import ExactTransport
@@ -27,9 +28,16 @@ from nearfar.workflow.evaluate import (
     snr,
     split_snr,
 )
+from nearfar.workflow.physical_split import physical_snr
 
-# What a judgement says of units and of dark pixels, beside its decibels.
-REMARKS = ("exposure", "exposure_is_fitted", "pixels_without_light", "pairs_without_light")
+# What a judgement says beside its decibels: of units, dark pixels, light that is not there.
+REMARKS = (
+    "exposure",
+    "exposure_is_fitted",
+    "pixels_without_light",
+    "pairs_without_light",
+    "false_subsurface_share",
+)
 # A truth whose own best exposure is this many times the recorded one, or a part of it, is in
 # other units.
 LARGEST_RATIO_OF_EXPOSURES = 1.25
@@ -73,13 +81,19 @@ def judge_by_truth(
     -------
     dict
         SNR in dB, ready for JSON: ``snr_b`` per light and ``snr_b_pictures`` their mean over
-        natural pictures; ``snr_b_frequency`` and ``snr_t`` as percentiles; ``snr`` of T, D, N
-        and F with the physical and the model's split, and of their pictures under full white;
-        ``ceiling``, the same lights with the model fitted to the truth. ``exposure`` is the
+        natural pictures; ``snr_b_frequency`` and ``snr_t`` as percentiles; ``snr`` of T, and of
+        the model's D, N and F: ``physical`` of their rows beside the scene's direct light,
+        subsurface light and inter-reflection, ``floodlit`` of their pictures under full white,
+        ``model`` of their rows beside the model's split of the truth; ``ceiling``, the same lights
+        with the model fitted to the truth. ``physical_split`` has the SNR of ``direct``,
+        ``subsurface`` and ``interreflection`` of `nearfar.split_physically` under full white, less
+        what the scene does not have; without subsurface light, ``false_subsurface_share`` is the
+        share of light, 0 to 1, that the split takes for it. ``exposure`` is the
         photo units per unit of the truth, ``exposure_is_fitted`` whether they were fitted to it,
         and ``pixels_without_light`` the camera pixels that the truth leaves dark: they have no
         SNR_t. Beside an operator rows are a sample, and there are no model's split and no
-        ceiling, which take all rows; nor are they at a pitch over 1.
+        ceiling, which take all rows; nor are they at a pitch over 1. A physical split is left out
+        of transports that have none.
 
     Raises
     ------
@@ -108,6 +122,9 @@ def judge_by_truth(
     if is_split:
         floodlit = floodlit_snr(transport, truth, factor)
         numbers["snr"] |= {"physical": components, "floodlit": floodlit}
+        report("physical split", 0.0)
+        numbers |= _physical_split(transport, truth, factor)
+        report("physical split", 1.0)
     # The model is fitted to every row, of which an operator has too many, by single pixels.
     if is_split and isinstance(truth, ExactTransport) and transport.pitch == 1:
         report("model's truth", 0.0)
@@ -122,13 +139,26 @@ def judge_by_truth(
     return numbers
 
 
+def _physical_split(transport: Transport, truth: KnownTransport, factor: float) -> dict[str, Any]:
+    """Return what `judge_by_truth` tells of the physical split."""
+    try:
+        split = split_physically(transport)
+    except InputError:
+        return {}
+    found = physical_snr(split, truth, exposure=factor)
+    numbers: dict[str, Any] = {"physical_split": dict(found.components)}
+    if "subsurface" not in found.components:
+        numbers["false_subsurface_share"] = found.subsurface_share
+    return numbers
+
+
 def white_last(of_lights: Mapping[str, Value]) -> dict[str, Value]:
     """Return the values of lights with white's at the end: white is measured, not relit."""
     return dict(sorted(of_lights.items(), key=lambda item: item[0] == "white"))
 
 
 def describe_units(judgement: Mapping[str, Any]) -> list[str]:
-    """Return sentences on a fitted exposure, and on dark camera pixels and photos left out."""
+    """Return sentences on what a judgement says beside decibels."""
     said = []
     if judgement.get("exposure_is_fitted"):
         said.append(
@@ -142,6 +172,11 @@ def describe_units(judgement: Mapping[str, Any]) -> list[str]:
         )
     if dark := judgement.get("pairs_without_light"):
         said.append(f"left out of the mean, as the photo holds no light: {', '.join(dark)}")
+    if (share := judgement.get("false_subsurface_share")) is not None:
+        said.append(
+            f"the scene has no subsurface light; the physical split takes {100 * share:.1f} % of "
+            f"the light for it"
+        )
     return said
 
 

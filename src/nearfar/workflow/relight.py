@@ -6,6 +6,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.estimate.error_bars import ErrorBars
+from nearfar.estimate.physical import split_physically
 from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.parts import require_parts
 from nearfar.transport.stored import StoredTransport
@@ -39,6 +40,36 @@ def relight_stored(stored: StoredTransport, light: Floats, gains: Mapping[str, f
         analysed = analysed or rows.analyse(light)
         parts.append(rows.relight(analysed, **gains).astype(np.float32, copy=False))
     return np.concatenate(parts)
+
+
+def relight_stored_physically(
+    stored: StoredTransport, light: Floats, gains: Mapping[str, float]
+) -> Floats:
+    """Relight the scene, as `nearfar.PhysicalSplit.relight` does.
+
+    All of the transport is read at once: the camera pixels of a body share its medium.
+
+    Parameters
+    ----------
+    stored : StoredTransport
+    light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        As `nearfar.Transport.relight` takes it.
+    gains : mapping of str to float
+        Gain of each component, ``"direct"``, ``"subsurface"`` or ``"interreflection"``; 1 where
+        left out.
+
+    Returns
+    -------
+    ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+        In photo units.
+
+    Raises
+    ------
+    InputError
+        If the transport cannot be split physically.
+    """
+    split = split_physically(stored.rows())
+    return split.relight(light, **gains).astype(np.float32, copy=False)
 
 
 def error_bars_of_stored(

@@ -103,7 +103,7 @@ def _told_by_neighbours(transport: Transport) -> tuple[Floats, Floats]:
     for side in SIDES:
         next_ones = np.stack([moved(step) for step in side])
         told = 2 * next_ones - np.stack([moved(2 * step) for step in side])
-        known: Booleans = np.isfinite(told).all(axis=-1)
+        known = np.asarray(np.isfinite(told).all(axis=-1))
         several = known.sum(axis=0) > 1
         # Those that are not known take no part in the mean, nor disagree with it.
         told = np.where(known[..., None] & several[..., None], told, 0.0)

@@ -8,6 +8,7 @@ responses, as a share, says how good they are; the errors of components go with 
 import numpy as np
 
 from nearfar.arrays import Floats
+from nearfar.checks import require_instance
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.kernels import kernel
 from nearfar.estimate.physical.responses import unit_direct
@@ -38,7 +39,15 @@ def physical_error_bars(split: PhysicalSplit, light: Floats) -> PhysicalComponen
     ------
     InputError
         If the transport holds no error bars, or as `Transport.components`.
+
+    Examples
+    --------
+    >>> split = nearfar.split_physically(transport)
+    >>> direct, subsurface, interreflection = nearfar.physical_error_bars(split, light)
+    >>> direct.shape
+    (8, 8)
     """
+    require_instance(split, PhysicalSplit, "split", "nearfar.split_physically")
     transport = split.transport
     shape = (transport.camera.pixels, transport.channels)
     bars = ErrorBars(transport)

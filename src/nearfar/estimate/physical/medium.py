@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
 from nearfar.arrays import Floats, Integers
-from nearfar.estimate.physical.body import Body
+from nearfar.estimate.physical.body import REACH, Body
 from nearfar.estimate.physical.kernels import slopes, source_at
 from nearfar.transport.dipole import Dipole
 
@@ -26,7 +26,7 @@ DEPTHS = (0.5, 1.0, 2.0)
 PRODUCTS = (0.1, 0.4, 1.0)
 # Least and largest: depths that responses can tell, and products sqrt(3 (1 - a')) of media that
 # scatter.
-RANGES = ((0.2, 6.0), (0.01, 1.7))
+RANGES = ((0.2, REACH / 2), (0.01, 1.7))
 # Logarithms this close to them are at them.
 AT_BOUND = 0.01
 # Camera pixels that the medium is fitted to, and how far a misfit may stand out from the median.
@@ -127,11 +127,16 @@ def media_of(body: Body) -> Media:
     )
 
 
-def out_of_range(media: Media) -> bool:
-    """Return whether a medium ended where responses about q tell no more of it."""
+def is_even(media: Media) -> bool:
+    """Return whether light does not fade as far as kernels are compared, in any channel.
+
+    The source then ended at the greatest depth, or the attenuation at the least.
+    """
     least, most = np.log(RANGES).T
     found = np.stack([_logarithms(source) for source in media.sources])
-    return bool(np.any((found < least + AT_BOUND) | (found > most - AT_BOUND)))
+    return bool(
+        np.any(found[:, 0] > most[0] - AT_BOUND) or np.any(found[:, 1] < least[1] + AT_BOUND)
+    )
 
 
 def _guesses() -> list[Dipole]:

@@ -18,7 +18,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.physical.body import body_at, cell_side
 from nearfar.estimate.physical.creases import Settled, settled
 from nearfar.estimate.physical.kernels import enlarged, kernel
-from nearfar.estimate.physical.medium import SLOPES, media_of, out_of_range
+from nearfar.estimate.physical.medium import SLOPES, is_even, media_of
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.translucent import SQUARE, translucent
 from nearfar.transport.dipole import Dipole
@@ -222,7 +222,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     for number in range(1, count + 1):
         body = body_at(transport, labels == number, waves)
         media = media_of(body)
-        if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or out_of_range(media):
+        if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or is_even(media):
             continue
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]

@@ -50,7 +50,7 @@ Use the transport
     load_transport         read a transport
     split_physically       split a transport into direct light, subsurface light, inter-reflection
     PhysicalSplit          a transport so split: relights and takes apart
-    physical_error_bars    standard deviations of its components
+    PhysicalErrorBars      standard deviations of its components and pictures
 
 Lights to relight under
     white                  full white
@@ -119,7 +119,7 @@ if TYPE_CHECKING:
     )
     from nearfar.errors import NearfarError
     from nearfar.estimate.error_bars import ErrorBars
-    from nearfar.estimate.physical import PhysicalSplit, physical_error_bars, split_physically
+    from nearfar.estimate.physical import PhysicalErrorBars, PhysicalSplit, split_physically
     from nearfar.illumination.pictures import natural_picture, penguin, random_pattern, white
     from nearfar.photometry.measurements import Measurements
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
@@ -175,7 +175,7 @@ _HOMES = {
     "load_transport": "nearfar.transport.store",
     "split_physically": "nearfar.estimate.physical",
     "PhysicalSplit": "nearfar.estimate.physical",
-    "physical_error_bars": "nearfar.estimate.physical",
+    "PhysicalErrorBars": "nearfar.estimate.physical",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -226,7 +226,7 @@ __all__ = [  # noqa: RUF022
     "load_transport",
     "split_physically",
     "PhysicalSplit",
-    "physical_error_bars",
+    "PhysicalErrorBars",
     "white",
     "natural_picture",
     "penguin",

@@ -81,7 +81,6 @@ def test_direct_light_alone_is_the_models(folder, split):
         (("--gain", "near=2", "--gain", "subsurface=2"), ("direct, near, far", "two splits")),
         (("--gain", "interreflection=0", "--gain", "far=0"), ("direct, subsurface,", "far")),
         (("--gain", "free=1", "--gain", "subsurface=2"), ("free", "two splits")),
-        (("--gain", "subsurface=2", "--error-bars"), ("no error bars",)),
         (("--gain", "subsurface=two"), ("interreflection=0",)),
         (("--gain", "subsurface=1", "--gain", "subsurface=2"), ("subsurface is given twice",)),
     ],
@@ -93,4 +92,13 @@ def test_what_does_not_go_together_is_wrong_usage(folder, options, named):
     said = " ".join(ran.err.replace("│", " ").split())
     for name in named:
         assert name in said
+    assert not out.exists()
+
+
+def test_error_bars_of_physical_components_need_those_of_the_transport(folder):
+    out = folder / "bars.npy"
+    gains = ("--gain", "subsurface=2", "--error-bars")
+    ran = run_nearfar("relight", folder / "t.zarr", folder / "grey.npy", out, *gains)
+    assert ran.status == 1
+    assert "holds no error bars" in ran.err
     assert not out.exists()

@@ -60,14 +60,12 @@ def _relighting(gains: dict[str, float], *, error_bars: bool) -> "Relighting":
             f"subsurface, interreflection).",
             param_hint="--gain",
         )
-    if physical and error_bars:
-        raise typer.BadParameter(
-            f"{physical[0]} is a component of the physical split, which has no error bars: leave "
-            f"out --error-bars, or give gains of the model's split (direct, near, far).",
-            param_hint="--gain",
-        )
     if physical:
-        return workflow.relight_stored_physically
+        return (
+            workflow.physical_error_bars_of_stored
+            if error_bars
+            else workflow.relight_stored_physically
+        )
     return workflow.error_bars_of_stored if error_bars else workflow.relight_stored
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.estimate.error_bars import ErrorBars
-from nearfar.estimate.physical import split_physically
+from nearfar.estimate.physical import PhysicalErrorBars, split_physically
 from nearfar.transport.analysed import AnalysedLight
 from nearfar.transport.parts import require_parts
 from nearfar.transport.stored import StoredTransport
@@ -70,6 +70,22 @@ def relight_stored_physically(
     """
     split = split_physically(stored.rows())
     return split.relight(light, **gains).astype(np.float32, copy=False)
+
+
+def physical_error_bars_of_stored(
+    stored: StoredTransport, light: Floats, gains: Mapping[str, float]
+) -> Floats:
+    """Return the standard deviation of what `relight_stored_physically` returns.
+
+    See `nearfar.PhysicalErrorBars`.
+
+    Raises
+    ------
+    InputError
+        If the transport holds no error bars, or cannot be split physically.
+    """
+    bars = PhysicalErrorBars(split_physically(stored.rows()))
+    return bars.picture(light, **gains).astype(np.float32, copy=False)
 
 
 def error_bars_of_stored(

@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nearfar import choose_plan, natural_picture, snr
+from nearfar import ErrorBars, choose_plan, natural_picture, snr
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.physical import physical_error_bars, split_physically
+from nearfar.estimate.physical import PhysicalErrorBars, split_physically
 from nearfar.photometry.measure import measure
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
+from nearfar.transport.quality import Quality
 from nearfar.workflow.acquire import acquire_in_memory
 
 PHOTOS = 117
@@ -56,7 +57,7 @@ def test_error_bars_of_components_hold_as_often_as_they_should(scene, split):
     opaque = split.transport.lit & ~candle.reshape(split.transport.camera)
     for light in (np.ones(scene.projector, np.float32), natural_picture(scene.projector, 3)):
         truth, found = scene.component_pictures(light), split.components(light)
-        bars = physical_error_bars(split, light)
+        bars = PhysicalErrorBars(split).components(light)
         for part in ("direct", "subsurface", "interreflection"):
             i = found._fields.index(part)
             within = np.abs(found[i] - truth[i]) < bars[i]
@@ -69,12 +70,35 @@ def test_error_bars_of_components_hold_as_often_as_they_should(scene, split):
 
 def test_bars_grow_with_the_light(scene, split):
     light = natural_picture(scene.projector, 3)
-    once, twice = (physical_error_bars(split, factor * light) for factor in (0.25, 0.5))
+    once, twice = (PhysicalErrorBars(split).components(factor * light) for factor in (0.25, 0.5))
     for one, two in zip(once[:2], twice[:2], strict=True):
         np.testing.assert_allclose(two, 2 * one, rtol=1e-4, atol=1e-9)
+
+
+def test_bars_of_a_picture_are_those_of_its_components(scene, split):
+    light = natural_picture(scene.projector, 3)
+    bars = PhysicalErrorBars(split)
+    whole = ErrorBars(split.transport).picture(light)
+    np.testing.assert_allclose(bars.picture(light), whole, rtol=1e-5)
+    alone = {"direct": 0.0, "subsurface": 0.0, "interreflection": 0.0}
+    for name, part in bars.components(light)._asdict().items():
+        found = bars.picture(light, **(alone | {name: 2.0}))
+        np.testing.assert_allclose(found, 2 * part, rtol=1e-5, atol=1e-9)
+
+
+def test_of_saturated_camera_pixels_nothing_is_known(scene, split):
+    transport = split.transport
+    clear = np.zeros(transport.camera, dtype=bool)
+    saturated = clear.copy()
+    saturated[3, 5] = True
+    quality = Quality(np.ones(transport.camera, np.float32), saturated)
+    spoilt = replace(split, transport=replace(transport, quality=quality))
+    found = PhysicalErrorBars(spoilt).picture(np.ones(scene.projector, np.float32), subsurface=0.0)
+    assert np.isinf(found[3, 5]).all()
+    assert np.isfinite(found[~saturated]).all()
 
 
 def test_a_transport_without_error_bars_says_so(split):
     without = replace(split, transport=replace(split.transport, posterior=None))
     with pytest.raises(InputError, match="holds no error bars"):
-        physical_error_bars(without, np.ones(split.transport.projector, np.float32))
+        PhysicalErrorBars(without)

@@ -7,7 +7,7 @@ import pytest
 
 from nearfar import Size, Transport
 from nearfar.errors import InputError
-from nearfar.estimate.physical import physical_error_bars, split_physically
+from nearfar.estimate.physical import PhysicalErrorBars, split_physically
 from nearfar.estimate.physical.kernels import kernel, source_at
 from nearfar.illumination.frequencies import DC, grid, representatives
 from nearfar.illumination.near_basis import NearBasis, window_offsets
@@ -201,7 +201,7 @@ def test_other_things_than_transports_are_refused():
     with pytest.raises(InputError, match="transport"):
         split_physically(np.eye(4))
     with pytest.raises(InputError, match="split"):
-        physical_error_bars(np.eye(4), np.ones((4, 4)))
+        PhysicalErrorBars(np.eye(4))
 
 
 def test_where_functions_are_of_several_projector_pixels_media_are_the_same():

@@ -1,6 +1,6 @@
 """The physical split of a transport: direct light, subsurface light and inter-reflection."""
 
-from nearfar.estimate.physical.error_bars import physical_error_bars
+from nearfar.estimate.physical.error_bars import PhysicalErrorBars
 from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, split_physically
 
-__all__ = ["PhysicalComponents", "PhysicalSplit", "physical_error_bars", "split_physically"]
+__all__ = ["PhysicalComponents", "PhysicalErrorBars", "PhysicalSplit", "split_physically"]

@@ -8,7 +8,7 @@ responses, as a share, says how good they are; the errors of components go with 
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.checks import require_instance
+from nearfar.checks import as_number, require_instance
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.kernels import kernel
 from nearfar.estimate.physical.responses import unit_direct
@@ -22,48 +22,121 @@ OF_SUBSURFACE = 0.5
 CORRELATION = -0.5
 
 
-def physical_error_bars(split: PhysicalSplit, light: Floats) -> PhysicalComponents:
-    """Return standard deviations of the components' errors against physical truth.
+class PhysicalErrorBars:
+    """Standard deviations of the physical components' errors against physical truth.
+
+    Where a camera pixel is saturated under white, they are infinite; see `nearfar.ErrorBars`.
 
     Parameters
     ----------
     split : PhysicalSplit
-    light : ndarray, shape (Py, Px) or (Py, Px, channels)
-
-    Returns
-    -------
-    PhysicalComponents
-        Photo units; subsurface light has none where no translucent surface was found.
 
     Raises
     ------
     InputError
-        If the transport holds no error bars, or as `Transport.components`.
+        If the transport holds no error bars.
 
     Examples
     --------
-    >>> split = nearfar.split_physically(transport)
-    >>> direct, subsurface, interreflection = nearfar.physical_error_bars(split, light)
-    >>> direct.shape
+    >>> bars = nearfar.PhysicalErrorBars(nearfar.split_physically(transport))
+    >>> direct, subsurface, interreflection = bars.components(light)
+    >>> bars.picture(light, subsurface=2.0).shape  # that of `split.relight`
     (8, 8)
     """
-    require_instance(split, PhysicalSplit, "split", "nearfar.split_physically")
-    transport = split.transport
-    shape = (transport.camera.pixels, transport.channels)
-    bars = ErrorBars(transport)
-    of_picture = bars.picture(light).reshape(shape)
-    of_direct = bars.direct().reshape(shape).astype(np.float64)
-    under = split.components(light).subsurface.reshape(shape)
-    of_under = np.zeros(shape)
-    for body in split.bodies:
-        left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
-        peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
-        of_direct[body.pixels] = OF_DIRECT * left * body.amplitude * peaks
-        of_under[body.pixels] = OF_SUBSURFACE * left * under[body.pixels]
-    factors = unit_direct(transport.factors)
-    lights = [factors.analyse(one[None]) for one in transport.lights(light)]
-    lit = np.concatenate([factors.relit(one).direct for one in lights], axis=1)
-    of_direct *= np.abs(lit)
-    both = of_direct**2 + of_under**2 + 2 * CORRELATION * of_direct * of_under
-    parts = (of_direct, of_under, np.sqrt(of_picture**2 + both))
-    return PhysicalComponents(*(transport.picture(part.astype(np.float32)) for part in parts))
+
+    def __init__(self, split: PhysicalSplit) -> None:
+        require_instance(split, PhysicalSplit, "split", "nearfar.split_physically")
+        self._split = split
+        self._bars = ErrorBars(split.transport)
+
+    def components(self, light: Floats) -> PhysicalComponents:
+        """Return the standard deviation of each component under a light.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+
+        Returns
+        -------
+        PhysicalComponents
+            Photo units; 0 for subsurface light where no translucent surface was found.
+
+        Raises
+        ------
+        InputError
+            As `Transport.components`.
+        """
+        deviations = self._deviations(light)
+        alone = np.eye(3)
+        return PhysicalComponents(*(self._with_gains(*deviations, *gains) for gains in alone))
+
+    def picture(
+        self,
+        light: Floats,
+        *,
+        direct: float = 1.0,
+        subsurface: float = 1.0,
+        interreflection: float = 1.0,
+    ) -> Floats:
+        """Return the standard deviation of a relit picture.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+        direct, subsurface, interreflection : float
+            Gains, as `PhysicalSplit.relight` takes them.
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
+            Photo units.
+
+        Raises
+        ------
+        InputError
+            As `PhysicalSplit.relight`.
+        """
+        given = {"direct": direct, "subsurface": subsurface, "interreflection": interreflection}
+        gains = [as_number(gain, f"the gain of {name}") for name, gain in given.items()]
+        return self._with_gains(*self._deviations(light), *gains)
+
+    def _deviations(self, light: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return those of the whole picture, direct and subsurface light, (C, channels) each."""
+        transport = self._split.transport
+        shape = (transport.camera.pixels, transport.channels)
+        of_picture = self._bars.picture(light).reshape(shape).astype(np.float64)
+        of_direct = self._bars.direct().reshape(shape).astype(np.float64)
+        under = self._split.components(light).subsurface.reshape(shape)
+        of_under = np.zeros(shape)
+        for body in self._split.bodies:
+            left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
+            peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
+            of_direct[body.pixels] = OF_DIRECT * left * body.amplitude * peaks
+            of_under[body.pixels] = OF_SUBSURFACE * left * under[body.pixels]
+        factors = unit_direct(transport.factors)
+        lights = [factors.analyse(one[None]) for one in transport.lights(light)]
+        lit = np.concatenate([factors.relit(one).direct for one in lights], axis=1)
+        return of_picture, of_direct * np.abs(lit), of_under
+
+    def _with_gains(
+        self,
+        of_picture: Floats,
+        of_direct: Floats,
+        of_under: Floats,
+        direct: float,
+        subsurface: float,
+        interreflection: float,
+    ) -> Floats:
+        """Combine them: inter-reflection is the picture less the other two."""
+        known = np.isfinite(of_picture)
+        whole, one, other = (
+            gain * np.where(known & np.isfinite(part), part, 0.0)
+            for gain, part in (
+                (interreflection, of_picture),
+                (direct - interreflection, of_direct),
+                (subsurface - interreflection, of_under),
+            )
+        )
+        variance = whole**2 + one**2 + other**2 + 2 * CORRELATION * one * other
+        found = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.inf)
+        return np.asarray(self._split.transport.picture(found.astype(np.float32)))

@@ -6,7 +6,9 @@ included. For the model's split and the physical one it prints, in dB under whit
 light, light under surfaces and inter-reflection are from those of the scene; then the share of the
 light that is taken for subsurface light, and mean and standard deviation of direct light at
 translucent surfaces beside the true ones. The model's near-range light stands beside subsurface
-light, its far-range light beside inter-reflection.
+light, its far-range light beside inter-reflection. Last come direct and global light, by the
+physical split and by the checkerboards of Nayar et al. (2006) that take no more photos, black
+included.
 alcove and shelf took no part in any choice that the split made.
 """
 
@@ -15,9 +17,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+import separation
 from accuracy import shoot
 from fewer_photos import jointly
-from nearfar import choose_plan, split_physically
+from nearfar import ExactTransport, choose_plan, snr, split_physically
+from nearfar.arrays import Floats
+from nearfar.baselines.separation_methods import by_checkerboards
+from nearfar.baselines.separation_photos import separate
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.evaluate import HIGHEST, floodlit_snr
@@ -32,6 +38,10 @@ WINDOWS = {
     "alcove": 11,
     "shelf": 13,
 }
+
+
+# Side of the squares and step between checkerboards, projector pixels.
+CHECKERBOARDS = ((2, 1), (3, 2), (3, 1), (4, 2), (4, 1), (8, 1))
 
 
 def line(found: Mapping[str, float], names: Sequence[str]) -> str:
@@ -63,6 +73,30 @@ def run(name: str, photos: int) -> None:
             means, spreads = part[translucent].mean(axis=0), part[translucent].std(axis=0)
             numbers = f"mean {means.round(3)} deviation {spreads.round(3)}"
             print(f"  direct light there, {kind:5s} {numbers}")
+    global_ = np.reshape(physical.subsurface + physical.interreflection, truth[0].shape)
+    print(f"  direct, global   {direct_and_global(truth, physical.direct, global_)}")
+    for side, step in CHECKERBOARDS:
+        beside_checkerboards(scene, truth, photos, side, step)
+
+
+def direct_and_global(truth: Sequence[Floats], direct: Floats, global_: Floats) -> str:
+    """Write the SNR of direct light and of all other light."""
+    found = snr(truth[0], np.reshape(direct, truth[0].shape)), snr(truth[1] + truth[2], global_)
+    return " ".join(f"{value:6.2f}" for value in found)
+
+
+def beside_checkerboards(
+    scene: ExactTransport, truth: Sequence[Floats], photos: int, side: int, step: int
+) -> None:
+    """Print what checkerboards come to, if they take no more photos."""
+    method = by_checkerboards(side, step)
+    assert method.count is not None
+    if method.count + 1 > photos:
+        return
+    taken = separation.shoot(scene, method, separation.NOISY)
+    found = separate(taken, method.separate)
+    numbers = direct_and_global(truth, found.direct, found.global_)
+    print(f"    checkerboards of {side} by {step}, {method.count + 1:3d} photos {numbers}")
 
 
 if __name__ == "__main__":

@@ -51,6 +51,8 @@ Use the transport
     split_physically       split a transport into direct light, subsurface light, inter-reflection
     PhysicalSplit          a transport so split: relights and takes apart
     PhysicalErrorBars      standard deviations of its components and pictures
+    bounces                take a relit picture apart by how often its light was reflected
+    Bounces                pictures of the first, second ... bounce
 
 Lights to relight under
     white                  full white
@@ -110,6 +112,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from nearfar.applications.bounces import Bounces, bounces
     from nearfar.arrays import Size, parse_size
     from nearfar.capture import Capture, open_capture, write_capture
     from nearfar.correspondence import (
@@ -176,6 +179,8 @@ _HOMES = {
     "split_physically": "nearfar.estimate.physical",
     "PhysicalSplit": "nearfar.estimate.physical",
     "PhysicalErrorBars": "nearfar.estimate.physical",
+    "bounces": "nearfar.applications.bounces",
+    "Bounces": "nearfar.applications.bounces",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -227,6 +232,8 @@ __all__ = [  # noqa: RUF022
     "split_physically",
     "PhysicalSplit",
     "PhysicalErrorBars",
+    "bounces",
+    "Bounces",
     "white",
     "natural_picture",
     "penguin",

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import fields
+from typing import NamedTuple
 
 import numpy as np
 
 from nearfar.arrays import Floats, Integers, Size
-from nearfar.scenes.camera import gather
+from nearfar.scenes.camera import Gather, gather
 from nearfar.scenes.dipole import dipole, subsurface
 from nearfar.scenes.form_factors import exchange
 from nearfar.scenes.geometry import Scene
@@ -20,6 +21,62 @@ from nearfar.transport.exact import ExactTransport
 SAMPLES_PER_SIDE = 4
 # The brightest camera pixel under full white.
 WHITE_LEVEL = 0.9
+
+
+class PatchedScene(NamedTuple):
+    """A scene cut into patches, and what they see of each other.
+
+    Attributes
+    ----------
+    patches : Patches
+    gathered : Gather
+        What the camera sees of them.
+    form : ndarray, shape (n, n), float32
+        Areas times form factors, symmetric.
+    albedo : ndarray, shape (n, channels)
+    translucent : ndarray of int, shape (m,)
+        The patches of the translucent body.
+    inside : tuple of ndarray, shape (m, m)
+        Its dipole per channel; empty where nothing is translucent.
+    """
+
+    patches: Patches
+    gathered: Gather
+    form: Floats
+    albedo: Floats
+    translucent: Integers
+    inside: tuple[Floats, ...]
+
+
+def patched(
+    scene: Scene,
+    projector: Size,
+    camera: Size,
+    *,
+    progress: Callable[[str, float], None],
+) -> PatchedScene:
+    """Cut a scene into patches, and compute what they see of each other."""
+    progress("patches", 0.0)
+    everything = surface(scene.parts, range(len(scene.parts)))
+    occluders = surface(scene.parts, [i for i, part in enumerate(scene.parts) if part.occludes])
+    eye = pinhole(scene.projector_view, projector)
+    lens = pinhole(scene.camera_view or scene.projector_view, projector)
+    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES_PER_SIDE)
+    finest = min(camera.height / projector.height, camera.width / projector.width)
+    seen = gather(
+        everything,
+        scene.parts,
+        patches,
+        (eye, projector),
+        (lens, camera),
+        samples=max(1, int(np.ceil(SAMPLES_PER_SIDE / finest))),
+    )
+    progress("form factors", 0.1)
+    form = exchange(patches, scene.parts, occluders)
+    progress("subsurface", 0.3)
+    translucent = np.flatnonzero(with_medium(patches, scene.parts))
+    inside = subsurface_of(patches, scene, translucent)
+    return PatchedScene(patches, seen, form, albedo(patches, scene.parts), translucent, inside)
 
 
 def render(
@@ -43,34 +100,15 @@ def render(
     ExactTransport
         In photo units: the brightest camera pixel and channel is 0.9 under full white.
     """
-    progress("patches", 0.0)
-    everything = surface(scene.parts, range(len(scene.parts)))
-    occluders = surface(scene.parts, [i for i, part in enumerate(scene.parts) if part.occludes])
-    eye = pinhole(scene.projector_view, projector)
-    lens = pinhole(scene.camera_view or scene.projector_view, projector)
-    patches = build_patches(everything, scene.parts, eye, projector, samples=SAMPLES_PER_SIDE)
-    finest = min(camera.height / projector.height, camera.width / projector.width)
-    seen = gather(
-        everything,
-        scene.parts,
-        patches,
-        (eye, projector),
-        (lens, camera),
-        samples=max(1, int(np.ceil(SAMPLES_PER_SIDE / finest))),
-    )
-    progress("form factors", 0.1)
-    form = exchange(patches, scene.parts, occluders)
-    progress("subsurface", 0.3)
-    translucent = np.flatnonzero(with_medium(patches, scene.parts))
-    inside = subsurface_of(patches, scene, translucent)
+    found = patched(scene, projector, camera, progress=progress)
     direct, near, far = components(
-        seen,
-        patches,
+        found.gathered,
+        found.patches,
         projector.pixels,
-        form,
-        albedo=albedo(patches, scene.parts),
-        translucent=translucent,
-        inside=inside,
+        found.form,
+        albedo=found.albedo,
+        translucent=found.translucent,
+        inside=found.inside,
         progress=lambda share: progress("inter-reflections", 0.4 + 0.6 * share),
     )
     brightest = max(

@@ -236,5 +236,5 @@ def test_bad_input_gets_a_sentence(measured):
     with pytest.raises(InputError, match="components of mixed are not known apart"):
         bounces(mixed, LIGHT[..., 0])
     lamps = replace(measured, parts=("free",))
-    with pytest.raises(InputError, match="no part 'direct'"):
+    with pytest.raises(InputError, match="a transport without direct light"):
         bounces(lamps, LIGHT)

@@ -37,7 +37,6 @@ from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_operator import ExactOperator
 from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
-from nearfar.transport.parts import require_parts
 
 # Takes the first bounce and all the rest of the picture under a light apart.
 Apart = Callable[[Floats], tuple[Floats, Floats]]
@@ -86,9 +85,18 @@ class Bounces:
     @property
     def shares(self) -> tuple[float, ...]:
         """Share of each bounce in all the light of the relit picture; 0 without any light."""
-        lights = self.pictures.sum(axis=tuple(range(1, self.pictures.ndim)), dtype=np.float64)
-        total = float(lights.sum() + self.later.sum(dtype=np.float64))
-        return tuple(float(light) / total if total > 0 else 0.0 for light in lights)
+        return self._all_shares[:-1]
+
+    @property
+    def later_share(self) -> float:
+        """Share of all later bounces together."""
+        return self._all_shares[-1]
+
+    @property
+    def _all_shares(self) -> tuple[float, ...]:
+        lights = [float(part.sum(dtype=np.float64)) for part in (*self.pictures, self.later)]
+        total = sum(lights)
+        return tuple(light / total if total > 0 else 0.0 for light in lights)
 
     @property
     def negative(self) -> tuple[float, ...]:
@@ -218,7 +226,11 @@ def _apart(
 
             return physical, transport.transport
         case Transport():
-            require_parts(transport.parts, ["direct"])
+            if "direct" not in transport.parts:
+                raise InputError(
+                    "bounces cannot be told apart in a transport without direct light, such as "
+                    "that of lamps: give one that was measured with a projector."
+                )
 
             def modelled(light: Floats) -> tuple[Floats, Floats]:
                 direct, near, far = transport.components(light)

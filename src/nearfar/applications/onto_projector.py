@@ -103,7 +103,8 @@ def unseen_share(onto: OntoProjector, correspondence: Floats, reaching: Floats) 
     """
     if not onto.seen.any():
         return 1.0
-    gives = reaching > LEAST_LIGHT * max(float(reaching[reaching > 0].mean()), 0.0)
+    size = np.abs(reaching)
+    gives = size > LEAST_LIGHT * size[size > 0].mean()
     # A camera coarser than the projector sees the pixels between its own, too.
     far = ndimage.distance_transform_edt(~onto.seen) > max(1.0, _spacing(correspondence))
     return float((far & gives).sum() / gives.sum())

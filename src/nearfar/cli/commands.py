@@ -21,6 +21,7 @@ COMMANDS = Registry(
         "correspond": "nearfar.cli.correspond:correspond",
         "reconstruct": "nearfar.cli.reconstruct:reconstruct",
         "relight": "nearfar.cli.relight:relight",
+        "bounces": "nearfar.cli.bounces:bounces",
         "evaluate": "nearfar.cli.evaluate:evaluate",
         "render": "nearfar.cli.render:render",
         "info": "nearfar.cli.info:info",

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nearfar.arrays import Size
+from nearfar.cli.lights import Resize, Srgb, read_light_for, say_resized
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
-from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -69,44 +68,6 @@ def _relighting(gains: dict[str, float], *, error_bars: bool) -> "Relighting":
     return workflow.error_bars_of_stored if error_bars else workflow.relight_stored
 
 
-def _of_size(light: "Floats", path: Path, projector: Size) -> "Floats":
-    """Return a light of the projector's size, and refuse another one."""
-    from nearfar.files import light_of_size
-
-    return light_of_size(light, path, projector, other_cure=", or add --resize")
-
-
-def _resized(light: "Floats", _path: Path, projector: Size) -> "Floats":
-    """Return a light resized to the projector's size, where it has another one."""
-    from nearfar.files.resizing import resize_light
-
-    return light if light.shape[:2] == projector else resize_light(light, projector)
-
-
-def _read(path: Path, transport: "StoredTransport", *, srgb: bool) -> "Floats":
-    """Read a light: a picture, or a table of a weight, or red, green and blue, for each lamp."""
-    from nearfar.files import read_light_of_any_size
-    from nearfar.files.arrays import read_arrays
-    from nearfar.files.tables import is_table, read_table
-
-    lamps = transport.projector.pixels
-    is_list = is_table(path) or ("free" in transport.parts and path.suffix.lower() == ".npy")
-    if not is_list:
-        return read_light_of_any_size(path, srgb=srgb)
-    if not is_table(path) and read_arrays(path)["array"].shape[:2] == transport.projector:
-        return read_light_of_any_size(path, srgb=srgb)
-    weights = read_table(path)
-    if weights.shape == (1, lamps):
-        weights = weights.T
-    if weights.shape not in {(lamps, 1), (lamps, 3)}:
-        raise InputError(
-            f"{path} has {len(weights)} rows of {weights.shape[1]} numbers: give a row for each of "
-            f"{lamps} lamps, of one weight or of red, green and blue."
-        )
-    shaped = weights.reshape(*transport.projector, -1)
-    return shaped[..., 0] if shaped.shape[2] == 1 else shaped
-
-
 def relight(
     transport: TransportPath,
     light: Annotated[
@@ -126,12 +87,8 @@ def relight(
             metavar="NAME=VALUE",
         ),
     ] = None,
-    srgb: Annotated[
-        bool, typer.Option("--srgb", help="LIGHT is an ordinary sRGB picture.")
-    ] = False,
-    resize: Annotated[
-        bool, typer.Option("--resize", help="Resize LIGHT to the projector's size.")
-    ] = False,
+    srgb: Srgb = False,
+    resize: Resize = False,
     error_bars: Annotated[
         bool,
         typer.Option(
@@ -152,7 +109,6 @@ def relight(
         check_picture_ending,
         write_picture,
     )
-    from nearfar.transport.colour import as_channels_see
     from nearfar.transport.stored import open_transport
 
     gains = _gains(gain or [])
@@ -164,13 +120,9 @@ def relight(
         require_reconstructed(transport)
         opened = open_transport(transport)
         warn_if_wrong(transport, opened.verdict)
-        projected = _read(light, opened, srgb=srgb)
-        given = Size(*projected.shape[:2])
-        projected = (_resized if resize else _of_size)(projected, light, opened.projector)
-        projected = as_channels_see(projected, opened.channels, opened.provenance)
+        projected, given = read_light_for(opened, light, srgb=srgb, resize=resize)
         picture = make(opened, projected, gains)
         write_picture(output, picture, force=force, may_be_infinite=error_bars)
-    if given != opened.projector:
-        say(f"{light} of {given} was resized to {opened.projector}", quiet=quiet)
+    say_resized(light, given, opened.projector, quiet=quiet)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"
     say(f"{what} of {opened.camera} written to {output}", quiet=quiet)

@@ -12,8 +12,8 @@ from nearfar.errors import InputError
 from nearfar.estimate.physical.kernels import source_at
 from nearfar.estimate.physical.split import Translucent
 from nearfar.scenes.bounces import bounces_between
-from nearfar.scenes.corner import CREAM, SKY, WOOD
-from nearfar.scenes.geometry import Scene, View, quadrilateral
+from nearfar.scenes.corner import corner
+from nearfar.scenes.geometry import View
 from nearfar.scenes.render import render
 from tests.worlds import model_transport
 
@@ -89,16 +89,8 @@ def test_what_is_in_shadow_has_its_bounces_too():
         np.testing.assert_allclose(in_shadow[number], expected, rtol=1e-3)
 
 
-def small_corner(side=0.8):
-    """Describe a corner of which all is lit and seen."""
-    x, y, z = (side, 0.0, 0.0), (0.0, side, 0.0), (0.0, 0.0, side)
-    origin = (0.0, 0.0, 0.0)
-    walls = (
-        quadrilateral("floor", origin, z, x, WOOD),
-        quadrilateral("left wall", origin, y, z, CREAM),
-        quadrilateral("right wall", origin, x, y, SKY),
-    )
-    return Scene("small corner", walls, View((1.8, 1.8, 1.8), (0.2, 0.2, 0.2), 0.45), None)
+# All of it is lit and seen.
+SMALL_CORNER = corner(0.8, View((1.8, 1.8, 1.8), (0.2, 0.2, 0.2), 0.45))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +106,7 @@ def small_corner(side=0.8):
 )
 def test_bounces_between_walls_are_those_of_radiosity(camera, wanted):
     """Cameras of the projector's pixels, of finer and coarser ones."""
-    projector, scene = Size(32, 32), small_corner()
+    projector, scene = Size(32, 32), SMALL_CORNER
     truth = render(scene, projector, camera, progress=lambda *_: None)
     light = natural_picture(projector, 3)
     expected = bounces_between(scene, light, 4, projector, camera)
@@ -192,6 +184,15 @@ def test_surfaces_that_the_camera_does_not_see_are_told():
     # The camera sees the upper half, and so knows of the row of projector pixels below.
     assert half.unseen == pytest.approx(2 / 6)
     assert "33.3% of the projector's pixels light surfaces" in half.faults[0]
+
+
+def test_projector_pixels_that_light_next_to_nothing_are_not_missed():
+    """What an estimate has of those beyond the scene is noise."""
+    world = World()
+    world.direct[:, 24:] *= 0.01
+    found = bounces(world.seen_by(Size(3, 8), np.arange(24)), LIGHT, 2)
+    assert found.unseen == 0
+    assert found.faults == ()
 
 
 def test_light_that_does_not_fade_is_told():

@@ -20,9 +20,9 @@ WOOD = Material((0.68, 0.42, 0.22), texture=_planks)
 VIEW = View((1.75, 1.78, 1.75), (0.02, 0.05, 0.02), 0.175)
 
 
-def corner() -> Scene:
-    """Describe the corner, under a coaxial camera."""
-    x, y, z = (WALL_LENGTH, 0.0, 0.0), (0.0, WALL_LENGTH, 0.0), (0.0, 0.0, WALL_LENGTH)
+def corner(length: float = WALL_LENGTH, view: View = VIEW) -> Scene:
+    """Describe the corner, under a coaxial camera: of walls that reach beyond its view, or not."""
+    x, y, z = (length, 0.0, 0.0), (0.0, length, 0.0), (0.0, 0.0, length)
     origin = (0.0, 0.0, 0.0)
     return Scene(
         name="corner",
@@ -31,7 +31,7 @@ def corner() -> Scene:
             quadrilateral("left wall", origin, y, z, CREAM),
             quadrilateral("right wall", origin, x, y, SKY),
         ),
-        projector_view=VIEW,
+        projector_view=view,
         camera_view=None,
     )
 

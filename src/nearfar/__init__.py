@@ -53,6 +53,8 @@ Use the transport
     PhysicalErrorBars      standard deviations of its components and pictures
     bounces                take a relit picture apart by how often its light was reflected
     Bounces                pictures of the first, second ... bounce
+    probe                  relight by chosen projector pixels for each camera pixel
+    ProbingMask            these: within a distance of q, a ring, a band about a line, any
 
 Lights to relight under
     white                  full white
@@ -113,6 +115,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from nearfar.applications.bounces import Bounces, bounces
+    from nearfar.applications.masks import ProbingMask
+    from nearfar.applications.probe import probe
     from nearfar.arrays import Size, parse_size
     from nearfar.capture import Capture, open_capture, write_capture
     from nearfar.correspondence import (
@@ -181,6 +185,8 @@ _HOMES = {
     "PhysicalErrorBars": "nearfar.estimate.physical",
     "bounces": "nearfar.applications.bounces",
     "Bounces": "nearfar.applications.bounces",
+    "probe": "nearfar.applications.probe",
+    "ProbingMask": "nearfar.applications.masks",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -234,6 +240,8 @@ __all__ = [  # noqa: RUF022
     "PhysicalErrorBars",
     "bounces",
     "Bounces",
+    "probe",
+    "ProbingMask",
     "white",
     "natural_picture",
     "penguin",

@@ -1,0 +1,208 @@
+"""Probing beside T's dense rows, masked one projector pixel after another by distances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import nearfar
+from nearfar.applications.probe import probe_stored
+from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.transport.store import save_transport
+from nearfar.transport.stored import open_transport
+from tests.worlds import model_transport
+
+PROJECTOR, CAMERA = Size(18, 24), Size(9, 11)
+MASK = nearfar.ProbingMask
+
+
+def world(channels=2, **changes):
+    """A transport with fractional q, some camera pixels without q."""
+    transport = model_transport(
+        PROJECTOR, CAMERA, window=7, far=Size(5, 5), channels=channels, fractional=True
+    )
+    q = transport.correspondence + np.float32(0.137)
+    q = np.minimum(q, np.array(PROJECTOR) - 1).astype(np.float32)
+    unlit = np.zeros(CAMERA, dtype=bool)
+    unlit[2:4, 3:6] = True
+    q[unlit] = np.nan
+    direct, near = transport.direct.copy(), transport.near.copy()
+    direct[unlit], near[unlit] = 0, 0
+    return replace(transport, correspondence=q, direct=direct, near=near, **changes)
+
+
+def blurred_world():
+    """A transport whose near-range light is of hats, and whose direct light of boxes."""
+    base, generator = world(), np.random.default_rng(5)
+    near = generator.uniform(0, 0.01, (*CAMERA, 2, 25 + 16))
+    footprint = np.tile(np.array([1.7, 2.2, 0.3, -0.4]), (*CAMERA, 1))
+    near[~base.lit] = 0
+    return replace(
+        base,
+        near=near.astype(np.float32),
+        pitch=4,
+        footprint=footprint.astype(np.float32),
+    )
+
+
+def a_light(channels=None):
+    shape = PROJECTOR if channels is None else (*PROJECTOR, channels)
+    return np.random.default_rng(3).uniform(0, 1, shape).astype(np.float32)
+
+
+def distances(transport):
+    """Distance of every projector pixel from every q, (C, Py, Px); infinite without q."""
+    q = transport.correspondence.reshape(-1, 2).astype(np.float64)
+    places = np.moveaxis(np.indices(PROJECTOR), 0, -1)
+    return np.nan_to_num(np.linalg.norm(places - q[:, None, None], axis=-1), nan=np.inf)
+
+
+def masked(transport, light, allowed):
+    """Sum T's dense rows over what is allowed, (C, Py, Px)."""
+    rows = transport.rows(slice(None)).astype(np.float64).reshape(-1, 2, *PROJECTOR)
+    shaped = light[..., None] if light.ndim == 2 else light
+    lit = np.broadcast_to(np.moveaxis(shaped, 2, 0), (2, *PROJECTOR))
+    return np.einsum("ciyx,iyx,cyx->ci", rows, lit, allowed.astype(float)).reshape(*CAMERA, 2)
+
+
+WORLDS = {"single pixels": world, "hats and boxes": blurred_world}
+EDGES = [(0, 0.8), (0, 3), (0, 5.5), (0, 40), (2, 5), (0.5, 9.3)]
+
+
+@pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
+@pytest.mark.parametrize("channels", [None, 2])
+@pytest.mark.parametrize(("inner", "outer"), EDGES)
+def test_rings_are_the_dense_rows_masked_by_distance(make, channels, inner, outer):
+    transport, light = make(), a_light(channels)
+    apart = distances(transport)
+    expected = masked(transport, light, (apart >= inner) & (apart < outer))
+    found = nearfar.probe(transport, light, MASK.ring(inner, outer))
+    np.testing.assert_allclose(found, expected, atol=3e-6)
+    assert np.abs(expected).max() > 0.01
+
+
+@pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
+def test_rings_that_meet_add_up_to_the_relit_picture(make):
+    transport, light = make(), a_light()
+    masks = [MASK.within(1), MASK.ring(1, 4), MASK.ring(4, 11), MASK.beyond(11)]
+    total = sum(nearfar.probe(transport, light, mask) for mask in masks)
+    np.testing.assert_allclose(total, transport @ light, atol=3e-6)
+
+
+def test_without_q_all_light_comes_from_beyond():
+    transport, light = world(), a_light()
+    unlit = ~transport.lit
+    assert not nearfar.probe(transport, light, MASK.within(30))[unlit].any()
+    found = nearfar.probe(transport, light, MASK.beyond(30))
+    np.testing.assert_allclose(found[unlit], (transport @ light)[unlit], atol=1e-6)
+
+
+def test_a_projector_pixel_on_the_edge_belongs_to_the_outer_ring():
+    base = world()
+    transport = replace(base, correspondence=np.rint(base.correspondence))
+    apart, light = distances(transport), a_light()
+    assert (apart == 5).any()
+    found = nearfar.probe(transport, light, MASK.within(5))
+    np.testing.assert_allclose(found, masked(transport, light, apart < 5), atol=3e-6)
+
+
+@pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
+@pytest.mark.parametrize("width", [0.9, 4.1])
+@pytest.mark.parametrize("lines", ["rows", "columns", "slanted", "with an epipole"])
+def test_a_band_is_the_dense_rows_masked_by_distance_from_the_line(make, width, lines):
+    matrices = {
+        "rows": [[0, 0, 0], [0, 0, -1], [0, 2, 0.3]],
+        "columns": [[0, 0, -1], [0, 0, 0], [2, 0, 0.3]],
+        "slanted": [[0.01, 0.02, -1], [0.03, -0.01, 1.7], [2, -1.5, 0.3]],
+        # (a, b) vanish at camera pixel x = 4, y = 3.
+        "with an epipole": [[0, 1, -3], [-1, 0, 4], [0.5, 0.7, -6]],
+    }
+    fundamental = np.array(matrices[lines])
+    transport, light = make(), a_light()
+    y, x = np.indices(PROJECTOR)
+    allowed = np.zeros((CAMERA.pixels, *PROJECTOR), dtype=bool)
+    for c in range(CAMERA.pixels):
+        down, across = divmod(c, CAMERA.width)
+        a, b, off = fundamental @ [across, down, 1]
+        if a or b:
+            allowed[c] = np.abs(a * x + b * y + off) / np.hypot(a, b) <= width / 2
+    assert allowed.any()
+    found = nearfar.probe(transport, light, MASK.epipolar(fundamental, width))
+    np.testing.assert_allclose(found, masked(transport, light, allowed), atol=3e-6)
+
+
+def test_any_mask_multiplies_t_entry_by_entry():
+    transport, light = world(), a_light()
+    generator = np.random.default_rng(8)
+    each = generator.uniform(-1, 1, (CAMERA.pixels, *PROJECTOR))
+    expected = masked(transport, light, each)
+    for shape in ((*CAMERA, *PROJECTOR), (CAMERA.pixels, PROJECTOR.pixels)):
+        found = nearfar.probe(transport, light, MASK.of_matrix(each.reshape(shape)))
+        np.testing.assert_allclose(found, expected, atol=3e-6)
+    found = nearfar.probe(transport, light, MASK.of_matrix(each[0]))
+    np.testing.assert_allclose(found, transport @ (light * each[0]), atol=3e-6)
+
+
+def test_an_exact_transport_is_probed_as_a_measured_one():
+    transport, light = world(), a_light()
+    exact = nearfar.ExactTransport(
+        PROJECTOR, CAMERA, (), (), np.moveaxis(transport.dense(), 1, 0), "dense"
+    )
+    fundamental = np.array([[0.01, 0.02, -1], [0.03, -0.01, 1.7], [2, -1.5, 0.3]])
+    mask = MASK.epipolar(fundamental, 3)
+    found = nearfar.probe(exact, light, mask)
+    np.testing.assert_allclose(found, nearfar.probe(transport, light, mask), atol=3e-6)
+
+
+@pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
+def test_blocks_of_a_stored_transport_give_the_same(make, tmp_path, monkeypatch):
+    transport, light = make(), a_light()
+    save_transport(transport, tmp_path / "t.zarr")
+    stored = open_transport(tmp_path / "t.zarr")
+    monkeypatch.setattr("nearfar.transport.stored.StoredTransport.blocks", three_rows)
+    each = np.random.default_rng(8).uniform(0, 1, (*CAMERA, *PROJECTOR))
+    lines = np.array([[0.01, 0.02, -1], [0.03, -0.01, 1.7], [2, -1.5, 0.3]])
+    for mask in (MASK.ring(1, 4), MASK.beyond(3), MASK.epipolar(lines, 3), MASK.of_matrix(each)):
+        found = probe_stored(stored, light, mask)
+        np.testing.assert_allclose(found, nearfar.probe(transport, light, mask), atol=1e-6)
+
+
+def three_rows(stored):
+    """Yield a stored transport in blocks of three camera rows."""
+    for first in range(0, CAMERA.height, 3):
+        yield stored.rows(slice(first, first + 3))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: MASK.within(0), "`radius` is 0"),
+        (lambda: MASK.within(float("nan")), "`radius` is nan"),
+        (lambda: MASK.beyond(-2), "`radius` is -2"),
+        (lambda: MASK.ring(3, 3), "`outer` is 3"),
+        (lambda: MASK.ring(-1, 3), "`inner` is -1"),
+        (lambda: MASK.epipolar(np.eye(2), 1), "2x2: give 3x3"),
+        (lambda: MASK.epipolar(np.zeros((3, 3)), 1), "makes no lines"),
+        (lambda: MASK.epipolar(np.eye(3), 0), "`width` is 0"),
+        (lambda: MASK.of_matrix(np.zeros(3)), "1 axes"),
+        (lambda: MASK.of_matrix(["a"]), "real numbers"),
+    ],
+)
+def test_a_mask_that_cannot_be_is_refused(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("light", "mask", "words"),
+    [
+        (np.ones((3, 3)), MASK.within(2), "resize the light"),
+        (np.ones(PROJECTOR), MASK.of_matrix(np.ones((3, 4))), "the mask is 3x4"),
+        (np.ones(PROJECTOR), MASK.of_matrix(np.full(PROJECTOR, np.nan)), "the mask holds NaN"),
+        (np.ones(PROJECTOR), 3.0, "float was given for the mask"),
+    ],
+)
+def test_what_does_not_fit_is_refused(light, mask, words):
+    with pytest.raises(InputError, match=words):
+        nearfar.probe(world(), light, mask)

@@ -55,6 +55,7 @@ Use the transport
     Bounces                pictures of the first, second ... bounce
     probe                  relight by chosen projector pixels for each camera pixel
     ProbingMask            these: within a distance of q, a ring, a band about a line, any
+    dual_view              the scene as the projector sees it, lit from the camera
 
 Lights to relight under
     white                  full white
@@ -115,6 +116,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from nearfar.applications.bounces import Bounces, bounces
+    from nearfar.applications.dual import dual_view
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
     from nearfar.arrays import Size, parse_size
@@ -187,6 +189,7 @@ _HOMES = {
     "Bounces": "nearfar.applications.bounces",
     "probe": "nearfar.applications.probe",
     "ProbingMask": "nearfar.applications.masks",
+    "dual_view": "nearfar.applications.dual",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -242,6 +245,7 @@ __all__ = [  # noqa: RUF022
     "Bounces",
     "probe",
     "ProbingMask",
+    "dual_view",
     "white",
     "natural_picture",
     "penguin",

@@ -126,16 +126,31 @@ def finite_numbers(values: ArrayLike, name: str) -> Floats:
     return array
 
 
-def as_light(light: ArrayLike, projector: Size, channels: int) -> Floats:
+def as_light(
+    light: ArrayLike,
+    projector: Size,
+    channels: int,
+    *,
+    name: str = "light",
+    side: str = "projector",
+) -> Floats:
     """Return a light as (Py, Px), for all channels, or (Py, Px, channels).
+
+    Parameters
+    ----------
+    light : array_like
+    projector : Size
+    channels : int
+    name, side : str
+        What the light and the grid it lies on are called in messages.
 
     Raises
     ------
     InputError
         If it does not hold finite numbers, or has another size or other channels.
     """
-    array = finite_numbers(light, "the light")
-    _require_light(array.shape, projector, channels)
+    array = finite_numbers(light, f"the {name}")
+    _require_light(array.shape, projector, channels, name, side)
     return array
 
 
@@ -171,15 +186,21 @@ def _finite_elsewhere(values: Any) -> Any:
     return values
 
 
-def _require_light(shape: tuple[int, ...], projector: Size, channels: int) -> None:
+def _require_light(
+    shape: tuple[int, ...],
+    projector: Size,
+    channels: int,
+    name: str = "light",
+    side: str = "projector",
+) -> None:
     if shape[:2] != projector or len(shape) not in (2, 3):
         raise InputError(
-            f"the light is {_by(shape)}, this transport's projector is {projector}: resize the "
-            f"light to {projector}."
+            f"the {name} is {_by(shape)}, this transport's {side} is {projector}: resize the "
+            f"{name} to {projector}."
         )
     if len(shape) == 3 and shape[2] not in (1, channels):
         raise InputError(
-            f"the light has {shape[2]} channels, this transport {channels}: give a grey light "
+            f"the {name} has {shape[2]} channels, this transport {channels}: give a grey {name} "
             f"of {projector}, or one with {channels} channels."
         )
 

@@ -122,8 +122,8 @@ class ProbingMask:
         >>> masks = [nearfar.ProbingMask.ring(*pair) for pair in zip(edges, edges[1:])]
         >>> by_distance = [nearfar.probe(transport, light, mask) for mask in masks]
         """
-        inner = _distance(inner, "inner", least=None)
-        outer = _distance(outer, "outer", least=inner)
+        inner = _distance(inner, "inner radius", least=None)
+        outer = _distance(outer, "outer radius", least=inner)
         smaller = ((-1, Disc(inner)),) if inner else ()
         return ProbingMask(((1, Disc(outer)), *smaller))
 
@@ -239,10 +239,10 @@ def _distance(value: float, name: str, *, least: float | None) -> float:
     """Return a distance of 0 or more, above `least`; it may be infinite where `least` is given."""
     if least is not None and value == inf:
         return inf
-    number = as_number(value, f"`{name}`")
+    number = as_number(value, f"the {name}")
     if number < 0 or (least is not None and number <= least):
         raise InputError(
-            f"`{name}` is {number:g} projector pixels: give "
+            f"the {name} is {number:g} projector pixels: give "
             f"{'0 or more' if least is None else f'more than {least:g}'}."
         )
     return number

@@ -84,12 +84,12 @@ def _by_shape(
     """Return the picture by one shape, of camera pixels from `first` on."""
     match shape:
         case Whole():
-            return transport @ light
+            return np.asarray(transport @ light)
         case SameForAll(weights):
             shaped = weights if light.ndim == 2 else weights[..., None]
-            return transport @ (light * shaped)
+            return np.asarray(transport @ (light * shaped))
         case Disc(radius) if isinf(radius):
-            return transport @ light
+            return np.asarray(transport @ light)
         case _:
             return _by_rows(transport, light, shape, first, camera)
 

@@ -22,6 +22,8 @@ COMMANDS = Registry(
         "reconstruct": "nearfar.cli.reconstruct:reconstruct",
         "relight": "nearfar.cli.relight:relight",
         "bounces": "nearfar.cli.bounces:bounces",
+        "probe": "nearfar.cli.probe:probe",
+        "dual": "nearfar.cli.dual:dual",
         "evaluate": "nearfar.cli.evaluate:evaluate",
         "render": "nearfar.cli.render:render",
         "info": "nearfar.cli.info:info",

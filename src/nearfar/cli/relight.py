@@ -1,12 +1,12 @@
 """``nearfar relight``."""
 
 from collections.abc import Callable, Mapping
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nearfar.cli.gains import MODEL, PHYSICAL, gains_of
 from nearfar.cli.lights import Resize, Srgb, read_light_for, say_resized
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
@@ -17,29 +17,6 @@ if TYPE_CHECKING:
     from nearfar.transport.stored import StoredTransport
 
     Relighting = Callable[[StoredTransport, Floats, Mapping[str, float]], Floats]
-
-MODEL = ("direct", "near", "far", "free")
-PHYSICAL = ("direct", "subsurface", "interreflection")
-
-
-def _gains(texts: list[str]) -> dict[str, float]:
-    gains: dict[str, float] = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        if name in gains:
-            raise typer.BadParameter(f"the gain of {name} is given twice.", param_hint="--gain")
-        try:
-            number = float(value)
-        except ValueError:
-            number = float("nan")
-        if name not in MODEL + PHYSICAL or not isfinite(number):
-            raise typer.BadParameter(
-                f"{text!r} is no gain: write direct=1, near=2, far=0, subsurface=2, "
-                f"interreflection=0 or free=1, one per --gain.",
-                param_hint="--gain",
-            )
-        gains[name] = number
-    return gains
 
 
 def _relighting(gains: dict[str, float], *, error_bars: bool) -> "Relighting":
@@ -111,7 +88,7 @@ def relight(
     )
     from nearfar.transport.stored import open_transport
 
-    gains = _gains(gain or [])
+    gains = gains_of(gain or [])
     make = _relighting(gains, error_bars=error_bars)
     check_picture_ending(output)
     keep_input(output, transport, light)

@@ -59,3 +59,21 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
         raise UnreadableFileError(
             f"{path} cannot be read as arrays: save it again with numpy.save or numpy.savez."
         ) from error
+
+
+def map_array(path: Path) -> NDArray[Any]:
+    """Return the array of an .npy as a memory map, which is read where it is used.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError
+        If there is no such file, or it is damaged or holds something else.
+    """
+    try:
+        return np.asanyarray(np.lib.format.open_memmap(path, mode="r"))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path} is not there: check the name.") from None
+    except (OSError, *DAMAGE) as error:
+        raise UnreadableFileError(
+            f"{path} cannot be read as an array: save it again with numpy.save."
+        ) from error

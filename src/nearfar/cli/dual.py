@@ -1,0 +1,81 @@
+"""``nearfar dual``."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nearfar.arrays import Size
+from nearfar.cli.gains import MODEL, gains_of
+from nearfar.cli.lights import Srgb
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
+from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.errors import InputError
+from nearfar.progress import progress_bar
+
+if TYPE_CHECKING:
+    from nearfar.arrays import Floats
+
+
+def _camera_picture(path: Path, camera: Size, channels: int, *, srgb: bool) -> "Floats":
+    """Read a light on the camera's side; grey of a colour picture for a camera of one channel."""
+    import numpy as np
+
+    from nearfar.files import luminance, read_light_of_any_size
+
+    picture = read_light_of_any_size(path, srgb=srgb)
+    if picture.shape[:2] != camera:
+        raise InputError(
+            f"{path} is {Size(*picture.shape[:2])} but the camera is {camera} (height x width): "
+            f"give a picture of {camera}."
+        )
+    return np.asarray(luminance(picture) if picture.ndim == 3 and channels == 1 else picture)
+
+
+def dual(
+    transport: TransportPath,
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=".npy, .exr, .tiff or .png.")],
+    light: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CAMERA_PICTURE",
+            help="Light that the camera sends, of its size; white if left out.",
+        ),
+    ] = None,
+    gain: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Gain of a component: direct=1, near=2 or far=0; for lamps free=2.",
+            metavar="NAME=VALUE",
+        ),
+    ] = None,
+    srgb: Srgb = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Show the scene as the projector sees it, lit from the camera (dual photography).
+
+    Example: nearfar dual transport.zarr dual.png --light photo.png --srgb
+    """
+    from nearfar.applications.dual import dual_view_of_stored
+    from nearfar.files import check_output, check_picture_ending, write_picture
+    from nearfar.transport.stored import open_transport
+
+    gains = gains_of(gain or [])
+    for name in gains:
+        if name not in MODEL:
+            raise typer.BadParameter(
+                f"{name} is a component of the physical split: give direct, near, far or free.",
+                param_hint="--gain",
+            )
+    check_picture_ending(output)
+    keep_input(output, transport, *([light] if light else []))
+    check_output(output, force=force)
+    with progress_bar("making the dual view", quiet=quiet):
+        require_reconstructed(transport)
+        opened = open_transport(transport)
+        warn_if_wrong(transport, opened.verdict)
+        camera, channels = opened.camera, opened.channels
+        sent = None if light is None else _camera_picture(light, camera, channels, srgb=srgb)
+        write_picture(output, dual_view_of_stored(opened, sent, gains), force=force)
+    say(f"dual view of {opened.projector} written to {output}", quiet=quiet)

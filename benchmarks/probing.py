@@ -4,10 +4,10 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
+from tests.worlds import model_transport
 
 import nearfar
 from nearfar.arrays import Size
-from tests.worlds import model_transport
 
 SIDE = Size(64, 64)
 SAME_ROW = np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0]])

@@ -51,6 +51,8 @@ Use the transport
     split_physically       split a transport into direct light, subsurface light, inter-reflection
     PhysicalSplit          a transport so split: relights and takes apart
     PhysicalErrorBars      standard deviations of its components and pictures
+    compensate             find the light under which the scene looks like a picture
+    Compensation           that light, and how near its photo is expected to come
     bounces                take a relit picture apart by how often its light was reflected
     Bounces                pictures of the first, second ... bounce
     probe                  relight by chosen projector pixels for each camera pixel
@@ -116,6 +118,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from nearfar.applications.bounces import Bounces, bounces
+    from nearfar.applications.compensate import Compensation, compensate
     from nearfar.applications.dual import dual_view
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
@@ -185,6 +188,8 @@ _HOMES = {
     "split_physically": "nearfar.estimate.physical",
     "PhysicalSplit": "nearfar.estimate.physical",
     "PhysicalErrorBars": "nearfar.estimate.physical",
+    "compensate": "nearfar.applications.compensate",
+    "Compensation": "nearfar.applications.compensate",
     "bounces": "nearfar.applications.bounces",
     "Bounces": "nearfar.applications.bounces",
     "probe": "nearfar.applications.probe",
@@ -241,6 +246,8 @@ __all__ = [  # noqa: RUF022
     "split_physically",
     "PhysicalSplit",
     "PhysicalErrorBars",
+    "compensate",
+    "Compensation",
     "bounces",
     "Bounces",
     "probe",

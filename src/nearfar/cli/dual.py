@@ -1,35 +1,15 @@
 """``nearfar dual``."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from nearfar.arrays import Size
 from nearfar.cli.gains import MODEL, gains_of
-from nearfar.cli.lights import Srgb
+from nearfar.cli.lights import Srgb, read_camera_picture
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
-from nearfar.errors import InputError
 from nearfar.progress import progress_bar
-
-if TYPE_CHECKING:
-    from nearfar.arrays import Floats
-
-
-def _camera_picture(path: Path, camera: Size, channels: int, *, srgb: bool) -> "Floats":
-    """Read a light on the camera's side; grey of a colour picture for a camera of one channel."""
-    import numpy as np
-
-    from nearfar.files import luminance, read_light_of_any_size
-
-    picture = read_light_of_any_size(path, srgb=srgb)
-    if picture.shape[:2] != camera:
-        raise InputError(
-            f"{path} is {Size(*picture.shape[:2])} but the camera is {camera} (height x width): "
-            f"give a picture of {camera}."
-        )
-    return np.asarray(luminance(picture) if picture.ndim == 3 and channels == 1 else picture)
 
 
 def dual(
@@ -76,6 +56,6 @@ def dual(
         opened = open_transport(transport)
         warn_if_wrong(transport, opened.verdict)
         camera, channels = opened.camera, opened.channels
-        sent = None if light is None else _camera_picture(light, camera, channels, srgb=srgb)
+        sent = None if light is None else read_camera_picture(light, camera, channels, srgb=srgb)
         write_picture(output, dual_view_of_stored(opened, sent, gains), force=force)
     say(f"dual view of {opened.projector} written to {output}", quiet=quiet)

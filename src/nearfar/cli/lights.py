@@ -35,6 +35,27 @@ def read_light_for(
     return as_channels_see(light, transport.channels, transport.provenance), given
 
 
+def read_camera_picture(path: Path, camera: Size, channels: int, *, srgb: bool) -> "Floats":
+    """Read a picture of the camera's size; grey of a colour picture for a camera of one channel.
+
+    Raises
+    ------
+    InputError
+        If it has another size.
+    """
+    import numpy as np
+
+    from nearfar.files import luminance, read_light_of_any_size
+
+    picture = read_light_of_any_size(path, srgb=srgb)
+    if picture.shape[:2] != camera:
+        raise InputError(
+            f"{path} is {Size(*picture.shape[:2])} but the camera is {camera} (height x width): "
+            f"give a picture of {camera}."
+        )
+    return np.asarray(luminance(picture) if picture.ndim == 3 and channels == 1 else picture)
+
+
 def say_resized(path: Path, given: Size, projector: Size, *, quiet: bool) -> None:
     """Print that a light was resized, if it was."""
     if given != projector:

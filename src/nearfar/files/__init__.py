@@ -18,6 +18,7 @@ from nearfar.files.images import (
     read_linear,
     read_picture,
     require_finite,
+    write_light,
     write_picture,
 )
 from nearfar.files.kinds import kind_of_store
@@ -54,5 +55,6 @@ __all__ = [
     "resumable_output",
     "to_srgb",
     "write_array",
+    "write_light",
     "write_picture",
 ]

@@ -293,6 +293,33 @@ def write_picture(
         partial.write_bytes(_encode(path.suffix.lower(), image))
 
 
+def write_light(path: Path, light: NDArray[np.float32], *, force: bool = False) -> None:
+    """Write a light by the ending of its name, whole or not at all, as `read_light` reads it.
+
+    Parameters
+    ----------
+    path : Path
+        ``.npy``, ``.exr``, ``.tiff`` and ``.tif`` keep float32 exactly; ``.png`` has 16 bits of
+        linear light.
+    light : array
+        0 to 1, shape (y, x) or (y, x, 3).
+    force : bool
+        Replace a file that is there.
+
+    Raises
+    ------
+    NearfarError
+        As `write_picture`.
+    """
+    if path.suffix.lower() != ".png":
+        write_picture(path, light, force=force)
+        return
+    require_finite(light, f"the light for {path}")
+    levels = np.rint(65535.0 * np.clip(light, 0, 1)).astype(np.uint16)
+    with new_output(path, force=force) as partial:
+        partial.write_bytes(codecs.encode_png(levels))
+
+
 def _encode(ending: str, image: NDArray[np.float32]) -> bytes:
     if ending == ".npy":
         return codecs.encode_npy(image)

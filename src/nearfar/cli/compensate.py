@@ -1,0 +1,105 @@
+"""``nearfar compensate``."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nearfar.cli.lights import read_camera_picture
+from nearfar.cli.options import (
+    AsJson,
+    Force,
+    Quiet,
+    TransportPath,
+    keep_input,
+    require_reconstructed,
+)
+from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.progress import progress_bar
+
+
+def _scale(text: str) -> float | None:
+    """Return the scale; None for one that is to be chosen."""
+    if text == "auto":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(
+            f"{text!r} is no scale: write auto or a number.", param_hint="--scale"
+        ) from None
+
+
+def compensate(
+    transport: TransportPath,
+    wanted: Annotated[
+        Path,
+        typer.Argument(metavar="WANTED", help="What the photo is to look like; camera's size."),
+    ],
+    output: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LIGHT_OUT", help="Light to project, linear: .npy, .exr, .tiff or .png."
+        ),
+    ],
+    scale: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|S",
+            help="What WANTED is multiplied by; auto: so that 95 % of the camera pixels need no "
+            "more than full white.",
+        ),
+    ] = "auto",
+    expected: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT", help="Write what the photo is expected to be, too."),
+    ] = None,
+    out_of_reach: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT", help="Write a map of camera pixels that no light serves, 1 there."
+        ),
+    ] = None,
+    srgb: Annotated[
+        bool, typer.Option("--srgb", help="WANTED is an ordinary sRGB picture.")
+    ] = False,
+    as_json: AsJson = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find the light under which the scene looks like a picture: radiometric compensation.
+
+    Texture, shading and light from other surfaces are counter-acted. WANTED is linear light without
+    ambient light, as relit pictures are.
+
+    Example: nearfar compensate transport.zarr wanted.png light.png --srgb
+    """
+    import numpy as np
+
+    from nearfar.applications.compensate import compensate as found_by
+    from nearfar.applications.compensate import describe, summarise
+    from nearfar.files import check_output, check_picture_ending, write_light, write_picture
+    from nearfar.transport.stored import open_transport
+
+    given = _scale(scale)
+    outputs = [output, *filter(None, (expected, out_of_reach))]
+    for number, path in enumerate(outputs):
+        check_picture_ending(path)
+        keep_input(path, transport, wanted, *outputs[:number])
+        check_output(path, force=force)
+    with progress_bar("compensation", quiet=quiet) as report:
+        require_reconstructed(transport)
+        opened = open_transport(transport)
+        warn_if_wrong(transport, opened.verdict)
+        picture = read_camera_picture(wanted, opened.camera, opened.channels, srgb=srgb)
+        found = found_by(opened.rows(), picture, given, progress=report)
+        if expected is not None:
+            write_picture(expected, found.expected, force=force)
+        if out_of_reach is not None:
+            write_picture(out_of_reach, found.out_of_reach.astype(np.float32), force=force)
+        write_light(output, found.light, force=force)
+    if as_json:
+        print(json.dumps(describe(found), allow_nan=False))
+    else:
+        say(f"{summarise(found)}\nlight of {opened.projector} written to {output}", quiet=quiet)

@@ -1,5 +1,6 @@
 """What the pages show was run: by their build, or here on a virtual rig."""
 
+import importlib
 import re
 import shlex
 import tomllib
@@ -7,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
+from nearfar.cli.application import app
 from nearfar.cli.commands import COMMANDS
 from nearfar.plan import paper_plan
 from nearfar.rigs.tables import RealTable, SimulatedTable
@@ -131,14 +134,37 @@ def _look_over(path):
     path.write_text("\n".join(kept) + "\n")
 
 
-def test_every_command_has_its_place_in_the_reference():
-    import sys
+@pytest.fixture
+def reference(monkeypatch):
+    """What writes the pages of the command line and of licences."""
+    monkeypatch.syspath_prepend(DOCS / "extensions")
+    return importlib.import_module("reference")
 
-    sys.path.insert(0, str(DOCS / "extensions"))
-    try:
-        from reference import GROUPS, dependencies, licence_of
-    finally:
-        sys.path.remove(str(DOCS / "extensions"))
+
+def test_the_reference_has_every_argument_and_option_of_every_command(reference, tmp_path):
+    reference.write_command_line(tmp_path)
+    page = (tmp_path / "command-line.md").read_text()
+    sections = dict(
+        re.findall(r"^### nearfar (\S+)\n(.*?)(?=^#|\Z)", page, re.MULTILINE | re.DOTALL)
+    )
+    assert set(sections) == set(COMMANDS.own)
+    group = typer.main.get_command(app)
+    for name, section in sections.items():
+        for parameter in group.commands[name].params:
+            common = {"--force", "--quiet"} & set(parameter.opts)
+            if parameter.param_type_name == "option" and not common:
+                shown = f"`{', '.join(sorted(parameter.opts, key=len))}"
+                assert (shown in section) != parameter.hidden, (name, shown)
+        assert f"```bash\nnearfar {name}" in section
+        assert "[required]" not in section
+
+
+def test_every_command_has_its_place_in_the_reference(reference):
+    GROUPS, dependencies, licence_of = (
+        reference.GROUPS,
+        reference.dependencies,
+        reference.licence_of,
+    )
     assert sorted(name for names in GROUPS.values() for name in names) == sorted(COMMANDS.own)
     needed = dependencies()
     assert {"numpy", "zarr"} <= set(needed[""])

@@ -88,8 +88,8 @@ def _row(record: tuple[str, str]) -> str:
     # An argument is required as it stands; an option is not.
     if required and not kind:
         meaning += " Required."
-    code, text = names.replace("|", "\\|"), meaning.replace("|", "\\|")
-    return f"| `{code}` | {html.escape(text, quote=False)} |"
+    text = re.sub(r"(?<![-\w])--[a-z][a-z-]*", r"`\g<0>`", html.escape(meaning, quote=False))
+    return "| `{}` | {} |".format(*(part.replace("|", "\\|") for part in (names, text)))
 
 
 def licence_of(package: str) -> str:

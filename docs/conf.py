@@ -4,6 +4,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import nearfar
 from nearfar.release import version as _version
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
@@ -36,16 +37,25 @@ autosummary_generate = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
-numpydoc_xref_param_type = False
+# Types of parameters and results link to their pages.
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"
+numpydoc_xref_aliases = {
+    name: f"nearfar.{name}" for name in nearfar.__all__ if isinstance(getattr(nearfar, name), type)
+}
 suppress_warnings = ["config.cache"]
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",
+    # Pages of functions and classes list the examples that use them.
+    "doc_module": ("nearfar",),
+    "backreferences_dir": "gallery/backreferences",
     "filename_pattern": r".*\.py",
     "abort_on_example_error": True,
     "capture_repr": ("_repr_html_",),
     "show_memory": False,
     "remove_config_comments": True,
+    "within_subsection_order": "gallery.ReadingOrder",
     "download_all_examples": False,
     "matplotlib_animations": False,
     "min_reported_time": 600,

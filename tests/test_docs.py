@@ -1,5 +1,8 @@
 """What the pages show was run: by their build, or here on a virtual rig."""
 
+import ast
+import dataclasses
+import importlib
 import re
 import shlex
 import tomllib
@@ -7,11 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
+from nearfar.cli.application import app
 from nearfar.cli.commands import COMMANDS
+from nearfar.faults import of_photos as faults_of_photos
+from nearfar.faults import records
 from nearfar.plan import paper_plan
 from nearfar.rigs.tables import RealTable, SimulatedTable
 from nearfar.scenes.cache import cached_scene
+from nearfar.workflow.verdict.verdict import SENTENCES
 from tests.rigs.displays import one_monitor
 from tests.rigs.loopback import alone_on_the_loopback
 from tests.rigs.test_loop import CAMERA, PROJECTOR, SCREEN, Bench
@@ -37,7 +45,7 @@ def fences(page):
 def test_every_block_of_a_page_is_run(page):
     for kind, text in fences(page):
         # Tables of a RIG.toml are read by test_the_rig_files_that_are_shown_are_read.
-        if kind in {"run", "on-a-rig", "toctree", "eval-rst", "toml"}:
+        if kind in {"run", "on-a-rig", "toctree", "eval-rst", "toml", "include"}:
             continue
         assert kind == "", f"{page.name}: a block of {kind}"
         for line in text.splitlines():
@@ -131,14 +139,37 @@ def _look_over(path):
     path.write_text("\n".join(kept) + "\n")
 
 
-def test_every_command_has_its_place_in_the_reference():
-    import sys
+@pytest.fixture
+def reference(monkeypatch):
+    """What writes the pages of the command line and of licences."""
+    monkeypatch.syspath_prepend(DOCS / "extensions")
+    return importlib.import_module("reference")
 
-    sys.path.insert(0, str(DOCS / "extensions"))
-    try:
-        from reference import GROUPS, dependencies, licence_of
-    finally:
-        sys.path.remove(str(DOCS / "extensions"))
+
+def test_the_reference_has_every_argument_and_option_of_every_command(reference, tmp_path):
+    reference.write_command_line(tmp_path)
+    page = (tmp_path / "command-line.md").read_text()
+    sections = dict(
+        re.findall(r"^### nearfar (\S+)\n(.*?)(?=^#|\Z)", page, re.MULTILINE | re.DOTALL)
+    )
+    assert set(sections) == set(COMMANDS.own)
+    group = typer.main.get_command(app)
+    for name, section in sections.items():
+        for parameter in group.commands[name].params:
+            common = {"--force", "--quiet"} & set(parameter.opts)
+            if parameter.param_type_name == "option" and not common:
+                shown = f"`{', '.join(sorted(parameter.opts, key=len))}"
+                assert (shown in section) != parameter.hidden, (name, shown)
+        assert f"```bash\nnearfar {name}" in section
+        assert "[required]" not in section
+
+
+def test_every_command_has_its_place_in_the_reference(reference):
+    GROUPS, dependencies, licence_of = (
+        reference.GROUPS,
+        reference.dependencies,
+        reference.licence_of,
+    )
     assert sorted(name for names in GROUPS.values() for name in names) == sorted(COMMANDS.own)
     needed = dependencies()
     assert {"numpy", "zarr"} <= set(needed[""])
@@ -147,3 +178,90 @@ def test_every_command_has_its_place_in_the_reference():
         licence = licence_of(name)
         assert licence != "not told", name
         assert not re.search(r"(?<![L])A?GPL|non-?commercial", licence, re.I), f"{name}: {licence}"
+
+
+def rows_of(page):
+    """Yield what the first column of each table of a page says, header rows left out."""
+    for line in page.read_text().splitlines():
+        if line.startswith("| ") and not line.startswith(("| message |", "| --- ")):
+            yield line.split(" | ")[0].removeprefix("| ").strip()
+
+
+def matches(shown, sentence):
+    """Return whether a sentence is one that a page shows with … for what changes."""
+    parts = (re.escape(part.strip()) for part in shown.split("…"))
+    return re.search(".*".join(parts), sentence, re.DOTALL) is not None
+
+
+def sentences_in(text):
+    """Yield the sentences of a source file, with … for values."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.JoinedStr):
+            parts = (part.value if isinstance(part, ast.Constant) else "…" for part in node.values)
+            yield "".join(parts)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+TROUBLESHOOTING = DOCS / "howto" / "troubleshooting.md"
+A_FAULT = {
+    faults_of_photos.Moved: [
+        {"what": what, "photo": 3, "pixels": 0.5}
+        for what in ("camera", "scene", "projector", "camera's focus")
+    ],
+    faults_of_photos.ShowsOtherPattern: [
+        {"photos": (3, 4), "others": others} for others in ((4, 3), (2, 3), (9, 1))
+    ],
+    faults_of_photos.NotLinear: [{"encoding": encoding} for encoding in ("", "sRGB")],
+}
+VALUES = {
+    "camera": "the camera",
+    "capture": Path("capture.zarr"),
+    "change": records.LightChange("lamp", 0.1),
+    "frequency": (0, 1),
+    "how": "mirrored left to right",
+    "is_calibrated": False,
+    "is_interlaced": False,
+    "last_good": 1,
+    "others": (4,),
+    "pattern": "white",
+    "patterns": "two patterns",
+    "photo": 3,
+    "photos": (3,),
+    "reason": "it was lost",
+}
+
+
+def faults_by_class():
+    for module in (records, faults_of_photos):
+        for name, kind in vars(module).items():
+            if dataclasses.is_dataclass(kind) and kind.__module__ == module.__name__:
+                # What is part of another fault's sentence.
+                if name == "LightChange":
+                    continue
+                fields = [field.name for field in dataclasses.fields(kind)]
+                given = A_FAULT.get(kind, [{}])
+                for values in given:
+                    yield kind(**{each: VALUES.get(each, 0.5) for each in fields} | values)
+
+
+@pytest.mark.parametrize(
+    "sentence", [*map(str, faults_by_class()), *SENTENCES.values()], ids=lambda text: text[:40]
+)
+def test_every_fault_of_photos_has_its_row(sentence):
+    assert any(matches(shown, sentence) for shown in rows_of(TROUBLESHOOTING))
+
+
+def test_what_the_page_of_messages_shows_is_said():
+    said = [
+        sentence
+        for path in (DOCS.parent / "src" / "nearfar").rglob("*.py")
+        for sentence in sentences_in(path.read_text())
+    ]
+    shown = list(rows_of(TROUBLESHOOTING))
+    # The last table is of sorts of errors.
+    messages = shown[: shown.index("… is there already …") + 1]
+    assert len(messages) > 50
+    for message in messages:
+        parts = [part.strip() for part in message.split("…") if len(part.strip()) > 12]
+        assert any(all(part in sentence for part in parts) for sentence in said), message

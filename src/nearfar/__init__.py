@@ -53,6 +53,8 @@ Use the transport
     PhysicalErrorBars      standard deviations of its components and pictures
     compensate             find the light under which the scene looks like a picture
     Compensation           that light, and how near its photo is expected to come
+    refine_compensation    correct it by photos of it on a rig
+    Refinement             the light that photos have corrected, and how near they came
     bounces                take a relit picture apart by how often its light was reflected
     Bounces                pictures of the first, second ... bounce
     probe                  relight by chosen projector pixels for each camera pixel
@@ -149,6 +151,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct, reconstruct_to_file
+    from nearfar.workflow.refine import Refinement, refine_compensation
     from nearfar.workflow.steps import correspond, estimate_transport, measure
     from nearfar.workflow.verdict.keeping import judge_transport
 
@@ -190,6 +193,8 @@ _HOMES = {
     "PhysicalErrorBars": "nearfar.estimate.physical",
     "compensate": "nearfar.applications.compensate",
     "Compensation": "nearfar.applications.compensate",
+    "refine_compensation": "nearfar.workflow.refine",
+    "Refinement": "nearfar.workflow.refine",
     "bounces": "nearfar.applications.bounces",
     "Bounces": "nearfar.applications.bounces",
     "probe": "nearfar.applications.probe",
@@ -248,6 +253,8 @@ __all__ = [  # noqa: RUF022
     "PhysicalErrorBars",
     "compensate",
     "Compensation",
+    "refine_compensation",
+    "Refinement",
     "bounces",
     "Bounces",
     "probe",

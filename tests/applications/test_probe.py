@@ -9,6 +9,7 @@ import nearfar
 from nearfar.applications.probe import probe_stored
 from nearfar.arrays import Size
 from nearfar.errors import InputError
+from nearfar.transport.half import in_half
 from nearfar.transport.store import save_transport
 from nearfar.transport.stored import open_transport
 from tests.worlds import model_transport
@@ -80,6 +81,24 @@ def test_rings_are_the_dense_rows_masked_by_distance(make, channels, inner, oute
     found = nearfar.probe(transport, light, MASK.ring(inner, outer))
     np.testing.assert_allclose(found, expected, atol=3e-6)
     assert np.abs(expected).max() > 0.01
+
+
+def test_far_range_light_summed_some_functions_at_a_time_is_the_same(monkeypatch):
+    """As at projectors whose sums along rows do not fit into memory."""
+    transport, light = world(), a_light(2)
+    whole = nearfar.probe(transport, light, MASK.ring(2, 5))
+    monkeypatch.setattr("nearfar.applications.by_runs.FUNCTIONS_TOGETHER", 3)
+    monkeypatch.setattr("nearfar.applications.by_runs.TABLE_BYTES", 12 * 18 * 25 * 7)
+    monkeypatch.setattr("nearfar.applications.by_runs.BATCH_PIXELS", 10)
+    found = nearfar.probe(transport, light, MASK.ring(2, 5))
+    np.testing.assert_allclose(found, whole, atol=1e-6)
+
+
+@pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
+def test_factors_in_half_precision_are_probed(make):
+    transport, light = make(), a_light()
+    found = nearfar.probe(in_half(transport), light, MASK.ring(2, 5))
+    np.testing.assert_allclose(found, nearfar.probe(transport, light, MASK.ring(2, 5)), atol=2e-4)
 
 
 @pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)

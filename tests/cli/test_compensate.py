@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import nearfar
+from nearfar.errors import DeviceError
 from nearfar.files import read_light
+from nearfar.rigs.simulated.rig import SimulatedRig
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 
 
@@ -58,3 +60,73 @@ def test_what_does_not_fit_gets_a_sentence(job, wanted):
     assert ran.status == 2
     assert "no scale" in ran.err
     assert not out.exists()
+
+
+@pytest.fixture
+def rig(job):
+    """The rig of the job, with a response that its transport does not know."""
+    path = job.folder / "rig.toml"
+    text = '[scene]\ntransport = "truth.npy"\n[projector]\ngamma = 1.8\n[camera]\nbits = 16\n'
+    path.write_text(text)
+    return path
+
+
+def test_photos_on_a_rig_correct_the_light(job, wanted, rig):
+    plain, out = job.folder / "plain.npy", job.folder / "l.npy"
+    command = ("compensate", job.transport, wanted)
+    check_done(run_nearfar(*command, plain, "--scale", 1))
+    ran = check_done(run_nearfar(*command, out, "--scale", 1, "--refine", 2, "--rig", rig))
+    assert "dB before corrections" in ran.out
+    again = job.folder / "again.npy"
+    told = check_done(
+        run_nearfar(*command, again, "--scale", 1, "--refine", 2, "--rig", rig, "--json")
+    )
+    numbers = json.loads(told.out)
+    assert len(numbers["photo_rmse"]) == 3
+    assert numbers["psnr_refined_dB"] > numbers["psnr_before_dB"] + 3
+    np.testing.assert_array_equal(np.load(out), np.load(again))
+    truth = nearfar.load_exact(job.truth)
+    target = np.load(wanted)
+    distances = [
+        np.sqrt(np.mean((truth @ np.load(path) ** np.float32(1.8) - target) ** 2))
+        for path in (plain, out)
+    ]
+    assert distances[1] < 0.7 * distances[0]
+
+
+@pytest.mark.parametrize("stop", [DeviceError("the camera is gone."), KeyboardInterrupt()])
+def test_a_rig_that_stops_leaves_the_best_light_so_far(job, wanted, rig, monkeypatch, stop):
+    shoot, calls = SimulatedRig.shoot, []
+
+    def stopping(self, patterns, first=0):
+        calls.append(first)
+        if len(calls) > 2:
+            raise stop
+        return shoot(self, patterns, first)
+
+    monkeypatch.setattr(SimulatedRig, "shoot", stopping)
+    out = job.folder / "l.npy"
+    ran = run_nearfar("compensate", job.transport, wanted, out, "--refine", 3, "--rig", rig)
+    assert ran.status == (1 if isinstance(stop, DeviceError) else 130)
+    assert f"the best light of 2 photos is kept in {out}" in ran.err
+    assert np.load(out).shape[:2] == (16, 20)
+
+
+def test_refine_and_rig_go_together(job, wanted, rig):
+    out = job.folder / "l.npy"
+    for alone in (("--refine", 1), ("--rig", rig), ("--refine", 7, "--rig", rig)):
+        assert run_nearfar("compensate", job.transport, wanted, out, *alone).status == 2
+    assert not out.exists()
+
+
+def test_a_photo_may_be_wanted(job):
+    transport = nearfar.load_transport(job.transport)
+    photo = job.folder / "photo.npy"
+    light = nearfar.natural_picture(transport.projector, 2)
+    np.save(photo, np.maximum(transport @ light + transport.black, 0))
+    out, expected = job.folder / "l.npy", job.folder / "e.npy"
+    command = ("compensate", job.transport, photo, out, "--scale", 1, "--expected", expected)
+    check_done(run_nearfar(*command, "--as-photo"))
+    error = np.load(expected) + transport.black - np.load(photo)
+    assert np.abs(error).mean() < 0.02 * np.load(photo).max()
+    assert transport.black.mean() > 0.02

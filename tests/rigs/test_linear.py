@@ -50,6 +50,16 @@ def test_a_linear_projector_gets_the_pattern_as_it_is():
         np.testing.assert_array_equal(frame[..., primary], draw_frame(pattern, shown))
 
 
+def test_each_colour_of_a_pattern_is_shown_by_its_primary():
+    grid = Size(16, 16)
+    pattern = np.random.default_rng(1).integers(0, 256, (*grid, 3), dtype=np.uint8)
+    linear = LinearProjector(_response(), fit_frame(grid, 3, Size(50, 70)))
+    frame = linear.draw(pattern)
+    for primary in range(3):
+        alone = linear.draw(pattern[..., primary])[..., primary]
+        np.testing.assert_array_equal(frame[..., primary], alone)
+
+
 def test_a_pair_of_inverses_adds_up_to_white():
     grid, scale = Size(16, 16), 4
     pattern = np.arange(256, dtype=np.uint8).reshape(grid)

@@ -19,8 +19,10 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
+from nearfar.illumination.pictures import natural_picture
 from nearfar.plan import Plan, read_plan
 from nearfar.scenes.cache import cached_scene
+from nearfar.transport.store import load_transport
 from tests.cli.conftest import check_done, run_nearfar
 from tests.rigs.displays import one_monitor
 from tests.rigs.loopback import alone_on_the_loopback
@@ -213,6 +215,47 @@ def test_a_calibrated_rig_relights_as_in_memory_and_another_does_not(
     assert random[1] > random[0] - 1
     assert pictures[2] < pictures[1] - 10
     assert random[2] < random[1] - 10
+
+
+def _true_photo(bench, light, gamma):
+    """What the scene does under a light on a projector of some gamma, without noise."""
+    transport = np.load(bench.folder / "transport.npy")
+    levels = np.rint(255 * np.load(bench.folder / light)) / 255
+    return (transport @ (levels**gamma).ravel()).reshape(CAMERA)
+
+
+def test_a_light_that_compensates_is_corrected_by_photos(bench, calibrated):
+    """The calibrated rig is linear; another of the same devices is not, and nobody told it."""
+    if not (bench.folder / "calibrated.zarr").exists():
+        bench.do("acquire", "plan.json", "calibrated.zarr", "--rig", bench.rig)
+    check_done(run_nearfar(
+        "reconstruct", bench.folder / "calibrated.zarr", bench.folder / "t.zarr", "--force"
+    ))  # fmt: skip
+    plain = bench.folder / "plain.toml"
+    plain.write_text(bench.rig.read_text())
+    drawn = 0.3 + 0.6 * natural_picture(PROJECTOR, 2).astype(np.float64)
+    transport = np.load(bench.folder / "transport.npy")
+    target = (transport @ drawn.ravel()).reshape(CAMERA)
+    np.save(bench.folder / "wanted.npy", target.astype(np.float32))
+    command = ("compensate", "t.zarr", "wanted.npy")
+    bench.do(*command, "light.npy", "--scale", 1)
+    errors = {}
+    for rig, gamma in ((bench.rig, 1.0), (plain, 2.2)):
+        found = f"refined-{rig.stem}.npy"
+        out = bench.do(*command, found, "--scale", 1, "--refine", 3, "--rig", rig, "--json")
+        numbers = json.loads(re.search(r"\{.*\}", out)[0])
+        lit = np.isfinite(load_transport(bench.folder / "t.zarr").correspondence[..., 0])
+        truly = [
+            float(np.sqrt(np.mean((_true_photo(bench, light, gamma) - target)[lit] ** 2)))
+            for light in ("light.npy", found)
+        ]
+        errors[rig.stem] = [*truly, numbers["psnr_before_dB"], numbers["psnr_refined_dB"]]
+        assert numbers["psnr_refined_dB"] >= numbers["psnr_before_dB"]
+    before, after, *_ = errors["plain"]
+    assert after < 0.4 * before
+    before, after, *_ = errors[bench.rig.stem]
+    # The calibration's own error, and the noise of a photo.
+    assert after < before + 0.0005
 
 
 def test_the_calibration_is_what_the_rig_is(bench, calibrated):

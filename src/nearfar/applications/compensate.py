@@ -3,11 +3,12 @@
 Light that reaches a camera pixel from elsewhere is counter-acted, and so are texture and shading.
 The light l minimises
 
-    |W (T l - s wanted)|^2 + mu |gradient of l|^2    over 0 <= l <= 1
+    |W (T l + b - s wanted)|^2 + mu |gradient of l|^2    over 0 <= l <= 1
 
-by accelerated projected gradients, each step divided by the diagonal of D^T W^2 D. W is 1 where
-the camera sees direct light, and 0 elsewhere and where it is saturated. Colours that the projector
-and the camera mix are part of T where a calibration knows them.
+by accelerated projected gradients, each step divided by the diagonal of D^T W^2 D. b is the photo
+under black where what is wanted is a photo, with ambient light, and 0 where it is light alone. W is
+1 where the camera sees direct light, and 0 elsewhere and where it is saturated. Colours that the
+projector and the camera mix are part of T where a calibration knows them.
 
 Truncated series for T^-1, such as stratified inverses (Ng et al. 2009; Bai et al. 2010), diverge
 where much light is reflected on; a projected gradient does not.
@@ -63,7 +64,10 @@ class Compensation:
     rmse_of_direct : float
         The same for a light that is computed from direct light alone.
     peak : float
-        Greatest value of what is wanted, `scale` times the picture's.
+        Greatest value of `target`.
+    target : ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+        What the relit picture is to be: `scale` times the wanted picture, less the photo under
+        black where it was given.
 
     Examples
     --------
@@ -81,6 +85,7 @@ class Compensation:
     rmse: float
     rmse_of_direct: float
     peak: float
+    target: Floats
 
     @property
     def psnr(self) -> float:
@@ -103,6 +108,7 @@ def compensate(
     wanted: Floats,
     scale: float | None = None,
     *,
+    black: Floats | None = None,
     progress: Report | None = None,
 ) -> Compensation:
     """Find the light under which the scene looks like a wanted picture.
@@ -115,6 +121,10 @@ def compensate(
     scale : float, optional
         What `wanted` is multiplied by. Left out, the one at which 95 % of the camera pixels need no
         more than full white.
+    black : ndarray, shape (Cy, Cx) or (Cy, Cx, channels), optional
+        The photo under black, in photo units. Given, `wanted` times the scale is what a photo is to
+        look like, ambient light and black level included; ``transport.black`` is that of the
+        capture.
     progress : callable, optional
         Called with what is being done and the share done, 0 to 1.
 
@@ -142,18 +152,22 @@ def compensate(
     report = as_report(progress)
     weights = camera_weights(transport)
     problem = compensation_problem(transport, weights)
+    dark = np.zeros_like(target) if black is None else _picture(transport, black)
     if scale is None:
-        # Without an upper limit the light is proportional to the scale.
-        free = problem.solve(target, np.zeros_like(problem.diagonal), inf)
-        scale = _scale_within_reach(transport, free, target, weights)
-        start = scale * free
+        # Without an upper limit the light for each of both is proportional to it.
+        nothing = np.zeros_like(problem.diagonal)
+        free = problem.solve(target, nothing, inf)
+        saved = nothing if black is None else problem.solve(dark, nothing, inf)
+        scale = _scale_within_reach(transport, free, saved, target, weights)
+        start = scale * free - saved
     else:
         start = np.full_like(problem.diagonal, 0.5)
-    light = problem.solve(scale * target, start, 1.0, report)
+    goal = scale * target - dark
+    light = problem.solve(goal, start, 1.0, report)
     alone = compensation_problem(direct_alone(transport), weights)
-    of_direct = alone.solve(scale * target, light, 1.0)
+    of_direct = alone.solve(goal, light, 1.0)
     report("compensation", 1.0)
-    return _judged(transport, problem, weights, (light, of_direct), scale, scale * target)
+    return _judged(transport, problem, weights, (light, of_direct), scale, goal)
 
 
 def describe(found: Compensation) -> dict[str, Any]:
@@ -185,11 +199,7 @@ def _target(transport: Transport, wanted: Floats) -> Floats:
             "the transport has no direct light, so that no light makes a picture on the scene: "
             "give one that was measured with a projector."
         )
-    given = np.asarray(wanted)
-    if given.ndim == 2 and transport.channels > 1:
-        given = np.repeat(given[..., None], transport.channels, axis=2)
-    flat = as_image(given, transport.camera, transport.channels)
-    target = np.asarray(flat, dtype=np.float64).reshape(*transport.camera, transport.channels)
+    target = _picture(transport, wanted)
     if target.min() < 0:
         raise InputError(
             "the wanted picture has negative values, and there is no negative light: set them to 0."
@@ -199,6 +209,15 @@ def _target(transport: Transport, wanted: Floats) -> Floats:
             "the wanted picture is black wherever the projector lights the scene: give another one."
         )
     return target
+
+
+def _picture(transport: Transport, given: Floats) -> Floats:
+    """Return a picture of the camera as (Cy, Cx, channels), float64."""
+    picture = np.asarray(given)
+    if picture.ndim == 2 and transport.channels > 1:
+        picture = np.repeat(picture[..., None], transport.channels, axis=2)
+    flat = as_image(picture, transport.camera, transport.channels)
+    return np.asarray(flat, dtype=np.float64).reshape(*transport.camera, transport.channels)
 
 
 def camera_weights(transport: Transport) -> Floats:
@@ -247,7 +266,7 @@ def compensation_problem(transport: Transport, weights: Floats) -> LeastSquares:
 
 
 def _scale_within_reach(
-    transport: Transport, light: Floats, target: Floats, weights: Floats
+    transport: Transport, light: Floats, saved: Floats, target: Floats, weights: Floats
 ) -> float:
     """Return the scale at which most camera pixels need no more than full white.
 
@@ -255,11 +274,17 @@ def _scale_within_reach(
     ----------
     light : ndarray, shape (Py, Px, colours)
         For the target itself, without an upper limit.
+    saved : ndarray, shape (Py, Px, colours)
+        Light that a photo under black stands for; what a target needs is less by it.
     """
     where = footprint(transport.correspondence, transport.projector)
-    needed = np.stack([look_up(one.ravel(), where) for one in np.moveaxis(light, -1, 0)])
+    needed, less = (
+        np.stack([look_up(one.ravel(), where) for one in np.moveaxis(lights, -1, 0)])
+        for lights in (light, saved)
+    )
     counted = (weights.ravel() > 0) & (target.reshape(len(needed[0]), -1).max(axis=1) > 0)
-    most = np.quantile(needed.max(axis=0)[counted], REACHABLE) if counted.any() else 0.0
+    shares = (needed / (1.0 + less)).max(axis=0)[counted]
+    most = np.quantile(shares, REACHABLE) if counted.any() else 0.0
     if most <= 0:
         raise InputError(
             "no light makes anything of the wanted picture on this scene: give a picture that is "
@@ -303,6 +328,7 @@ def _judged(
         rmse=distance(expected),
         rmse_of_direct=distance(of_direct),
         peak=peak,
+        target=target.reshape(shape).astype(np.float32),
     )
 
 

@@ -7,10 +7,16 @@ structured light transport", CVPR 2014. They mask T optically; with T in hand it
 Index convention: c runs over camera pixels, row by row.
 """
 
-from math import isinf
+from math import inf, isinf
 
 import numpy as np
 
+from nearfar.applications.by_runs import (
+    RunsOfCamera,
+    SummedLight,
+    picture_by_runs,
+    summed_lights,
+)
 from nearfar.applications.masks import Given, ProbingMask, SameForAll, Shape, Whole
 from nearfar.applications.shapes import Band, Disc
 from nearfar.arrays import Floats, Size, blocks
@@ -55,26 +61,49 @@ def probe(transport: AnyTransport, light: Floats, mask: ProbingMask) -> Floats:
     """
     require_instance(mask, ProbingMask, "mask", "nearfar.ProbingMask.within")
     checked = as_light(light, transport.projector, transport.channels)
-    return _probed(transport, checked, mask.on(transport.projector), 0, transport.camera)
+    sums = _summed(transport, checked)
+    return _probed(transport, checked, sums, mask.on(transport.projector), 0, transport.camera)
 
 
 def probe_stored(stored: StoredTransport, light: Floats, mask: ProbingMask) -> Floats:
     """Probe a transport that is in a file, some rows of the camera at a time; see `probe`."""
     checked = as_light(light, stored.projector, stored.channels)
     mask, first, parts = mask.on(stored.projector), 0, []
+    sums: list[SummedLight] | None = None
     for rows in stored.blocks():
-        parts.append(_probed(rows, checked, mask, first, stored.camera))
+        sums = sums or _summed(rows, checked)
+        parts.append(_probed(rows, checked, sums, mask, first, stored.camera))
         first += rows.camera.pixels
     return np.concatenate(parts)
 
 
+def _summed(transport: AnyTransport, light: Floats) -> list[SummedLight] | None:
+    """Return a light summed along projector rows; None if rows of T are to be drawn."""
+    if not isinstance(transport, Transport) or "free" in transport.parts:
+        return None
+    return summed_lights(transport.lights(light), transport.far_basis)
+
+
 def _probed(
-    transport: AnyTransport, light: Floats, mask: ProbingMask, first: int, camera: Size
+    transport: AnyTransport,
+    light: Floats,
+    sums: list[SummedLight] | None,
+    mask: ProbingMask,
+    first: int,
+    camera: Size,
 ) -> Floats:
     """Probe camera pixels from `first` on, of a whole camera."""
     total = np.zeros((*transport.camera, transport.channels), dtype=np.float32)
+    in_runs: list[tuple[int, Disc | Band]] = []
     for sign, shape in mask.terms:
-        total += sign * _by_shape(transport, light, shape, first, camera).reshape(total.shape)
+        match shape:
+            case Disc() | Band() if sums is not None and shape != Disc(inf):
+                in_runs.append((sign, shape))
+            case _:
+                found = _by_shape(transport, light, shape, first, camera)
+                total += sign * found.reshape(total.shape)
+    if in_runs and sums is not None and isinstance(transport, Transport):
+        total += _by_runs(transport, sums, in_runs, first, camera).reshape(total.shape)
     return np.asarray(total[..., 0] if transport.channels == 1 else total)
 
 
@@ -92,6 +121,19 @@ def _by_shape(
             return np.asarray(transport @ light)
         case _:
             return _by_rows(transport, light, shape, first, camera)
+
+
+def _by_runs(
+    transport: Transport,
+    sums: list[SummedLight],
+    shapes: list[tuple[int, Disc | Band]],
+    first: int,
+    camera: Size,
+) -> Floats:
+    """Return the picture of runs of projector pixels, from factors."""
+    q = transport.correspondence.reshape(-1, 2)
+    runs = RunsOfCamera(shapes, q, first, camera, transport.projector)
+    return picture_by_runs(transport.factors, sums, runs)
 
 
 def _by_rows(

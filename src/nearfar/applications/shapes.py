@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size
+from nearfar.applications.run_loops import runs_of_bands, runs_of_discs
+from nearfar.arrays import Floats, Integers, Size
 
 
 class Runs(NamedTuple):
@@ -44,15 +45,6 @@ class Runs(NamedTuple):
         return drawn.reshape(n, projector.pixels)
 
 
-def _runs(first: Integers, starts: Floats, stops: Floats, projector: Size) -> Runs:
-    """Return runs cut by the projector's border."""
-    y = first[:, None] + np.arange(starts.shape[1])
-    off = (y < 0) | (y >= projector.height)
-    starts, stops = (np.clip(side, 0, projector.width) for side in (starts, stops))
-    stops = np.where(off, starts, np.maximum(starts, stops))
-    return Runs(first.astype(np.int32), starts.astype(np.int32), stops.astype(np.int32))
-
-
 @dataclass(frozen=True)
 class Disc:
     """Projector pixels nearer to q than `radius`; none without q, unless it is infinite."""
@@ -69,19 +61,13 @@ class Disc:
             Of these camera pixels.
         camera, projector : Size
         """
-        lit: Booleans = np.asarray(np.isfinite(q).all(axis=1))
-        places = np.where(lit[:, None], q, 0.0).astype(np.float64)
         # No more rows than a projector has.
-        reach = min(self.radius, float(projector.height + projector.width))
-        rows = min(2 * int(np.ceil(reach)) + 1, projector.height)
-        first = np.clip(np.floor(places[:, 0] - reach), 0, projector.height - rows)
-        down = first[:, None] + np.arange(rows) - places[:, :1]
-        squared = self.radius**2 - down**2
-        half = np.sqrt(np.maximum(squared, 0.0))
-        found = lit[:, None] & (squared > 0)
-        starts = np.floor(places[:, 1:] - half) + 1
-        stops = np.where(found, np.ceil(places[:, 1:] + half), starts)
-        return _runs(first.astype(np.int64), starts, stops, projector)
+        reach = int(np.ceil(min(self.radius, float(projector.height))))
+        rows = min(2 * reach + 1, projector.height)
+        first = np.empty(len(q), dtype=np.int32)
+        starts, stops = (np.empty((len(q), rows), dtype=np.int32) for _ in range(2))
+        runs_of_discs(q, self.radius, (projector.height, projector.width), first, starts, stops)
+        return Runs(first, starts, stops)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,19 +87,7 @@ class Band:
     def runs(self, pixels: slice, q: Floats, camera: Size, projector: Size) -> Runs:
         """Return the runs of camera pixels; see `Disc.runs`."""
         y, x = np.divmod(np.arange(*pixels.indices(camera.pixels)), camera.width)
-        a, b, c = self.fundamental @ np.stack([x, y, np.ones_like(x)])
-        norm = np.hypot(a, b)
-        known = norm > 0
-        a, b, c = (np.divide(one, norm, where=known, out=np.zeros_like(norm)) for one in (a, b, c))
-        rows = np.arange(projector.height)
-        off = b[:, None] * rows + c[:, None]
-        half = 0.5 * self.width
-        # The columns x of a row with |a x + off| <= half; all or none of them if a is 0.
-        slanted = np.abs(a) > np.finfo(np.float64).eps
-        slope = np.where(slanted, a, 1.0)[:, None]
-        ends = np.sort(np.stack([(-half - off) / slope, (half - off) / slope]), axis=0)
-        whole = np.abs(off) <= half
-        starts = np.where(slanted[:, None], np.ceil(ends[0]), 0.0)
-        stops = np.where(slanted[:, None], np.floor(ends[1]) + 1, projector.width * whole)
-        stops = np.where(known[:, None], stops, starts)
-        return _runs(np.zeros(len(x), dtype=np.int64), starts, stops, projector)
+        lines = (self.fundamental @ np.stack([x, y, np.ones_like(x)])).T
+        starts, stops = (np.empty((len(x), projector.height), dtype=np.int32) for _ in range(2))
+        runs_of_bands(lines, self.width, (projector.height, projector.width), starts, stops)
+        return Runs(np.zeros(len(x), dtype=np.int32), starts, stops)

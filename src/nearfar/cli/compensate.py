@@ -14,7 +14,9 @@ from nearfar.cli.options import (
     TransportPath,
     keep_input,
     require_reconstructed,
+    scene_names,
 )
+from nearfar.cli.refining import MOST, refined, require_rig
 from nearfar.cli.saying import say, warn_if_wrong
 from nearfar.progress import progress_bar
 
@@ -61,6 +63,31 @@ def compensate(
             metavar="OUT", help="Write a map of camera pixels that no light serves, 1 there."
         ),
     ] = None,
+    as_photo: Annotated[
+        bool,
+        typer.Option(
+            "--as-photo",
+            help="WANTED is a photo as the camera is to take it, ambient light and black level "
+            "included: those of the capture's photo under black.",
+        ),
+    ] = False,
+    refine: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=MOST,
+            metavar="N",
+            help="Correct the light N times by photos of it, 1 to 3; a photo more confirms it.",
+        ),
+    ] = None,
+    rig: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RIG",
+            help="For --refine: RIG.toml, scene or stored transport, as for acquire.",
+            autocompletion=scene_names,
+        ),
+    ] = None,
     srgb: Annotated[
         bool, typer.Option("--srgb", help="WANTED is an ordinary sRGB picture.")
     ] = False,
@@ -71,7 +98,7 @@ def compensate(
     """Find the light under which the scene looks like a picture: radiometric compensation.
 
     Texture, shading and light from other surfaces are counter-acted. WANTED is linear light without
-    ambient light, as relit pictures are.
+    ambient light, as relit pictures are, unless --as-photo is given.
 
     Example: nearfar compensate transport.zarr wanted.png light.png --srgb
     """
@@ -81,25 +108,36 @@ def compensate(
     from nearfar.applications.compensate import describe, summarise
     from nearfar.files import check_output, check_picture_ending, write_light, write_picture
     from nearfar.transport.stored import open_transport
+    from nearfar.workflow.refine import describe_photos, summarise_photos
 
     given = _scale(scale)
+    require_rig(refine, rig)
     outputs = [output, *filter(None, (expected, out_of_reach))]
     for number, path in enumerate(outputs):
         check_picture_ending(path)
-        keep_input(path, transport, wanted, *outputs[:number])
+        keep_input(path, transport, wanted, *outputs[:number], *([Path(rig)] if rig else []))
         check_output(path, force=force)
     with progress_bar("compensation", quiet=quiet) as report:
         require_reconstructed(transport)
         opened = open_transport(transport)
         warn_if_wrong(transport, opened.verdict)
         picture = read_camera_picture(wanted, opened.camera, opened.channels, srgb=srgb)
-        found = found_by(opened.rows(), picture, given, progress=report)
+        rows = opened.rows()
+        black = rows.black if as_photo else None
+        found = found_by(rows, picture, given, black=black, progress=report)
         if expected is not None:
             write_picture(expected, found.expected, force=force)
         if out_of_reach is not None:
             write_picture(out_of_reach, found.out_of_reach.astype(np.float32), force=force)
-        write_light(output, found.light, force=force)
+        if refine is None:
+            write_light(output, found.light, force=force)
+    numbers, words = describe(found), summarise(found)
+    if refine is not None and rig is not None:
+        if not as_json:
+            say(words, quiet=quiet)
+        better = refined(rows, found, rig, refine, output=output, force=force, quiet=quiet)
+        numbers, words = numbers | describe_photos(better), summarise_photos(better)
     if as_json:
-        print(json.dumps(describe(found), allow_nan=False))
+        print(json.dumps(numbers, allow_nan=False))
     else:
-        say(f"{summarise(found)}\nlight of {opened.projector} written to {output}", quiet=quiet)
+        say(f"{words}\nlight of {opened.projector} written to {output}", quiet=quiet)

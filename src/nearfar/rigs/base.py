@@ -43,6 +43,7 @@ class Rig(Protocol):
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
         """Display each 8-bit pattern and yield its photo, (Cy, Cx, channels), in order.
 
-        `first` is the number of the first pattern in its plan.
+        Patterns are (Py, Px), or (Py, Px, 3) of red, green and blue. `first` is the number of the
+        first pattern in its plan.
         """
         ...

@@ -54,17 +54,18 @@ class LinearProjector:
         self._threshold = _thresholds(layout)
 
     def draw(self, pattern: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Draw the frame of an 8-bit pattern, black around."""
+        """Draw the frame of an 8-bit pattern, (Py, Px) or (Py, Px, 3), black around."""
         scale = self._layout.scale
         blown = pattern.repeat(scale, axis=0).repeat(scale, axis=1)
-        height, width = blown.shape
-        top, left = ((a - b) // 2 for a, b in zip(self._layout.frame, blown.shape, strict=True))
+        height, width = blown.shape[:2]
+        top, left = ((a - b) // 2 for a, b in zip(self._layout.frame, blown.shape[:2], strict=True))
         frame = np.zeros((*self._layout.frame, PRIMARY_COUNT), dtype=np.uint8)
         inside = frame[top : top + height, left : left + width]
         threshold = self._threshold[:height, :width]
         for primary in range(PRIMARY_COUNT):
-            more = self._share[:, primary][blown] > threshold
-            inside[..., primary] = self._level[:, primary][blown] + more
+            own = blown if blown.ndim == 2 else blown[..., primary]
+            more = self._share[:, primary][own] > threshold
+            inside[..., primary] = self._level[:, primary][own] + more
         return frame
 
 

@@ -70,11 +70,13 @@ class Factors:
         return box_axes(self.q, self.boxes, self.projector)
 
     @cached_property
-    def _footprint(self) -> footprints.Footprint:
+    def footprint(self) -> footprints.Footprint:
+        """Where direct light comes from, where near-range light is of single pixels."""
         return footprints.footprint(self.q, self.projector)
 
     @cached_property
-    def _centres(self) -> NDArray[np.int64]:
+    def centres(self) -> NDArray[np.int64]:
+        """The rounded q, shape (C, 2); see `nearfar.transport.near.centre`."""
         return windows.centre(self.q, self.projector)
 
     def of_channel(self, channel: int) -> "Factors":
@@ -94,11 +96,11 @@ class Factors:
         (of_far,) = far_pictures(self.far, light.overlaps[None])
         if self.of_single_pixels:
             lights = light.flat[None]
-            (of_direct,) = direct_pictures(self.direct, self._footprint, lights)
-            (of_near,) = near_pictures(self.near, self._centres, self.projector, lights)
+            (of_direct,) = direct_pictures(self.direct, self.footprint, lights)
+            (of_near,) = near_pictures(self.near, self.centres, self.projector, lights)
         else:
             of_direct, of_near = blurred_pictures(
-                self.direct, self.near, self.pyramid, self._centres, self.box_axes, light.blurred
+                self.direct, self.near, self.pyramid, self.centres, self.box_axes, light.blurred
             )
         return Components(of_direct, of_near, of_far)
 
@@ -108,8 +110,8 @@ class Factors:
             pictures = [self.relit(self.analyse(light)) for light in lights]
             return Components(*(np.stack(parts) for parts in zip(*pictures, strict=True)))
         return Components(
-            direct_pictures(self.direct, self._footprint, lights),
-            near_pictures(self.near, self._centres, self.projector, lights),
+            direct_pictures(self.direct, self.footprint, lights),
+            near_pictures(self.near, self.centres, self.projector, lights),
             far_pictures(self.far, overlaps_of(lights, self.far_basis)),
         )
 
@@ -118,13 +120,13 @@ class Factors:
         d, n, f = (part[:, channel] for part in (self.direct, self.near, self.far))
         of_far = self.far_basis.synthesise(image @ f).reshape(self.projector)
         if not self.of_single_pixels:
-            return of_far + blurred_adjoint(d, n, image, self.pyramid, self._centres, self.box_axes)
-        back = footprints.spread(d * image, self._footprint, self.projector).reshape(self.projector)
+            return of_far + blurred_adjoint(d, n, image, self.pyramid, self.centres, self.box_axes)
+        back = footprints.spread(d * image, self.footprint, self.projector).reshape(self.projector)
         back = back + of_far
         window = self.near_basis.window
         for batch in blocks(len(image), BATCH_PIXELS) if window else ():
             values = n[batch] * image[batch, None]
-            back += windows.spread(values, self._centres[batch], window, self.projector)
+            back += windows.spread(values, self.centres[batch], window, self.projector)
         return np.asarray(back)
 
     def rows(self, pixels: slice) -> Components:
@@ -132,11 +134,11 @@ class Factors:
         direct, near, far = (part[pixels] for part in (self.direct, self.near, self.far))
         f = self.far_basis.synthesise(far).astype(np.float32, copy=False)
         if not self.of_single_pixels:
-            centres, axes = self._centres[pixels], self.box_axes.of(pixels)
+            centres, axes = self.centres[pixels], self.box_axes.of(pixels)
             return Components(*blurred_rows(direct, near, self.pyramid, centres, axes), f)
         number = np.arange(len(f))[:, None]
-        corners, weights = self._footprint.pixels[pixels], self._footprint.weights[pixels]
-        centres, window = self._centres[pixels], self.near_basis.window
+        corners, weights = self.footprint.pixels[pixels], self.footprint.weights[pixels]
+        centres, window = self.centres[pixels], self.near_basis.window
         inside = windows.inside(centres, window, self.projector)
         # Entries beyond the border go to a column of their own, which is cut off.
         beyond = self.projector.pixels

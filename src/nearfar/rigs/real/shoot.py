@@ -1,6 +1,6 @@
 """A shoot of patterns: stale photos are taken again, and changes of light are followed.
 
-Index convention: patterns are (Py, Px), photos (Cy, Cx, channels) in raw levels.
+Index convention: patterns are (Py, Px) or (Py, Px, 3), photos (Cy, Cx, channels) in raw levels.
 """
 
 from collections.abc import Callable
@@ -79,15 +79,16 @@ class CheckedShoot:
         """
         frame = self._draw(pattern)
         photo = self._shutter.photograph(frame, number=number)
-        reason = self._stale.suspect(pattern, photo)
+        reason = self._stale.suspect(_grey(pattern), photo)
         if reason is not None:
             photo = self._photograph_again(number, pattern, photo, reason)
         return photo
 
     def follow_light(self, number: int, pattern: NDArray[np.uint8], photo: Photo) -> None:
         """Take in a photo of its pattern, and find by black and white what light has changed."""
-        self._stale.accept(pattern, photo)
-        deviation = self._light.compare(number, pattern, photo)
+        grey = _grey(pattern)
+        self._stale.accept(grey, photo)
+        deviation = self._light.compare(number, grey, photo)
         if deviation is None:
             return
         now = self._measure_levels()
@@ -157,3 +158,10 @@ class CheckedShoot:
         self._light.start_again(levels)
         # White was displayed last.
         self._stale.begin_after(self._white, levels.white)
+
+
+def _grey(pattern: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the mean of a pattern's colours, (Py, Px)."""
+    if pattern.ndim == 2:
+        return pattern
+    return np.asarray(np.rint(pattern.mean(axis=2)), dtype=np.uint8)

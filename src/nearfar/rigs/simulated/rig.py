@@ -27,7 +27,7 @@ class World(Protocol):
         ...
 
     def pictures(self, lights: Floats) -> Floats:
-        """Pictures (n, Cy, Cx, channels) of lights (n, Py, Px)."""
+        """Pictures (n, Cy, Cx, channels) of lights (n, Py, Px) or (n, Py, Px, channels)."""
         ...
 
 
@@ -105,9 +105,11 @@ class SimulatedRig:
             # Dark lights fill the batch up to the first: the last digit of a picture depends on how
             # many are computed at once, and photos must not depend on where a capture was resumed.
             before = number % PATTERNS_AT_ONCE
-            lights = np.zeros((before + len(batch), *self.projector), dtype=np.float32)
+            colours = max((pattern.shape[2:] for pattern in batch), key=len)
+            lights = np.zeros((before + len(batch), *self.projector, *colours), dtype=np.float32)
             for i, pattern in enumerate(batch):
-                lights[before + i] = self.optics.emit(pattern, number + i)
+                alike = pattern if pattern.ndim == lights.ndim - 1 else pattern[..., None]
+                lights[before + i] = self.optics.emit(alike, number + i)
             for picture in self.world.pictures(lights)[before:]:
                 generator = np.random.default_rng([self.seed, number])
                 yield self.sensor.photograph(self.exposure * picture, generator, number)

@@ -1,0 +1,275 @@
+"""Sums of transport times light over runs of projector pixels, in compiled loops.
+
+All add to pictures `out`, (n, channels). A run of camera pixel c in projector row ``first[c] + r``
+is from column ``starts[c, r]`` up to the one before ``stops[c, r]``; see `Runs`.
+
+Index convention: c runs over camera pixels, i over channels, r over rows of runs, m over functions
+of far-range light.
+"""
+
+import numpy as np
+
+from nearfar.arrays import Floats, Integers
+from nearfar.compiled import compiled
+
+
+@compiled
+def runs_of_discs(
+    q: Floats,
+    radius: float,
+    size: tuple[int, int],
+    first: Integers,
+    starts: Integers,
+    stops: Integers,
+) -> None:
+    """Find the runs of projector pixels nearer to q, (n, 2), than a radius; none where q is NaN."""
+    height, width = size
+    rows = starts.shape[1]
+    for c in range(len(q)):
+        y, x = np.float64(q[c, 0]), np.float64(q[c, 1])
+        starts[c], stops[c], first[c] = 0, 0, 0
+        if np.isnan(y) or np.isnan(x):
+            continue
+        first[c] = max(0, min(int(np.floor(y - min(radius, 2.0 * height))), height - rows))
+        for r in range(rows):
+            squared = radius**2 - (first[c] + r - y) ** 2
+            if squared > 0:
+                half = np.sqrt(squared)
+                start = max(0, int(np.floor(max(x - half, -1.0))) + 1)
+                stop = min(width, int(np.ceil(min(x + half, np.float64(width)))))
+                if stop > start:
+                    starts[c, r], stops[c, r] = start, stop
+
+
+@compiled
+def runs_of_bands(
+    lines: Floats, width: float, size: tuple[int, int], starts: Integers, stops: Integers
+) -> None:
+    """Find the runs of projector pixels at most half of a width from lines (n, 3).
+
+    A line is a x + b y + c = 0; all zero in a and b, it is none.
+    """
+    half = 0.5 * width
+    for n in range(len(lines)):
+        starts[n], stops[n] = 0, 0
+        norm = np.hypot(lines[n, 0], lines[n, 1])
+        if norm == 0:
+            continue
+        a, b, offset = lines[n, 0] / norm, lines[n, 1] / norm, lines[n, 2] / norm
+        for y in range(size[0]):
+            apart = b * y + offset
+            if abs(a) <= 2.3e-16:
+                stops[n, y] = size[1] if abs(apart) <= half else 0
+                continue
+            # The columns x of a row with |a x + apart| <= half.
+            ends = ((-half - apart) / a, (half - apart) / a)
+            low, high = max(min(ends), 0.0), min(max(ends), size[1] - 1.0)
+            if low <= high:
+                starts[n, y], stops[n, y] = int(np.ceil(low)), int(np.floor(high)) + 1
+
+
+@compiled
+def sum_along_rows(
+    light: Floats,
+    down: tuple[Floats, Floats],
+    across: tuple[Floats, Floats],
+    first: int,
+    table: Floats,
+) -> None:
+    """Sum light times functions of far-range light along projector rows from `first` on.
+
+    Parameters
+    ----------
+    light : ndarray, shape (n, Px), float32
+        Of these rows.
+    down, across : tuple of ndarray, shapes (Py, M) and (Px, M), float32
+        A function is the sum of two products of one of `down` and one of `across`.
+    table : ndarray, shape (n, Px + 1, M), float32
+        Gets the sum of all pixels before each column.
+    """
+    count = table.shape[2]
+    sums = np.empty(count)
+    for y in range(len(light)):
+        sums[:] = 0.0
+        table[y, 0] = 0.0
+        one, two = down[0][first + y], down[1][first + y]
+        for x in range(light.shape[1]):
+            value, here = light[y, x], table[y, x + 1]
+            one_across, two_across = across[0][x], across[1][x]
+            for m in range(count):
+                sums[m] += value * (one[m] * one_across[m] + two[m] * two_across[m])
+            for m in range(count):
+                here[m] = sums[m]
+
+
+@compiled
+def add_far(
+    table: Floats, far: Floats, first: Integers, starts: Integers, stops: Integers, out: Floats
+) -> None:
+    """Add far-range light, (n, channels, M), of a table that `sum_along_rows` made."""
+    count, rows = far.shape[2], starts.shape[1]
+    sums = np.empty(count, dtype=np.float32)
+    for c in range(len(far)):
+        sums[:] = 0.0
+        # Two rows at once, so that the sums are read and written half as often.
+        for r in range(0, rows, 2):
+            s = min(r + 1, rows - 1)
+            if stops[c, r] <= starts[c, r] and stops[c, s] <= starts[c, s]:
+                continue
+            upper, lower = table[first[c] + r, stops[c, r]], table[first[c] + r, starts[c, r]]
+            if s == r:
+                for m in range(count):
+                    sums[m] += upper[m] - lower[m]
+                continue
+            more, less = table[first[c] + s, stops[c, s]], table[first[c] + s, starts[c, s]]
+            for m in range(count):
+                sums[m] += (upper[m] - lower[m]) + (more[m] - less[m])
+        for i in range(far.shape[1]):
+            factors, total = far[c, i], np.float32(0.0)
+            for m in range(count):
+                total += factors[m] * sums[m]
+            out[c, i] += total
+
+
+@compiled
+def add_window(
+    light: Floats,
+    near: Floats,
+    centres: Integers,
+    first: Integers,
+    starts: Integers,
+    stops: Integers,
+    out: Floats,
+) -> None:
+    """Add near-range light of single pixels, (n, channels, W, W), about centres (n, 2)."""
+    side = near.shape[2]
+    for c in range(len(near)):
+        top, left = centres[c, 0] - side // 2, centres[c, 1] - side // 2
+        for w in range(side):
+            y = top + w
+            r = y - first[c]
+            if y < 0 or y >= light.shape[0] or r < 0 or r >= starts.shape[1]:
+                continue
+            start, stop = max(starts[c, r], left), min(stops[c, r], left + side)
+            if stop <= start:
+                continue
+            lit = light[y, start:stop]
+            for i in range(near.shape[1]):
+                entries, total = near[c, i, w, start - left : stop - left], np.float32(0.0)
+                for x in range(len(lit)):
+                    total += entries[x] * lit[x]
+                out[c, i] += total
+
+
+@compiled
+def add_hats(
+    sums: tuple[Floats, Floats],
+    grid: Floats,
+    pitch: int,
+    centres: Integers,
+    first: Integers,
+    starts: Integers,
+    stops: Integers,
+    out: Floats,
+) -> None:
+    """Add near-range light of the hats of one pitch about centres (n, 2).
+
+    In a projector row it is a polygon between the hats' middles.
+
+    Parameters
+    ----------
+    sums : tuple of ndarray, shape (Py, Px + 1), float64
+        Of light, and of light times column, along rows, before each column.
+    grid : ndarray, shape (n, channels, side, side), float32
+        Coefficients of the hats.
+    """
+    plain, moments = sums
+    side, half = grid.shape[2], grid.shape[2] // 2
+    for c in range(len(grid)):
+        top, left = centres[c, 0] - half * pitch, centres[c, 1] - half * pitch
+        for r in range(starts.shape[1]):
+            start, stop = starts[c, r], stops[c, r]
+            down = first[c] + r - top
+            if stop <= start or down <= -pitch or down >= side * pitch:
+                continue
+            y = first[c] + r
+            above = down // pitch
+            part = (down - above * pitch) / pitch
+            # Segments between the middles of two hats; before the first and after the last it is 0.
+            begin = max((start - left) // pitch, -1)
+            end = min((stop - 1 - left) // pitch, side - 1)
+            for segment in range(begin, end + 1):
+                origin = left + segment * pitch
+                low, high = max(start, origin), min(stop, origin + pitch)
+                lit = plain[y, high] - plain[y, low]
+                ramp = (moments[y, high] - moments[y, low] - origin * lit) / pitch
+                for i in range(grid.shape[1]):
+                    value = 0.0
+                    for step, row_share in ((0, 1.0 - part), (1, part)):
+                        row = above + step
+                        if row < 0 or row >= side:
+                            continue
+                        if segment >= 0:
+                            value += row_share * grid[c, i, row, segment] * (lit - ramp)
+                        if segment + 1 < side:
+                            value += row_share * grid[c, i, row, segment + 1] * ramp
+                    out[c, i] += value / (pitch * pitch)
+
+
+@compiled
+def add_corners(
+    light: Floats,
+    direct: Floats,
+    pixels: Integers,
+    weights: Floats,
+    first: Integers,
+    starts: Integers,
+    stops: Integers,
+    out: Floats,
+) -> None:
+    """Add direct light, (n, channels), of the four flat projector pixels of footprints, (n, 4)."""
+    width = light.shape[1]
+    for c in range(len(direct)):
+        total = np.float32(0.0)
+        for k in range(pixels.shape[1]):
+            y, x = pixels[c, k] // width, pixels[c, k] % width
+            r = y - first[c]
+            if 0 <= r < starts.shape[1] and starts[c, r] <= x < stops[c, r]:
+                total += weights[c, k] * light[y, x]
+        for i in range(direct.shape[1]):
+            out[c, i] += direct[c, i] * total
+
+
+@compiled
+def add_boxes(
+    light: Floats,
+    direct: Floats,
+    middles: Floats,
+    sides: Floats,
+    first: Integers,
+    starts: Integers,
+    stops: Integers,
+    out: Floats,
+) -> None:
+    """Add direct light, (n, channels), of two boxes; middles (2, n, 2) are NaN where it has none.
+
+    Each projector pixel counts by the share of a box, of sides (n, 2), that it covers.
+    """
+    for c in range(len(direct)):
+        total, high, wide = 0.0, sides[c, 0], sides[c, 1]
+        for box in range(len(middles)):
+            y, x = middles[box, c, 0], middles[box, c, 1]
+            if np.isnan(y) or np.isnan(x):
+                continue
+            top, left = y - 0.5 * high, x - 0.5 * wide
+            for row in range(int(np.floor(top + 0.5)), int(np.ceil(top + high + 0.5))):
+                r = row - first[c]
+                if r < 0 or r >= starts.shape[1]:
+                    continue
+                down = min(row + 0.5, top + high) - max(row - 0.5, top)
+                begin = max(starts[c, r], int(np.floor(left + 0.5)))
+                for column in range(begin, min(stops[c, r], int(np.ceil(left + wide + 0.5)))):
+                    across = min(column + 0.5, left + wide) - max(column - 0.5, left)
+                    total += light[row, column] * down * across
+        for i in range(direct.shape[1]):
+            out[c, i] += direct[c, i] * total / (len(middles) * high * wide)

@@ -1,0 +1,283 @@
+"""Lights that compensate a scene, corrected by photos of them on a rig.
+
+What a transport does not know of a rig, such as a response that is not linear, shows in a photo of
+the light: where it is darker than wanted, the light is raised there by D^-1 of what is missing.
+What a correction changes in the next photo tells the slope of the projector's response at each
+projector pixel, by which later corrections are divided (Broyden's method with a diagonal matrix).
+A correction that the photos do not confirm is taken back.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, isfinite, log10, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from nearfar.applications.compensate import (
+    LEAST_DIAGONAL,
+    Compensation,
+    camera_weights,
+)
+from nearfar.applications.onto_projector import OntoProjector, onto_projector
+from nearfar.arrays import Booleans, Floats
+from nearfar.callbacks import Report, as_report
+from nearfar.checks import as_count, require_instance
+from nearfar.errors import InputError
+from nearfar.rigs.base import Rig
+from nearfar.transport.colour import mixing_of
+from nearfar.transport.model import Transport
+
+MOST_CORRECTIONS = 3
+# Slope of the response that the first correction takes for granted: it falls short of what a
+# linear projector needs, as one of gamma 2.2 has twice its slope at white.
+FIRST_SLOPE = 1.4
+SLOPES = (0.3, 4.0)
+# Slopes are those of projector pixels within so many, and of the first where little has changed.
+SLOPE_WIDTH = 1.5
+LEAST_CHANGE = 0.01
+# Where a correction made a photo worse, the next one is at most so much of it.
+BACK = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A light that photos of it have corrected.
+
+    Attributes
+    ----------
+    light : ndarray, shape (Py, Px) or (Py, Px, channels), float32
+        The one whose photo was nearest to what is wanted, in steps of 1/255.
+    photo : ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+        Its photo, less one under black; photo units.
+    errors : tuple of float
+        Distance of each photo so far from what is wanted, root mean square over camera pixels with
+        direct light; that of the light as it was given is the first.
+    peak : float
+        Greatest value of what is wanted.
+
+    Examples
+    --------
+    >>> wanted = 0.5 * (transport @ np.ones((8, 8), dtype=np.float32))
+    >>> found = nearfar.compensate(transport, wanted, scale=1.0)
+    >>> with nearfar.open_rig("scene.npy", (8, 8)) as rig:
+    ...     refined = nearfar.refine_compensation(transport, found, rig, corrections=1)
+    >>> refined.rmse == min(refined.errors)
+    True
+    """
+
+    light: Floats
+    photo: Floats
+    errors: tuple[float, ...]
+    peak: float
+
+    @property
+    def rmse(self) -> float:
+        """Distance of `photo` from what is wanted."""
+        return min(self.errors)
+
+    @property
+    def psnr(self) -> float:
+        """`rmse` below `peak`, in dB."""
+        return self._decibels(self.rmse)
+
+    @property
+    def psnr_before(self) -> float:
+        """The same of the light as it was given."""
+        return self._decibels(self.errors[0])
+
+    def _decibels(self, rmse: float) -> float:
+        return 20 * log10(self.peak / rmse) if rmse > 0 else inf
+
+
+def refine_compensation(
+    transport: Transport,
+    found: Compensation,
+    rig: Rig,
+    corrections: int = 2,
+    *,
+    progress: Report | None = None,
+) -> Refinement:
+    """Correct a light that compensates a scene by photos of it.
+
+    Each photo of a light is taken after one of black, which is subtracted. There is one more than
+    there are corrections, as the last one is confirmed too.
+
+    Parameters
+    ----------
+    transport : Transport
+    found : Compensation
+        Of `nearfar.compensate`.
+    rig : Rig
+        Before the same scene, at the exposure of the transport's photos.
+    corrections : int
+        1 to 3.
+    progress : callable, optional
+        Called with "photos" and the share of them that is taken.
+
+    Returns
+    -------
+    Refinement
+
+    Raises
+    ------
+    InputError
+        If the rig has another projector or other photos than the transport, or for another number
+        of corrections.
+    DeviceError
+        If a photo cannot be taken.
+
+    Examples
+    --------
+    >>> wanted = np.full(transport.camera, 0.2, dtype=np.float32)
+    >>> found = nearfar.compensate(transport, wanted)
+    >>> with nearfar.open_rig("scene.npy", (8, 8)) as rig:
+    ...     refined = nearfar.refine_compensation(transport, found, rig)
+    >>> len(refined.errors)
+    3
+    """
+    report = as_report(progress)
+    steps = refinements(transport, found, rig, corrections)
+    best = next(steps)
+    report("photos", 1 / (corrections + 1))
+    for best in steps:
+        report("photos", len(best.errors) / (corrections + 1))
+    return best
+
+
+def refinements(
+    transport: Transport, found: Compensation, rig: Rig, corrections: int
+) -> Iterator[Refinement]:
+    """Yield what is best after each photo; see `refine_compensation`."""
+    require_instance(transport, Transport, "transport", "nearfar.load_transport")
+    require_instance(found, Compensation, "compensation", "nearfar.compensate")
+    if not 1 <= as_count(corrections, "the number of corrections") <= MOST_CORRECTIONS:
+        raise InputError(f"{corrections} corrections were asked for: give 1 to {MOST_CORRECTIONS}.")
+    if rig.projector != transport.projector:
+        raise InputError(
+            f"the transport is of a projector of {transport.projector}, the rig has "
+            f"{rig.projector}: give the rig that the transport was measured with."
+        )
+    target = found.target.astype(np.float64).reshape(*transport.camera, transport.channels)
+    correction = _correction(transport)
+    counted = camera_weights(transport)[..., 0] > 0
+    best = shown = _shown(transport, rig, found.light, target, counted, 0)
+    errors = [shown.error]
+    yield _refinement(best, errors, target, counted, transport)
+    slope, share = np.full_like(best.light, FIRST_SLOPE), 1.0
+    for number in range(1, corrections + 1):
+        step = share * correction.of(best.missing) / slope
+        light = np.clip(best.light + step, 0.0, 1.0)
+        shown = _shown(transport, rig, light, target, counted, 2 * number)
+        errors.append(shown.error)
+        slope = _slope(shown.light - best.light, correction.of(best.missing - shown.missing))
+        if shown.error < best.error:
+            best, share = shown, 1.0
+        else:
+            share *= BACK
+        yield _refinement(best, errors, target, counted, transport)
+
+
+def describe_photos(refined: Refinement) -> dict[str, Any]:
+    """Return what photos of the lights showed, as JSON types."""
+    found = {"psnr_before_dB": refined.psnr_before, "psnr_refined_dB": refined.psnr}
+    return {
+        "photo_rmse": list(refined.errors),
+        **{name: value if isfinite(value) else None for name, value in found.items()},
+    }
+
+
+def summarise_photos(refined: Refinement) -> str:
+    """Return in a line what `describe_photos` says."""
+    return (
+        f"photos of the light: {refined.psnr_before:.1f} dB before corrections, "
+        f"{refined.psnr:.1f} dB after"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """A light (Py, Px, colours) that was photographed, and what its photo lacks."""
+
+    light: Floats
+    missing: Floats
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Correction:
+    """D^-1, for pictures (Cy, Cx, channels) and lights (Py, Px, colours)."""
+
+    onto: OntoProjector
+    trust: Floats
+    colours: Floats
+
+    def of(self, picture: Floats) -> Floats:
+        """Return the light whose direct light is a picture, less where little of it is seen."""
+        return np.asarray((self.trust * self.onto(picture)) @ self.colours.T)
+
+
+def _correction(transport: Transport) -> _Correction:
+    channels = transport.channels
+    seen = camera_weights(transport).reshape(-1, 1) > 0
+    white = np.where(seen, transport.direct.reshape(-1, channels), 0.0)
+    onto = onto_projector(transport.correspondence, white, transport.projector)
+    lit = onto.weights[onto.weights > 0]
+    least = LEAST_DIAGONAL * float(np.median(lit)) if lit.size else 1.0
+    known = onto.weights > 0
+    trust = np.where(known, onto.weights / (onto.weights + least), 1.0)
+    mixing = mixing_of(channels, transport.provenance) if channels > 1 else None
+    colours = np.eye(channels) if mixing is None else np.linalg.pinv(mixing)
+    return _Correction(onto, trust, colours)
+
+
+def _shown(
+    transport: Transport,
+    rig: Rig,
+    light: Floats,
+    target: Floats,
+    counted: Booleans,
+    first: int,
+) -> _Shown:
+    """Photograph black and a light, and compare them with what is wanted."""
+    pattern = np.rint(255 * np.clip(light, 0.0, 1.0)).astype(np.uint8)
+    pattern = pattern[..., 0] if pattern.ndim == 3 and pattern.shape[2] == 1 else pattern
+    black = np.zeros(transport.projector, dtype=np.uint8)
+    photos: list[NDArray[Any]] = list(rig.shoot([black, pattern], first))
+    under_black, photo = (one.astype(np.float64) / rig.full_scale for one in photos)
+    if photo.shape != target.shape:
+        shape = "x".join(map(str, photo.shape))
+        wanted = "x".join(map(str, target.shape))
+        raise InputError(
+            f"the rig's photos are {shape}, those of the transport {wanted} (height x width x "
+            f"channels): give the rig that the transport was measured with."
+        )
+    missing = target - (photo - under_black)
+    error = sqrt(float(np.mean(missing[counted] ** 2)))
+    levels = pattern.astype(np.float64) / 255
+    return _Shown(levels.reshape(*transport.projector, -1), missing, error)
+
+
+def _slope(change: Floats, seen: Floats) -> Floats:
+    """Return what a change of light did to photos over what D says, (Py, Px, colours)."""
+    width = (SLOPE_WIDTH, SLOPE_WIDTH, 0)
+    both = ndimage.gaussian_filter(seen * change, width)
+    squares = ndimage.gaussian_filter(change**2, width)
+    known = LEAST_CHANGE**2
+    return np.clip((both + FIRST_SLOPE * known) / (squares + known), *SLOPES)
+
+
+def _refinement(
+    best: _Shown, errors: list[float], target: Floats, counted: Booleans, transport: Transport
+) -> Refinement:
+    one = transport.channels == 1
+    photo = (target - best.missing).astype(np.float32)
+    light = best.light.astype(np.float32)
+    return Refinement(
+        light=light[..., 0] if light.shape[2] == 1 else light,
+        photo=photo[..., 0] if one else photo,
+        errors=tuple(errors),
+        peak=float(target[counted].max()),
+    )

@@ -12,6 +12,7 @@ from tests.viewer.conftest import browser
 __all__ = ["browser"]
 
 LOW, HIGH = 10.0, 50.0
+LIGHTS = ("black", "grey light", "light grey", "white", "blue")
 PARTS = ("First part", "Second part", "Third part")
 
 
@@ -28,7 +29,8 @@ def opened(browser, values, tmp_path):
     saturated = np.zeros(values.shape, dtype=bool)
     saturated[2, 1] = True
     body = "".join(f"<h2>{part}</h2>" for part in PARTS)
-    body += gallery(["light"], [("row", [picture(np.full((4, 4), 0.2), "grey light")])])
+    lights = [picture(np.full((4, 4), 0.2 * k), name) for k, name in enumerate(LIGHTS)]
+    body += gallery(list(LIGHTS), [("row", lights)])
     body += colour_map(values, LOW, HIGH, "dB", "a map", saturated=saturated, step=3)
     path = tmp_path / "page.html"
     path.write_text(page("a page", body))

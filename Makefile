@@ -28,7 +28,7 @@ check: lint types layers test
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/oxlint --deny-warnings src/nearfar/viewer
+	$(BIN)/oxlint --deny-warnings src/nearfar/viewer src/nearfar/report
 
 types: $(READY)
 	$(BIN)/mypy

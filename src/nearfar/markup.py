@@ -1,4 +1,4 @@
-"""Fragments of HTML that need no other files: pictures are embedded, and there are no scripts."""
+"""Fragments of HTML that need no other files: pictures are embedded."""
 
 import base64
 from collections.abc import Collection

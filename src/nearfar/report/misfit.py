@@ -38,6 +38,7 @@ def misfit_section(misfit: MisfitMaps | None) -> str:
         reading="A bright patch holds something that moved, or light that the model does not hold, "
         f"such as a mirror's; stripes all over come from single bad photos.{cell}",
         saturated=misfit.saturated,
+        step=misfit.cell,
     )
     by_frequency = plot(
         _by_frequency(misfit),

@@ -1,11 +1,13 @@
-"""Self-contained HTML pages: pictures inside, no script, nothing fetched."""
+"""Self-contained HTML pages: pictures inside, nothing fetched, readable without their script."""
 
-import base64
+import json
 import re
 from html import escape
-from io import BytesIO
+from importlib.resources import files
+from io import StringIO
 from pathlib import Path
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from nearfar.arrays import Booleans, Floats
@@ -26,6 +28,17 @@ _THEMES = (
     f"@media (prefers-color-scheme: dark) {{ :root:not([data-theme=light]) {{ {_DARK} }} }}\n"
     f":root[data-theme=dark] {{ {_DARK} }}\n"
 )
+
+# Colours of plots, and what they become in a page: legible in both themes.
+INKS = {
+    "#000000": "currentColor",
+    "#111111": "currentColor",
+    "#1f4e9c": "var(--mark)",
+    "#c2561a": "var(--near)",
+    "#3f9e74": "var(--far)",
+}
+# A page of fewer parts needs no links to them.
+FEWEST_LINKED_PARTS = 3
 
 SATURATED_KEY = '<figcaption class="mark">saturated: not measured</figcaption>'
 
@@ -91,6 +104,32 @@ figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }
 )
 
 
+# Of pages alone, not of the viewer.
+_PAGE_STYLE = """
+main img { cursor: zoom-in; box-shadow: 0 0 0 1px var(--line); }
+main a img { cursor: pointer; }
+.contents { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; font-size: .9rem;
+  margin: 0 0 1.2rem; padding: 0 0 .7rem; border-bottom: 1px solid var(--line); }
+.contents a { color: var(--soft); text-decoration: none; }
+.contents a:hover, .contents a:focus { color: var(--mark); text-decoration: underline; }
+h2 { scroll-margin-top: 1rem; }
+@media (min-width: 1500px) {
+  .contents { position: fixed; top: 2.6rem; left: max(1.5rem, 50vw - 590px - 12rem); width: 10.5rem;
+    flex-direction: column; border: 0; }
+}
+.under-pointer { font-variant-numeric: tabular-nums; color: var(--ink); }
+.sheet svg { width: 100%; height: auto; color: var(--ink); }
+.sheet svg text { fill: currentColor; font-family: inherit !important; }
+dialog { border: 0; padding: 0; background: transparent; max-width: 96vw; max-height: 96vh; }
+dialog::backdrop { background: rgb(0 0 0 / .82); }
+dialog img { width: auto; height: min(88vh, 92vw); max-width: 96vw; object-fit: contain;
+  cursor: zoom-out; }
+dialog p { color: #e8eaed; text-align: center; margin: .5rem auto 0; }
+@media print { .contents { display: none; } }
+"""
+_SCRIPT = files("nearfar.report").joinpath("page.js")
+
+
 def page(
     title: str, body: str, *, methods: Methods | None = None, command: str | None = None
 ) -> str:
@@ -99,16 +138,37 @@ def page(
     Parameters
     ----------
     title, body : str
+        Each <h2> of the body has a link at the page's top, where there are several.
     methods : Methods, optional
     command : str, optional
         The command line that was typed.
     """
+    contents, headed = _with_contents(f"{body}\n{about_page(methods, command)}")
+    script = _SCRIPT.read_text(encoding="utf-8")
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f"{body}\n{about_page(methods, command)}\n</main>\n</body>\n</html>\n"
+        f"<title>{escape(title)}</title>\n<style>{STYLE}{_PAGE_STYLE}</style>\n</head>\n<body>\n"
+        f"<main>\n{contents}{headed}\n</main>\n"
+        f'<script type="module">\n{script}</script>\n</body>\n</html>\n'
     )
+
+
+def _with_contents(body: str) -> tuple[str, str]:
+    """Return links to the <h2> of a body, and the body with an id on each."""
+    found: list[tuple[str, str]] = []
+
+    def named(heading: re.Match[str]) -> str:
+        known = re.search(r'id="([^"]+)"', heading[1])
+        name = known[1] if known else f"part-{len(found) + 1}"
+        found.append((name, heading[2]))
+        return heading[0] if known else f'<h2 id="{name}"{heading[1]}>{heading[2]}</h2>'
+
+    headed = re.sub(r"<h2([^>]*)>(.*?)</h2>", named, body)
+    if len(found) < FEWEST_LINKED_PARTS:
+        return "", headed
+    links = "".join(f'<a href="#{name}">{title}</a>' for name, title in found)
+    return f'<nav class="contents" aria-label="contents">{links}</nav>\n', headed
 
 
 def colour_map(
@@ -120,6 +180,7 @@ def colour_map(
     *,
     reading: str = "",
     saturated: Booleans | None = None,
+    step: int = 1,
 ) -> str:
     """Return a <figure> of values in false colour with its scale.
 
@@ -134,15 +195,19 @@ def colour_map(
         How to read it, a sentence or two.
     saturated : ndarray of bool, shape (y, x), optional
         Camera pixels that are marked as saturated.
+    step : int
+        Rows and columns of the camera from one value to the next.
     """
     stops = ", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SCALE)
     digits = 0 if high - low >= 10 else 1
-    ends = "".join(f"<span>{value:.{digits}f} {escape(unit)}</span>" for value in (low, high))
+    first, last = (f"<span>{value:.{digits}f} {escape(unit)}</span>" for value in (low, high))
     marks = saturated is not None and bool(saturated.any())
+    data = f'data-low="{low:.9g}" data-high="{high:.9g}" data-unit="{escape(unit)}"'
     return (
-        f"<figure>{embedded(false_colour(values, low, high, saturated), caption)}"
+        f'<figure {data} data-step="{step}" data-stops="{json.dumps(SCALE.tolist())}">'
+        f"{embedded(false_colour(values, low, high, saturated), caption)}"
         f'<div class="bar" style="background: linear-gradient(to right, {stops})"></div>'
-        f'<div class="scale">{ends}</div>'
+        f'<div class="scale">{first}<span class="under-pointer"></span>{last}</div>'
         f"{figure_caption(caption, reading)}"
         f"{SATURATED_KEY if marks else ''}</figure>"
     )
@@ -200,12 +265,27 @@ def write_page(path: Path, text: str, *, force: bool = False) -> None:
 
 
 def plot(figure: Figure, description: str, reading: str = "") -> str:
-    """Return a <figure> of a plot, with how to read it."""
-    data = BytesIO()
-    with styled():
-        figure.savefig(data, format="png", dpi=DPI, metadata={"Software": None})
-    encoded = base64.b64encode(data.getvalue()).decode("ascii")
+    """Return a <figure> of a plot, with how to read it; its ink is that of the page.
+
+    Parameters
+    ----------
+    figure : Figure
+    description : str
+        What a reader who does not see it is told; different for each plot of a page.
+    reading : str
+        How to read it, a sentence or two.
+    """
+    drawn = StringIO()
+    # Names inside of a plot differ from those of the page's other plots, and stay the same.
+    with styled(), mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": description}):
+        nameless = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(drawn, format="svg", transparent=True, dpi=DPI, metadata=nameless)
+    text = drawn.getvalue()
+    vector = text[text.index("<svg") :]
+    for ink, themed in INKS.items():
+        vector = vector.replace(ink, themed)
+    label = f'<svg role="img" aria-label="{escape(description)}"'
     return (
-        f'<figure class="sheet"><img alt="{escape(description)}" '
-        f'src="data:image/png;base64,{encoded}">{figure_caption("", reading)}</figure>'
+        f'<figure class="sheet">{vector.replace("<svg", label, 1)}'
+        f"{figure_caption(description, reading)}</figure>"
     )

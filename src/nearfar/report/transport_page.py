@@ -164,7 +164,7 @@ def transport_page(
 {gallery(["light", *_names(transport), "relit"], _rows(transport, exposure))}
 <h2>Maps</h2>
 <p>Grey where there is no value, such as where no direct light is seen.</p>
-<div class="maps">{"".join(_map(each) for each in maps.values())}</div>
+<div class="maps">{"".join(_map(each, shown.step) for each in maps.values())}</div>
 {_how_sure(snr)}
 {told.further}
 <h2>Where it comes from</h2>
@@ -274,7 +274,7 @@ def _explain(snr: Map) -> str:
     )
 
 
-def _map(each: Map) -> str:
+def _map(each: Map, step: int) -> str:
     return colour_map(
         each.values,
         each.low,
@@ -283,6 +283,7 @@ def _map(each: Map) -> str:
         each.title,
         reading=each.reading,
         saturated=each.saturated,
+        step=step,
     )
 
 

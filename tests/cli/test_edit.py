@@ -35,7 +35,7 @@ def test_far_light_is_cut_between_masks(job):
     np.testing.assert_array_equal(nearfar.load_transport(out).far, expected.far)
     swapped = f"{projector}:{camera}"
     ran = run_nearfar("edit", job.transport, job.folder / "no.zarr", "--cut-far", swapped)
-    check_sentence(ran, projector, "give a mask of 8x9")
+    check_sentence(ran, projector, "give a picture of 8x9")
     for spoilt in (camera, projector):
         ran = run_nearfar(
             "edit", job.transport, spoilt, "--cut-far", f"{camera}:{projector}", "--force"

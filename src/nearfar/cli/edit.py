@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from nearfar.arrays import Floats, Size
+from nearfar.cli.lights import read_grey
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
-from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -114,20 +113,8 @@ def _edited(
         return editing.recolour(transport, name, each), f"{name} light recoloured"
     assert masks is not None
     sizes = (transport.camera, transport.projector)
-    cut = editing.cut_far(transport, *(_mask(*pair) for pair in zip(masks, sizes, strict=True)))
+    cut = editing.cut_far(transport, *(read_grey(*pair) for pair in zip(masks, sizes, strict=True)))
     return cut.transport, (
         f"far-range light cut; {cut.error:.0%} off an exact cut at single projector pixels, as "
         f"far-range light has no sharp edges"
     )
-
-
-def _mask(path: Path, size: Size) -> Floats:
-    """Read a mask of a size, grey."""
-    from nearfar.files import luminance, read_light_of_any_size
-
-    mask = read_light_of_any_size(path, srgb=False)
-    if mask.shape[:2] != size:
-        raise InputError(
-            f"{path} is {Size(*mask.shape[:2])}: give a mask of {size} (height x width)."
-        )
-    return np.asarray(luminance(mask) if mask.ndim == 3 else mask)

@@ -60,6 +60,10 @@ Use the transport
     probe                  relight by chosen projector pixels for each camera pixel
     ProbingMask            these: within a distance of q, a ring, a band about a line, any
     dual_view              the scene as the projector sees it, lit from the camera
+    widen_subsurface       let light travel farther under translucent surfaces, or less far
+    recolour               change the colour of one component
+    cut_far                cut far-range light between regions of the projector and the camera
+    Cut                    the transport without that light, and how well it is cut
 
 Lights to relight under
     white                  full white
@@ -122,6 +126,7 @@ if TYPE_CHECKING:
     from nearfar.applications.bounces import Bounces, bounces
     from nearfar.applications.compensate import Compensation, compensate
     from nearfar.applications.dual import dual_view
+    from nearfar.applications.editing import Cut, cut_far, recolour, widen_subsurface
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
     from nearfar.arrays import Size, parse_size
@@ -200,6 +205,10 @@ _HOMES = {
     "probe": "nearfar.applications.probe",
     "ProbingMask": "nearfar.applications.masks",
     "dual_view": "nearfar.applications.dual",
+    "widen_subsurface": "nearfar.applications.editing",
+    "recolour": "nearfar.applications.editing",
+    "cut_far": "nearfar.applications.editing",
+    "Cut": "nearfar.applications.editing",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -260,6 +269,10 @@ __all__ = [  # noqa: RUF022
     "probe",
     "ProbingMask",
     "dual_view",
+    "widen_subsurface",
+    "recolour",
+    "cut_far",
+    "Cut",
     "white",
     "natural_picture",
     "penguin",

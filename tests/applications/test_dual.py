@@ -53,6 +53,33 @@ def test_a_stored_transport_gives_the_same_with_components_apart(make, tmp_path,
     np.testing.assert_allclose(direct, transposed(only, picture), atol=1e-4)
 
 
+def test_flat_fields_are_divided_out(tmp_path):
+    """A transport behind two lenses that dim the corners, and the same without them."""
+    plain = WORLDS["single pixels"]()
+    of_camera, of_projector = (
+        np.random.default_rng(i).uniform(0.3, 1.0, size).astype(np.float32)
+        for i, size in enumerate((CAMERA, PROJECTOR))
+    )
+    matrices = np.moveaxis(plain.dense(), 1, 0)
+    dimmed = matrices * of_camera.reshape(-1, 1) * of_projector.ravel()
+    one, other = (nearfar.ExactTransport(PROJECTOR, CAMERA, (), (), m) for m in (matrices, dimmed))
+    flats = {"camera_flat": 50 * of_camera, "projector_flat": 3 * of_projector}
+    found = nearfar.dual_view(other, a_picture(), **flats)
+    expected = nearfar.dual_view(one, a_picture()) * of_camera.mean() * of_projector.mean()
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
+    save_transport(plain, tmp_path / "t.zarr")
+    stored = open_transport(tmp_path / "t.zarr")
+    np.testing.assert_allclose(
+        dual_view_of_stored(stored, a_picture(), {}, **flats),
+        nearfar.dual_view(plain, a_picture(), **flats),
+        rtol=1e-4,
+    )
+    with pytest.raises(InputError, match="flat field of the camera is 3x3"):
+        nearfar.dual_view(plain, camera_flat=np.ones((3, 3)))
+    with pytest.raises(InputError, match="flat field of the projector has values of 0"):
+        nearfar.dual_view(plain, projector_flat=np.zeros(PROJECTOR))
+
+
 @pytest.mark.parametrize(
     ("picture", "words"),
     [

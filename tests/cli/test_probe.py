@@ -37,6 +37,22 @@ def test_the_light_is_white_by_default(job):
     np.testing.assert_allclose(np.load(out), nearfar.dual_view(transport), rtol=1e-4)
 
 
+def test_flat_fields_are_divided_out_of_a_dual_view(job):
+    transport, out = nearfar.load_transport(job.transport), job.folder / "out.npy"
+    flats, options = {}, []
+    for number, (side, size) in enumerate(
+        (("camera", transport.camera), ("projector", transport.projector))
+    ):
+        flats[f"{side}_flat"] = np.random.default_rng(number).uniform(0.5, 1, size).astype("f4")
+        path = job.folder / f"{side}.npy"
+        np.save(path, flats[f"{side}_flat"])
+        options += [f"--{side}-flat", path]
+    check_done(run_nearfar("dual", job.transport, out, *options))
+    np.testing.assert_allclose(np.load(out), nearfar.dual_view(transport, **flats), rtol=1e-4)
+    np.save(path, np.zeros(transport.projector, np.float32))
+    check_sentence(run_nearfar("dual", job.transport, out, *options, "--force"), path, "black")
+
+
 def test_a_dual_view_of_one_component(job):
     transport, out = nearfar.load_transport(job.transport), job.folder / "out.npy"
     picture = np.random.default_rng(1).uniform(size=(8, 9)).astype(np.float32)

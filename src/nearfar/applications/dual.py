@@ -2,12 +2,16 @@
 
 Light travels both ways alike (Helmholtz), so that T^T relates a light on the camera's side to a
 picture on the projector's: Sen et al., "Dual photography", SIGGRAPH 2005.
+
+A lens dims light towards the corners. With the flat fields v of the camera and w of the projector,
+T is V T_0 W, and the view without both is T_0^T l = W^-1 T^T V^-1 l.
 """
 
 import numpy as np
 
 from nearfar.arrays import Floats, Size
 from nearfar.checks import as_light
+from nearfar.errors import InputError
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.exact_operator import ExactOperator
 from nearfar.transport.model import Transport
@@ -16,7 +20,11 @@ from nearfar.transport.stored import StoredTransport
 
 
 def dual_view(
-    transport: Transport | ExactTransport | ExactOperator, picture: Floats | None = None
+    transport: Transport | ExactTransport | ExactOperator,
+    picture: Floats | None = None,
+    *,
+    camera_flat: Floats | None = None,
+    projector_flat: Floats | None = None,
 ) -> Floats:
     """Return the scene as the projector sees it, lit from the camera: T^T by a picture.
 
@@ -25,6 +33,12 @@ def dual_view(
     transport : Transport, ExactTransport or ExactOperator
     picture : ndarray, shape (Cy, Cx) or (Cy, Cx, channels), optional
         Light at each camera pixel, grey for all channels or channel by channel; white if left out.
+    camera_flat : ndarray, shape (Cy, Cx) or (Cy, Cx, channels), optional
+        Flat field of the camera, in any unit: its photo of an evenly bright surface. The light is
+        divided by it over its mean.
+    projector_flat : ndarray, shape (Py, Px) or (Py, Px, channels), optional
+        That of the projector: the light of each of its pixels under white on an even surface. The
+        view is divided by it over its mean.
 
     Returns
     -------
@@ -36,7 +50,7 @@ def dual_view(
     ------
     InputError
         If the picture does not hold finite numbers, or has another size than the camera or other
-        channels.
+        channels; the same of the flat fields, which must be above 0.
 
     Examples
     --------
@@ -50,12 +64,20 @@ def dual_view(
     >>> bool(np.isclose(np.vdot(transport @ light, picture), np.vdot(light, dual), rtol=1e-4))
     True
     """
-    image = _image(picture, transport.camera, transport.channels)
-    return _shaped(transport.adjoint(image))
+    camera, projector, channels = transport.camera, transport.projector, transport.channels
+    image = _image(picture, camera, channels) / _flat(camera_flat, camera, channels, "camera")
+    flat = _flat(projector_flat, projector, channels, "projector")
+    seen = np.reshape(transport.adjoint(image), (*projector, channels))
+    return _shaped(seen / flat)
 
 
 def dual_view_of_stored(
-    stored: StoredTransport, picture: Floats | None, gains: dict[str, float]
+    stored: StoredTransport,
+    picture: Floats | None,
+    gains: dict[str, float],
+    *,
+    camera_flat: Floats | None = None,
+    projector_flat: Floats | None = None,
 ) -> Floats:
     """Return the dual view of a transport in a file, some rows of the camera at a time.
 
@@ -66,6 +88,8 @@ def dual_view_of_stored(
         As `dual_view` takes it.
     gains : dict of str to float
         Gain of each part, ``"direct"``, ``"near"``, ``"far"`` or ``"free"``; 1 where left out.
+    camera_flat, projector_flat : ndarray, optional
+        As `dual_view` takes them.
 
     Raises
     ------
@@ -74,13 +98,15 @@ def dual_view_of_stored(
     """
     require_parts(stored.parts, gains)
     image = _image(picture, stored.camera, stored.channels)
+    image = image / _flat(camera_flat, stored.camera, stored.channels, "camera")
+    flat = _flat(projector_flat, stored.projector, stored.channels, "projector")
     total, first = np.zeros((*stored.projector, stored.channels)), 0
     for rows in stored.blocks():
         lit = image[first : first + rows.camera.height]
         block = rows.with_gains(**gains) if gains else rows
         total += block.adjoint(lit).reshape(total.shape)
         first += rows.camera.height
-    return _shaped(total)
+    return _shaped(total / flat)
 
 
 def _image(picture: Floats | None, camera: Size, channels: int) -> Floats:
@@ -89,6 +115,20 @@ def _image(picture: Floats | None, camera: Size, channels: int) -> Floats:
         return np.ones((*camera, channels), dtype=np.float32)
     image = as_light(picture, camera, channels, name="picture", side="camera")
     return np.broadcast_to(image.reshape(*camera, -1), (*camera, channels))
+
+
+def _flat(flat: Floats | None, size: Size, channels: int, side: str) -> Floats:
+    """Return a flat field over its mean, (y, x, 1 or channels)."""
+    if flat is None:
+        return np.ones((1, 1, 1), dtype=np.float32)
+    name = f"flat field of the {side}"
+    field = as_light(flat, size, channels, name=name, side=side).reshape(*size, -1)
+    if field.min() <= 0:
+        raise InputError(
+            f"the {name} has values of 0 or below, by which nothing can be divided: give one that "
+            f"is bright everywhere."
+        )
+    return np.asarray(field / field.mean(axis=(0, 1)), dtype=np.float32)
 
 
 def _shaped(dual: Floats) -> Floats:

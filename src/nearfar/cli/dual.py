@@ -1,15 +1,20 @@
 """``nearfar dual``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nearfar.arrays import Size
 from nearfar.cli.gains import MODEL, gains_of
-from nearfar.cli.lights import Srgb, read_camera_picture
+from nearfar.cli.lights import Srgb, read_camera_picture, read_grey
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
 from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.errors import InputError
 from nearfar.progress import progress_bar
+
+if TYPE_CHECKING:
+    from nearfar.arrays import Floats
 
 
 def dual(
@@ -27,6 +32,18 @@ def dual(
         typer.Option(
             help="Gain of a component: direct=1, near=2 or far=0; for lamps free=2.",
             metavar="NAME=VALUE",
+        ),
+    ] = None,
+    camera_flat: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PICTURE", help="Flat field of the camera, which is divided out; linear."
+        ),
+    ] = None,
+    projector_flat: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PICTURE", help="Flat field of the projector, which is divided out; linear."
         ),
     ] = None,
     srgb: Srgb = False,
@@ -49,7 +66,7 @@ def dual(
                 param_hint="--gain",
             )
     check_picture_ending(output)
-    keep_input(output, transport, *([light] if light else []))
+    keep_input(output, transport, *filter(None, (light, camera_flat, projector_flat)))
     check_output(output, force=force)
     with progress_bar("making the dual view", quiet=quiet):
         require_reconstructed(transport)
@@ -57,5 +74,22 @@ def dual(
         warn_if_wrong(transport, opened.verdict)
         camera, channels = opened.camera, opened.channels
         sent = None if light is None else read_camera_picture(light, camera, channels, srgb=srgb)
-        write_picture(output, dual_view_of_stored(opened, sent, gains), force=force)
+        flats = {
+            "camera_flat": _flat(camera_flat, camera),
+            "projector_flat": _flat(projector_flat, opened.projector),
+        }
+        write_picture(output, dual_view_of_stored(opened, sent, gains, **flats), force=force)
     say(f"dual view of {opened.projector} written to {output}", quiet=quiet)
+
+
+def _flat(path: Path | None, size: Size) -> "Floats | None":
+    """Read a flat field of a size; None if none is given."""
+    if path is None:
+        return None
+    flat = read_grey(path, size)
+    if flat.min() <= 0:
+        raise InputError(
+            f"{path} is black somewhere, so that it is no flat field: give one that is bright "
+            f"everywhere."
+        )
+    return flat

@@ -56,6 +56,26 @@ def read_camera_picture(path: Path, camera: Size, channels: int, *, srgb: bool) 
     return np.asarray(luminance(picture) if picture.ndim == 3 and channels == 1 else picture)
 
 
+def read_grey(path: Path, size: Size) -> "Floats":
+    """Read a linear picture of a size as grey.
+
+    Raises
+    ------
+    InputError
+        If it has another size.
+    """
+    import numpy as np
+
+    from nearfar.files import luminance, read_light_of_any_size
+
+    picture = read_light_of_any_size(path, srgb=False)
+    if picture.shape[:2] != size:
+        raise InputError(
+            f"{path} is {Size(*picture.shape[:2])}: give a picture of {size} (height x width)."
+        )
+    return np.asarray(luminance(picture) if picture.ndim == 3 else picture)
+
+
 def say_resized(path: Path, given: Size, projector: Size, *, quiet: bool) -> None:
     """Print that a light was resized, if it was."""
     if given != projector:

@@ -20,7 +20,7 @@ from nearfar.transport import near
 from nearfar.transport.boxes import box_axes
 from nearfar.transport.components import Components
 from nearfar.transport.direct import footprint
-from nearfar.transport.gains import Gains, gains_on
+from nearfar.transport.gains import Gains, gains_on, why_unjudgeable
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import FreePosterior, PatternPosterior
 
@@ -66,12 +66,18 @@ def _variances_of(transport: Transport) -> Variances:
     """Return the posterior variances of a transport's rows, of whichever estimate they are."""
     posterior = transport.posterior
     if posterior is None:
-        cure = (
-            "its photos do not tell their own noise. Take some patterns twice, such as black and "
-            "white, or give reference photos of several lamps, and make the transport again."
-            if "free" in transport.parts
-            else "reconstruct a capture with `method='joint'`."
-        )
+        if why_unjudgeable(transport.provenance) is not None:
+            cure = (
+                "it was changed after it was reconstructed. Take those of the transport as it was."
+            )
+        elif "free" in transport.parts:
+            cure = (
+                "its photos do not tell their own noise. Take some patterns twice, such as black "
+                "and white, or give reference photos of several lamps, and make the transport "
+                "again."
+            )
+        else:
+            cure = "reconstruct a capture with `method='joint'`."
         raise InputError(f"this transport holds no error bars: {cure}")
     if isinstance(posterior, FreePosterior):
         return FreeVariances(transport, posterior)

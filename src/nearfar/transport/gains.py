@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from nearfar.checks import as_number
+from nearfar.transport.edits import edits_of
 from nearfar.transport.parts import Parts, require_parts
 
 GAINS = "gains"
@@ -88,8 +89,13 @@ def with_gains(provenance: Mapping[str, Any], gains: Gains) -> dict[str, Any]:
 def why_unjudgeable(provenance: Mapping[str, Any]) -> str | None:
     """Return why a transport of a provenance cannot be judged, a predicate of it, and the cure.
 
-    None if no gains changed it.
+    None if neither gains nor edits changed it.
     """
+    if edits_of(provenance):
+        return (
+            "was edited after it was reconstructed, so that the photos of its capture do not tell "
+            "how far it can be trusted: judge the transport as it was reconstructed."
+        )
     gains = gains_of(provenance)
     if gains == Gains():
         return None

@@ -14,6 +14,7 @@ from nearfar.files.stores import open_array, open_store, read_selection
 from nearfar.illumination.frequencies import frequency_from_text
 from nearfar.illumination.near_basis import basis_of
 from nearfar.illumination.real_basis import RealBasis, real_basis
+from nearfar.transport.edits import edits_of
 from nearfar.transport.gains import gains_of
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS, Parts, parts_from_json
@@ -155,6 +156,7 @@ def open_transport(path: AnyPath) -> StoredTransport:
         frequencies = [frequency_from_text(k) for k in listed(group.attrs["far_frequencies"])]
         provenance = dict(mapped(group.attrs["provenance"]))
         gains_of(provenance)
+        edits_of(provenance)
         if POSTERIOR in group.attrs:
             described_as = mapped(group.attrs[POSTERIOR])
             posterior = shared_posterior(described_as, group, POSTERIOR, projector)

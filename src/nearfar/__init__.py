@@ -53,6 +53,9 @@ Use the transport
     PhysicalErrorBars      standard deviations of its components and pictures
     compensate             find the light under which the scene looks like a picture
     Compensation           that light, and how near its photo is expected to come
+    relight_together       relight by several projectors before one camera
+    compensate_together    find the lights of several projectors that make a picture together
+    JointCompensation      these lights, and how near their photo is expected to come
     bounces                take a relit picture apart by how often its light was reflected
     Bounces                pictures of the first, second ... bounce
     probe                  relight by chosen projector pixels for each camera pixel
@@ -119,9 +122,11 @@ if TYPE_CHECKING:
 
     from nearfar.applications.bounces import Bounces, bounces
     from nearfar.applications.compensate import Compensation, compensate
+    from nearfar.applications.compensate_together import JointCompensation, compensate_together
     from nearfar.applications.dual import dual_view
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
+    from nearfar.applications.several_projectors import relight_together
     from nearfar.arrays import Size, parse_size
     from nearfar.capture import Capture, open_capture, write_capture
     from nearfar.correspondence import (
@@ -190,6 +195,9 @@ _HOMES = {
     "PhysicalErrorBars": "nearfar.estimate.physical",
     "compensate": "nearfar.applications.compensate",
     "Compensation": "nearfar.applications.compensate",
+    "relight_together": "nearfar.applications.several_projectors",
+    "compensate_together": "nearfar.applications.compensate_together",
+    "JointCompensation": "nearfar.applications.compensate_together",
     "bounces": "nearfar.applications.bounces",
     "Bounces": "nearfar.applications.bounces",
     "probe": "nearfar.applications.probe",
@@ -248,6 +256,9 @@ __all__ = [  # noqa: RUF022
     "PhysicalErrorBars",
     "compensate",
     "Compensation",
+    "relight_together",
+    "compensate_together",
+    "JointCompensation",
     "bounces",
     "Bounces",
     "probe",

@@ -21,7 +21,7 @@ import numpy as np
 
 from nearfar.applications.least_squares import LeastSquares
 from nearfar.applications.onto_projector import onto_projector
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.callbacks import Report, as_report
 from nearfar.checks import as_image, as_number, require_instance
 from nearfar.errors import InputError
@@ -185,16 +185,27 @@ def _target(transport: Transport, wanted: Floats) -> Floats:
             "the transport has no direct light, so that no light makes a picture on the scene: "
             "give one that was measured with a projector."
         )
+    return wanted_picture(wanted, transport.camera, transport.channels, transport.lit)
+
+
+def wanted_picture(wanted: Floats, camera: Size, channels: int, lit: Booleans) -> Floats:
+    """Return a wanted picture as (Cy, Cx, channels), float64; `lit` is where a light makes one.
+
+    Raises
+    ------
+    InputError
+        If it does not fit the camera, is negative, or black where `lit`.
+    """
     given = np.asarray(wanted)
-    if given.ndim == 2 and transport.channels > 1:
-        given = np.repeat(given[..., None], transport.channels, axis=2)
-    flat = as_image(given, transport.camera, transport.channels)
-    target = np.asarray(flat, dtype=np.float64).reshape(*transport.camera, transport.channels)
+    if given.ndim == 2 and channels > 1:
+        given = np.repeat(given[..., None], channels, axis=2)
+    flat = as_image(given, camera, channels)
+    target = np.asarray(flat, dtype=np.float64).reshape(*camera, channels)
     if target.min() < 0:
         raise InputError(
             "the wanted picture has negative values, and there is no negative light: set them to 0."
         )
-    if not target[transport.lit].any():
+    if not target[lit].any():
         raise InputError(
             "the wanted picture is black wherever the projector lights the scene: give another one."
         )
@@ -256,10 +267,31 @@ def _scale_within_reach(
     light : ndarray, shape (Py, Px, colours)
         For the target itself, without an upper limit.
     """
+    counted = (weights.ravel() > 0) & (target.reshape(weights.size, -1).max(axis=1) > 0)
+    return scale_of_needed(light_needed(transport, light)[counted])
+
+
+def light_needed(transport: Transport, light: Floats) -> Floats:
+    """Return the light at each camera pixel's q, of the brightest colour, shape (C,)."""
     where = footprint(transport.correspondence, transport.projector)
-    needed = np.stack([look_up(one.ravel(), where) for one in np.moveaxis(light, -1, 0)])
-    counted = (weights.ravel() > 0) & (target.reshape(len(needed[0]), -1).max(axis=1) > 0)
-    most = np.quantile(needed.max(axis=0)[counted], REACHABLE) if counted.any() else 0.0
+    each = [look_up(one.ravel(), where) for one in np.moveaxis(light, -1, 0)]
+    return np.asarray(np.max(each, axis=0))
+
+
+def scale_of_needed(needed: Floats) -> float:
+    """Return the scale at which most camera pixels need no more than full white.
+
+    Parameters
+    ----------
+    needed : ndarray, shape (n,)
+        Light that camera pixels need for a scale of 1.
+
+    Raises
+    ------
+    InputError
+        If they need none.
+    """
+    most = np.quantile(needed, REACHABLE) if needed.size else 0.0
     if most <= 0:
         raise InputError(
             "no light makes anything of the wanted picture on this scene: give a picture that is "
@@ -279,12 +311,7 @@ def _judged(
     """Say how near to a target the photos under two lights will come."""
     chosen = lights[0].astype(np.float32)
     expected, of_direct = (problem.forward(light) for light in lights)
-    bars = None
-    if transport.posterior is not None:
-        mixing = mixing_of(transport.channels, transport.provenance)
-        seen = chosen if mixing is None or transport.channels == 1 else chosen @ mixing.T
-        projected = seen[..., 0] if seen.shape[2] == 1 else seen
-        bars = ErrorBars(transport).picture(projected.astype(np.float32))
+    bars = error_bar_under(transport, chosen)
     counted = weights[..., 0] > 0
     noise = 0.0 if bars is None else np.reshape(bars, target.shape)[counted] ** 2
 
@@ -304,6 +331,16 @@ def _judged(
         rmse_of_direct=distance(of_direct),
         peak=peak,
     )
+
+
+def error_bar_under(transport: Transport, light: Floats) -> Floats | None:
+    """Return the error bar of the picture under a light (Py, Px, colours); None without any."""
+    if transport.posterior is None:
+        return None
+    mixing = mixing_of(transport.channels, transport.provenance)
+    seen = light if mixing is None or transport.channels == 1 else light @ mixing.T
+    projected = seen[..., 0] if seen.shape[2] == 1 else seen
+    return ErrorBars(transport).picture(projected.astype(np.float32))
 
 
 def _decibels(peak: float, rmse: float) -> float:

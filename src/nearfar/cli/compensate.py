@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from nearfar.cli.compensate_together import Wanted, compensate_projectors
 from nearfar.cli.lights import read_camera_picture
 from nearfar.cli.options import (
     AsJson,
@@ -15,6 +16,7 @@ from nearfar.cli.options import (
     keep_input,
     require_reconstructed,
 )
+from nearfar.cli.other_projectors import OtherProjector, others_of
 from nearfar.cli.saying import say, warn_if_wrong
 from nearfar.progress import progress_bar
 
@@ -61,6 +63,15 @@ def compensate(
             metavar="OUT", help="Write a map of camera pixels that no light serves, 1 there."
         ),
     ] = None,
+    other: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--and",
+            help="Transport of a further projector before the same camera, and where to write its "
+            "light.",
+            metavar="TRANSPORT.zarr=LIGHT_OUT",
+        ),
+    ] = None,
     srgb: Annotated[
         bool, typer.Option("--srgb", help="WANTED is an ordinary sRGB picture.")
     ] = False,
@@ -83,6 +94,15 @@ def compensate(
     from nearfar.transport.stored import open_transport
 
     given = _scale(scale)
+    if others := others_of(other, "RIGHT.zarr=RIGHT_LIGHT_OUT"):
+        compensate_projectors(
+            [OtherProjector(transport, output), *others],
+            Wanted(wanted, given, srgb, expected, out_of_reach),
+            as_json=as_json,
+            force=force,
+            quiet=quiet,
+        )
+        return
     outputs = [output, *filter(None, (expected, out_of_reach))]
     for number, path in enumerate(outputs):
         check_picture_ending(path)

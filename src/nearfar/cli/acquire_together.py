@@ -9,6 +9,10 @@ from nearfar.cli.saying import say, say_captured, say_time, warn
 from nearfar.files import UNFINISHED
 from nearfar.progress import Report, progress_bar
 
+# What shared photos must gain: what is said is up to 0.9 dB more than relighting gains, and a lamp
+# that drifts spoils the photos of all projectors that share them.
+LEAST_GAIN_DECIBELS = 1.0
+
 if TYPE_CHECKING:
     from nearfar.capture import Capture
     from nearfar.plan import Plan
@@ -138,12 +142,13 @@ def _is_worth_it(rig: "SimulatedRig | RealRig", rigs: list[str], manner: Manner)
 
     exposures = (1 / rig.exposure, 1.0) if isinstance(rig, SimulatedRig) else None
     gain = gain_of_sharing(rig, len(rigs), exposures=exposures).decibels
-    if gain > 0:
+    if gain >= LEAST_GAIN_DECIBELS:
         say(f"shared photos have {gain:.1f} dB less noise than photos in turn", quiet=manner.quiet)
         return True
+    what = f"{-gain:.1f} dB more noise" if gain < 0 else f"no more than {gain:.1f} dB less noise"
     say(
-        f"shared photos would have {-gain:.1f} dB more noise: each projector is photographed while "
-        f"the others are dark",
+        f"shared photos would have {what}: each projector is photographed while the others are "
+        f"dark",
         quiet=manner.quiet,
     )
     return False

@@ -1,16 +1,19 @@
-"""Photos that several projectors shared, taken apart: what each projector alone would have made.
+"""Photos that several projectors shared, taken apart: a photo of each pattern by each projector.
 
 By the Hadamard matrix h of `nearfar.plan.sharing`, the m photos S_j of a pattern p are
 
     S_j = k + sum over i of (W_i / 2 + h_ji a_i),   a_i = T_i (p - 1/2),
 
 with the photo under black k, and W_i what white of projector i adds. The mean over j of h_ji S_j is
-a_i, and the first, for which all h are 1, has k and half of all whites besides. So with means of k
-and W_i over all whites and blacks of the plan, k + W_i / 2 + a_i is the photo by projector i alone.
+a_i, and the first, for which all h are 1, has k and half of all whites besides. So with the mean of
+that first over all whites and blacks of the plan, which is k + sum of W_i / 2,
 
-These means are the same in every photo of a capture, so that they drop out where photos are
-measured against its whites and blacks. What is left is the noise of the mean of m photos; whites
-and blacks show it, for they are taken apart as all others are.
+    k + (half of the whites of the others) + T_i p
+
+is the photo of p by projector i, the others' light being ambient light. It is left in, for the
+photo's noise is that of the light that was there: a line through the levels of black and white, as
+photometry fits it, is right at every camera pixel, also where the others alone light it. Of a
+response, which is measured against white and black, it is no part.
 
 Index convention: photos are (n, rows, Cx, channels); i runs over projectors, j over the photos of
 one pattern.
@@ -31,6 +34,8 @@ from nearfar.plan.sharing import plan_of_each, projectors_of, signs
 @dataclass(frozen=True, eq=False)
 class PhotosOfOneProjector:
     """Photos of a plan by one of the projectors that shared them; read as any others.
+
+    Half of the light of white by the other projectors is in them, as ambient light.
 
     Attributes
     ----------
@@ -97,35 +102,29 @@ def photos_of_each(shared: Photos) -> list[PhotosOfOneProjector]:
         If it is of another plan.
     """
     plan, columns = plan_of_each(shared.plan), signs(projectors_of(shared.plan))
-    white, black, saturated = _levels(shared, plan, columns)
-    # What the pattern adds by each projector, as it goes from half of white to white.
-    whites = white - black
-    middle = (white[0] + black[0]) / 2
-    dark = middle - whites.sum(axis=0) / 2
-    offsets = [whites[0] / 2 + dark - middle, *(dark + own / 2 for own in whites[1:])]
+    middle, saturated = _middle(shared, plan, len(columns))
     return [
-        PhotosOfOneProjector(plan, shared, own, offset, saturated)
-        for own, offset in zip(columns.T, offsets, strict=True)
+        PhotosOfOneProjector(plan, shared, own, middle if number else 0 * middle, saturated)
+        for number, own in enumerate(columns.T)
     ]
 
 
-def _levels(shared: Photos, plan: Plan, columns: Integers) -> tuple[Floats, Floats, Booleans]:
-    """Return a_i of white and of black, the first with the rest, (i, Cy, Cx, channels); saturation.
+def _middle(shared: Photos, plan: Plan, length: int) -> tuple[Floats, Booleans]:
+    """Return black and half of all whites, the mean over all whites and blacks; saturation.
 
-    They are means over all whites and blacks of the plan.
+    Both are (Cy, Cx, channels).
     """
     shape = (*shared.camera, shared.channels)
-    sums = np.zeros((2, columns.shape[1], *shape))
-    counts = [0, 0]
+    sums, counts = np.zeros((2, *shape)), [0, 0]
     saturated = np.zeros(shape, dtype=bool)
     for index, pattern in enumerate(plan.patterns):
         level = _level(pattern)
         if level is not None:
-            group = _group(shared, index, len(columns), slice(0, shared.camera.height))
-            sums[level] += np.einsum("ji,jyxc->iyxc", columns, group) / len(columns)
+            group = _group(shared, index, length, slice(0, shared.camera.height))
+            sums[level] += group.mean(axis=0)
             counts[level] += 1
             saturated |= (group >= 1.0).any(axis=0)
-    return sums[1] / counts[1], sums[0] / counts[0], saturated
+    return (sums[0] / counts[0] + sums[1] / counts[1]) / 2, saturated
 
 
 def _group(shared: Photos, index: int, length: int, rows: slice) -> Floats:

@@ -55,6 +55,9 @@ Use the transport
     Compensation           that light, and how near its photo is expected to come
     refine_compensation    correct it by photos of it on a rig
     Refinement             the light that photos have corrected, and how near they came
+    relight_together       relight by several projectors before one camera
+    compensate_together    find the lights of several projectors that make a picture together
+    JointCompensation      these lights, and how near their photo is expected to come
     bounces                take a relit picture apart by how often its light was reflected
     Bounces                pictures of the first, second ... bounce
     probe                  relight by chosen projector pixels for each camera pixel
@@ -125,10 +128,12 @@ if TYPE_CHECKING:
 
     from nearfar.applications.bounces import Bounces, bounces
     from nearfar.applications.compensate import Compensation, compensate
+    from nearfar.applications.compensate_together import JointCompensation, compensate_together
     from nearfar.applications.dual import dual_view
     from nearfar.applications.editing import Cut, cut_far, recolour, widen_subsurface
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
+    from nearfar.applications.several_projectors import relight_together
     from nearfar.arrays import Size, parse_size
     from nearfar.capture import Capture, open_capture, write_capture
     from nearfar.correspondence import (
@@ -200,6 +205,9 @@ _HOMES = {
     "Compensation": "nearfar.applications.compensate",
     "refine_compensation": "nearfar.workflow.refine",
     "Refinement": "nearfar.workflow.refine",
+    "relight_together": "nearfar.applications.several_projectors",
+    "compensate_together": "nearfar.applications.compensate_together",
+    "JointCompensation": "nearfar.applications.compensate_together",
     "bounces": "nearfar.applications.bounces",
     "Bounces": "nearfar.applications.bounces",
     "probe": "nearfar.applications.probe",
@@ -264,6 +272,9 @@ __all__ = [  # noqa: RUF022
     "Compensation",
     "refine_compensation",
     "Refinement",
+    "relight_together",
+    "compensate_together",
+    "JointCompensation",
     "bounces",
     "Bounces",
     "probe",

@@ -34,6 +34,52 @@ print(window.monitor)
 """
 
 
+SEEN = """
+import mss, numpy as np
+from nearfar.arrays import Size
+from nearfar.rigs.screens import Window, find_monitors
+from nearfar.rigs.side_by_side import SideBySideScreen
+eye = mss.MSS()
+def seen(monitor):
+    (top, left), size = monitor.place, monitor.size
+    place = dict(left=left, top=top, width=size.width, height=size.height)
+    return np.asarray(eye.grab(place))[..., 2::-1]
+one, other = find_monitors()
+white = np.full(one.size, 255, dtype=np.uint8)
+"""
+# What was on the other monitor before is covered while a window is open, and is there again after.
+HELD_BLACK = (
+    SEEN
+    + """
+with Window(1) as left_over:
+    left_over.show(white)
+    assert seen(other).all()
+    with Window(0, dark=["DUMMY1"]) as window:
+        window.show(white)
+        window.wait(0.05)
+        assert seen(one).all()
+        assert not seen(other).any()
+    left_over.show(white)
+    assert seen(other).all()
+"""
+)
+BOTH = (
+    SEEN
+    + """
+with Window(0) as left, Window(1) as right:
+    both = SideBySideScreen([left, right], Size(100, 150))
+    for seed in (0, 1):
+        frame = np.random.default_rng(seed).integers(1, 256, (100, 300, 3), dtype=np.uint8)
+        both.show(frame)
+        both.wait(0.05)
+        for monitor, part in ((one, frame[:, :150]), (other, frame[:, 150:])):
+            found = seen(monitor)
+            assert (found[310:410, 565:715] == part).all()
+            assert np.count_nonzero(found) == part.size
+"""
+)
+
+
 @pytest.fixture(scope="module")
 def display():
     with one_monitor() as name:
@@ -57,6 +103,12 @@ def test_patterns_are_on_the_second_monitor_pixel_for_pixel(tmp_path):
         done = run_on(display, "-m", "nearfar", "devices")
         assert "0: DUMMY0, 720x1280 at 60 Hz" in done.stdout
         assert "1: DUMMY1, 720x1280 at 60 Hz" in done.stdout
+        done = run_on(display, "-c", HELD_BLACK)
+        assert done.returncode == 0, done.stderr
+        done = run_on(display, "-c", BOTH)
+        assert done.returncode == 0, done.stderr
+        done = run_on(display, "-c", FAULT.format(body="Window('DUMMY0', dark=[0])"))
+        assert "DUMMY0 is to show patterns and to be held black" in done.stdout
         done = run_on(display, "-c", FAULT.format(body="Window('HDMI-1')"))
         assert "no monitor 'HDMI-1'" in done.stdout
         assert "1: DUMMY1" in done.stdout

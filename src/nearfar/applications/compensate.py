@@ -22,7 +22,7 @@ import numpy as np
 
 from nearfar.applications.least_squares import LeastSquares
 from nearfar.applications.onto_projector import onto_projector
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.callbacks import Report, as_report
 from nearfar.checks import as_image, as_number, require_instance
 from nearfar.errors import InputError
@@ -152,7 +152,11 @@ def compensate(
     report = as_report(progress)
     weights = camera_weights(transport)
     problem = compensation_problem(transport, weights)
-    dark = np.zeros_like(target) if black is None else _picture(transport, black)
+    dark = (
+        np.zeros_like(target)
+        if black is None
+        else _picture(black, transport.camera, transport.channels)
+    )
     if scale is None:
         # Without an upper limit the light for each of both is proportional to it.
         nothing = np.zeros_like(problem.diagonal)
@@ -199,25 +203,36 @@ def _target(transport: Transport, wanted: Floats) -> Floats:
             "the transport has no direct light, so that no light makes a picture on the scene: "
             "give one that was measured with a projector."
         )
-    target = _picture(transport, wanted)
+    return wanted_picture(wanted, transport.camera, transport.channels, transport.lit)
+
+
+def wanted_picture(wanted: Floats, camera: Size, channels: int, lit: Booleans) -> Floats:
+    """Return a wanted picture as (Cy, Cx, channels), float64; `lit` is where a light makes one.
+
+    Raises
+    ------
+    InputError
+        If it does not fit the camera, is negative, or black where `lit`.
+    """
+    target = _picture(wanted, camera, channels)
     if target.min() < 0:
         raise InputError(
             "the wanted picture has negative values, and there is no negative light: set them to 0."
         )
-    if not target[transport.lit].any():
+    if not target[lit].any():
         raise InputError(
             "the wanted picture is black wherever the projector lights the scene: give another one."
         )
     return target
 
 
-def _picture(transport: Transport, given: Floats) -> Floats:
+def _picture(given: Floats, camera: Size, channels: int) -> Floats:
     """Return a picture of the camera as (Cy, Cx, channels), float64."""
     picture = np.asarray(given)
-    if picture.ndim == 2 and transport.channels > 1:
-        picture = np.repeat(picture[..., None], transport.channels, axis=2)
-    flat = as_image(picture, transport.camera, transport.channels)
-    return np.asarray(flat, dtype=np.float64).reshape(*transport.camera, transport.channels)
+    if picture.ndim == 2 and channels > 1:
+        picture = np.repeat(picture[..., None], channels, axis=2)
+    flat = as_image(picture, camera, channels)
+    return np.asarray(flat, dtype=np.float64).reshape(*camera, channels)
 
 
 def camera_weights(transport: Transport) -> Floats:
@@ -277,14 +292,36 @@ def _scale_within_reach(
     saved : ndarray, shape (Py, Px, colours)
         Light that a photo under black stands for; what a target needs is less by it.
     """
+    needed, less = (_at_q(transport, each) for each in (light, saved))
+    counted = (weights.ravel() > 0) & (target.reshape(weights.size, -1).max(axis=1) > 0)
+    return scale_of_needed((needed / (1.0 + less)).max(axis=0)[counted])
+
+
+def light_needed(transport: Transport, light: Floats) -> Floats:
+    """Return the light at each camera pixel's q, of the brightest colour, shape (C,)."""
+    return np.asarray(_at_q(transport, light).max(axis=0))
+
+
+def _at_q(transport: Transport, light: Floats) -> Floats:
+    """Return a light (Py, Px, colours) at each camera pixel's q, shape (colours, C)."""
     where = footprint(transport.correspondence, transport.projector)
-    needed, less = (
-        np.stack([look_up(one.ravel(), where) for one in np.moveaxis(lights, -1, 0)])
-        for lights in (light, saved)
-    )
-    counted = (weights.ravel() > 0) & (target.reshape(len(needed[0]), -1).max(axis=1) > 0)
-    shares = (needed / (1.0 + less)).max(axis=0)[counted]
-    most = np.quantile(shares, REACHABLE) if counted.any() else 0.0
+    return np.stack([look_up(one.ravel(), where) for one in np.moveaxis(light, -1, 0)])
+
+
+def scale_of_needed(needed: Floats) -> float:
+    """Return the scale at which most camera pixels need no more than full white.
+
+    Parameters
+    ----------
+    needed : ndarray, shape (n,)
+        Light that camera pixels need for a scale of 1.
+
+    Raises
+    ------
+    InputError
+        If they need none.
+    """
+    most = np.quantile(needed, REACHABLE) if needed.size else 0.0
     if most <= 0:
         raise InputError(
             "no light makes anything of the wanted picture on this scene: give a picture that is "
@@ -304,12 +341,7 @@ def _judged(
     """Say how near to a target the photos under two lights will come."""
     chosen = lights[0].astype(np.float32)
     expected, of_direct = (problem.forward(light) for light in lights)
-    bars = None
-    if transport.posterior is not None:
-        mixing = mixing_of(transport.channels, transport.provenance)
-        seen = chosen if mixing is None or transport.channels == 1 else chosen @ mixing.T
-        projected = seen[..., 0] if seen.shape[2] == 1 else seen
-        bars = ErrorBars(transport).picture(projected.astype(np.float32))
+    bars = error_bar_under(transport, chosen)
     counted = weights[..., 0] > 0
     noise = 0.0 if bars is None else np.reshape(bars, target.shape)[counted] ** 2
 
@@ -330,6 +362,16 @@ def _judged(
         peak=peak,
         target=target.reshape(shape).astype(np.float32),
     )
+
+
+def error_bar_under(transport: Transport, light: Floats) -> Floats | None:
+    """Return the error bar of the picture under a light (Py, Px, colours); None without any."""
+    if transport.posterior is None:
+        return None
+    mixing = mixing_of(transport.channels, transport.provenance)
+    seen = light if mixing is None or transport.channels == 1 else light @ mixing.T
+    projected = seen[..., 0] if seen.shape[2] == 1 else seen
+    return ErrorBars(transport).picture(projected.astype(np.float32))
 
 
 def _decibels(peak: float, rmse: float) -> float:

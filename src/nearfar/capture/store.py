@@ -18,7 +18,7 @@ from nearfar.files.stores import open_array, open_store, read_array, read_select
 from nearfar.illumination.frequencies import DC
 from nearfar.markup import card, picture
 from nearfar.plan import Pattern, Plan, Sinusoid, parse_plan
-from nearfar.plan.patterns import Shown
+from nearfar.plan.patterns import Shown, SideBySide
 from nearfar.plan.recognition.contents import Fringes, Uniform
 
 # Bytes of a chunk at most: rows of a large camera are read without the rest of it.
@@ -285,4 +285,7 @@ def _level(pattern: Pattern) -> float | None:
         return 0.0 if pattern.inverse else 1.0
     if isinstance(pattern, Shown) and isinstance(pattern.content, Uniform):
         return pattern.content.level
+    if isinstance(pattern, SideBySide) and len(set(pattern.inverted)) == 1:
+        level = _level(pattern.pattern)
+        return 1.0 - level if level is not None and pattern.inverted[0] else level
     return None

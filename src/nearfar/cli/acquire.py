@@ -12,14 +12,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
+from nearfar.cli.acquire_together import Manner, Projector, acquire_projectors
 from nearfar.cli.choices import choice
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
+from nearfar.cli.other_projectors import others_of
 from nearfar.cli.reshoot import photo_numbers, take_again
-from nearfar.cli.saying import say, say_captured, say_memory, say_reconstructed, warn
+from nearfar.cli.saying import (
+    say,
+    say_captured,
+    say_memory,
+    say_reconstructed,
+    say_time,
+    warn,
+)
 from nearfar.devices import Device
 from nearfar.errors import InputError
-from nearfar.progress import Report, duration, progress_bar
+from nearfar.progress import Report, progress_bar
 from nearfar.scenes import SCENES
 
 if TYPE_CHECKING:
@@ -63,6 +72,23 @@ def acquire(
             autocompletion=scene_names,
         ),
     ],
+    other: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--and",
+            help="Capture of a further projector before the same camera, and its rig; each "
+            "projector is photographed while the others are dark.",
+            metavar="CAPTURE.zarr=RIG",
+        ),
+    ] = None,
+    shared: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --and, let projectors share photos where that lowers the noise, and keep "
+            "these as they were taken here.",
+            metavar="SHARED.zarr",
+        ),
+    ] = None,
     until: Annotated[
         float | None,
         typer.Option(
@@ -108,6 +134,14 @@ def acquire(
     from nearfar.workflow.acquire import acquire as shoot
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
+    if others := others_of(other, "RIGHT.zarr=RIGHT.toml"):
+        given = {"--until": until, "--transport": transport, "--memory": memory}
+        given |= {"--device": device, "--reshoot": reshoot}
+        _refuse(given, "does not go with --and.")
+        projectors = [Projector(output, rig), *(Projector(o.path, str(o.beside)) for o in others)]
+        acquire_projectors(plan_file, projectors, shared, Manner(resume, force, quiet))
+        return
+    _refuse({"--shared": shared}, "is for photos of several projectors, given by --and.")
     if reshoot is not None:
         given = {"--until": until, "--transport": transport, "--memory": memory}
         given |= {"--device": device, "--resume": resume, "--force": force}
@@ -133,7 +167,7 @@ def acquire(
             exposure=exposure,
             progress=report,
             on_alarm=warn,
-            on_start=partial(_say_time, len(made.patterns) - before, quiet=quiet),
+            on_start=partial(say_time, len(made.patterns) - before, quiet=quiet),
         )
         stack.enter_context(opened)
         for note in opened.notes:
@@ -208,11 +242,6 @@ def _finish(
     say_reconstructed(summary, taken, transport, quiet=quiet)
     say(f"{time.monotonic() - start:.1f} s after the last photo", quiet=quiet)
     say(str(judge_transport(transport, taken, progress=report)), quiet=quiet)
-
-
-def _say_time(photos: int, seconds: float, *, quiet: bool) -> None:
-    """Print before the first photo how long all of them will take."""
-    say(f"{photos} photos at {seconds:.2f} s each: about {duration(photos * seconds)}", quiet=quiet)
 
 
 def _say_exposure(rig: "Rig", *, quiet: bool) -> None:

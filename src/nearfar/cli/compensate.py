@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from nearfar.cli.compensate_together import Wanted, compensate_projectors
 from nearfar.cli.lights import read_camera_picture
 from nearfar.cli.options import (
     AsJson,
@@ -16,6 +17,7 @@ from nearfar.cli.options import (
     require_reconstructed,
     scene_names,
 )
+from nearfar.cli.other_projectors import OtherProjector, others_of
 from nearfar.cli.refining import MOST, refined, require_rig
 from nearfar.cli.saying import say, warn_if_wrong
 from nearfar.progress import progress_bar
@@ -88,6 +90,15 @@ def compensate(
             autocompletion=scene_names,
         ),
     ] = None,
+    other: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--and",
+            help="Transport of a further projector before the same camera, and where to write its "
+            "light.",
+            metavar="TRANSPORT.zarr=LIGHT_OUT",
+        ),
+    ] = None,
     srgb: Annotated[
         bool, typer.Option("--srgb", help="WANTED is an ordinary sRGB picture.")
     ] = False,
@@ -112,6 +123,21 @@ def compensate(
 
     given = _scale(scale)
     require_rig(refine, rig)
+    if others := others_of(other, "RIGHT.zarr=RIGHT_LIGHT_OUT"):
+        if as_photo or refine is not None:
+            raise typer.BadParameter(
+                "is for one projector with --refine or --as-photo: leave these out, or leave it "
+                "out.",
+                param_hint="--and",
+            )
+        compensate_projectors(
+            [OtherProjector(transport, output), *others],
+            Wanted(wanted, given, srgb, expected, out_of_reach),
+            as_json=as_json,
+            force=force,
+            quiet=quiet,
+        )
+        return
     outputs = [output, *filter(None, (expected, out_of_reach))]
     for number, path in enumerate(outputs):
         check_picture_ending(path)

@@ -8,8 +8,9 @@ import typer
 
 from nearfar.cli.gains import MODEL, PHYSICAL, gains_of
 from nearfar.cli.lights import Resize, Srgb, read_light_for, say_resized
-from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
-from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
+from nearfar.cli.other_projectors import open_transports, others_of
+from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -64,6 +65,14 @@ def relight(
             metavar="NAME=VALUE",
         ),
     ] = None,
+    other: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--and",
+            help="Transport of a further projector before the same camera, and its light.",
+            metavar="TRANSPORT.zarr=LIGHT",
+        ),
+    ] = None,
     srgb: Srgb = False,
     resize: Resize = False,
     error_bars: Annotated[
@@ -81,25 +90,33 @@ def relight(
 
     Example: nearfar relight transport.zarr light.png relit.exr --srgb --gain near=2
     """
+    from nearfar.applications.several_projectors import added_deviations, added_pictures
     from nearfar.files import (
         check_output,
         check_picture_ending,
         write_picture,
     )
-    from nearfar.transport.stored import open_transport
 
     gains = gains_of(gain or [])
     make = _relighting(gains, error_bars=error_bars)
+    others = others_of(other, "RIGHT.zarr=RIGHT_LIGHT")
+    paths = [transport, *(each.path for each in others)]
+    lights = [light, *(each.beside for each in others)]
     check_picture_ending(output)
-    keep_input(output, transport, light)
+    keep_input(output, *paths, *lights)
     check_output(output, force=force)
     with progress_bar("relighting", quiet=quiet):
-        require_reconstructed(transport)
-        opened = open_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
-        projected, given = read_light_for(opened, light, srgb=srgb, resize=resize)
-        picture = make(opened, projected, gains)
+        opened = open_transports(paths)
+        read = [
+            read_light_for(one, path, srgb=srgb, resize=resize)
+            for one, path in zip(opened, lights, strict=True)
+        ]
+        pictures = [
+            make(one, projected, gains) for one, (projected, _) in zip(opened, read, strict=True)
+        ]
+        picture = (added_deviations if error_bars else added_pictures)(pictures)
         write_picture(output, picture, force=force, may_be_infinite=error_bars)
-    say_resized(light, given, opened.projector, quiet=quiet)
+    for path, one, (_, given) in zip(lights, opened, read, strict=True):
+        say_resized(path, given, one.projector, quiet=quiet)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"
-    say(f"{what} of {opened.camera} written to {output}", quiet=quiet)
+    say(f"{what} of {opened[0].camera} written to {output}", quiet=quiet)

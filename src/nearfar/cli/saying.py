@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from nearfar.arrays import Size, parse_size
 from nearfar.cli.flags import with_flags
 from nearfar.cli.printable import printable
+from nearfar.progress import duration
 
 # A scene that takes less is not announced.
 BYTES_TO_ANNOUNCE = 10**9
@@ -66,6 +67,11 @@ def say_memory(
     if memory.peak > memory.kept:
         text += f" while it is computed, {memory.kept / 1e9:.1f} GB from then on"
     say(text, quiet=quiet)
+
+
+def say_time(photos: int, seconds: float, *, quiet: bool) -> None:
+    """Print before the first photo how long all of them will take."""
+    say(f"{photos} photos at {seconds:.2f} s each: about {duration(photos * seconds)}", quiet=quiet)
 
 
 def say_captured(taken: "Capture", output: Path, *, quiet: bool) -> None:

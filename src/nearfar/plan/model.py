@@ -31,6 +31,7 @@ from nearfar.plan.patterns import (
     LampCode,
     Pattern,
     Purpose,
+    SideBySide,
     kinds_of,
     pattern_reader,
 )
@@ -225,8 +226,9 @@ class Plan(Frozen):
         Raises
         ------
         PlanError
-            If the plan has offset "shown", or codes of lamps.
+            If the plan has offset "shown", codes of lamps, or photos that projectors share.
         """
+        self.require_one_projector(what)
         if self.offset == "shown":
             raise PlanError(
                 f"these photos are of somebody else's pictures, not of the sinusoids of a plan, so "
@@ -236,6 +238,19 @@ class Plan(Frozen):
             raise PlanError(
                 f"these photos are of codes of lamps, not of sinusoids, so that there is nothing "
                 f"to {what}: go on with `reconstruct(no_near=True, no_far=True)`."
+            )
+
+    def require_one_projector(self, what: str) -> None:
+        """Refuse a plan whose photos several projectors share.
+
+        Raises
+        ------
+        PlanError
+        """
+        if any(isinstance(pattern, SideBySide) for pattern in self.patterns):
+            raise PlanError(
+                f"these photos show several projectors at once, so that there is nothing to {what} "
+                f"in them: go on with the capture of each projector, which was written beside them."
             )
 
     @property

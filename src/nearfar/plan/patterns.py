@@ -12,8 +12,10 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainSerializer,
+    SerializeAsAny,
     SerializerFunctionWrapHandler,
     TypeAdapter,
+    field_validator,
     model_serializer,
 )
 
@@ -303,6 +305,54 @@ class Shown(Pattern):
         )
 
 
+class SideBySide(Pattern):
+    """One pattern on several projectors, on some of them inverted; see `nearfar.plan.sharing`.
+
+    The pattern grids of the projectors are side by side, in one that is as wide as all of them.
+
+    Attributes
+    ----------
+    pattern : Pattern
+    inverted : tuple of bool
+        Of each projector, whether it shows the inverse: 255 minus the 8-bit pattern.
+    """
+
+    kind: Literal["side by side"] = "side by side"
+    pattern: SerializeAsAny[Pattern]
+    inverted: tuple[bool, ...] = Field(min_length=2)
+    purpose: Purpose
+
+    @field_validator("pattern", mode="before")
+    @classmethod
+    def _pattern_is_of_nearfars_own(cls, value: Any) -> Any:
+        return pattern_reader(()).validate_python((value,))[0]
+
+    @property
+    def description(self) -> str:
+        """The pattern in a few words."""
+        shown = ", ".join("inverse" if inverted else "as it is" for inverted in self.inverted)
+        return f"{self.pattern.description} on {len(self.inverted)} projectors: {shown}"
+
+    def draw(self, size: Size) -> NDArray[np.uint8]:
+        """Draw the 8-bit pattern, shape (Py, Px)."""
+        drawn = self.pattern.draw(self._grid(size))
+        return np.hstack([patterns.invert(drawn) if one else drawn for one in self.inverted])
+
+    def require_place_on(self, projector: Size) -> None:
+        """Refuse a width that is not the same for all projectors, and as the pattern does.
+
+        Raises
+        ------
+        ValueError
+        """
+        if projector.width % len(self.inverted):
+            raise ValueError(f"{self.description} do not fit side by side on {projector}")
+        self.pattern.require_place_on(self._grid(projector))
+
+    def _grid(self, size: Size) -> Size:
+        return Size(size.height, size.width // len(self.inverted))
+
+
 OWN_PATTERNS: tuple[type[Pattern], ...] = (
     Sinusoid,
     Exponential,
@@ -312,6 +362,7 @@ OWN_PATTERNS: tuple[type[Pattern], ...] = (
     HalfScreen,
     LampCode,
     Shown,
+    SideBySide,
 )
 
 

@@ -58,6 +58,8 @@ def draft_rig(monitors: Sequence[Monitor], cameras: Sequence[FoundCamera]) -> st
         "# brightness = 0.5",
         "# Refreshes from a pattern's display to the exposure; raised where photos show the need.",
         "# settle = 2",
+        "# Monitors of other projectors before this camera, which are held black.",
+        "# dark = [2]",
         "",
         "[camera]",
     ]

@@ -177,7 +177,7 @@ def open_real_rig(
             scale=table.projector.scale,
             brightness=table.projector.brightness,
             settle=table.projector.settle,
-            exposure=_exposure_of(table) if exposure is None else exposure,
+            exposure=exposure_of(table) if exposure is None else exposure,
             on_alarm=on_alarm,
             on_start=on_start,
         )
@@ -199,7 +199,7 @@ def open_rig_to_calibrate(
     single = table.camera.model_copy(update={"average": 1, "bracket": (1.0,)})
 
     def set_up(screen: Window, camera: Camera) -> RealRig:
-        return _uncalibrated(screen, camera, table, _exposure_of(table), on_alarm)
+        return _uncalibrated(screen, camera, table, exposure_of(table), on_alarm)
 
     return _open_devices(path, table.model_copy(update={"camera": single}), set_up)
 
@@ -213,7 +213,7 @@ def open_rig_to_preview(path: Path, table: RealTable) -> RealRig:
     """
 
     def set_up(screen: Window, camera: Camera) -> RealRig:
-        exposure = _exposure_of(table)
+        exposure = exposure_of(table)
         if exposure is None and camera.exposure_limits is not None:
             shortest, longest = camera.exposure_limits
             exposure = min(max(PREVIEW_EXPOSURE_SECONDS, shortest), longest)
@@ -240,7 +240,7 @@ def _uncalibrated(
     )
 
 
-def _exposure_of(table: RealTable) -> float | None:
+def exposure_of(table: RealTable) -> float | None:
     """Return the exposure of the table in seconds; None where it is to be chosen."""
     return None if table.camera.exposure == "auto" else table.camera.exposure
 
@@ -252,7 +252,8 @@ def _open_devices(
     with ExitStack() as stack:
         # The camera first: it fails more often, and leaves the monitor alone meanwhile.
         camera = stack.enter_context(table.camera.open(path.parent))
-        rig = set_up(stack.enter_context(Window(table.projector.monitor)), camera)
+        window = Window(table.projector.monitor, table.projector.dark)
+        rig = set_up(stack.enter_context(window), camera)
         # The rig closes them from here on.
         stack.pop_all()
     return rig

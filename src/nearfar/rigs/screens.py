@@ -26,6 +26,9 @@ KEYBOARD_INTERVAL_SECONDS = 0.01
 TIMED_REFRESHES = 24
 PERIOD_TOLERANCE = 0.02
 
+# The window system once for each that uses it.
+_USERS: list[Any] = []
+
 VERTEX_SHADER = """
 #version 330
 void main() {
@@ -139,6 +142,19 @@ def choose_monitor(monitors: Sequence[Monitor], wanted: str | int | None) -> Mon
     raise InputError(f"{problem} {wanted!r}: name one of these by its index: {listed}.")
 
 
+def _dark_monitors(
+    monitors: Sequence[Monitor], wanted: Sequence[str | int], lit: Monitor
+) -> list[Monitor]:
+    """Choose monitors to hold black, and refuse the one that shows patterns."""
+    chosen = [choose_monitor(monitors, name) for name in wanted]
+    if lit in chosen:
+        raise InputError(
+            f"monitor {lit.name} is to show patterns and to be held black: name the monitors of "
+            f"other projectors alone under dark."
+        )
+    return chosen
+
+
 class Window:
     """A full-screen window on a monitor; shows frames pixel for pixel, in step with its refresh.
 
@@ -149,20 +165,28 @@ class Window:
     ----------
     wanted : str or int, optional
         Monitor's name or index; see `choose_monitor`.
+    dark : sequence of str or int
+        Monitors of other projectors, which are held black meanwhile.
 
     Raises
     ------
     MissingPackageError, DeviceError, InputError
     """
 
-    def __init__(self, wanted: str | int | None = None) -> None:
+    def __init__(self, wanted: str | int | None = None, dark: Sequence[str | int] = ()) -> None:
         self._stack = ExitStack()
         try:
             self._glfw = self._stack.enter_context(_window_system())
-            self.monitor = choose_monitor(_monitors(self._glfw), wanted)
+            monitors = _monitors(self._glfw)
+            self.monitor = choose_monitor(monitors, wanted)
+            others = _dark_monitors(monitors, dark, self.monitor)
             self._stack.enter_context(_kept_awake())
             self._stopped = self._gone = False
+            self._dark: list[Window] = []
             self._open()
+            self._dark = [self._stack.enter_context(Window(other.index)) for other in others]
+            for window in self._dark:
+                window.show(np.zeros(window.monitor.size, dtype=np.uint8))
         except BaseException:
             self._stack.close()
             raise
@@ -199,6 +223,8 @@ class Window:
                 f"a frame of shape {frame.shape} is not of the monitor's {self.monitor.size}."
             )
         colour = np.broadcast_to(np.atleast_3d(frame), (*self.monitor.size, 3))
+        # Another window's may be the current one.
+        self._glfw.make_context_current(self._handle)
         self._texture.write(np.ascontiguousarray(colour).tobytes())
         self._texture.use()
         # Twice: of the two buffers that take turns, a window may be shown either when it has been
@@ -234,6 +260,8 @@ class Window:
             )
         if self._stopped or self._glfw.window_should_close(self._handle):
             raise KeyboardInterrupt
+        for window in self._dark:
+            window._listen()
 
     def _open(self) -> None:
         import moderngl
@@ -316,10 +344,14 @@ def _window_system() -> Iterator[Any]:
         raise _no_display(str(error)) from None
     if not there:
         raise _no_display("no display")
+    _USERS.append(glfw)
     try:
         yield glfw
     finally:
-        glfw.terminate()
+        _USERS.pop()
+        # Terminating closes the windows of all.
+        if not _USERS:
+            glfw.terminate()
 
 
 def _no_display(reason: str) -> DeviceError:

@@ -82,6 +82,8 @@ class ScreenTable(BaseModel):
         Light of a white pattern over the projector's full white.
     settle : int
         Refreshes from the display of a pattern to the exposure.
+    dark : tuple of str or int
+        Monitors of other projectors, which are held black.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -90,6 +92,7 @@ class ScreenTable(BaseModel):
     scale: int | None = Field(default=None, ge=1)
     brightness: float = Field(default=1.0, gt=0.0, le=1.0)
     settle: int = Field(default=2, ge=0, le=64)
+    dark: tuple[str | int, ...] = ()
 
 
 class RealTable(BaseModel):

@@ -25,6 +25,8 @@ SCENES: Registry[SceneDescription] = Registry(
     {
         "cornell": "nearfar.scenes.cornell:CORNELL",
         "cornell-aside": "nearfar.scenes.cornell:CORNELL_ASIDE",
+        "cornell-left": "nearfar.scenes.cornell:CORNELL_LEFT",
+        "cornell-right": "nearfar.scenes.cornell:CORNELL_RIGHT",
         "wedge": "nearfar.scenes.wedge:WEDGE",
         "corner": "nearfar.scenes.corner:CORNER",
         "alcove": "nearfar.scenes.alcove:ALCOVE",

@@ -34,6 +34,9 @@ WAX = Material(
 
 PROJECTOR = View((0.0, 0.56, 2.3), (0.0, 0.5, 0.0), 0.207)
 CAMERA = View((0.3, 0.62, 2.28), (-0.015, 0.5, -0.25), 0.204)
+# Two projectors that light a part of the box each, and what both light is its middle.
+LEFT_PROJECTOR = View((-0.3, 0.6, 2.3), (-0.17, 0.5, -0.3), 0.17)
+RIGHT_PROJECTOR = View((0.3, 0.6, 2.3), (0.17, 0.5, -0.3), 0.17)
 
 
 def _room() -> list[Part]:
@@ -84,6 +87,20 @@ def cornell_aside() -> Scene:
     return replace(cornell(), name="cornell-aside", camera_view=CAMERA)
 
 
+def cornell_left() -> Scene:
+    """Describe the same box under a projector on the left; the camera is where cornell has it."""
+    return replace(
+        cornell(), name="cornell-left", projector_view=LEFT_PROJECTOR, camera_view=PROJECTOR
+    )
+
+
+def cornell_right() -> Scene:
+    """Describe the same box under a projector on the right, and the same camera."""
+    return replace(
+        cornell(), name="cornell-right", projector_view=RIGHT_PROJECTOR, camera_view=PROJECTOR
+    )
+
+
 CORNELL = SceneDescription(
     summary="box of coloured walls, glazed cup, translucent candle",
     projector=Size(64, 64),
@@ -94,4 +111,14 @@ CORNELL_ASIDE = SceneDescription(
     projector=Size(64, 64),
     camera_scale=2,
     compute=ByRadiosity(cornell_aside),
+)
+CORNELL_LEFT = SceneDescription(
+    summary="the box of cornell, its left part lit by one of two projectors",
+    projector=Size(64, 64),
+    compute=ByRadiosity(cornell_left),
+)
+CORNELL_RIGHT = SceneDescription(
+    summary="the same, its right part lit by the other one",
+    projector=Size(64, 64),
+    compute=ByRadiosity(cornell_right),
 )

@@ -61,6 +61,8 @@ class RealRig:
         are needed.
     exposure : float, optional
         In seconds, rounded to whole refreshes; fitted to a white pattern if left out.
+    draw : callable, optional
+        Draws the frame of an 8-bit pattern; by default by `calibration` and `brightness`.
     on_alarm : callable, optional
         Called with each alarm, a sentence.
     on_start : callable, optional
@@ -91,6 +93,7 @@ class RealRig:
         brightness: float = 1.0,
         settle: int = 2,
         exposure: float | None = None,
+        draw: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] | None = None,
         on_alarm: Callable[[str], None] | None = None,
         on_start: Callable[[float], None] | None = None,
     ) -> None:
@@ -99,7 +102,7 @@ class RealRig:
         self.layout: FrameLayout = _layout(projector, scale, screen.monitor)
         self._calibration, self._brightness = calibration, brightness
         response = calibration.response_table() if calibration else identity()
-        self._linear = LinearProjector(response, self.layout, brightness)
+        self._draw = draw or LinearProjector(response, self.layout, brightness).draw
         if calibration is not None:
             camera.sensor = calibration.sensor
         self._shutter = Shutter(screen, camera, settle, self._alarms)
@@ -187,7 +190,7 @@ class RealRig:
         """
         levels = self.synchronise()
         shoot = CheckedShoot(
-            self._shutter, self._linear.draw, self._projector, levels, self._alarms, first
+            self._shutter, self._draw, self._projector, levels, self._alarms, first
         )
         shoot.begin_after_halves(*self._check_linearity(levels))
         for number, pattern in enumerate(patterns, first):
@@ -244,7 +247,7 @@ class RealRig:
 
     def frame(self, level: int) -> NDArray[np.uint8]:
         """Draw the frame of a pattern of one level, linear in light."""
-        return self._linear.draw(np.full(self._projector, level, dtype=np.uint8))
+        return self._draw(np.full(self._projector, level, dtype=np.uint8))
 
     def _check_linearity(self, levels: BlackAndWhite) -> tuple[Photo, Photo]:
         """Note whether light adds up; return photos of the left half of white and the right."""
@@ -255,7 +258,7 @@ class RealRig:
         def photograph(pattern: NDArray[np.uint8]) -> Photo:
             nonlocal photos
             photos += 1
-            return self._shutter.photograph(self._linear.draw(pattern))
+            return self._shutter.photograph(self._draw(pattern))
 
         found = check_superposition(
             photograph, self._projector, levels, is_calibrated=self._calibration is not None

@@ -1,0 +1,172 @@
+"""``nearfar acquire --and``: a capture for each of several projectors before one camera."""
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from nearfar.cli.options import keep_input
+from nearfar.cli.saying import say, say_captured, say_time, warn
+from nearfar.files import UNFINISHED
+from nearfar.progress import Report, progress_bar
+
+# What shared photos must gain: what is said is up to 0.9 dB more than relighting gains, and a lamp
+# that drifts spoils the photos of all projectors that share them.
+LEAST_GAIN_DECIBELS = 1.0
+
+if TYPE_CHECKING:
+    from nearfar.capture import Capture
+    from nearfar.plan import Plan
+    from nearfar.rigs.real.rig import RealRig
+    from nearfar.rigs.simulated.rig import SimulatedRig
+
+
+class Projector(NamedTuple):
+    """A projector: the capture to make, and its rig."""
+
+    output: Path
+    rig: str
+
+
+class Manner(NamedTuple):
+    """How captures are made: resumed, replaced, in silence."""
+
+    resume: bool
+    force: bool
+    quiet: bool
+
+
+def acquire_projectors(
+    plan_file: Path, projectors: list[Projector], shared: Path | None, manner: Manner
+) -> None:
+    """Shoot a plan by several projectors: in turn, or at once where that is worth it."""
+    from nearfar.plan import read_plan
+
+    made = read_plan(plan_file)
+    made.require_real("shoot")
+    outputs = [each.output for each in projectors] + ([] if shared is None else [shared])
+    for number, output in enumerate(outputs):
+        keep_input(output, plan_file, *(Path(each.rig) for each in projectors), *outputs[:number])
+    with progress_bar("opening the rig", quiet=manner.quiet) as report:
+        if shared is None or not _share(made, projectors, shared, manner, report):
+            for each in projectors:
+                _shoot_alone(made, each, manner, report)
+
+
+def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Report) -> None:
+    """Shoot a plan by one projector; a capture that is whole is kept when resuming."""
+    from nearfar.capture.unfinished import RESUMABLE_CAPTURE, unfinished_capture
+    from nearfar.files import check_resumable
+    from nearfar.rigs.opening import open_rig
+    from nearfar.workflow.acquire import acquire
+
+    output = projector.output
+    begun = manner.resume and _unfinished(output).exists()
+    if manner.resume and not begun and output.exists():
+        say(f"{output} is there already", quiet=manner.quiet)
+        return
+    check_resumable(output, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
+    before, exposure = unfinished_capture(output) if begun else (0, None)
+    with open_rig(
+        projector.rig,
+        made.projector,
+        exposure=exposure,
+        progress=report,
+        on_alarm=warn,
+        on_start=partial(say_time, len(made.patterns) - before, quiet=manner.quiet),
+    ) as rig:
+        _warn_of_notes(rig)
+        taken = acquire(
+            made,
+            output,
+            rig,
+            resume=begun,
+            force=manner.force,
+            progress=report,
+            on_alarm=warn,
+        )
+    say_captured(taken, output, quiet=manner.quiet)
+
+
+def _share(
+    made: "Plan", projectors: list[Projector], shared: Path, manner: Manner, report: Report
+) -> bool:
+    """Shoot a plan by all projectors at once, unless that loses; return whether it was done."""
+    from nearfar.capture import open_capture
+    from nearfar.capture.unfinished import RESUMABLE_CAPTURE, unfinished_capture
+    from nearfar.files import check_output, check_resumable
+    from nearfar.rigs.side_by_side import open_side_by_side
+    from nearfar.workflow.acquire_shared import acquire_shared, take_apart
+
+    outputs, rigs = [each.output for each in projectors], [each.rig for each in projectors]
+    begun = manner.resume and _unfinished(shared).exists()
+    if manner.resume and not begun and any(_is_begun(output) for output in outputs):
+        # Photos in turn were found to be better before.
+        return False
+    for output in outputs:
+        check_output(output, force=manner.force)
+    if manner.resume and not begun and shared.exists():
+        _say_written(take_apart(open_capture(shared), outputs, progress=report), outputs, manner)
+        return True
+    check_resumable(shared, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
+    before, exposure = unfinished_capture(shared) if begun else (0, None)
+    with open_side_by_side(
+        rigs,
+        made.projector,
+        exposure=exposure,
+        progress=report,
+        on_alarm=warn,
+        on_start=partial(say_time, len(rigs) * len(made.patterns) - before, quiet=manner.quiet),
+    ) as rig:
+        _warn_of_notes(rig)
+        if not begun and not _is_worth_it(rig, rigs, manner):
+            return False
+        taken = acquire_shared(
+            made,
+            shared,
+            outputs,
+            rig,
+            resume=begun,
+            force=manner.force,
+            progress=report,
+            on_alarm=warn,
+        )
+    say_captured(open_capture(shared), shared, quiet=manner.quiet)
+    _say_written(taken, outputs, manner)
+    return True
+
+
+def _is_worth_it(rig: "SimulatedRig | RealRig", rigs: list[str], manner: Manner) -> bool:
+    """Say what it gains that projectors share photos, and return whether it does."""
+    from nearfar.rigs.simulated.rig import SimulatedRig
+    from nearfar.workflow.acquire_shared import gain_of_sharing
+
+    exposures = (1 / rig.exposure, 1.0) if isinstance(rig, SimulatedRig) else None
+    gain = gain_of_sharing(rig, len(rigs), exposures=exposures).decibels
+    if gain >= LEAST_GAIN_DECIBELS:
+        say(f"shared photos have {gain:.1f} dB less noise than photos in turn", quiet=manner.quiet)
+        return True
+    what = f"{-gain:.1f} dB more noise" if gain < 0 else f"no more than {gain:.1f} dB less noise"
+    say(
+        f"shared photos would have {what}: each projector is photographed while the others are "
+        f"dark",
+        quiet=manner.quiet,
+    )
+    return False
+
+
+def _unfinished(output: Path) -> Path:
+    return output.with_name(f"{output.name}{UNFINISHED}")
+
+
+def _is_begun(output: Path) -> bool:
+    return output.exists() or _unfinished(output).exists()
+
+
+def _warn_of_notes(rig: "SimulatedRig | RealRig") -> None:
+    for note in rig.notes:
+        warn(note)
+
+
+def _say_written(taken: "list[Capture]", outputs: list[Path], manner: Manner) -> None:
+    for capture, output in zip(taken, outputs, strict=True):
+        say_captured(capture, output, quiet=manner.quiet)

@@ -85,6 +85,23 @@ def test_more_lights_come_nearer_and_all_are_exact():
     assert found[0] < found[-1] - 10
 
 
+def test_light_outside_of_the_lights_is_relit_by_symmetry():
+    # Light that spreads, of albedos that break the symmetry of the grid.
+    place = np.stack(np.divmod(np.arange(64), 8), axis=1)
+    spread = np.exp(-((place[:, None] - place) ** 2).sum(axis=2) / 8)
+    albedo = np.random.default_rng(2).uniform(0.3, 1.0, 64)
+    world = transport_of((albedo[:, None] * spread * albedo)[None], SIDE)
+    found = arnoldi(shooting_of(world, 16), direct_first=False)
+    pixels = np.eye(64).reshape(64, *SIDE)
+    matrix = np.stack([(found @ pixel).ravel() for pixel in pixels], axis=1)
+    one_sided = found.pictures[0] @ found.lights.T
+    asymmetries = [np.abs(each - each.T).max() / world.far.max() for each in (matrix, one_sided)]
+    assert asymmetries[0] < 1e-3
+    assert asymmetries[1] > 1e-2
+    errors = [np.linalg.norm(each - world.far[0]) for each in (matrix, one_sided)]
+    assert errors[0] < errors[1]
+
+
 def test_direct_light_found_first_leaves_a_low_rank():
     size = Size(8, 9)
     world = transport_of(5 * _diagonal(size) + _symmetric(2, size) / 50, size)

@@ -1,5 +1,7 @@
 """Relit by stored photos alone: exact for sums of patterns, with honest error bars."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,8 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from tests.conftest import QUIET
 from tests.shown import captured, cornell, random_binary, white_and_black
+
+pytestmark = pytest.mark.slow(minutes=0.2)
 
 PROJECTOR, CAMERA = Size(12, 10), Size(14, 20)
 DARK = {"ambient": 0.08, "black_level": 0.05}
@@ -32,11 +36,16 @@ def _capture(folder, world, plan, camera, **optics):
     return nearfar.acquire(plan, folder / "capture.zarr", rig)
 
 
-@pytest.fixture(scope="module", params=["inverse", "reference"])
-def plan(request):
-    if request.param == "inverse":
+@cache
+def _plan(offset):
+    if offset == "inverse":
         return nearfar.paper_plan(PROJECTOR, window=3, far=(3, 3))
     return nearfar.choose_plan(PROJECTOR, 60)[0]
+
+
+@pytest.fixture(params=["inverse", "reference"])
+def plan(request):
+    return _plan(request.param)
 
 
 def _light_of(plan, channels=None, seed=3):
@@ -88,9 +97,8 @@ def test_what_was_never_shown_is_told_and_is_all_that_is_missing(plan, world, tm
     assert np.abs(nothing.picture).max() < 1e-3
 
 
-def test_drift_is_taken_out_where_references_follow_it(plan, world, tmp_path):
-    if plan.offset != "reference":
-        pytest.skip("only photos by reference tell the drift")
+def test_drift_is_taken_out_where_references_follow_it(world, tmp_path):
+    plan = _plan("reference")
     camera = QUIET.model_copy(update=DARK)
     drifting = _capture(tmp_path, world, plan, camera, lamp_drift={"per_100_photos": 0.2})
     light = _light_of(plan)

@@ -25,6 +25,8 @@ Capture the photos
     write_capture          keep photos that were taken elsewhere
     open_capture           open the photos that are kept
     Capture                the photos of a plan, on the disk
+    superpose              relight by a weighted sum of photos alone, without a transport
+    Superposition          that picture, its error bars, and how much of the light is missing
 
 Measure
     measure                turn photos into responses to cosines and sines
@@ -163,6 +165,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.reconstruction.reconstruct import reconstruct, reconstruct_to_file
     from nearfar.workflow.refine import Refinement, refine_compensation
     from nearfar.workflow.steps import correspond, estimate_transport, measure
+    from nearfar.workflow.superpose import Superposition, superpose
     from nearfar.workflow.verdict.keeping import judge_transport
 
     __version__: str
@@ -183,6 +186,8 @@ _HOMES = {
     "write_capture": "nearfar.capture",
     "open_capture": "nearfar.capture",
     "Capture": "nearfar.capture",
+    "superpose": "nearfar.workflow.superpose",
+    "Superposition": "nearfar.workflow.superpose",
     "measure": "nearfar.workflow.steps",
     "Measurements": "nearfar.photometry.measurements",
     "correspond": "nearfar.workflow.steps",
@@ -250,6 +255,8 @@ __all__ = [  # noqa: RUF022
     "write_capture",
     "open_capture",
     "Capture",
+    "superpose",
+    "Superposition",
     "measure",
     "Measurements",
     "correspond",

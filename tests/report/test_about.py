@@ -130,3 +130,7 @@ def test_methods_of_a_comparison_cite_the_rivals_that_were_compared():
     assert "compressive (CLT) [3], Hadamard [4]" in both.text
     assert "Peers" in both.references[2]
     assert "Schechner" in both.references[3]
+    # One paper may describe two methods.
+    arnoldi = cited("Arnoldi", "Arnoldi after D", "symmetric")
+    assert "optical Arnoldi [3], optical Arnoldi, D first [3], symmetric [4]" in arnoldi.text
+    assert len(arnoldi.references) == 4

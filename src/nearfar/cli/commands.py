@@ -21,6 +21,7 @@ COMMANDS = Registry(
         "correspond": "nearfar.cli.correspond:correspond",
         "reconstruct": "nearfar.cli.reconstruct:reconstruct",
         "relight": "nearfar.cli.relight:relight",
+        "superpose": "nearfar.cli.superpose:superpose",
         "compensate": "nearfar.cli.compensate:compensate",
         "bounces": "nearfar.cli.bounces:bounces",
         "probe": "nearfar.cli.probe:probe",

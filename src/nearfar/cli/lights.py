@@ -11,6 +11,7 @@ from nearfar.errors import InputError
 
 if TYPE_CHECKING:
     from nearfar.arrays import Floats
+    from nearfar.capture import Capture
     from nearfar.transport.stored import StoredTransport
 
 Srgb = Annotated[bool, typer.Option("--srgb", help="LIGHT is an ordinary sRGB picture.")]
@@ -33,6 +34,25 @@ def read_light_for(
     given = Size(*light.shape[:2])
     light = (_resized if resize else _of_size)(light, path, transport.projector)
     return as_channels_see(light, transport.channels, transport.provenance), given
+
+
+def read_light_for_capture(
+    capture: "Capture", path: Path, *, srgb: bool, resize: bool
+) -> "tuple[Floats, Size]":
+    """Read a light as the channels of a capture's camera see it, and the size that its file has.
+
+    Raises
+    ------
+    InputError
+        If it has another size than the projector and is not to be resized.
+    """
+    from nearfar.files import read_light_of_any_size
+    from nearfar.transport.colour import as_channels_see
+
+    light = read_light_of_any_size(path, srgb=srgb)
+    given = Size(*light.shape[:2])
+    light = (_resized if resize else _of_size)(light, path, capture.plan.projector)
+    return as_channels_see(light, capture.channels, {"rig": capture.rig}), given
 
 
 def read_camera_picture(path: Path, camera: Size, channels: int, *, srgb: bool) -> "Floats":

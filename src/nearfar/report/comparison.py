@@ -24,11 +24,13 @@ TITLE = "nearfar: methods compared"
 # In dB; with a lower SNR_b a relit picture is hardly recognisable.
 MINIMUM_PLOTTED_SNR = 10.0
 MINIMUM_TICK_RATIO = 1.25
+MOST_LABELS_IN_A_ROW = 5
 PLOT_SHOWS = "SNR against photos and exposure"
 READING = (
     "Each line is a method; higher is better, and 20 dB are an error of 10 %, 40 dB of 1 %. On the "
     "left every photo is exposed alike; on the right all photos together get the same light, so "
-    "that methods of many photos gain nothing by their number."
+    "that methods of many photos gain nothing by their number. What is below "
+    f"{MINIMUM_PLOTTED_SNR:.0f} dB stands in the tables alone."
 )
 BEST = (
     "The best on pictures of each budget at which several methods were tried is marked, with the "
@@ -90,7 +92,10 @@ def draw(comparison: Comparison) -> Figure:
     right.set_xlabel("total exposure, photos' worth")
     left.set_ylabel("SNR$_b$, mean over pictures, dB")
     handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    # In rows of about the same length.
+    rows = -(-len(labels) // MOST_LABELS_IN_A_ROW)
+    columns = -(-len(labels) // max(rows, 1))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
     return figure
 
 
@@ -147,11 +152,15 @@ def verdict(comparison: Comparison) -> str:
 
 
 def describe_failures(comparison: Comparison) -> list[str]:
-    """Return a sentence for each method that failed, and one if the comparison was stopped."""
+    """Return a sentence for each method that was left out or failed, and one if it was stopped."""
     reasons: dict[tuple[str, str], list[int]] = {}
     for failure in comparison.failures:
         reasons.setdefault((failure.method, failure.reason), []).append(failure.budget)
     said = [
+        f"{RIVALS[method].title} is left out: it {reason}."
+        for method, reason in comparison.left_out
+    ]
+    said += [
         f"{RIVALS[method].title} came to nothing at {', '.join(map(str, sorted(set(mine))))}: "
         f"{reason}"
         for (method, reason), mine in reasons.items()
@@ -194,6 +203,18 @@ def _ordered(trials: Sequence[Trial]) -> list[Trial]:
     return sorted(trials, key=lambda t: (methods.index(t.method), t.photos, t.exposure))
 
 
+def assumption_rows(comparison: Comparison) -> list[list[str]]:
+    """Return a row for each method that was tried or left out and says what it assumes."""
+    trials = (*comparison.equal_photos, *comparison.equal_exposure)
+    named = {trial.method for trial in trials} | {method for method, _ in comparison.left_out}
+    return [
+        [RIVALS[method].title, RIVALS[method].assumes]
+        for method in RIVALS
+        if method in named and RIVALS[method].assumes
+    ]
+
+
+ASSUMPTIONS_HEAD = ["method", "assumes"]
 TABLE_HEAD = ["method", "photos", "exposure", "pictures", "white", "random", "best of"]
 
 
@@ -217,9 +238,11 @@ def comparison_page(comparison: Comparison, command: str | None = None) -> str:
 def _page(comparison: Comparison, sheet: str, links: str, command: str | None) -> str:
     caption = (
         "Every method sees the same scene, camera and noise, and finds correspondence itself where "
-        "it needs it; photos count stripes, inverses, references and black. The paper's method "
-        "takes the best of several far bands, compressive light transport the regularisation that "
-        "fits the true transport best."
+        "it needs it; photos count stripes, inverses, references and black, and both photos of a "
+        "light with negative parts. The paper's method takes the best of several far bands, "
+        "compressive light transport the regularisation that fits the true transport best, and a "
+        "method with a threshold the best of several. A method whose patterns depend on its photos "
+        "may take fewer photos than it is allowed."
     )
     body = [
         f"<h1>Methods compared on {escape(comparison.scene)}</h1>",
@@ -244,5 +267,9 @@ def _page(comparison: Comparison, sheet: str, links: str, command: str | None) -
         marked = [place for place, trial in enumerate(_ordered(trials)) if trial in best]
         table = numbers(TABLE_HEAD, table_rows(trials), marked)
         body += [f"<h2>{title}</h2>", f"<p>{text} {BEST}</p>", table]
+    assumptions = assumption_rows(comparison)
+    if assumptions:
+        table = numbers(ASSUMPTIONS_HEAD, assumptions)
+        body += ["<h2>What each method assumes</h2>", f'<div class="words">{table}</div>']
     methods = comparison_methods(comparison)
     return page(TITLE, "\n".join(body), methods=methods, command=command)

@@ -24,8 +24,33 @@ SCHECHNER = (
     "Schechner, Y.Y., Nayar, S.K., Belhumeur, P.N.: A Theory of Multiplexed Illumination. IEEE "
     "International Conference on Computer Vision (ICCV), 2003."
 )
+OTOOLE = (
+    "O'Toole, M., Kutulakos, K.N.: Optical Computing for Fast Light Transport Analysis. ACM "
+    "Transactions on Graphics 29(6) (SIGGRAPH Asia), 2010."
+)
+JIANG = (
+    "Jiang, H., Li, Y., Zhao, H., Li, X., Xu, Y.: Parallel Single-Pixel Imaging: A General Method "
+    "for Direct-Global Separation and 3D Shape Reconstruction Under Strong Global Illumination. "
+    "International Journal of Computer Vision 129, 2021."
+)
+SEN = (
+    "Sen, P., Chen, B., Garg, G., Marschner, S.R., Horowitz, M., Levoy, M., Lensch, H.P.A.: Dual "
+    "Photography. ACM Transactions on Graphics 24(3) (SIGGRAPH), 2005."
+)
+GARG = (
+    "Garg, G., Talvala, E.-V., Levoy, M., Lensch, H.P.A.: Symmetric Photography: Exploiting "
+    "Data-sparseness in Reflectance Fields. Eurographics Symposium on Rendering, 2006."
+)
 # What the methods of `nearfar compare` go back to, beside the paper.
-REFERENCES_OF_RIVALS = {"CLT": PEERS, "Hadamard": SCHECHNER}
+REFERENCES_OF_RIVALS = {
+    "CLT": PEERS,
+    "Arnoldi": OTOOLE,
+    "Arnoldi after D": OTOOLE,
+    "parallel single-pixel": JIANG,
+    "adaptive dual": SEN,
+    "symmetric": GARG,
+    "Hadamard": SCHECHNER,
+}
 
 PURPOSES = {
     "direct": "of the checkerboard, for direct light",
@@ -256,13 +281,14 @@ def comparison_methods(comparison: Comparison) -> Methods:
     """Return how methods were compared."""
     trials = (*comparison.equal_photos, *comparison.equal_exposure)
     names = [name for name in RIVALS if any(trial.method == name for trial in trials)]
-    further = {
-        name: place
-        for place, name in enumerate((name for name in names if name in REFERENCES_OF_RIVALS), 3)
-    }
-    cited = [
-        RIVALS[name].title + (f" [{further[name]}]" if name in further else "") for name in names
-    ]
+    references = list(
+        dict.fromkeys(REFERENCES_OF_RIVALS[name] for name in names if name in REFERENCES_OF_RIVALS)
+    )
+    cited = []
+    for name in names:
+        reference = REFERENCES_OF_RIVALS.get(name)
+        place = "" if reference is None else f" [{3 + references.index(reference)}]"
+        cited.append(RIVALS[name].title + place)
     budgets = sorted({trial.budget for trial in comparison.equal_photos})
     return _methods(
         [
@@ -274,7 +300,7 @@ def comparison_methods(comparison: Comparison) -> Methods:
             "Transports were relit under five pictures, white and a random pattern, and compared "
             "by SNR_b [1] with the true pictures.",
         ],
-        [REFERENCES_OF_RIVALS[name] for name in further],
+        references,
     )
 
 

@@ -86,7 +86,7 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .beside { display: grid; grid-template-columns: repeat(auto-fit, minmax(280px, 1fr)); gap: 1.6rem;
   align-items: start; }
 figure { margin: 0; }
-.words .numbers td { text-align: left; }
+.words .numbers td, .words .numbers th { text-align: left; }
 .sheet { margin-bottom: 1.2rem; }
 .sheet img { image-rendering: auto; background: #ffffff; }
 figcaption { font-size: .85rem; color: var(--soft); margin-top: .4rem; }

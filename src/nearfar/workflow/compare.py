@@ -75,6 +75,21 @@ class Failure(NamedTuple):
     reason: str
 
 
+class LeftOut(NamedTuple):
+    """A method that was not tried, as the scene is not what it assumes.
+
+    Attributes
+    ----------
+    method : str
+        Of `nearfar.workflow.rivals.RIVALS`.
+    reason : str
+        A clause, such as "needs a coaxial camera, ...".
+    """
+
+    method: str
+    reason: str
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Trials of one scene.
@@ -91,6 +106,8 @@ class Comparison:
         Methods that failed, which cost no other method its trials.
     is_finished : bool
         Whether every method had its turn.
+    left_out : tuple of LeftOut
+        Methods that do not suit the scene.
     """
 
     scene: str
@@ -100,6 +117,7 @@ class Comparison:
     equal_exposure: tuple[Trial, ...]
     failures: tuple[Failure, ...] = ()
     is_finished: bool = True
+    left_out: tuple[LeftOut, ...] = ()
 
     def numbers(self) -> dict[str, Any]:
         """Return everything as JSON holds it."""
@@ -110,6 +128,7 @@ class Comparison:
             "equal_photos": [trial._asdict() for trial in self.equal_photos],
             "equal_exposure": [trial._asdict() for trial in self.equal_exposure],
             "failures": [failure._asdict() for failure in self.failures],
+            "left_out": [method._asdict() for method in self.left_out],
             "finished": self.is_finished,
         }
 
@@ -143,7 +162,8 @@ def compare(
     bands, and compressive light transport the regularisation that fits the truth best.
     Correspondence is found by each method itself. A method that fails, such as one whose plans do
     not fit the projector, or one that holds each entry of T of a scene that is too large for it, is
-    listed with its reason, and the others go on.
+    listed with its reason, and the others go on; so is one that assumes what the scene is not, such
+    as a coaxial camera.
 
     Parameters
     ----------
@@ -170,9 +190,9 @@ def compare(
     Raises
     ------
     InputError
-        If there is no such method, or no budget that is enough for any.
+        If there is no such method, none that suits the scene, or no budget that is enough for any.
     """
-    methods = known_methods(methods)
+    methods, left_out = suited(scene, known_methods(methods))
     budgets = known_budgets(scene.projector, budgets)
     lights = standard_lights(scene.projector)
     gain = choose_exposure(None, scene, scene.name)
@@ -187,7 +207,7 @@ def compare(
     )
     report = progress or (lambda _what, _share: None)
     jobs = _jobs(scene.projector, methods, budgets)
-    found = _Found(scene)
+    found = _Found(scene, left_out)
     for number, (method, budget) in enumerate(jobs):
         told = _of_method(report, jobs, number)
         told(0.0)
@@ -206,8 +226,9 @@ def compare(
 class _Found:
     """What a comparison has found so far."""
 
-    def __init__(self, scene: KnownTransport) -> None:
+    def __init__(self, scene: KnownTransport, left_out: tuple[LeftOut, ...]) -> None:
         self.scene = scene
+        self.left_out = left_out
         self.trials: list[tuple[Budget, Trial]] = []
         self.failures: list[Failure] = []
         # Where a method took every photo of its budget, as much total exposure gives the same
@@ -234,6 +255,7 @@ class _Found:
             tuple(trial for budget, trial in self.trials if budget.total_exposure is not None),
             tuple(self.failures),
             is_finished,
+            self.left_out,
         )
 
 
@@ -287,7 +309,8 @@ def known_budgets(projector: Size, budgets: Sequence[int] | None) -> list[int]:
 
 
 def describe_work(scene: KnownTransport, methods: Sequence[str], budgets: Sequence[int]) -> str:
-    """Return in a line what `compare` is about to do."""
+    """Return in a line what `compare` is about to do; raises as it does."""
+    methods, _ = suited(scene, methods)
     jobs = _jobs(scene.projector, methods, budgets)
     titles = ", ".join(RIVALS[method].title for method in methods)
     counts = ", ".join(map(str, budgets))
@@ -307,6 +330,29 @@ def known_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
             f"{', '.join(RIVALS)}."
         )
     return chosen
+
+
+def suited(
+    scene: KnownTransport, methods: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[LeftOut, ...]]:
+    """Return the methods that can run on a scene, and those that cannot, with the reason.
+
+    Raises
+    ------
+    InputError
+        If none can.
+    """
+    left_out = []
+    for method in methods:
+        unsuited = RIVALS[method].unsuited
+        reason = None if unsuited is None else unsuited(scene)
+        if reason is not None:
+            left_out.append(LeftOut(method, reason))
+    others = tuple(name for name in methods if name not in {name for name, _ in left_out})
+    if not others:
+        reasons = "; ".join(f"{RIVALS[name].title} {reason}" for name, reason in left_out)
+        raise InputError(f"no method is left to compare: {reasons}. Name others.")
+    return others, tuple(left_out)
 
 
 def _jobs(
@@ -340,7 +386,9 @@ def _judge(
         method,
         _counted(budget),
         attempt.photos,
-        attempt.photos * budget.exposure(attempt.photos),
+        attempt.photos * budget.exposure(attempt.photos)
+        if attempt.exposure is None
+        else attempt.exposure,
         float(np.mean(pictures)),
         values["white"],
         values["random"],

@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from nearfar.baselines.shooting import Shooting
 from nearfar.errors import InputError
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.known import KnownTransport
+from nearfar.workflow.rivals.rival import Budget
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,3 +62,20 @@ class Bench:
         """Return a rig that exposes for `exposure` units, its full well deeper in proportion."""
         camera = self.camera.model_copy(update={"full_well": self.camera.full_well * exposure})
         return SimulatedRig(self.scene, self.scene.name, SimulatedProjector(), camera, self.gain, 0)
+
+    def shooting(self, budget: Budget, photos: int | None = None) -> Shooting:
+        """Return a rig for a method that asks for its photos one batch after the other.
+
+        Parameters
+        ----------
+        budget : Budget
+        photos : int, optional
+            How many it may take, if it knows that it takes fewer than the budget's. A total
+            exposure is shared among so many: light of photos that are not taken is lost.
+        """
+        photos = budget.photos if photos is None else photos
+        return Shooting(self.rig(budget.exposure(photos)), photos)
+
+    def exposure_of(self, budget: Budget, shooting: Shooting) -> float:
+        """Return the total exposure of what was shot by a `shooting` of the whole budget."""
+        return shooting.taken * budget.exposure(budget.photos)

@@ -71,6 +71,7 @@ def _telling_of_long_choices(bench: Bench, budget: Budget) -> Callable[[float], 
 
 COMPRESSIVE = Rival(
     title=TITLE,
+    assumes="a row is sparse in Haar wavelets",
     line={"color": "#c2561a", "marker": "^", "linestyle": "-."},
     attempts=_attempts,
     is_dense=True,

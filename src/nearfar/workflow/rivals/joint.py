@@ -31,6 +31,8 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
 
 JOINT = Rival(
     title="joint, no stripes",
+    assumes="a row is direct light about one projector pixel, smooth light near it, and far light "
+    "that is likely to be of low frequencies",
     line={"color": "#1f4e9c", "marker": "o", "linestyle": "-"},
     attempts=_attempts,
 )

@@ -73,6 +73,8 @@ def _attempts(bench: Bench, budget: Budget) -> Iterator[Attempt]:
 
 PAPER = Rival(
     title="the paper's",
+    assumes="a row is direct light at one projector pixel, a window of light near it, and far "
+    "light of low frequencies alone",
     line={"color": "#111111", "marker": "s", "linestyle": "--"},
     attempts=_attempts,
 )

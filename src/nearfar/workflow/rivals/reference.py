@@ -29,6 +29,7 @@ def reference_rival(
 
     return Rival(
         title=title,
+        assumes="nothing: as many photos as projector pixels",
         line=line,
         attempts=attempts,
         is_dense=True,

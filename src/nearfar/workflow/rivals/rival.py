@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from nearfar.arrays import Floats, Size
+from nearfar.transport.known import KnownTransport
 
 if TYPE_CHECKING:
     from nearfar.workflow.rivals.bench import Bench
@@ -51,10 +52,14 @@ class Attempt(NamedTuple):
         All that were taken: those of stripes, inverses, references and black too.
     transport : Relights
         In photo units.
+    exposure : float, optional
+        Total, in units of one photo's at the camera's own setting. If left out, each photo was
+        exposed for ``budget.exposure(photos)``.
     """
 
     photos: int
     transport: Relights
+    exposure: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +76,14 @@ class Rival:
     attempts : callable
         From the bench and a budget to the attempts, of which the best on pictures counts; none
         where the budget is too small for the method. An attempt takes its photos with
-        ``bench.rig(budget.exposure(photos))`` and finds correspondence itself.
+        ``bench.rig(budget.exposure(photos))`` and finds correspondence itself. A method whose
+        patterns depend on its photos asks for them one batch after the other, with
+        ``bench.shooting(budget)``.
+    assumes : str
+        What it takes for granted of a scene or a rig, a phrase; empty if nothing.
+    unsuited : callable, optional
+        From the scene to a clause that says why the method cannot run on it, such as "needs ...",
+        or None if it can.
     is_dense : bool
         Whether it holds each entry of T, or a photo of each projector pixel, so that it cannot run
         on scenes that are too large for matrices.
@@ -83,5 +95,7 @@ class Rival:
     title: str
     line: Mapping[str, Any]
     attempts: "Callable[[Bench, Budget], Iterable[Attempt]]"
+    assumes: str = ""
+    unsuited: Callable[[KnownTransport], str | None] | None = None
     is_dense: bool = False
     photos: Callable[[Size], int] | None = None

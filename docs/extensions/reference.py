@@ -13,7 +13,7 @@ TOLD_ELSEWHERE = {"embreex": "BSD-2-Clause", "openexr": "BSD-3-Clause"}
 GROUPS = {
     "Plan and capture": ["plan", "export", "import", "acquire"],
     "Estimate and judge": ["correspond", "reconstruct", "evaluate", "check", "info", "convert"],
-    "Use": ["relight", "compensate", "bounces", "probe", "dual", "view"],
+    "Use": ["relight", "compensate", "bounces", "probe", "dual", "depth", "view"],
     "Real rigs": ["devices", "init", "preview", "calibrate"],
     "Scenes and experiments": ["demo", "render", "figures", "compare", "separate"],
 }

@@ -58,6 +58,12 @@ Use the transport
     probe                  relight by chosen projector pixels for each camera pixel
     ProbingMask            these: within a distance of q, a ring, a band about a line, any
     dual_view              the scene as the projector sees it, lit from the camera
+    depth                  points on the surfaces of a capture or a transport, with error bars
+    triangulate            the same from correspondence
+    Depth                  these points
+    StereoCalibration      where camera and projector stand, and their lenses
+    read_stereo_calibration   read it from a file, as OpenCV writes it
+    save_stereo_calibration   write it
 
 Lights to relight under
     white                  full white
@@ -119,6 +125,7 @@ if TYPE_CHECKING:
 
     from nearfar.applications.bounces import Bounces, bounces
     from nearfar.applications.compensate import Compensation, compensate
+    from nearfar.applications.depth import Depth, triangulate
     from nearfar.applications.dual import dual_view
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
@@ -137,6 +144,11 @@ if TYPE_CHECKING:
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
     from nearfar.progress import progress_bar
     from nearfar.rigs.opening import open_rig
+    from nearfar.stereo import (
+        StereoCalibration,
+        read_stereo_calibration,
+        save_stereo_calibration,
+    )
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_operator import ExactOperator
     from nearfar.transport.exact_store import load_exact, save_exact
@@ -146,6 +158,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.acquire import acquire, shoot_again
     from nearfar.workflow.check import check_model
     from nearfar.workflow.conditioning import condition_near
+    from nearfar.workflow.depth import depth
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct, reconstruct_to_file
@@ -195,6 +208,12 @@ _HOMES = {
     "probe": "nearfar.applications.probe",
     "ProbingMask": "nearfar.applications.masks",
     "dual_view": "nearfar.applications.dual",
+    "depth": "nearfar.workflow.depth",
+    "triangulate": "nearfar.applications.depth",
+    "Depth": "nearfar.applications.depth",
+    "StereoCalibration": "nearfar.stereo",
+    "read_stereo_calibration": "nearfar.stereo",
+    "save_stereo_calibration": "nearfar.stereo",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -253,6 +272,12 @@ __all__ = [  # noqa: RUF022
     "probe",
     "ProbingMask",
     "dual_view",
+    "depth",
+    "triangulate",
+    "Depth",
+    "StereoCalibration",
+    "read_stereo_calibration",
+    "save_stereo_calibration",
     "white",
     "natural_picture",
     "penguin",

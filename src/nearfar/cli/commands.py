@@ -25,6 +25,7 @@ COMMANDS = Registry(
         "bounces": "nearfar.cli.bounces:bounces",
         "probe": "nearfar.cli.probe:probe",
         "dual": "nearfar.cli.dual:dual",
+        "depth": "nearfar.cli.depth:depth",
         "evaluate": "nearfar.cli.evaluate:evaluate",
         "render": "nearfar.cli.render:render",
         "info": "nearfar.cli.info:info",

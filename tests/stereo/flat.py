@@ -1,4 +1,4 @@
-"""A camera and a projector before a flat board or any other surface, whose light is direct alone."""
+"""A camera and a projector before a surface that reflects direct light alone."""
 
 from collections.abc import Callable
 
@@ -6,11 +6,12 @@ import numpy as np
 from scipy import sparse
 
 from nearfar.arrays import Size
-from nearfar.stereo import Lens, StereoCalibration
+from nearfar.stereo import StereoCalibration
 from nearfar.transport.exact import ExactTransport
 
 # From rays (n, 3) of the camera to depths (n,) and albedos (n,); NaN where nothing is hit.
 Surface = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+BOARD_CORNERS = Size(4, 6)
 BENT = np.array([-0.12, 0.05, 0.002, -0.003])
 
 
@@ -34,7 +35,7 @@ def rig_of(
         f = focal * max(size)
         return [[f, 0, size.width / 2 - 0.5], [0, f, up * size.height - 0.5], [0, 0, 1]]
 
-    turned = rotation(1.0, -12.0, 0.5)
+    turned = rotation(1.0, 17.0, 0.5)
     return StereoCalibration.from_opencv(
         camera, matrix(camera, 0.5), bent, projector, matrix(projector, 0.6), bent,
         turned, -turned @ [-0.2, 0.01, 0.0],
@@ -97,7 +98,7 @@ def sphere(middle: np.ndarray, radius: float) -> Surface:
 
 
 def board(
-    turned: np.ndarray, middle: np.ndarray, corners: Size = Size(4, 6), square: float = 0.03
+    turned: np.ndarray, middle: np.ndarray, corners: Size = BOARD_CORNERS, square: float = 0.03
 ) -> Surface:
     """A checkerboard about a place, with a white border."""
 

@@ -24,7 +24,7 @@ ONE_DEVIATION = 0.6827
 # The deviation of q is multiplied by what makes it explain the misses; of fewer points than these,
 # by what does on exact scenes (benchmarks/depth.py).
 FEWEST_MISSES = 50
-USUAL_FACTOR = 1.4
+USUAL_FACTOR = 1.1
 LEAST_FACTOR = 0.1
 # Misses typically above this many pattern pixels are of a calibration that does not fit.
 LARGEST_TYPICAL_MISS = 1.0
@@ -170,31 +170,26 @@ def triangulate(
             "the camera sees the projector's light and that patterns tell rows and columns apart."
         )
     sure = lit & (confidence >= least)
-    spread = deviation_of(np.where(sure[..., None], q, np.nan))
-    rows, columns = np.nonzero(sure)
-    native = side * (q[sure] + 0.5) - 0.5 + corner
-    camera = np.stack([columns, rows], axis=1).astype(np.float64)
-    found = _in_blocks(stereo, camera, native[:, ::-1], side * spread[sure][:, ::-1])
+    on_screen = side * (q + 0.5) - 0.5 + corner
+    # What is far off every epipolar line is no q, and would spoil the error bars of its neighbours.
+    first = _by_camera_pixel(stereo, sure, on_screen, np.ones(q.shape))
+    typical = max(_within_one(first.distance), side * LEAST_FACTOR * LEAST_DEVIATION)
+    near = first.distance <= LARGEST_MISS * typical
+    spread = side * deviation_of(np.where(near[..., None], q, np.nan))
+    found = _by_camera_pixel(stereo, near, on_screen, spread)
     factor = _factor(found.miss)
-    meet = np.isfinite(found.miss)
-    typical = max(_within_one(found.distance), side * LEAST_FACTOR * LEAST_DEVIATION)
-    keep = meet & (found.miss <= LARGEST_MISS * factor)
-    keep &= found.distance <= LARGEST_MISS * typical
-    points = np.full((*lit.shape, 3), np.nan)
-    deviation, miss = np.full(lit.shape, np.nan), np.full(lit.shape, np.nan)
-    points[sure] = np.where(keep[:, None], found.points, np.nan)
-    deviation[sure] = np.where(keep, factor * found.deviation, np.nan)
-    miss[sure] = found.distance / side
+    keep = found.miss <= LARGEST_MISS * factor
+    meet = np.isfinite(first.distance)
     return Depth(
-        points=points,
-        deviation=deviation,
+        points=np.where(keep[..., None], found.points, np.nan),
+        deviation=np.where(keep, factor * found.deviation, np.nan),
         confidence=confidence,
-        miss=miss,
+        miss=first.distance / side,
         factor=factor,
         lit=int(lit.sum()),
         unsure=int((lit & ~sure).sum()),
         missed=int((meet & ~keep).sum()),
-        behind=int((~meet).sum()),
+        behind=int((sure & ~meet).sum()),
     )
 
 
@@ -241,17 +236,20 @@ def _require_camera(camera: Size, stereo: StereoCalibration) -> None:
         )
 
 
-def _in_blocks(
-    stereo: StereoCalibration, camera: Floats, projector: Floats, deviation: Floats
+def _by_camera_pixel(
+    stereo: StereoCalibration, chosen: Booleans, projector: Floats, deviation: Floats
 ) -> Triangulated:
-    parts = [
-        triangulate_pixels(stereo, camera[some], projector[some], deviation[some])
-        for some in blocks(len(camera), PIXELS_AT_ONCE)
-    ]
-    if not parts:
-        none = np.zeros(0)
-        return Triangulated(np.zeros((0, 3)), none, none, none)
-    return Triangulated(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    """Triangulate chosen camera pixels; arrays of the camera's shape, NaN at the others."""
+    shape = chosen.shape
+    found = Triangulated(np.full((*shape, 3), np.nan), *(np.full(shape, np.nan) for _ in range(3)))
+    rows, columns = np.nonzero(chosen)
+    for some in blocks(len(rows), PIXELS_AT_ONCE):
+        y, x = rows[some], columns[some]
+        camera = np.stack([x, y], axis=1).astype(np.float64)
+        part = triangulate_pixels(stereo, camera, projector[y, x, ::-1], deviation[y, x, ::-1])
+        for whole, values in zip(found, part, strict=True):
+            whole[y, x] = values
+    return found
 
 
 def _factor(miss: Floats) -> float:

@@ -115,7 +115,7 @@ def _summary(found: "Depth") -> str:
     if found.missed:
         lines.append(
             f"{found.missed} left out, whose rays miss each other by more than chance: their q is "
-            f"wrong"
+            f"wrong, or of two surfaces"
         )
     if found.behind:
         lines.append(f"{found.behind} left out, whose rays meet behind the camera or nowhere")

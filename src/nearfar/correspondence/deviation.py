@@ -15,6 +15,9 @@ from nearfar.arrays import Floats
 
 # Camera pixels on each side whose scatter is pooled.
 POOLED = 2
+# A larger second difference is of an edge between two surfaces, and counts as this: it says that q
+# beside the edge may be of both, and not by how much the surfaces are apart.
+LARGEST_SECOND_DIFFERENCE = 1.0
 # Where q of all neighbours agrees, it is no more certain than this, in projector pixels.
 LEAST_DEVIATION = 0.05
 # Of q(c - 1) - 2 q(c) + q(c + 1), in variances of q.
@@ -41,6 +44,7 @@ def deviation_of(q: Floats) -> Floats:
     for axis in (0, 1):
         bent = _beside(values, axis, 1) - 2 * values + _beside(values, axis, -1)
         known = np.isfinite(bent)
+        bent = np.clip(bent, -LARGEST_SECOND_DIFFERENCE, LARGEST_SECOND_DIFFERENCE)
         total += _pooled(np.where(known, bent, 0.0) ** 2)
         count += _pooled(known.astype(np.float64))
     known = count > 0

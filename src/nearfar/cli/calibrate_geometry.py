@@ -85,7 +85,8 @@ def of_rig(
         )
     seen, folder = _board(board), output.with_suffix(".poses")
     check_output(folder, force=force)
-    with open_rig_to_calibrate(rig, table, on_alarm=warn) as opened:
+    # Gray code needs no linear light, of which a rig without calibration warns; captures keep it.
+    with open_rig_to_calibrate(rig, table) as opened:
         poses = shoot_poses(opened, opened.projector, folder, seen, input, quiet=quiet)
     try:
         found = calibrate_geometry(poses)

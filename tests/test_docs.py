@@ -33,6 +33,7 @@ PAGES = sorted(page for page in DOCS.rglob("*.md") if not OTHERS & set(page.part
 ELSEWHERE = {
     "pip": "tests/test_packaging.py",
     "nearfar view": "tests/viewer/test_view.py",
+    "nearfar calibrate": "tests/cli/test_depth.py",
 }
 
 

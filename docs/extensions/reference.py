@@ -14,7 +14,17 @@ TOLD_ELSEWHERE = {"embreex": "BSD-2-Clause", "openexr": "BSD-3-Clause"}
 GROUPS = {
     "Plan and capture": ["plan", "export", "import", "acquire"],
     "Estimate and judge": ["correspond", "reconstruct", "evaluate", "check", "info", "convert"],
-    "Use": ["relight", "superpose", "compensate", "bounces", "probe", "dual", "edit", "view"],
+    "Use": [
+        "relight",
+        "superpose",
+        "compensate",
+        "bounces",
+        "probe",
+        "dual",
+        "edit",
+        "depth",
+        "view",
+    ],
     "Real rigs": ["devices", "init", "preview", "calibrate"],
     "Scenes and experiments": ["demo", "render", "figures", "compare", "separate"],
 }

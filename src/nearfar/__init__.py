@@ -69,6 +69,12 @@ Use the transport
     recolour               change the colour of one component
     cut_far                cut far-range light between regions of the projector and the camera
     Cut                    the transport without that light, and how well it is cut
+    depth                  points on the surfaces of a capture or a transport, with error bars
+    triangulate            the same from correspondence
+    Depth                  these points
+    StereoCalibration      where camera and projector stand, and their lenses
+    read_stereo_calibration   read it from a file, as OpenCV writes it
+    save_stereo_calibration   write it
 
 Lights to relight under
     white                  full white
@@ -131,6 +137,7 @@ if TYPE_CHECKING:
     from nearfar.applications.bounces import Bounces, bounces
     from nearfar.applications.compensate import Compensation, compensate
     from nearfar.applications.compensate_together import JointCompensation, compensate_together
+    from nearfar.applications.depth import Depth, triangulate
     from nearfar.applications.dual import dual_view
     from nearfar.applications.editing import Cut, cut_far, recolour, widen_subsurface
     from nearfar.applications.masks import ProbingMask
@@ -151,6 +158,11 @@ if TYPE_CHECKING:
     from nearfar.plan import Plan, choose_plan, paper_plan, parse_plan, read_plan
     from nearfar.progress import progress_bar
     from nearfar.rigs.opening import open_rig
+    from nearfar.stereo import (
+        StereoCalibration,
+        read_stereo_calibration,
+        save_stereo_calibration,
+    )
     from nearfar.transport.exact import ExactTransport
     from nearfar.transport.exact_operator import ExactOperator
     from nearfar.transport.exact_store import load_exact, save_exact
@@ -160,6 +172,7 @@ if TYPE_CHECKING:
     from nearfar.workflow.acquire import acquire, shoot_again
     from nearfar.workflow.check import check_model
     from nearfar.workflow.conditioning import condition_near
+    from nearfar.workflow.depth import depth
     from nearfar.workflow.evaluate import relighting_snr, row_snr, snr
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
     from nearfar.workflow.reconstruction.reconstruct import reconstruct, reconstruct_to_file
@@ -222,6 +235,12 @@ _HOMES = {
     "recolour": "nearfar.applications.editing",
     "cut_far": "nearfar.applications.editing",
     "Cut": "nearfar.applications.editing",
+    "depth": "nearfar.workflow.depth",
+    "triangulate": "nearfar.applications.depth",
+    "Depth": "nearfar.applications.depth",
+    "StereoCalibration": "nearfar.stereo",
+    "read_stereo_calibration": "nearfar.stereo",
+    "save_stereo_calibration": "nearfar.stereo",
     "white": "nearfar.illumination.pictures",
     "natural_picture": "nearfar.illumination.pictures",
     "penguin": "nearfar.illumination.pictures",
@@ -291,6 +310,12 @@ __all__ = [  # noqa: RUF022
     "recolour",
     "cut_far",
     "Cut",
+    "depth",
+    "triangulate",
+    "Depth",
+    "StereoCalibration",
+    "read_stereo_calibration",
+    "save_stereo_calibration",
     "white",
     "natural_picture",
     "penguin",

@@ -374,3 +374,19 @@ def test_alarms_of_a_capture_that_is_gone_on_with_name_its_own_photos(table, pla
     camera.from_now_on = lambda picture: picture + 0.1
     list(frames)
     assert "numbers=range(3" in told[0]
+
+
+def test_gray_code_is_photographed_where_the_camera_sees_few_of_its_stripes():
+    # A quarter of the projector, where coarse bits are as black, or as white, as the photo before.
+    screen, seen = TableScreen(Size(24, 32)), Size(12, 16)
+    direct = np.zeros((*seen, *screen.monitor.size))
+    y, x = np.indices(seen)
+    direct[y, x, y, x + 16] = 0.4
+    transport = direct.reshape(seen.pixels, -1)
+    camera = TableCamera(screen, transport, seen, screen.monitor.size)
+    rig = RealRig(screen, camera, screen.monitor.size, scale=1, exposure=0.1)
+    gray = paper_plan(rig.projector, 1, Size(1, 1), correspondence="gray")
+    photos = _photos(rig, gray)[..., 0]
+    patterns = [gray.draw(i)[:12, 16:] for i in range(len(gray.patterns))]
+    shown = np.array(patterns, dtype=float)
+    assert np.corrcoef(shown.ravel(), photos.ravel())[0, 1] > 0.999

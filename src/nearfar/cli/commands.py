@@ -27,6 +27,7 @@ COMMANDS = Registry(
         "probe": "nearfar.cli.probe:probe",
         "dual": "nearfar.cli.dual:dual",
         "edit": "nearfar.cli.edit:edit",
+        "depth": "nearfar.cli.depth:depth",
         "evaluate": "nearfar.cli.evaluate:evaluate",
         "render": "nearfar.cli.render:render",
         "info": "nearfar.cli.info:info",

@@ -107,7 +107,7 @@ class CheckedShoot:
         shutter = self._shutter
         # After black or white, whichever is unlike the pattern, a photo of it differs everywhere.
         is_bright = pattern.mean() > 127
-        away = self._draw(self._black if is_bright else self._white)
+        away, other = (self._draw(p) for p in (self._black, self._white)[:: 1 if is_bright else -1])
         for _ in range(MAXIMUM_TRIES):
             between = shutter.photograph(away, shutter.flush, number=number)
             photo = shutter.photograph(self._draw(pattern), shutter.flush, number=number)
@@ -117,7 +117,12 @@ class CheckedShoot:
                 self._measure_levels_again(number)
                 continue
             if self._stale.repeated(photo, between) is not None:
-                continue
+                # The pattern may be as black, or as white, where the camera looks: bits of Gray
+                # code are. Then its photo is the same by way of the other; an old part is not.
+                shutter.photograph(other, shutter.flush, number=number)
+                again = shutter.photograph(self._draw(pattern), shutter.flush, number=number)
+                if not self._levels.is_same_light(photo, again):
+                    continue
             if self._levels.is_same_light(suspect, photo):
                 self._stale.accept_suspect()
                 if self._stale.is_too_coarse:

@@ -1,0 +1,1 @@
+"""Where a camera and a projector stand, measured by photos of a checkerboard."""

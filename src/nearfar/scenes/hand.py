@@ -1,5 +1,6 @@
 """A hand of wax on a plinth, its palm towards the projector, seen from aside."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -158,16 +159,16 @@ def _hand() -> Part:
 def hand() -> Scene:
     """Describe the hand; its projector stands on the left, its camera on the right."""
     plinth = [(0.15, 0.0), (0.15, 0.03), (0.135, 0.045), (0.12, 0.05), (0.0, 0.05)]
-    left, right, back, front = -0.75, 0.44, -0.38, 0.55
+    left, right, back, front = -0.75, 0.75, -0.38, 0.55
     across, inwards, up = (right - left, 0.0, 0.0), (0.0, 0.0, back - front), (0.0, 1.0, 0.0)
-    outwards = (0.0, 0.0, front - back)
+    screen = quadrilateral("screen", (0.33, 0.0, back), (0.42, 0.0, front - back), up, SCREEN)
     x, _, z = WRIST
     return Scene(
         name="hand",
         parts=(
             quadrilateral("table", (left, 0.0, front), across, inwards, WOOD),
             quadrilateral("wall", (left, 0.0, back), across, up, WALL),
-            quadrilateral("screen", (right, 0.0, back), outwards, up, SCREEN),
+            replace(screen, occludes=True),
             solid("plinth", lathe(plinth), EBONY, move=(x, 0.0, z)),
             _hand(),
         ),

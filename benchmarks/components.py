@@ -4,12 +4,13 @@ Run ``python benchmarks/components.py [--photos N] [SCENE ...]``. The camera is 
 benchmarks/accuracy.py, the plan one of N photos (117) that were chosen for it, correspondence
 included. For the model's split and the physical one it prints, in dB under white, how far direct
 light, light under surfaces and inter-reflection are from those of the scene; then the share of the
-light that is taken for subsurface light, and mean and standard deviation of direct light at
-translucent surfaces beside the true ones. The model's near-range light stands beside subsurface
-light, its far-range light beside inter-reflection. Last come direct and global light, by the
-physical split and by the checkerboards of Nayar et al. (2006) that take no more photos, black
+light that is taken for subsurface light, mean and standard deviation of direct light at
+translucent surfaces over the true ones, and the share of errors within one standard deviation of
+the error bars, at translucent surfaces and at others. The model's near-range light stands beside
+subsurface light, its far-range light beside inter-reflection. Last come direct and global light, by
+the physical split and by the checkerboards of Nayar et al. (2006) that take no more photos, black
 included.
-alcove and shelf took no part in any choice that the split made.
+alcove, shelf, hand and marble took no part in any choice that the split made.
 """
 
 import argparse
@@ -20,8 +21,8 @@ import numpy as np
 import separation
 from accuracy import shoot
 from fewer_photos import jointly
-from nearfar import ExactTransport, choose_plan, snr, split_physically
-from nearfar.arrays import Floats
+from nearfar import ExactTransport, PhysicalErrorBars, choose_plan, snr, split_physically
+from nearfar.arrays import Booleans, Floats
 from nearfar.baselines.separation_methods import by_checkerboards
 from nearfar.baselines.separation_photos import separate
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -37,8 +38,9 @@ WINDOWS = {
     "corner": None,
     "alcove": 11,
     "shelf": 13,
+    "hand": 11,
+    "marble": 11,
 }
-
 
 # Side of the squares and step between checkerboards, projector pixels.
 CHECKERBOARDS = ((2, 1), (3, 2), (3, 1), (4, 2), (4, 1), (8, 1))
@@ -66,22 +68,41 @@ def run(name: str, photos: int) -> None:
     print(
         f"  physical split   {line(found.components, physical._fields)}  subsurface {share:.1f} %"
     )
+    found_parts = [np.reshape(part, truth[0].shape) for part in physical]
+    deviations = [
+        np.reshape(part, truth[0].shape) for part in PhysicalErrorBars(split).components(white)
+    ]
     translucent = truth[1].any(axis=-1) & transport.lit
     if translucent.any():
-        direct = np.reshape(physical.direct, truth[0].shape)
-        for kind, part in (("true", truth[0]), ("found", direct)):
-            means, spreads = part[translucent].mean(axis=0), part[translucent].std(axis=0)
-            numbers = f"mean {means.round(3)} deviation {spreads.round(3)}"
-            print(f"  direct light there, {kind:5s} {numbers}")
-    global_ = np.reshape(physical.subsurface + physical.interreflection, truth[0].shape)
-    print(f"  direct, global   {direct_and_global(truth, physical.direct, global_)}")
+        known, direct = truth[0][translucent], found_parts[0][translucent]
+        print(
+            f"  direct light there, over the true: mean {direct.mean(axis=0) / known.mean(axis=0)}"
+        )
+        print(f"    standard deviation {direct.std(axis=0) / known.std(axis=0)}")
+        print(f"  within error bars there {within(found_parts, truth, deviations, translucent)}")
+    opaque = transport.lit & ~translucent
+    print(f"  within error bars elsewhere {within(found_parts, truth, deviations, opaque)}")
+    global_ = found_parts[1] + found_parts[2]
+    print(f"  direct, global   {direct_and_global(truth, found_parts[0], global_)}")
     for side, step in CHECKERBOARDS:
         beside_checkerboards(scene, truth, photos, side, step)
 
 
+def within(
+    found: Sequence[Floats],
+    truth: Sequence[Floats],
+    deviations: Sequence[Floats],
+    chosen: Booleans,
+) -> str:
+    """Write the share of errors within one standard deviation, of each component."""
+    parts = zip(found, truth, deviations, strict=True)
+    shares = [100 * np.mean((np.abs(one - other) <= bar)[chosen]) for one, other, bar in parts]
+    return ", ".join(f"{share:.0f} %" for share in shares)
+
+
 def direct_and_global(truth: Sequence[Floats], direct: Floats, global_: Floats) -> str:
     """Write the SNR of direct light and of all other light."""
-    found = snr(truth[0], np.reshape(direct, truth[0].shape)), snr(truth[1] + truth[2], global_)
+    found = snr(truth[0], direct), snr(truth[1] + truth[2], global_)
     return " ".join(f"{value:6.2f}" for value in found)
 
 
@@ -104,5 +125,6 @@ if __name__ == "__main__":
     parser.add_argument("scenes", nargs="*", default=list(WINDOWS))
     parser.add_argument("--photos", type=int, default=117)
     chosen = parser.parse_args()
+    np.set_printoptions(precision=3)
     for scene_name in chosen.scenes:
         run(scene_name, chosen.photos)

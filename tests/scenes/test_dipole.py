@@ -57,7 +57,15 @@ def test_patch_matrix_returns_the_total_in_the_middle_of_a_plane():
         assert total == pytest.approx(diffuse_reflectance(source), rel=0.02)
 
 
-@pytest.mark.parametrize(("name", "size"), [("shelf", Size(10, 10)), ("alcove", Size(8, 8))])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("shelf", Size(10, 10)),
+        ("alcove", Size(8, 8)),
+        ("hand", Size(9, 9)),
+        ("marble", Size(7, 7)),
+    ],
+)
 def test_patch_matrix_is_positive_definite_on_a_coarse_grid(name, size):
     """Where a sample seen at a glancing angle stands for more than its true area."""
     scene = SCENES[name].compute.surfaces()

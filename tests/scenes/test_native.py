@@ -33,7 +33,12 @@ def noise(size, seed=0):
     ("name", "least"),
     # dB of T, D, N and F under a random light; N and F differ by what patches cost where they are
     # mixed.
-    [("corner", (50, 65, 0, 38)), ("cornell", (33, 33, 24, 29)), ("wedge", (34, 34, 0, 24))],
+    [
+        ("corner", (50, 65, 0, 38)),
+        ("cornell", (33, 33, 24, 29)),
+        ("wedge", (34, 34, 0, 24)),
+        ("marble", (31, 28, 32, 32)),
+    ],
 )
 def test_an_operator_agrees_with_the_matrices(name, least):
     size = Size(24, 24)

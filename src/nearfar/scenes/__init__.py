@@ -31,6 +31,8 @@ SCENES: Registry[SceneDescription] = Registry(
         "corner": "nearfar.scenes.corner:CORNER",
         "alcove": "nearfar.scenes.alcove:ALCOVE",
         "shelf": "nearfar.scenes.shelf:SHELF",
+        "hand": "nearfar.scenes.hand:HAND",
+        "marble": "nearfar.scenes.marble:MARBLE_STEPS",
     },
     SceneDescription,
 )

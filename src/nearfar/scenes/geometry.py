@@ -64,7 +64,8 @@ class Material:
     gloss, medium : Gloss or None, Medium or None
         Clear coat and translucent inside.
     texture : callable or None
-        Factor on the albedo at positions (..., 3), shape (...); of mean about one.
+        Factor on the albedo at positions (..., 3), shape (...); of mean about one. Light under a
+        surface has the factor's root where it enters and where it leaves.
     """
 
     albedo: Vector

@@ -1,6 +1,6 @@
 """From a scene's description to its exact transport."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import NamedTuple
 
@@ -10,9 +10,9 @@ from nearfar.arrays import Floats, Integers, Size
 from nearfar.scenes.camera import Gather, gather
 from nearfar.scenes.dipole import dipole, subsurface
 from nearfar.scenes.form_factors import exchange
-from nearfar.scenes.geometry import Scene
+from nearfar.scenes.geometry import Part, Scene
 from nearfar.scenes.optics import pinhole
-from nearfar.scenes.patches import Patches, albedo, build_patches, with_medium
+from nearfar.scenes.patches import Patches, albedo, build_patches, texture, with_medium
 from nearfar.scenes.radiosity import components
 from nearfar.scenes.rays import surface
 from nearfar.transport.exact import ExactTransport
@@ -75,7 +75,7 @@ def patched(
     form = exchange(patches, scene.parts, occluders)
     progress("subsurface", 0.3)
     translucent = np.flatnonzero(with_medium(patches, scene.parts))
-    inside = subsurface_of(patches, scene, translucent)
+    inside = subsurface_of(patches, scene.parts, translucent)
     return PatchedScene(patches, seen, form, albedo(patches, scene.parts), translucent, inside)
 
 
@@ -134,15 +134,20 @@ def body_of(patches: Patches, chosen: Integers) -> Patches:
     )
 
 
-def subsurface_of(patches: Patches, scene: Scene, translucent: Integers) -> tuple[Floats, ...]:
+def subsurface_of(
+    patches: Patches, parts: Sequence[Part], translucent: Integers
+) -> tuple[Floats, ...]:
     """Compute the dipole of the translucent body per channel; empty where there is none."""
     if not len(translucent):
         return ()
     body = body_of(patches, translucent)
-    material = scene.parts[body.part[0]].material
+    material = parts[body.part[0]].material
     assert material.medium is not None
-    # What the surface does not reflect enters.
+    # What the surface does not reflect enters. The root of the texture dims it there, and again
+    # where it leaves.
+    tone = np.sqrt(texture(body, parts))
     return tuple(
-        (1 - material.albedo[channel]) * subsurface(body, dipole(material.medium, channel))
+        (1 - material.albedo[channel])
+        * (tone[:, None] * subsurface(body, dipole(material.medium, channel)) * tone)
         for channel in range(len(material.albedo))
     )

@@ -147,7 +147,7 @@ def _bounces(scene: Scene, patches: Patches) -> DenseBetween:
     occluders = surface(scene.parts, [i for i, part in enumerate(scene.parts) if part.occludes])
     form = exchange(patches, scene.parts, occluders)
     translucent = np.flatnonzero(with_medium(patches, scene.parts))
-    inside = subsurface_of(patches, scene, translucent)
+    inside = subsurface_of(patches, scene.parts, translucent)
     reflected = albedo(patches, scene.parts)
     channels = reflected.shape[1]
     matrices = np.empty((channels, len(patches), len(patches)), dtype=np.float32)

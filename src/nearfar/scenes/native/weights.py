@@ -2,7 +2,8 @@
 
 The nodes of F are patches, and those of N a lattice around the translucent body. A pixel's weight
 of a patch is the patch's share of the pixel, or the light that the pixel sends there, times the
-texture at the point over that of the patch: what patches reflect has the texture of the point.
+tone at the point over that of the patch. The tone of an opaque surface is its texture; that of a
+translucent one is the texture's root, which light under the surface has where it enters and leaves.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from nearfar.scenes.geometry import Part
 from nearfar.scenes.native.interpolation import PatchGrid, weights_at
 from nearfar.scenes.native.near import Lattice, step_of
 from nearfar.scenes.native.points import Points, spots_of, texture_at
-from nearfar.scenes.patches import texture
+from nearfar.scenes.patches import texture as mean_texture
 from nearfar.transport.dipole import Dipole
 
 # Cells within which points of a pixel are taken together, per step of the lattice.
@@ -66,7 +67,7 @@ class Nodes(NamedTuple):
     parts : sequence of Part
     grid : PatchGrid
     tone : ndarray, shape (n,)
-        Mean texture of each patch.
+        Of each patch.
     body : Body or None
         None where nothing is translucent.
     """
@@ -79,7 +80,13 @@ class Nodes(NamedTuple):
 
 def nodes_of(parts: Sequence[Part], grid: PatchGrid) -> Nodes:
     """Return the nodes in a scene, its patches and a lattice around its translucent body."""
-    return Nodes(parts, grid, texture(grid.patches, parts), translucent_body(parts))
+    body, texture = translucent_body(parts), mean_texture(grid.patches, parts)
+    return Nodes(parts, grid, _tone(texture, grid.patches.part, body), body)
+
+
+def _tone(texture: Floats, part: Integers, body: Body | None) -> Floats:
+    """Return the tone of some parts where their texture is known, shape (m,)."""
+    return texture if body is None else np.where(body.is_body[part], np.sqrt(texture), texture)
 
 
 def node_weights(
@@ -102,7 +109,8 @@ def node_weights(
     -------
     near, far : scipy.sparse.csr_array, shape (pixels, nodes), float32
     """
-    tone = texture_at(nodes.parts, points.part, points.position)
+    texture = texture_at(nodes.parts, points.part, points.position)
+    tone = _tone(texture, points.part, nodes.body)
     spots, tones, share = spots_of(points, weight, weight * tone, seen, len(nodes.parts))
     patch, mixed = weights_at(spots, nodes.grid, share > 0.5)
     mixed *= tones[:, None] / nodes.tone[patch]
@@ -112,7 +120,7 @@ def node_weights(
         nothing = np.zeros((0, 1), dtype=np.int64)
         return _rows(nothing[:, 0], nothing, nothing.astype(float), (count, 0)), far
     mine = nodes.body.is_body[points.part]
-    return _near_weights(points[mine], weight[mine], pixels, nodes.body.lattice), far
+    return _near_weights(points[mine], (weight * tone)[mine], pixels, nodes.body.lattice), far
 
 
 def _near_weights(

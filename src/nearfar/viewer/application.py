@@ -24,6 +24,7 @@ from nearfar.viewer.payloads import (
     pack_map,
     pack_row,
 )
+from nearfar.viewer.physical import PhysicalRelighting
 from nearfar.viewer.uploads import read_body
 
 with needed(extra="viewer", what="a page in the browser"):
@@ -40,11 +41,12 @@ class _Handlers:
     """Handlers of the viewer's requests, one method for each path."""
 
     def __init__(self, transport: InteractiveTransport) -> None:
-        self._transport = transport
+        self._transport, self._physical = transport, PhysicalRelighting(transport)
         # A light moves on while pixels are inspected, both while a map or an exact picture is
         # computed, and all of them while a file is decoded.
         self._relighting, self._pixels = JobQueue(), JobQueue()
         self._whole_pictures, self._files = JobQueue(), JobQueue()
+        self._splitting = JobQueue()
         self._maps = maps_of(transport.coarse)
         self._packed_maps: dict[str, bytes] = {}
         self._assets = read_page("view")
@@ -83,8 +85,16 @@ class _Handlers:
         """Return every camera pixel under the light of the request, as OpenEXR."""
         body = await read_body(request, self._maximum_light_bytes)
         header, light = unpack_light(body, self._transport.projector)
-        exr = await self._whole_pictures.run(encode_relit_exr, self._transport, light, header.gains)
+        if header.split == "physical":
+            await self._splitting.run(self._physical.prepare)
+        relight = (self._physical if header.split == "physical" else self._transport).relight
+        arguments = self._transport, relight, light, header.gains
+        exr = await self._whole_pictures.run(encode_relit_exr, *arguments)
         return _bytes_response(exr, "image/x-exr")
+
+    async def split(self) -> dict[str, int]:
+        """Split the transport physically, once; respond when that is done."""
+        return {"bodies": await self._splitting.run(self._physical.prepare)}
 
     async def light(self, request: Request) -> Response:
         """Return the light of the request as a 16-bit PNG, linear, for ``nearfar relight``."""
@@ -112,7 +122,7 @@ class _Handlers:
             return
         self._sessions += 1
         try:
-            await run_session(self._transport, self._relighting, socket)
+            await run_session(self._transport, self._physical, self._relighting, socket)
         finally:
             self._sessions -= 1
 
@@ -142,6 +152,7 @@ def application(transport: InteractiveTransport) -> FastAPI:
     for path, post in (
         ("/picture.exr", handlers.picture),
         ("/light.png", handlers.light),
+        ("/split", handlers.split),
         ("/read/{kind}", handlers.read),
     ):
         routes.post(path, response_model=None)(post)

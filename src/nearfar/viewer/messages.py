@@ -7,6 +7,7 @@ row-major, each padded to a multiple of 8 bytes.
 
 import json
 import struct
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -31,14 +32,28 @@ _TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2", "uint8": "|u1"}
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
+Gain = Annotated[float, Field(ge=0.0, le=4.0)]
+Split = Literal["model", "physical"]
+
+
 class Gains(BaseModel):
-    """Gains of the components, within the range of the page's sliders."""
+    """Gains of the components of either split, within the range of the page's sliders.
+
+    `direct` is of the split that a light's header names; `near` and `far` are of the model's,
+    `subsurface` and `interreflection` of the physical one.
+    """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
-    direct: float = Field(default=1.0, ge=0.0, le=4.0)
-    near: float = Field(default=1.0, ge=0.0, le=4.0)
-    far: float = Field(default=1.0, ge=0.0, le=4.0)
+    direct: Gain = 1.0
+    near: Gain = 1.0
+    far: Gain = 1.0
+    subsurface: Gain = 1.0
+    interreflection: Gain = 1.0
+
+    def of(self, names: Iterable[str]) -> dict[str, float]:
+        """Return the gains of some components, by name."""
+        return {name: getattr(self, name) for name in names}
 
 
 class Light(NamedTuple):
@@ -84,6 +99,8 @@ class LightHeader(BaseModel):
         Side, in projector pixels, of the blocks that levels are means over.
     colour : tuple of float
         Linear red, green and blue, which the levels are multiplied by.
+    split : {"model", "physical"}
+        Which components the picture is taken apart into.
     gains : Gains
         Used for pictures that are saved; pages apply the gains of live frames themselves.
     """
@@ -94,6 +111,7 @@ class LightHeader(BaseModel):
     shape: tuple[int, int, Literal[1, 3]]
     block: int = Field(default=1, ge=1, le=2**16)
     colour: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
+    split: Split = "model"
     gains: Gains = Gains()
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
@@ -83,9 +84,14 @@ def pack_map(maps: Mapping[str, Callable[[], Map]], name: str) -> bytes:
     return pack(header, values, saturated.astype(np.uint8))
 
 
-def encode_relit_exr(transport: InteractiveTransport, light: Light, gains: Gains) -> bytes:
-    """Relight every camera pixel and encode the picture as OpenEXR."""
-    picture = transport.relight(light, **gains.model_dump())
+def encode_relit_exr(
+    transport: InteractiveTransport,
+    relight: Callable[[Light, Gains], Floats],
+    light: Light,
+    gains: Gains,
+) -> bytes:
+    """Relight every camera pixel by `relight` and encode the picture as OpenEXR."""
+    picture = relight(light, gains)
     return encode_exr(transport.to_colours(picture.reshape(*picture.shape[:2], -1)).squeeze())
 
 

@@ -1,6 +1,6 @@
 // The page's state in its address: only what differs from the initial state.
 
-import { KINDS } from './state.js';
+import { KINDS, SPLITS } from './state.js';
 
 // Dropped pictures that take more than this are left out of the address.
 const MAXIMUM_PICTURE_CHARACTERS = 400000;
@@ -33,6 +33,7 @@ export function fromAddress(hash, initial) {
   }
   if (!COLOUR.test(state.colour)) state.colour = initial.colour;
   if (!KINDS.includes(state.kind)) state.kind = initial.kind;
+  if (!Object.hasOwn(SPLITS, state.split)) state.split = initial.split;
   for (const name of ['pixel', 'column'])
     if (Array.isArray(given[name]) && given[name].length === 2 && given[name].every(Number.isInteger))
       state[name] = given[name];

@@ -4,11 +4,11 @@ import { all, get, set } from './dom.js';
 import { zoomLight } from './light-canvas.js';
 import { ONE_PIXEL } from './painting.js';
 import { canPlay } from './playback.js';
-import { PARTS, hasPart, isFree } from './state.js';
+import { ALL_ONE, hasPart, isFree, soloOf } from './state.js';
 
 const UNITS = { radius: ' px', width: ' px', brush: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
 const BROADEST = 8;
-const TWO_DECIMALS = [...PARTS, 'gamma', 'soft'];
+const TWO_DECIMALS = [...Object.keys(ALL_ONE), 'gamma', 'soft'];
 
 // What the page is of, and how far its sliders go.
 export function describe(scene) {
@@ -19,10 +19,8 @@ export function describe(scene) {
     (hasPart(scene, 'direct') ? `projector ${height}x${width}` : `${height * width} lamps`) + (scene.parts.includes('near') ? `; W = ${scene.window}` : '') +
     (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') +
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
-  PARTS.forEach((name, i) => { get('part' + i).parentElement.hidden = !hasPart(scene, name); });
   document.querySelector('.parts').hidden = scene.parts.length === 1;
   if (isFree(scene)) {
-    document.querySelector('[data-solo=far]').textContent = 'lamp by lamp';
     get('row-far').nextElementSibling.textContent = 'each lamp, log scale';
     for (const id of ['row-window', 'row-spectrum']) get(id).parentElement.hidden = true;
   }
@@ -48,7 +46,7 @@ export function bindControls({ store, scenePictures, playback, onTheme, show }) 
   get('play').onclick = () => playback.toggle();
   get('undo').onclick = () => store.update({ strokes: store.state.strokes.slice(0, -1) });
   get('clear').onclick = () => store.update({ strokes: [] });
-  get('reset').onclick = () => store.update({ exposure: 0, gamma: 1, direct: 1, near: 1, far: 1, solo: '' });
+  get('reset').onclick = () => store.update({ exposure: 0, gamma: 1, ...ALL_ONE, solo: '' });
   get('expose').onclick = () => {
     const exposure = scenePictures.exposure(store.state);
     if (exposure !== null) store.update({ exposure });
@@ -59,9 +57,9 @@ export function bindControls({ store, scenePictures, playback, onTheme, show }) 
   prefersDark.onchange = show;
 }
 
-export function showControls(state, { pictureCount, hasReference, isPlaying }) {
+export function showControls(state, { pictureCount, hasReference, isPlaying, split }) {
   for (const button of all('[data-kind]')) set(button, 'ariaPressed', String(button.dataset.kind === state.kind));
-  for (const button of all('[data-solo]')) set(button, 'ariaPressed', String(button.dataset.solo === state.solo));
+  for (const button of all('[data-solo]')) set(button, 'ariaPressed', String(button.dataset.solo === soloOf(state, split)));
   for (const part of all('[data-for]')) set(part, 'hidden', !part.dataset.for.split(' ').includes(state.kind));
   set(slider('shown'), 'max', String(Math.max(0, pictureCount - 1)));
   for (const input of all('[data-of]')) {

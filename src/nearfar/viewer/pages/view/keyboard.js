@@ -1,18 +1,19 @@
 // Keys: what they do depends on the element that has the focus.
 
 import { all, get, nearestPixel } from './dom.js';
-import { hasPart } from './state.js';
+import { SPLITS, hasPart } from './state.js';
 
 const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
 const SHIFT_PIXELS = 8;
-const SOLOS = { d: 'direct', n: 'near', f: 'far', a: '' };
+const SOLOS = { d: 'direct', n: 'near', f: 'far', s: 'subsurface', i: 'interreflection', a: '' };
+const SPLIT_KEYS = { m: 'model', p: 'physical' };
 
 const moved = ([y, x], arrow, event) => {
   const pixels = event.shiftKey ? SHIFT_PIXELS : 1;
   return [y + pixels * arrow[0], x + pixels * arrow[1]];
 };
 
-export function bindKeyboard({ scene, store, inspector, playback }) {
+export function bindKeyboard({ scene, store, inspector, playback, scenePictures, splits }) {
   addEventListener('keydown', event => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const focused = document.activeElement, arrow = ARROWS[event.key];
@@ -41,7 +42,8 @@ export function bindKeyboard({ scene, store, inspector, playback }) {
   function onPage(event, focused) {
     const kind = all('[data-kind]')[Number(event.key) - 1], solo = SOLOS[event.key];
     if (kind) store.update({ kind: kind.dataset.kind });
-    else if (solo !== undefined && (!solo || hasPart(scene, solo))) store.update({ solo });
+    else if (solo !== undefined && (!solo || hasPart(scene, solo) && SPLITS[scenePictures.split].includes(solo))) store.update({ solo });
+    else if (SPLIT_KEYS[event.key]) splits.choose(SPLIT_KEYS[event.key]);
     else if (event.key === ' ' && !['BUTTON', 'SUMMARY'].includes(focused.tagName)) {
       event.preventDefault();
       playback.toggle();

@@ -15,6 +15,7 @@ import { Playback } from './playback.js';
 import { request } from './protocol.js';
 import { bindSaving } from './saving.js';
 import { ScenePictures } from './scene-pictures.js';
+import { Splits } from './splits.js';
 import { Store, changesLight, initialState } from './state.js';
 import { showVerdict } from './verdict.js';
 
@@ -37,12 +38,14 @@ async function open() {
     }
   });
   const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store }), maps = new Maps({ scene, store });
-  const lamps = new Lamps(scene);
+  const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
   const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); } });
-  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector };
+  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
   function show() {
-    const { hasReference } = scenePictures, { isPlaying } = playback;
-    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying });
+    const { hasReference, split } = scenePictures, { isPlaying } = playback;
+    splits.show(split);
+    splits.prepare();
+    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying, split });
     writeAddress(store.state);
   }
 
@@ -53,12 +56,23 @@ async function open() {
   lightCanvas.draw();
   show();
   const connection = new Connection({
-    light: () => light,
-    onFrame: (header, parts, isNewest) =>
-      scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state),
+    light: () => ({ sent: light.sent, colour: light.colour, split: splits.current }),
+    onFrame: receiving(page, show),
     onFault: showFault,
   });
   if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
+  inspect(state, { inspector, maps });
+}
+
+const receiving = ({ store, lightCanvas, scenePictures, splits }, show) => (header, parts, isNewest) => {
+  const { split } = scenePictures;
+  scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state);
+  if (header.split !== split) show();
+  if (isNewest && header.split !== splits.current) splits.lost();
+};
+
+// Shows again what the address says was inspected.
+function inspect(state, { inspector, maps }) {
   if (state.pixel) inspector.showRow(...state.pixel);
   if (state.column) inspector.showColumn(...state.column);
   if (state.map) maps.show(state.map);

@@ -2,7 +2,7 @@
 
 import { get, showingFaults } from './dom.js';
 import { pack, request } from './protocol.js';
-import { gainsOf } from './state.js';
+import { SPLITS, gainsOf } from './state.js';
 
 const PATIENCE_MILLISECONDS = 60000;
 const POLLING_MILLISECONDS = 50;
@@ -28,10 +28,11 @@ async function savePng({ scenePictures, lightCanvas, playback }) {
 }
 
 // Saves what the server makes of the light.
-async function saveResponse(path, name, { store, light, lightCanvas }) {
+async function saveResponse(path, name, { store, light, lightCanvas, scenePictures }) {
   lightCanvas.drawAtRest();
-  const [direct, near, far] = gainsOf(store.state), { sent: { values, shape }, colour } = light;
-  const response = await request(path, { method: 'POST', body: pack({ shape, colour, gains: { direct, near, far } }, values) });
+  const { split } = scenePictures, { sent: { values, shape }, colour } = light, given = gainsOf(store.state, split);
+  const gains = Object.fromEntries(SPLITS[split].map((part, i) => [part, given[i]]));
+  const response = await request(path, { method: 'POST', body: pack({ shape, colour, split, gains }, values) });
   download(await response.blob(), name);
 }
 

@@ -2,7 +2,7 @@
 
 import { get, set } from './dom.js';
 import { drawPicture, exposureFor, onePart, shrink, sumOfParts } from './picture.js';
-import { PARTS, gainsOf } from './state.js';
+import { SPLITS, gainsOf } from './state.js';
 
 const MAXIMUM_PIXELS_OF_A_PART = 65536;
 
@@ -16,6 +16,9 @@ export class ScenePictures {
   constructor(camera) { this.#camera = camera; }
 
   get hasReference() { return this.#reference !== null; }
+
+  // The split of the newest frame.
+  get split() { return this.#frame?.split || 'model'; }
 
   // Whether the picture is exact.
   get isExact() { return Boolean(this.#frame?.exact); }
@@ -31,7 +34,7 @@ export class ScenePictures {
   }
 
   receive(header, parts, isNewest, state) {
-    this.#frame = { exact: header.exact, isNewest, parts: { ...parts, scale: header.scale } };
+    this.#frame = { exact: header.exact, split: header.split, isNewest, parts: { ...parts, scale: header.scale } };
     this.#frameTimes = this.#frameTimes.filter(time => time > performance.now() - 1000);
     this.#frameTimes.push(performance.now());
     this.draw(state);
@@ -45,14 +48,14 @@ export class ScenePictures {
 
   // For those who drive the page by a program.
   #describeFrame() {
-    const { exact, isNewest } = this.#frame;
-    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, newest: isNewest });
+    const { exact, split, isNewest } = this.#frame;
+    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, split, newest: isNewest });
   }
 
   draw(state) {
     if (!this.#frame) return;
     drawPicture(get('picture'), this.#picture(state), state);
-    PARTS.forEach((name, i) =>
+    SPLITS[this.split].forEach((name, i) =>
       drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
     this.#drawReference(state);
     this.#markPixel(state.pixel);
@@ -71,7 +74,7 @@ export class ScenePictures {
   // The exposure that suits the picture; null before there is one.
   exposure(state) { return this.#frame && exposureFor(this.#picture(state)); }
 
-  #picture(state) { return sumOfParts(this.#frame.parts, gainsOf(state)); }
+  #picture(state) { return sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
 
   #drawReference(state) {
     if (this.#reference) drawPicture(get('before'), this.#reference, state);

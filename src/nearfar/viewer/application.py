@@ -13,7 +13,7 @@ from nearfar.report.maps import maps_of
 from nearfar.viewer.assets import read_page, with_security_headers
 from nearfar.viewer.decoding import MAXIMUM_FILE_BYTES
 from nearfar.viewer.interactive import InteractiveTransport
-from nearfar.viewer.jobs import BusyError, JobQueue
+from nearfar.viewer.jobs import BusyError, JobQueue, next_of
 from nearfar.viewer.live import run_session
 from nearfar.viewer.messages import WHITE_LEVEL, maximum_light_bytes, unpack_light
 from nearfar.viewer.payloads import (
@@ -25,6 +25,7 @@ from nearfar.viewer.payloads import (
     pack_row,
 )
 from nearfar.viewer.physical import PhysicalRelighting
+from nearfar.viewer.tools import TOOLS
 from nearfar.viewer.uploads import read_body
 
 with needed(extra="viewer", what="a page in the browser"):
@@ -35,6 +36,8 @@ MAXIMUM_SESSIONS = 8
 # WebSocket close code for a session too many.
 TRY_AGAIN_LATER = 1013
 MAXIMUM_NAME_CHARACTERS = 255
+# Nobody reads the response; not of the standard, but known by this number.
+CLIENT_CLOSED_REQUEST = 499
 
 
 class _Handlers:
@@ -47,10 +50,12 @@ class _Handlers:
         self._relighting, self._pixels = JobQueue(), JobQueue()
         self._whole_pictures, self._files = JobQueue(), JobQueue()
         self._splitting = JobQueue()
+        self._tools = {name: JobQueue() for name in TOOLS}
         self._maps = maps_of(transport.coarse)
         self._packed_maps: dict[str, bytes] = {}
         self._assets = read_page("view")
         self._maximum_light_bytes = maximum_light_bytes(transport.projector)
+        self._maximum_picture_bytes = maximum_light_bytes(transport.stored.camera)
         self._scene = describe_scene(transport, self._maps)
         self._sessions = 0
 
@@ -95,6 +100,17 @@ class _Handlers:
     async def split(self) -> dict[str, int]:
         """Split the transport physically, once; respond when that is done."""
         return {"bodies": await self._splitting.run(self._physical.prepare)}
+
+    async def tool(self, name: str, request: Request) -> Response:
+        """Return what a tool makes of a light; given up once the page does not wait for it."""
+        if name not in TOOLS:
+            raise InputError(f"there is no tool {name!r}: choose one of {', '.join(TOOLS)}.")
+        largest = max(self._maximum_light_bytes, self._maximum_picture_bytes)
+        steps = TOOLS[name](self._transport, await read_body(request, largest))
+        while (found := await self._tools[name].run(next_of, steps)) is None:
+            if await request.is_disconnected():
+                return Response(status_code=CLIENT_CLOSED_REQUEST)
+        return _bytes_response(found)
 
     async def light(self, request: Request) -> Response:
         """Return the light of the request as a 16-bit PNG, linear, for ``nearfar relight``."""
@@ -153,6 +169,7 @@ def application(transport: InteractiveTransport) -> FastAPI:
         ("/picture.exr", handlers.picture),
         ("/light.png", handlers.light),
         ("/split", handlers.split),
+        ("/tool/{name}", handlers.tool),
         ("/read/{kind}", handlers.read),
     ):
         routes.post(path, response_model=None)(post)

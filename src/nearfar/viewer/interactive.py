@@ -250,9 +250,13 @@ class InteractiveTransport:
         """
         blocks = self._blocks_in_memory
         for block in blocks if blocks is not None else self.stored.blocks(BLOCK_BYTES):
-            if self._stopped.is_set():
-                raise StoppedError("the page's server ends.")
+            self.require_running()
             yield block
+
+    def require_running(self) -> None:
+        """Raise `StoppedError` after `stop`."""
+        if self._stopped.is_set():
+            raise StoppedError("the page's server ends.")
 
     def stop(self) -> None:
         """End computations that are under way, when the server stops."""

@@ -5,15 +5,13 @@ rests, exactly.
 """
 
 import asyncio
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 from nearfar.errors import InputError, NearfarError
 from nearfar.packages import needed
 from nearfar.viewer.interactive import Frame, InteractiveTransport, Relighting
-from nearfar.viewer.jobs import JobQueue
+from nearfar.viewer.jobs import ExhaustedError, JobQueue, next_of
 from nearfar.viewer.messages import Light, Split, pack, unpack_light
 from nearfar.viewer.physical import PhysicalRelighting
 
@@ -26,8 +24,6 @@ REST_SECONDS = 0.12
 POLICY_VIOLATION, SERVER_ERROR = 1008, 1011
 # The protocol allows a close reason of 123 bytes.
 MAXIMUM_REASON_BYTES = 120
-
-R = TypeVar("R")
 
 
 @dataclass
@@ -118,8 +114,8 @@ async def _send_frames(
         steps = relighting.relight_exactly(light)
         while not newest.arrived.is_set():
             try:
-                exact = await jobs.run(_next, steps)
-            except _ExhaustedError:
+                exact = await jobs.run(next_of, steps)
+            except ExhaustedError:
                 break
             if exact is not None:
                 await socket.send_bytes(_pack_frame(number, exact))
@@ -128,16 +124,6 @@ async def _send_frames(
 def _pack_frame(number: int, frame: Frame) -> bytes:
     header = {name: getattr(frame, name) for name in ("exact", "stride", "scale", "split")}
     return pack({"number": number, **header}, frame.parts)
-
-
-class _ExhaustedError(Exception):
-    """An iterator has no more items; a thread cannot raise StopIteration into a coroutine."""
-
-
-def _next(iterator: Iterator[R]) -> R:
-    for item in iterator:
-        return item
-    raise _ExhaustedError
 
 
 async def _arrives_within(newest: _NewestLight, seconds: float) -> bool:

@@ -8,7 +8,7 @@ row-major, each padded to a multiple of 8 bytes.
 import json
 import struct
 from collections.abc import Iterable
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +115,9 @@ class LightHeader(BaseModel):
     gains: Gains = Gains()
 
 
+Header = TypeVar("Header", bound=LightHeader)
+
+
 def pack(header: dict[str, Any], *arrays: NDArray[Any]) -> bytes:
     """Return a message of a header and arrays.
 
@@ -141,14 +144,31 @@ def maximum_light_bytes(projector: Size) -> int:
 
 
 def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[LightHeader, Light]:
+    """Read the message of a projector's light; see `unpack_levels`."""
+    return unpack_levels(LightHeader, message, projector, block=block)
+
+
+def unpack_levels(
+    header_type: type[Header],
+    message: bytes,
+    size: Size,
+    *,
+    block: int = 1,
+    side: str = "projector",
+) -> tuple[Header, Light]:
     """Read the message of a light: uint16 levels, `WHITE_LEVEL` for full white.
 
     Parameters
     ----------
+    header_type : type
+        `LightHeader`, or what extends it.
     message : bytes
-    projector : Size
+    size : Size
+        Of whatever sends the light.
     block : int, optional
-        Side of the blocks of projector pixels that the light may be made of as well.
+        Side of the blocks of pixels that the light may be made of as well.
+    side : {"projector", "camera"}
+        What sends the light, for error messages.
 
     Returns
     -------
@@ -168,7 +188,7 @@ def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[Light
     if length > min(MAXIMUM_HEADER_BYTES, len(message) - _LENGTH.size):
         raise InputError(f"the message claims a header of {length} bytes: send a light.")
     try:
-        header = LightHeader.model_validate_json(message[_LENGTH.size : _LENGTH.size + length])
+        header = header_type.model_validate_json(message[_LENGTH.size : _LENGTH.size + length])
     except ValidationError as error:
         fault = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, fault["loc"]))
@@ -176,11 +196,11 @@ def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[Light
     channels = header.shape[2]
     if header.block not in (1, block):
         raise InputError(f"the light is of blocks of {header.block} pixels: send it whole.")
-    size = size_in_blocks(projector, header.block)
-    if header.shape[:2] != size or len(data) != 2 * channels * size.pixels:
+    sent = size_in_blocks(size, header.block)
+    if header.shape[:2] != sent or len(data) != 2 * channels * sent.pixels:
         raise InputError(
-            f"the light is {'x'.join(map(str, header.shape))} in {len(data)} bytes, the projector "
-            f"{projector}: send {size}x1 or x3 of 2 bytes each."
+            f"the light is {'x'.join(map(str, header.shape))} in {len(data)} bytes, the {side} "
+            f"{size}: send {sent}x1 or x3 of 2 bytes each."
         )
     levels = np.frombuffer(data, dtype="<u2").reshape(header.shape)
     first = levels[..., :1]

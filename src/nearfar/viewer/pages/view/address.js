@@ -1,6 +1,6 @@
 // The page's state in its address: only what differs from the initial state.
 
-import { KINDS, SPLITS } from './state.js';
+import { KINDS, RANGES, SPLITS, TOOLS } from './state.js';
 
 // Dropped pictures that take more than this are left out of the address.
 const MAXIMUM_PICTURE_CHARACTERS = 400000;
@@ -32,7 +32,8 @@ export function fromAddress(hash, initial) {
     if (typeof before === 'string' && typeof value === 'string') state[name] = value;
   }
   if (!COLOUR.test(state.colour)) state.colour = initial.colour;
-  if (!KINDS.includes(state.kind)) state.kind = initial.kind;
+  for (const [name, known] of [['kind', KINDS], ['tool', TOOLS], ['range', RANGES]])
+    if (!known.includes(state[name])) state[name] = initial[name];
   if (!Object.hasOwn(SPLITS, state.split)) state.split = initial.split;
   for (const name of ['pixel', 'column'])
     if (Array.isArray(given[name]) && given[name].length === 2 && given[name].every(Number.isInteger))

@@ -6,7 +6,7 @@ import { ONE_PIXEL } from './painting.js';
 import { canPlay } from './playback.js';
 import { ALL_ONE, hasPart, isFree, soloOf } from './state.js';
 
-const UNITS = { radius: ' px', width: ' px', brush: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
+const UNITS = { radius: ' px', width: ' px', brush: ' px', reach: ' px', broad: ' px', cameraRadius: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
 const BROADEST = 8;
 const TWO_DECIMALS = [...Object.keys(ALL_ONE), 'gamma', 'soft'];
 
@@ -19,7 +19,7 @@ export function describe(scene) {
     (hasPart(scene, 'direct') ? `projector ${height}x${width}` : `${height * width} lamps`) + (scene.parts.includes('near') ? `; W = ${scene.window}` : '') +
     (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') +
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
-  document.querySelector('.parts').hidden = scene.parts.length === 1;
+  get('parts').hidden = scene.parts.length === 1;
   if (isFree(scene)) {
     get('row-far').nextElementSibling.textContent = 'each lamp, log scale';
     for (const id of ['row-window', 'row-spectrum']) get(id).parentElement.hidden = true;

@@ -52,7 +52,7 @@ async function compareWithPhoto(file, { store, scenePictures }) {
   if (!file) return;
   showFault('');
   const { header, arrays: [{ shape, data }] } = await readByServer('photo', await asReadable(file));
-  scenePictures.compareWith({ height: shape[0], width: shape[1], colours: shape[2], values: fromFloat16(data, header.scale) });
+  scenePictures.compareWith({ height: shape[0], width: shape[1], colours: shape[2], values: fromFloat16(data, header.scale) }, 'photo');
   store.update({ wipe: 50 });
 }
 

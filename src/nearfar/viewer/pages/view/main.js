@@ -13,15 +13,17 @@ import { Light } from './light.js';
 import { Maps } from './maps.js';
 import { Playback } from './playback.js';
 import { request } from './protocol.js';
+import { Reach } from './reach.js';
 import { bindSaving } from './saving.js';
 import { ScenePictures } from './scene-pictures.js';
 import { Splits } from './splits.js';
 import { Store, changesLight, initialState } from './state.js';
+import { Tools } from './tools.js';
 import { showVerdict } from './verdict.js';
 
 async function open() {
   const scene = await (await request('scene')).json();
-  const initial = initialState(scene.projector), state = fromAddress(location.hash, initial);
+  const initial = initialState(scene), state = fromAddress(location.hash, initial);
   const light = new Light(scene.projector, scene.light_block);
   const missing = await restorePictures(state.pictures, light);
   state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
@@ -33,19 +35,21 @@ async function open() {
       scenePictures.lightChanged();
       lightCanvas.requestDraw();
     } else {
-      show();
+      show(changes);
       scenePictures.draw(store.state);
     }
   });
   const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store }), maps = new Maps({ scene, store });
   const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
-  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); } });
+  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); tools.lightChanged(); } });
   const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
-  function show() {
+  const tools = new Tools(page, { reach: new Reach(page) });
+  function show(changes) {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
     splits.prepare();
     showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying, split });
+    tools.show(store.state, changes);
     writeAddress(store.state);
   }
 

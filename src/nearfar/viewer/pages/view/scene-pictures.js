@@ -10,10 +10,15 @@ export class ScenePictures {
   #camera;
   #frame = null;
   #reference = null;
+  // In place of the relit scene.
+  #stage = null;
   #frameTimes = [];
   #frameCount = 0;
 
-  constructor(camera) { this.#camera = camera; }
+  constructor(camera) {
+    this.#camera = camera;
+    Object.assign(this, { isStageFinal: false, referenceName: '' });
+  }
 
   get hasReference() { return this.#reference !== null; }
 
@@ -23,8 +28,8 @@ export class ScenePictures {
   // Whether the picture is exact.
   get isExact() { return Boolean(this.#frame?.exact); }
 
-  // Whether it is, and of the newest light.
-  get isFinal() { return this.isExact && this.#frame.isNewest; }
+  // Whether it is, and of the newest light; or whether the picture in its place is.
+  get isFinal() { return this.#stage ? this.isStageFinal : this.isExact && this.#frame.isNewest; }
 
   // The light has changed: the picture is of an older one.
   lightChanged() {
@@ -48,13 +53,16 @@ export class ScenePictures {
 
   // For those who drive the page by a program.
   #describeFrame() {
+    if (!this.#frame) return;
     const { exact, split, isNewest } = this.#frame;
-    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, split, newest: isNewest });
+    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, split, newest: isNewest, stage: this.#stage ? this.isStageFinal : null });
   }
 
   draw(state) {
     if (!this.#frame) return;
-    drawPicture(get('picture'), this.#picture(state), state);
+    const picture = this.#picture(state), [height, width] = this.#stage?.ofProjector ? [picture.height, picture.width] : this.#camera;
+    get('stage').style.setProperty('--aspect', width / height);
+    drawPicture(get('picture'), picture, state);
     SPLITS[this.split].forEach((name, i) =>
       drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
     this.#drawReference(state);
@@ -63,31 +71,48 @@ export class ScenePictures {
 
   // Compares with the picture as it is, if it is exact; returns whether it is.
   keepAsReference(state) {
-    if (this.isExact) this.#reference = this.#picture(state);
+    if (this.isExact) this.compareWith(this.#picture(state), 'kept');
     return this.isExact;
   }
 
-  compareWith(picture) { this.#reference = picture; }
+  compareWith(picture, name) {
+    this.#reference = picture;
+    this.referenceName = name;
+  }
 
-  removeReference() { this.#reference = null; }
+  removeReference() { this.compareWith(null, ''); }
+
+  // Shows another picture in place of the relit scene, until the next one; the relit scene again for null.
+  // isFinal: whether nothing finer will follow; ofProjector: whether it is one of projector pixels.
+  replace(picture, isFinal, state, { ofProjector = false } = {}) {
+    if (!picture && !this.#stage) return;
+    this.#stage = picture && { picture, ofProjector };
+    this.isStageFinal = isFinal;
+    this.draw(state);
+    this.#describeFrame();
+  }
 
   // The exposure that suits the picture; null before there is one.
   exposure(state) { return this.#frame && exposureFor(this.#picture(state)); }
 
-  #picture(state) { return sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
+  // The relit scene, whatever is shown in its place.
+  relit(state) { return sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
+
+  #picture(state) { return this.#stage?.picture || this.relit(state); }
 
   #drawReference(state) {
+    const isThere = Boolean(this.#reference) && !this.#stage?.ofProjector;
     if (this.#reference) drawPicture(get('before'), this.#reference, state);
-    set(get('before'), 'hidden', !this.#reference);
-    set(get('edge'), 'hidden', !this.#reference);
+    for (const id of ['before', 'edge']) set(get(id), 'hidden', !isThere);
     set(get('before').style, 'clipPath', `inset(0px ${100 - state.wipe}% 0px 0px)`);
     set(get('edge').style, 'left', `calc(${state.wipe}% - 1px)`);
   }
 
   #markPixel(pixel) {
     const [height, width] = this.#camera;
-    set(get('mark'), 'hidden', !pixel);
-    if (!pixel) return;
+    const isThere = pixel && !this.#stage?.ofProjector;
+    set(get('mark'), 'hidden', !isThere);
+    if (!isThere) return;
     set(get('mark').style, 'left', 100 * (pixel[1] + 0.5) / width + '%');
     set(get('mark').style, 'top', 100 * (pixel[0] + 0.5) / height + '%');
   }

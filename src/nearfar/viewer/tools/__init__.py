@@ -7,6 +7,7 @@ work, so that what nobody waits for can be given up, and the message of its resu
 from collections.abc import Callable, Iterator
 
 from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.tools.dual import seen_from_projector
 from nearfar.viewer.tools.reach import by_distance, by_reach
 
 Tool = Callable[[InteractiveTransport, bytes], Iterator[bytes | None]]
@@ -15,4 +16,5 @@ Tool = Callable[[InteractiveTransport, bytes], Iterator[bytes | None]]
 TOOLS: dict[str, Tool] = {
     "reach": by_reach,
     "distances": by_distance,
+    "dual": seen_from_projector,
 }

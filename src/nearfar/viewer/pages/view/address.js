@@ -1,6 +1,6 @@
 // The page's state in its address: only what differs from the initial state.
 
-import { KINDS, RANGES, SPLITS, TOOLS } from './state.js';
+import { CAMERA_LIGHTS, KINDS, RANGES, SPLITS, TOOLS } from './state.js';
 
 // Dropped pictures that take more than this are left out of the address.
 const MAXIMUM_PICTURE_CHARACTERS = 400000;
@@ -32,7 +32,7 @@ export function fromAddress(hash, initial) {
     if (typeof before === 'string' && typeof value === 'string') state[name] = value;
   }
   if (!COLOUR.test(state.colour)) state.colour = initial.colour;
-  for (const [name, known] of [['kind', KINDS], ['tool', TOOLS], ['range', RANGES]])
+  for (const [name, known] of [['kind', KINDS], ['tool', TOOLS], ['range', RANGES], ['cameraLight', CAMERA_LIGHTS]])
     if (!known.includes(state[name])) state[name] = initial[name];
   if (!Object.hasOwn(SPLITS, state.split)) state.split = initial.split;
   for (const name of ['pixel', 'column'])

@@ -88,7 +88,7 @@ function valueText(name, state, pictureCount) {
   const value = state[name];
   if (name === 'exposure') return (value > 0 ? '+' : '') + value.toFixed(1) + ' EV';
   if (name === 'cycles') return value + ' cycles';
-  if (name === 'brush' && value <= ONE_PIXEL) return 'one pixel';
+  if (['brush', 'cameraRadius'].includes(name) && value <= ONE_PIXEL) return 'one pixel';
   if (name === 'zoom') return value + 'x';
   if (name === 'shown') return `${pictureCount ? value + 1 : 0} of ${pictureCount}`;
   return (TWO_DECIMALS.includes(name) ? value.toFixed(2) : +value.toFixed(1)) + (UNITS[name] || '');

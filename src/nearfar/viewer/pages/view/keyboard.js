@@ -13,12 +13,16 @@ const moved = ([y, x], arrow, event) => {
   return [y + pixels * arrow[0], x + pixels * arrow[1]];
 };
 
-export function bindKeyboard({ scene, store, inspector, playback, scenePictures, splits }) {
+export function bindKeyboard({ scene, store, inspector, playback, scenePictures, splits, dual }) {
   addEventListener('keydown', event => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const focused = document.activeElement, arrow = ARROWS[event.key];
     if ((arrow || event.key === 'Enter') && focused === get('light')) onLight(event, arrow);
     else if ((arrow || event.key === 'Enter') && focused === get('picture')) onPicture(event, arrow);
+    else if (arrow && focused === get('camera-light')) {
+      event.preventDefault();
+      dual.move(moved([0, 0], arrow, event));
+    }
     else if (!['INPUT', 'SELECT'].includes(focused.tagName)) onPage(event, focused);
   });
 
@@ -35,6 +39,7 @@ export function bindKeyboard({ scene, store, inspector, playback, scenePictures,
 
   function onPicture(event, arrow) {
     event.preventDefault();
+    if (store.state.tool === 'dual') return;
     const pixel = store.state.pixel || scene.camera.map(side => Math.floor(side / 2));
     inspector.showRow(...nearestPixel(moved(pixel, arrow || [0, 0], event), scene.camera));
   }

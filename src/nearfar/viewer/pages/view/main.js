@@ -4,6 +4,7 @@ import { createAddressWriter, fromAddress } from './address.js';
 import { Connection } from './connection.js';
 import { bindControls, describe, showControls } from './controls.js';
 import { get, nearestPixel, positionOn, showFault } from './dom.js';
+import { Dual } from './dual.js';
 import { bindFiles, restorePictures } from './files.js';
 import { Inspector } from './inspector.js';
 import { bindKeyboard } from './keyboard.js';
@@ -43,7 +44,8 @@ async function open() {
   const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
   const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); tools.lightChanged(); } });
   const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
-  const tools = new Tools(page, { reach: new Reach(page) });
+  page.dual = new Dual(page);
+  const tools = new Tools(page, { reach: new Reach(page), dual: page.dual });
   function show(changes) {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
@@ -82,6 +84,8 @@ function inspect(state, { inspector, maps }) {
   if (state.map) maps.show(state.map);
 }
 
+const clicked = (event, size) => nearestPixel(positionOn(event, size), size);
+
 function bind(page, show) {
   const { scene, store, inspector } = page;
   bindControls({ ...page, onTheme: () => inspector.drawRow(), show });
@@ -89,8 +93,10 @@ function bind(page, show) {
   bindFiles(page);
   bindSaving(page);
   bindKeyboard(page);
-  for (const id of ['map', 'picture'])
-    get(id).onclick = event => inspector.showRow(...nearestPixel(positionOn(event, scene.camera), scene.camera));
+  get('map').onclick = event => inspector.showRow(...clicked(event, scene.camera));
+  // A dual view is one of projector pixels.
+  get('picture').onclick = event =>
+    store.state.tool === 'dual' ? inspector.showColumn(...clicked(event, scene.projector)) : inspector.showRow(...clicked(event, scene.camera));
   addEventListener('resize', () => inspector.drawRow());
   addEventListener('hashchange', () => location.reload());
 }

@@ -96,7 +96,7 @@ export class ScenePictures {
   exposure(state) { return this.#frame && exposureFor(this.#picture(state)); }
 
   // The relit scene, whatever is shown in its place.
-  relit(state) { return sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
+  relit(state) { return this.#frame && sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
 
   #picture(state) { return this.#stage?.picture || this.relit(state); }
 

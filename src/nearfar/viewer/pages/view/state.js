@@ -12,6 +12,7 @@ export const canSplitPhysically = scene => scene.parts.includes('near');
 export const ALL_ONE = Object.freeze(Object.fromEntries(GAINS.map(name => [name, 1])));
 export const TOOLS = ['relit', 'reach', 'dual', 'compensation'];
 export const RANGES = ['within', 'ring', 'beyond'];
+export const CAMERA_LIGHTS = ['spot', 'white'];
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
 
 // What a page opens with; the keys are those of the address.

@@ -7,6 +7,7 @@ work, so that what nobody waits for can be given up, and the message of its resu
 from collections.abc import Callable, Iterator
 
 from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.tools.compensation import compensating_light
 from nearfar.viewer.tools.dual import seen_from_projector
 from nearfar.viewer.tools.reach import by_distance, by_reach
 
@@ -17,4 +18,5 @@ TOOLS: dict[str, Tool] = {
     "reach": by_reach,
     "distances": by_distance,
     "dual": seen_from_projector,
+    "compensation": compensating_light,
 }

@@ -9,13 +9,13 @@ const PNG_HEAD_BYTES = 26;
 const PNG_BIT_DEPTH = 24;
 
 // Pictures of linear light are read by the server: a browser shows them wrong, or not at all.
-async function isLinear(file) {
+export async function isLinear(file) {
   if (/\.(tiff?|exr|npy)$/i.test(file.name)) return true;
   const head = new Uint8Array(await file.slice(0, PNG_HEAD_BYTES).arrayBuffer());
   return head[0] === 0x89 && head[1] === 0x50 && head[PNG_BIT_DEPTH] === 16;
 }
 
-const readByServer = (kind, file) =>
+export const readByServer = (kind, file) =>
   requestMessage(`read/${kind}?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file });
 
 // The page's policy forbids fetching data: URLs, so they are decoded here.
@@ -64,6 +64,13 @@ async function asReadable(file) {
   return new File([await canvas.convertToBlob({ type: 'image/png' })], file.name + '.png');
 }
 
+// Dropped on the scene, a picture is a photo to compare with, or what the scene is to look like.
+async function dropped(files, isOnScene, page) {
+  if (!isOnScene) await addPictures(files, page);
+  else if (page.store.state.tool === 'compensation') await page.compensation.want(files[0]);
+  else await compareWithPhoto(files[0], page);
+}
+
 export function bindFiles(page) {
   get('pictures').onchange = showingFaults(async event => { await addPictures([...event.target.files], page); event.target.value = ''; });
   get('photo').onchange = showingFaults(async event => { await compareWithPhoto(event.target.files[0], page); event.target.value = ''; });
@@ -71,6 +78,6 @@ export function bindFiles(page) {
   addEventListener('drop', showingFaults(async event => {
     event.preventDefault();
     const files = [...event.dataTransfer.files];
-    if (files.length) await (get('stage').contains(event.target) ? compareWithPhoto(files[0], page) : addPictures(files, page));
+    if (files.length) await dropped(files, get('stage').contains(event.target), page);
   }));
 }

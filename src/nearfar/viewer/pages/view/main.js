@@ -1,6 +1,7 @@
 // Puts the page together; each part gets what it needs here, and knows nothing of the others.
 
 import { createAddressWriter, fromAddress } from './address.js';
+import { Compensation } from './compensation.js';
 import { Connection } from './connection.js';
 import { bindControls, describe, showControls } from './controls.js';
 import { get, nearestPixel, positionOn, showFault } from './dom.js';
@@ -44,8 +45,8 @@ async function open() {
   const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
   const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); tools.lightChanged(); } });
   const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
-  page.dual = new Dual(page);
-  const tools = new Tools(page, { reach: new Reach(page), dual: page.dual });
+  Object.assign(page, { dual: new Dual(page), compensation: new Compensation(page) });
+  const tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation });
   function show(changes) {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);

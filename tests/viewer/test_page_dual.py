@@ -69,9 +69,11 @@ def test_light_on_the_cameras_side_is_dragged(open_page, address, transport):
     page.mouse.click(*place(9, 30))
     page.wait_for_selector("#pixel:has-text('row 9, column 30')")
     page.click("#picture", position={"x": 3, "y": 3})
+    page.click("#tab-column")
     page.wait_for_selector("#column:has-text('row 0, column 0')")
     # The relit scene is of the camera's shape again.
     page.click("[data-tool=relit]")
+    page.click("[data-tab=light]")
     settled(page)
     assert seen(page).shape[:2] == CAMERA
     assert page.is_visible("#light")

@@ -15,7 +15,13 @@ from nearfar.viewer.decoding import MAXIMUM_FILE_BYTES
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.jobs import BusyError, JobQueue, next_of
 from nearfar.viewer.live import run_session
-from nearfar.viewer.messages import WHITE_LEVEL, maximum_light_bytes, unpack_light
+from nearfar.viewer.messages import (
+    WHITE_LEVEL,
+    maximum_light_bytes,
+    unpack_levels,
+    unpack_light,
+)
+from nearfar.viewer.numbers import PixelHeader, numbers_at
 from nearfar.viewer.payloads import (
     FILE_READERS,
     describe_scene,
@@ -74,6 +80,14 @@ class _Handlers:
         """Return the row of the transport of one camera pixel."""
         _require_pixel("camera", self._transport.stored.camera, y, x)
         return _bytes_response(await self._pixels.run(pack_row, self._transport, y, x))
+
+    async def numbers(self, request: Request) -> dict[str, Any]:
+        """Return what one camera pixel sees under the light of the request."""
+        body = await read_body(request, self._maximum_light_bytes)
+        header, light = unpack_levels(PixelHeader, body, self._transport.projector)
+        _require_pixel("camera", self._transport.stored.camera, header.y, header.x)
+        arguments = self._transport, self._physical, header, light
+        return await self._pixels.run(numbers_at, *arguments)
 
     async def column(self, y: int, x: int) -> Response:
         """Return the column of the transport of one projector pixel."""
@@ -169,6 +183,7 @@ def application(transport: InteractiveTransport) -> FastAPI:
         ("/picture.exr", handlers.picture),
         ("/light.png", handlers.light),
         ("/split", handlers.split),
+        ("/numbers", handlers.numbers),
         ("/tool/{name}", handlers.tool),
         ("/read/{kind}", handlers.read),
     ):

@@ -87,6 +87,11 @@ class PhysicalRelighting:
         parts, stride = self._parts(self._displayed, light), self._transport.display_stride
         yield packed_frame(parts, stride, exact=True, split="physical")
 
+    def pixel(self, y: int, x: int) -> PhysicalSplit:
+        """Return the split of one camera pixel."""
+        assert self._whole is not None
+        return _of_pixels(self._whole, np.array([y]), np.array([x]))
+
     def relight(self, light: Light, gains: Gains) -> Floats:
         """Relight every camera pixel with gains, as ``nearfar relight`` does."""
         assert self._whole is not None
@@ -109,7 +114,11 @@ def _every(split: PhysicalSplit, stride: int) -> PhysicalSplit:
     """Return the split of one camera row and column in every few."""
     if stride == 1:
         return split
-    rows, columns = (middles(side, stride) for side in split.transport.camera)
+    return _of_pixels(split, *(middles(side, stride) for side in split.transport.camera))
+
+
+def _of_pixels(split: PhysicalSplit, rows: Integers, columns: Integers) -> PhysicalSplit:
+    """Return the split of the camera pixels in some rows and columns."""
     places = np.full(split.transport.camera, -1)
     places[np.ix_(rows, columns)] = np.arange(len(rows) * len(columns)).reshape(len(rows), -1)
     return PhysicalSplit(

@@ -21,8 +21,9 @@ export function describe(scene) {
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
   get('parts').hidden = scene.parts.length === 1;
   if (isFree(scene)) {
-    get('row-far').nextElementSibling.textContent = 'each lamp, log scale';
-    for (const id of ['row-window', 'row-spectrum']) get(id).parentElement.hidden = true;
+    get('row-far-title').textContent = document.querySelector('.far-text').textContent = 'each lamp';
+    document.querySelector('.near-text').textContent = 'direct';
+    for (const id of ['row-window', 'row-spectrum']) get(id).closest('figure').hidden = true;
   }
   get('stage').style.setProperty('--aspect', columns / rows);
   // Lines of lamps and of pixels are drawn broad enough to point at.

@@ -15,8 +15,12 @@ export async function isLinear(file) {
   return head[0] === 0x89 && head[1] === 0x50 && head[PNG_BIT_DEPTH] === 16;
 }
 
-export const readByServer = (kind, file) =>
-  requestMessage(`read/${kind}?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file });
+export async function readByServer(kind, file) {
+  get('tool-status').textContent = `Reading ${file.name}.`;
+  try {
+    return await requestMessage(`read/${kind}?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file });
+  } finally { get('tool-status').textContent = ''; }
+}
 
 // The page's policy forbids fetching data: URLs, so they are decoded here.
 const blobOf = url => new Blob([Uint8Array.from(atob(url.split(',')[1]), c => c.charCodeAt(0))], { type: 'image/png' });

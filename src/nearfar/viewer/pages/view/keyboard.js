@@ -13,7 +13,16 @@ const moved = ([y, x], arrow, event) => {
   return [y + pixels * arrow[0], x + pixels * arrow[1]];
 };
 
+// A button that was pressed by a pointer keeps no keys for itself.
+function releaseFocus() {
+  addEventListener('pointerup', () => {
+    const focused = document.activeElement;
+    if (focused.tagName === 'BUTTON' && focused.role !== 'tab') focused.blur();
+  });
+}
+
 export function bindKeyboard({ scene, store, inspector, playback, scenePictures, splits, dual }) {
+  releaseFocus();
   addEventListener('keydown', event => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const focused = document.activeElement, arrow = ARROWS[event.key];
@@ -23,7 +32,7 @@ export function bindKeyboard({ scene, store, inspector, playback, scenePictures,
       event.preventDefault();
       dual.move(moved([0, 0], arrow, event));
     }
-    else if (!['INPUT', 'SELECT'].includes(focused.tagName)) onPage(event, focused);
+    else if (focused.tagName !== 'SELECT' && focused.type !== 'file') onPage(event, focused);
   });
 
   function onLight(event, arrow) {

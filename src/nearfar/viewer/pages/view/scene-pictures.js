@@ -1,7 +1,7 @@
 // The scene under the light, its three parts, and the reference beside it.
 
 import { get, set } from './dom.js';
-import { drawPicture, exposureFor, onePart, shrink, sumOfParts } from './picture.js';
+import { drawPicture, exposureFor, fromFloat16, onePart, shrink, sumOfParts } from './picture.js';
 import { SPLITS, gainsOf } from './state.js';
 
 const MAXIMUM_PIXELS_OF_A_PART = 65536;
@@ -14,6 +14,7 @@ export class ScenePictures {
   #stage = null;
   #frameTimes = [];
   #frameCount = 0;
+  #rateTimer = 0;
 
   constructor(camera) {
     this.#camera = camera;
@@ -47,8 +48,15 @@ export class ScenePictures {
     const coarse = header.exact ? '' : 'while it moves: ';
     set(get('frame-status'), 'textContent',
       rate + coarse + (header.stride > 1 ? `one row and column in ${header.stride}` : 'every camera pixel'));
+    this.#forgetRate();
     this.#frameCount += 1;
     this.#describeFrame();
+  }
+
+  // A rate is one of lights that move: it is gone once nothing comes.
+  #forgetRate() {
+    clearTimeout(this.#rateTimer);
+    this.#rateTimer = setTimeout(() => set(get('frame-status'), 'textContent', get('frame-status').textContent.replace(/^\d+ pictures a second · /, '')), 1000);
   }
 
   // For those who drive the page by a program.
@@ -90,6 +98,21 @@ export class ScenePictures {
     this.isStageFinal = isFinal;
     this.draw(state);
     this.#describeFrame();
+  }
+
+  // What is shown at a pixel [y, x] of a grid, and what the frame has there, colour by colour; null before there is one.
+  valuesAt([y, x], [height, width]) {
+    if (!this.#frame) return null;
+    const { shape: [count, rows, columns, colours], data, scale } = this.#frame.parts, stage = this.#stage?.picture;
+    const pick = (values, h, w, c, first = 0) => {
+      const at = first + (Math.min(h - 1, Math.floor(y * h / height)) * w + Math.min(w - 1, Math.floor(x * w / width))) * c;
+      return Array.from(values.slice(at, at + c));
+    };
+    const size = rows * columns * colours;
+    const parts = Array.from({ length: count }, (_, i) => [...fromFloat16(pick(data, rows, columns, colours, i * size), scale)]);
+    const total = parts[0].map((_, c) => parts.reduce((sum, part) => sum + part[c], 0));
+    const shown = stage ? pick(stage.values, stage.height, stage.width, stage.colours) : total;
+    return { shown, parts, total, split: this.split, isRelit: !stage };
   }
 
   // The exposure that suits the picture; null before there is one.

@@ -11,6 +11,7 @@ export const hasPart = (scene, name) => scene.parts.includes(name) || name === '
 export const canSplitPhysically = scene => scene.parts.includes('near');
 export const ALL_ONE = Object.freeze(Object.fromEntries(GAINS.map(name => [name, 1])));
 export const TOOLS = ['relit', 'reach', 'dual', 'compensation'];
+export const TABS = ['light', 'row', 'column', 'map', 'numbers'];
 export const RANGES = ['within', 'ring', 'beyond'];
 export const CAMERA_LIGHTS = ['spot', 'white'];
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
@@ -23,14 +24,14 @@ export function initialState({ projector: [height, width], camera: [rows, column
     angle: 90, width: Math.max(1, Math.round(side / 16)), cycles: 4, phase: 0, side: Math.max(1, Math.round(side / 16)),
     shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, zoom: 1, colour: '#ffffff', strokes: [], pictures: [],
     ...ALL_ONE, split: 'model', solo: '', exposure: 0, gamma: 1, wipe: 50, map: '', pixel: null,
-    column: null, theme: '', tool: 'relit', range: 'beyond', reach: 3, broad: 3,
+    column: null, theme: '', tab: 'light', tool: 'relit', range: 'beyond', reach: 3, broad: 3,
     cameraLight: 'spot', cameraX: (columns - 1) / 2, cameraY: (rows - 1) / 2, cameraRadius: Math.max(1, Math.round(Math.min(rows, columns) / 8)),
   });
 }
 
 // Everything else changes the light.
 const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
-  'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius'];
+  'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius'];
 
 export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));
 

@@ -95,7 +95,7 @@ def test_what_cannot_be_compensated_gets_a_sentence(open_page, stored, address):
     with served_view(InteractiveTransport(stored, memory=10**4)) as here:
         page = open_page(here, {"tool": "compensation"})
         drop(page, "#stage", "w.png", encode_png(np.full((9, 9, 3), 90, np.uint8)))
-        page.wait_for_selector("#tool-status:has-text('--memory 1GB')")
+        page.wait_for_selector("#tool-status:has-text('of 1GB')")
         page.goto("about:blank")
 
 

@@ -221,3 +221,28 @@ def test_an_address_out_of_range_is_brought_into_it(open_page, address):
     assert page.input_value("[data-of=exposure]") == "12"
     assert page.input_value("[data-of=gamma]") == "0.5"
     assert page.inner_text("#stage-label") == "relit, near-range × 4"
+
+
+def test_the_difference_to_what_is_compared_with_is_told_and_shown(open_page, address, transport):
+    page = open_page(address, {"kind": "white"})
+    page.click("#keep")
+    assert page.inner_text("#snr") == "equal"
+    slide(page, "near", 1.5)
+    parts = transport.components(WHITE)
+    reference, off = sum(parts), 0.5 * parts.near
+    snr = 10 * np.log10((reference**2).sum() / (off**2).sum())
+    assert _numbers(page.inner_text("#snr"))[0] == pytest.approx(snr, abs=0.1)
+    page.focus("#difference")
+    page.keyboard.press("Enter")
+    assert page.inner_text("#stage-label") == "relit, near-range × 1.5 less kept"
+    shown, mean = seen(page).astype(int), off.mean(axis=-1)
+    more, less = mean > 0.02, mean < -0.02
+    assert more.any()
+    assert (shown[..., 0] > shown[..., 2])[more].all()
+    assert (shown[..., 0] <= shown[..., 2])[less].all()
+    slide(page, "near", 0.5)
+    assert (seen(page).astype(int)[..., 2] > shown[..., 2])[more].all()
+    assert not page.is_visible("#before")
+    page.click("#forget")
+    assert not page.is_visible("#comparing")
+    assert page.inner_text("#stage-label") == "relit, near-range × 0.5"

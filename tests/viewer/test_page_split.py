@@ -145,7 +145,7 @@ def test_what_cannot_be_split_physically_says_why(open_page, stored_wax, wax, tm
     with served_view(InteractiveTransport(stored_wax, memory=10**4)) as address:
         page = open_page(address, {"kind": "white"})
         page.click("[data-split=physical]")
-        page.wait_for_selector("#split-status:has-text('--memory 1GB')")
+        page.wait_for_selector("#split-status:has-text('of 1GB')")
         assert page.get_attribute("[data-split=model]", "aria-pressed") == "true"
         page.goto("about:blank")
     far_alone = replace(wax, parts=("direct", "far"), near=wax.near[..., :0, :0])

@@ -231,8 +231,8 @@ class InteractiveTransport:
         if self._blocks_in_memory is None:
             needed = -(-self.stored.nbytes // 10**9)
             raise InputError(
-                f"this needs the whole transport in memory: start nearfar view with "
-                f"--memory {needed}GB."
+                f"this needs the whole transport in memory: view it again with `memory` of "
+                f"{needed}GB."
             )
         return self.coarse if self.coarse_stride == 1 else _join(self._blocks_in_memory)
 

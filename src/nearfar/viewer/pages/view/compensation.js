@@ -10,6 +10,8 @@ import { pack, requestMessage } from './protocol.js';
 import { Strip } from './strip.js';
 
 const DARK = 0.25;
+// A map is not exposed.
+const AS_IT_IS = { exposure: 0, gamma: 1 };
 
 export class Compensation {
   #page;
@@ -66,20 +68,21 @@ export class Compensation {
     const share = (100 * said.out_of_reach_share).toFixed(1);
     this.#strip.show([
       this.#item('wanted', '', wanted), this.#item('expected', errorOf(said), picture),
-      this.#item('out of reach', `${share} % of the camera pixels`, marked(picture, far.data, this.#page.scene.mark)),
+      this.#item('out of reach', `${share} % of the camera pixels`, marked(picture, far.data, this.#page.scene.mark, 2 ** store.state.exposure), AS_IT_IS),
     ]);
     this.#strip.draw(store.state);
   }
 
-  #item(title, detail, picture) {
-    return { title, detail, picture, isPressed: () => this.#shown === title, onClick: () => this.#choose(this.#shown === title ? '' : title, picture) };
+  #item(title, detail, picture, look = null) {
+    const onClick = () => this.#choose(this.#shown === title ? '' : title, picture, look);
+    return { title, detail, picture, look, isPressed: () => this.#shown === title, onClick };
   }
 
   // Shows a picture of the strip in place of the scene; the relit scene if there is none.
-  #choose(title, picture = null) {
+  #choose(title, picture = null, look = null) {
     if (this.#shown === title) return;
     this.#shown = title;
-    this.#page.scenePictures.replace(picture, true, this.#page.store.state);
+    this.#page.scenePictures.replace(picture, true, this.#page.store.state, { look });
     this.#page.store.update({});
   }
 }
@@ -91,10 +94,10 @@ function errorOf({ expected_rmse: rmse, psnr_dB: psnr, psnr_of_direct_dB: ofDire
 }
 
 // A picture, dark, with some of its pixels in a colour of 8 bits.
-function marked({ height, width, colours, values }, marks, colour) {
+function marked({ height, width, colours, values }, marks, colour, brightness) {
   const result = new Float32Array(3 * height * width);
   for (let i = 0; i < height * width; i++)
     for (let c = 0; c < 3; c++)
-      result[3 * i + c] = marks[i] ? (colour[c] / 255) ** 2.2 : DARK * values[i * colours + (colours === 3 ? c : 0)];
+      result[3 * i + c] = marks[i] ? (colour[c] / 255) ** 2.2 : DARK * brightness * values[i * colours + (colours === 3 ? c : 0)];
   return { height, width, colours: 3, values: result };
 }

@@ -52,8 +52,9 @@ export function bindControls({ store, scenePictures, playback, onTheme, show }) 
     const exposure = scenePictures.exposure(store.state);
     if (exposure !== null) store.update({ exposure });
   };
+  get('difference').onclick = () => store.update({ difference: !store.state.difference });
   get('keep').onclick = () => { if (scenePictures.keepAsReference(store.state)) store.update({ wipe: 50 }); };
-  get('forget').onclick = () => { scenePictures.removeReference(); store.update({}); };
+  get('forget').onclick = () => { scenePictures.removeReference(); store.update({ difference: false }); };
   get('theme').onclick = () => { store.update({ theme: theme(store.state) === 'dark' ? 'light' : 'dark' }); onTheme(); };
   prefersDark.onchange = show;
 }
@@ -71,7 +72,8 @@ export function showControls(state, { pictureCount, hasReference, isPlaying, spl
   zoomLight(state.zoom);
   set(get('colour'), 'value', state.colour);
   set(get('maps'), 'value', state.map);
-  set(get('wiping'), 'hidden', !hasReference);
+  for (const id of ['wiping', 'comparing']) set(get(id), 'hidden', !hasReference);
+  set(get('difference'), 'ariaPressed', String(state.difference));
   set(get('forget'), 'hidden', !hasReference);
   set(document.documentElement.dataset, 'theme', theme(state));
   set(get('theme'), 'textContent', theme(state) === 'dark' ? 'light page' : 'dark page');

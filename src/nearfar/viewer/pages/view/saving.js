@@ -17,14 +17,15 @@ function download(blob, name) {
 }
 
 // Saves the canvas as it is displayed, once it shows the exact picture of the newest light.
-async function savePng({ scenePictures, lightCanvas, playback }) {
+async function savePng({ store, scenePictures, lightCanvas, playback }) {
   const end = performance.now() + PATIENCE_MILLISECONDS;
   while (!scenePictures.isFinal || lightCanvas.isPending) {
     if (performance.now() > end || playback.isPlaying)
       throw new Error('The exact picture is not there yet: let the light rest, and save again.');
     await new Promise(resolve => { setTimeout(resolve, POLLING_MILLISECONDS); });
   }
-  get('picture').toBlob(blob => download(blob, 'relit.png'), 'image/png');
+  const { tool } = store.state, name = tool === 'compensation' ? 'relit' : tool;
+  get('picture').toBlob(blob => download(blob, `${name}.png`), 'image/png');
 }
 
 // Saves what the server makes of the light.

@@ -1,6 +1,8 @@
 // The scene under the light, its three parts, and the reference beside it.
 
+import { compare, describeDifference, drawDifference, rangeAt } from './difference.js';
 import { get, set } from './dom.js';
+import { FrameStatus } from './frame-status.js';
 import { drawPicture, exposureFor, fromFloat16, onePart, shrink, sumOfParts } from './picture.js';
 import { SPLITS, gainsOf } from './state.js';
 
@@ -12,9 +14,8 @@ export class ScenePictures {
   #reference = null;
   // In place of the relit scene.
   #stage = null;
-  #frameTimes = [];
+  #status = new FrameStatus();
   #frameCount = 0;
-  #rateTimer = 0;
 
   constructor(camera) {
     this.#camera = camera;
@@ -41,22 +42,10 @@ export class ScenePictures {
 
   receive(header, parts, isNewest, state) {
     this.#frame = { exact: header.exact, split: header.split, isNewest, parts: { ...parts, scale: header.scale } };
-    this.#frameTimes = this.#frameTimes.filter(time => time > performance.now() - 1000);
-    this.#frameTimes.push(performance.now());
+    this.#status.arrived(header);
     this.draw(state);
-    const rate = this.#frameTimes.length > 2 ? `${this.#frameTimes.length} pictures a second · ` : '';
-    const coarse = header.exact ? '' : 'while it moves: ';
-    set(get('frame-status'), 'textContent',
-      rate + coarse + (header.stride > 1 ? `one row and column in ${header.stride}` : 'every camera pixel'));
-    this.#forgetRate();
     this.#frameCount += 1;
     this.#describeFrame();
-  }
-
-  // A rate is one of lights that move: it is gone once nothing comes.
-  #forgetRate() {
-    clearTimeout(this.#rateTimer);
-    this.#rateTimer = setTimeout(() => set(get('frame-status'), 'textContent', get('frame-status').textContent.replace(/^\d+ pictures a second · /, '')), 1000);
   }
 
   // For those who drive the page by a program.
@@ -70,7 +59,7 @@ export class ScenePictures {
     if (!this.#frame) return;
     const picture = this.#picture(state), [height, width] = this.#stage?.ofProjector ? [picture.height, picture.width] : this.#camera;
     get('stage').style.setProperty('--aspect', width / height);
-    drawPicture(get('picture'), picture, state);
+    if (!this.#drawDifference(picture, state)) drawPicture(get('picture'), picture, this.#stage?.look || state);
     SPLITS[this.split].forEach((name, i) =>
       drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
     this.#drawReference(state);
@@ -91,10 +80,10 @@ export class ScenePictures {
   removeReference() { this.compareWith(null, ''); }
 
   // Shows another picture in place of the relit scene, until the next one; the relit scene again for null.
-  // isFinal: whether nothing finer will follow; ofProjector: whether it is one of projector pixels.
-  replace(picture, isFinal, state, { ofProjector = false } = {}) {
+  // isFinal: whether nothing finer will follow; ofProjector: whether it is one of projector pixels; look: in place of the page's.
+  replace(picture, isFinal, state, { ofProjector = false, look = null } = {}) {
     if (!picture && !this.#stage) return;
-    this.#stage = picture && { picture, ofProjector };
+    this.#stage = picture && { picture, ofProjector, look };
     this.isStageFinal = isFinal;
     this.draw(state);
     this.#describeFrame();
@@ -123,10 +112,21 @@ export class ScenePictures {
 
   #picture(state) { return this.#stage?.picture || this.relit(state); }
 
+  get #isCompared() { return Boolean(this.#reference) && !this.#stage?.ofProjector; }
+
+  // Tells how far the picture is from what it is compared with; draws the difference in its place and returns true if that
+  // is wanted.
+  #drawDifference(picture, state) {
+    if (!this.#isCompared) return false;
+    const compared = compare(picture, this.#reference);
+    describeDifference(compared, state);
+    if (state.difference) drawDifference(get('picture'), compared, rangeAt(state));
+    return state.difference;
+  }
+
   #drawReference(state) {
-    const isThere = Boolean(this.#reference) && !this.#stage?.ofProjector;
     if (this.#reference) drawPicture(get('before'), this.#reference, state);
-    for (const id of ['before', 'edge']) set(get(id), 'hidden', !isThere);
+    for (const id of ['before', 'edge']) set(get(id), 'hidden', !this.#isCompared || state.difference);
     set(get('before').style, 'clipPath', `inset(0px ${100 - state.wipe}% 0px 0px)`);
     set(get('edge').style, 'left', `calc(${state.wipe}% - 1px)`);
   }

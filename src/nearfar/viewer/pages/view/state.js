@@ -23,14 +23,14 @@ export function initialState({ projector: [height, width], camera: [rows, column
     kind: 'spot', x: (width - 1) / 2, y: (height - 1) / 2, radius: Math.max(1, Math.round(side / 4)), soft: 0.5,
     angle: 90, width: Math.max(1, Math.round(side / 16)), cycles: 4, phase: 0, side: Math.max(1, Math.round(side / 16)),
     shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, zoom: 1, colour: '#ffffff', strokes: [], pictures: [],
-    ...ALL_ONE, split: 'model', solo: '', exposure: 0, gamma: 1, wipe: 50, map: '', pixel: null,
+    ...ALL_ONE, split: 'model', solo: '', exposure: 0, gamma: 1, wipe: 50, difference: false, map: '', pixel: null,
     column: null, theme: '', tab: 'light', tool: 'relit', range: 'beyond', reach: 3, broad: 3,
     cameraLight: 'spot', cameraX: (columns - 1) / 2, cameraY: (rows - 1) / 2, cameraRadius: Math.max(1, Math.round(Math.min(rows, columns) / 8)),
   });
 }
 
 // Everything else changes the light.
-const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
+const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
   'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius'];
 
 export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));

@@ -44,7 +44,8 @@ export class Tools {
   #label(state) {
     const { scenePictures } = this.#page, { split } = scenePictures;
     const label = this.#tool?.label(state) || this.#relitLabel(state, split);
-    return scenePictures.referenceName && this.#open !== 'dual' ? `${scenePictures.referenceName} | ${label}` : label;
+    if (!scenePictures.referenceName || this.#open === 'dual') return label;
+    return state.difference ? `${label} less ${scenePictures.referenceName}` : `${scenePictures.referenceName} | ${label}`;
   }
 
   #relitLabel(state, split) {

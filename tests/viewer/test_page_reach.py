@@ -1,17 +1,22 @@
 """The viewer's page in a real browser: light by how far from q it comes."""
 
 import json
+import socket
+import threading
+import time
 
 import numpy as np
 import pytest
 
+from nearfar.applications.probe import probe
 from nearfar.arrays import middles
 from nearfar.files import from_srgb
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.tools import reach
 from tests.viewer.asking import CAMERA, PROJECTOR, ask, message, refused, unpack
 from tests.viewer.browsing import pictures, seen, settled, slide, tone
-from tests.waiting import wait_until
+from tests.viewer.conftest import served_view
+from tests.waiting import LONGEST_WAIT, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -169,3 +174,34 @@ def test_a_wrong_question_gets_a_sentence(address):
     status, text = refused(address, "/tool/tarot", message(WHITE))
     assert (status, "there is no tool" in text) == (400, True)
     assert ask(address, "/tool/reach", message(WHITE, outer=3))
+
+
+def test_the_server_stops_once_nobody_waits(stored, monkeypatch):
+    """A step is under way when the page goes away; few follow."""
+    steps, second = [], threading.Event()
+
+    def counted(*given):
+        steps.append(given)
+        if len(steps) == 2:
+            second.set()
+        if len(steps) > 2:
+            time.sleep(0.05)
+        return probe(*given)
+
+    monkeypatch.setattr(reach, "STEP_ENTRIES", 1)
+    monkeypatch.setattr(reach, "probe", counted)
+    with served_view(InteractiveTransport(stored)) as address:
+        host, port = address.removeprefix("http://").split(":")
+        body = message(WHITE, outer=3)
+        with socket.create_connection((host, int(port))) as connection:
+            head = (
+                f"POST /tool/reach HTTP/1.1\r\nHost: {host}\r\nContent-Length: {len(body)}\r\n\r\n"
+            )
+            connection.sendall(head.encode() + body)
+            assert second.wait(LONGEST_WAIT)
+        # One row of the camera is a step: all of them would be 30.
+        before = -1
+        while before != len(steps):
+            before = len(steps)
+            time.sleep(0.5)
+    assert len(steps) < CAMERA.height / 2

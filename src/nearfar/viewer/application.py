@@ -168,7 +168,7 @@ def application(transport: InteractiveTransport) -> FastAPI:
     handlers = _Handlers(transport)
     routes = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     routes.exception_handler(NearfarError)(_error_response)
-    routes.middleware("http")(with_security_headers)
+    routes.add_middleware(with_security_headers)
     # Without a response model: the handlers return responses, not data to be validated.
     for path, get in (
         ("/scene", handlers.scene),

@@ -76,6 +76,8 @@ export class Inspector {
   }
 }
 
+const RANGES = { near: 'near-range', far: 'far-range' };
+
 // Of the sum of magnitudes.
 const negativeText = share => share >= 0.001 ? `; ${(100 * share).toFixed(share < 0.1 ? 1 : 0)} % of it negative, in red` : '';
 
@@ -88,7 +90,7 @@ function placeCross(q, [height, width]) {
 
 function summary({ q, floodlit, confidence, no_errors: noErrors, saturated }) {
   const parts = Object.keys(floodlit), total = parts.reduce((sum, name) => sum + floodlit[name], 0);
-  const share = name => `${name} ${(100 * floodlit[name] / (total || 1)).toFixed(1)} %`;
+  const share = name => `${RANGES[name] || name} ${(100 * floodlit[name] / (total || 1)).toFixed(1)} %`;
   if (!('direct' in floodlit)) return `floodlit ${total.toPrecision(3)}` + (saturated ? '; a photo is saturated here' : '');
   return (q ? `q = (${q[0].toFixed(2)}, ${q[1].toFixed(2)})` : 'no direct light') +
     (confidence === null ? '' : `, confidence ${confidence.toFixed(2)}`) +

@@ -29,6 +29,7 @@ def test_the_address_brings_everything_back(open_page, address):
     drag(page, (3, 3), (9, 15))
     slide(page, "near", 2)
     slide(page, "exposure", -0.5)
+    page.click("#tab-map")
     page.select_option("#maps", "near-share")
     page.keyboard.press("Escape")
     page.click("#theme")
@@ -192,7 +193,9 @@ def contrast(page, selector):
 def test_it_is_readable_by_day_and_night_and_on_a_phone(
     open_page, address, scheme, width, tmp_path
 ):
-    page = open_page(address, {"pixel": [10, 10], "map": "error"}, color_scheme=scheme)
+    page = open_page(
+        address, {"pixel": [10, 10], "map": "error", "tab": "map"}, color_scheme=scheme
+    )
     page.set_viewport_size({"width": width, "height": 844})
     page.wait_for_selector("#map-caption:has-text('grey')")
     back = page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -233,6 +236,7 @@ def test_it_is_used_by_the_keyboard(open_page, address, tmp_path):
         assert page.evaluate("document.activeElement.id") == name
     page.focus("#light")
     page.keyboard.press("Enter")
+    page.click("#tab-column")
     page.wait_for_selector("#column:has-text('row 2, column 14')")
     # Everything that can be used can be reached, and says what it is.
     for control in page.query_selector_all("button, input, select, canvas[tabindex]"):

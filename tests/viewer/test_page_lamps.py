@@ -95,7 +95,7 @@ def test_the_row_of_a_camera_pixel_has_the_error_bars_of_its_lamps(stage):
 def test_the_page_shows_lamps_and_no_absent_part(open_page, page_of_stage, stage):
     page = open_page(page_of_stage, {"kind": "white"})
     settled(page)
-    assert page.locator(".parts").is_hidden()
+    assert page.locator("#parts").is_hidden()
     assert page.locator("#lamps").is_visible()
     about = page.locator("#about").inner_text()
     assert "6 lamps" in about

@@ -252,6 +252,8 @@ def test_a_camera_pixel_is_clicked(open_page, address, transport):
 def test_a_projector_pixel_is_clicked(open_page, address, transport):
     page = open_page(address)
     drag(page, (9, 4))
+    # The light stays in view, and the tab says that there is something new.
+    page.click("#tab-column.news")
     page.wait_for_selector("#column-map:not([hidden])")
     assert page.inner_text("#column") == "row 9, column 4"
     column = transport.column(9, 4).mean(axis=-1)
@@ -261,7 +263,7 @@ def test_a_projector_pixel_is_clicked(open_page, address, transport):
 
 
 def test_maps_are_chosen(open_page, address):
-    page = open_page(address)
+    page = open_page(address, {"tab": "map"})
     names = [option.get_attribute("value") for option in page.query_selector_all("#maps option")]
     assert len(names) >= 8
     drawn = {}

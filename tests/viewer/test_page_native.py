@@ -129,6 +129,7 @@ def test_a_row_and_a_column_are_those_of_the_transport(open_page, page_of_native
     page.wait_for_selector("#row:not([hidden])")
     # As many screen pixels as projector pixels, or a small multiple.
     assert seen(page, "row-spectrum").shape[:2] == (2 * PROJECTOR.height, 2 * PROJECTOR.width)
+    page.click("[data-tab=light]")
     page.click("[data-kind=pixel]")
     box = page.locator("#light").bounding_box()
     with page.expect_response("**/column?*") as answer:

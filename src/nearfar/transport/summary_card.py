@@ -1,9 +1,11 @@
-"""What a notebook shows of a transport."""
+"""What a notebook shows of a transport, and of its splits."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nearfar.arrays import Floats
 from nearfar.markup import card, picture
 from nearfar.transport.plots import colours
 
@@ -16,14 +18,8 @@ THUMBNAIL = 256
 
 def summary_card(transport: "Transport") -> str:
     """Return a transport as HTML: what it is, floodlit and taken apart."""
-    step = -(-max(transport.camera) // THUMBNAIL)
     parts = transport.components(np.ones(transport.projector, dtype=np.float32))
-    pictures = {"floodlit": np.asarray(sum(parts)), **transport.named(parts)}
-    brightest = float(np.percentile(pictures["floodlit"], 99.5))
-    images = [
-        (name, picture(colours(part)[::step, ::step] / max(brightest, 1e-9), name))
-        for name, part in pictures.items()
-    ]
+    images = floodlit_and_apart(transport.named(parts))
     verdict = transport.verdict
     rows = [
         ("projector", str(transport.projector)),
@@ -36,3 +32,20 @@ def summary_card(transport: "Transport") -> str:
         ("method", str(transport.provenance.get("method", "unknown"))),
     ]
     return card("transport", rows, images)
+
+
+def floodlit_and_apart(parts: Mapping[str, Floats]) -> list[tuple[str, str]]:
+    """Return thumbnails of a floodlit scene and of its components, as (name, <img>).
+
+    Parameters
+    ----------
+    parts : mapping of str to ndarray, shape (Cy, Cx) or (Cy, Cx, channels)
+        Under white, photo units; by the components' names.
+    """
+    floodlit = np.asarray(sum(parts.values()))
+    step = -(-max(floodlit.shape[:2]) // THUMBNAIL)
+    brightest = float(np.percentile(floodlit, 99.5))
+    return [
+        (name, picture(colours(part)[::step, ::step] / max(brightest, 1e-9), name))
+        for name, part in {"floodlit": floodlit, **parts}.items()
+    ]

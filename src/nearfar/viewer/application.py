@@ -13,9 +13,15 @@ from nearfar.report.maps import maps_of
 from nearfar.viewer.assets import read_page, with_security_headers
 from nearfar.viewer.decoding import MAXIMUM_FILE_BYTES
 from nearfar.viewer.interactive import InteractiveTransport
-from nearfar.viewer.jobs import BusyError, JobQueue
+from nearfar.viewer.jobs import BusyError, JobQueue, next_of
 from nearfar.viewer.live import run_session
-from nearfar.viewer.messages import WHITE_LEVEL, maximum_light_bytes, unpack_light
+from nearfar.viewer.messages import (
+    WHITE_LEVEL,
+    maximum_light_bytes,
+    unpack_levels,
+    unpack_light,
+)
+from nearfar.viewer.numbers import PixelHeader, numbers_at
 from nearfar.viewer.payloads import (
     FILE_READERS,
     describe_scene,
@@ -24,6 +30,8 @@ from nearfar.viewer.payloads import (
     pack_map,
     pack_row,
 )
+from nearfar.viewer.physical import PhysicalRelighting
+from nearfar.viewer.tools import TOOLS
 from nearfar.viewer.uploads import read_body
 
 with needed(extra="viewer", what="a page in the browser"):
@@ -34,21 +42,26 @@ MAXIMUM_SESSIONS = 8
 # WebSocket close code for a session too many.
 TRY_AGAIN_LATER = 1013
 MAXIMUM_NAME_CHARACTERS = 255
+# Nobody reads the response; not of the standard, but known by this number.
+CLIENT_CLOSED_REQUEST = 499
 
 
 class _Handlers:
     """Handlers of the viewer's requests, one method for each path."""
 
     def __init__(self, transport: InteractiveTransport) -> None:
-        self._transport = transport
+        self._transport, self._physical = transport, PhysicalRelighting(transport)
         # A light moves on while pixels are inspected, both while a map or an exact picture is
         # computed, and all of them while a file is decoded.
         self._relighting, self._pixels = JobQueue(), JobQueue()
         self._whole_pictures, self._files = JobQueue(), JobQueue()
+        self._splitting = JobQueue()
+        self._tools = {name: JobQueue() for name in TOOLS}
         self._maps = maps_of(transport.coarse)
         self._packed_maps: dict[str, bytes] = {}
         self._assets = read_page("view")
         self._maximum_light_bytes = maximum_light_bytes(transport.projector)
+        self._maximum_picture_bytes = maximum_light_bytes(transport.stored.camera)
         self._scene = describe_scene(transport, self._maps)
         self._sessions = 0
 
@@ -68,6 +81,14 @@ class _Handlers:
         _require_pixel("camera", self._transport.stored.camera, y, x)
         return _bytes_response(await self._pixels.run(pack_row, self._transport, y, x))
 
+    async def numbers(self, request: Request) -> dict[str, Any]:
+        """Return what one camera pixel sees under the light of the request."""
+        body = await read_body(request, self._maximum_light_bytes)
+        header, light = unpack_levels(PixelHeader, body, self._transport.projector)
+        _require_pixel("camera", self._transport.stored.camera, header.y, header.x)
+        arguments = self._transport, self._physical, header, light
+        return await self._pixels.run(numbers_at, *arguments)
+
     async def column(self, y: int, x: int) -> Response:
         """Return the column of the transport of one projector pixel."""
         _require_pixel("projector", self._transport.projector, y, x)
@@ -83,8 +104,27 @@ class _Handlers:
         """Return every camera pixel under the light of the request, as OpenEXR."""
         body = await read_body(request, self._maximum_light_bytes)
         header, light = unpack_light(body, self._transport.projector)
-        exr = await self._whole_pictures.run(encode_relit_exr, self._transport, light, header.gains)
+        if header.split == "physical":
+            await self._splitting.run(self._physical.prepare)
+        relight = (self._physical if header.split == "physical" else self._transport).relight
+        arguments = self._transport, relight, light, header.gains
+        exr = await self._whole_pictures.run(encode_relit_exr, *arguments)
         return _bytes_response(exr, "image/x-exr")
+
+    async def split(self) -> dict[str, int]:
+        """Split the transport physically, once; respond when that is done."""
+        return {"bodies": await self._splitting.run(self._physical.prepare)}
+
+    async def tool(self, name: str, request: Request) -> Response:
+        """Return what a tool makes of a light; given up once the page does not wait for it."""
+        if name not in TOOLS:
+            raise InputError(f"there is no tool {name!r}: choose one of {', '.join(TOOLS)}.")
+        largest = max(self._maximum_light_bytes, self._maximum_picture_bytes)
+        steps = TOOLS[name](self._transport, await read_body(request, largest))
+        while (found := await self._tools[name].run(next_of, steps)) is None:
+            if await request.is_disconnected():
+                return Response(status_code=CLIENT_CLOSED_REQUEST)
+        return _bytes_response(found)
 
     async def light(self, request: Request) -> Response:
         """Return the light of the request as a 16-bit PNG, linear, for ``nearfar relight``."""
@@ -112,7 +152,7 @@ class _Handlers:
             return
         self._sessions += 1
         try:
-            await run_session(self._transport, self._relighting, socket)
+            await run_session(self._transport, self._physical, self._relighting, socket)
         finally:
             self._sessions -= 1
 
@@ -128,7 +168,7 @@ def application(transport: InteractiveTransport) -> FastAPI:
     handlers = _Handlers(transport)
     routes = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     routes.exception_handler(NearfarError)(_error_response)
-    routes.middleware("http")(with_security_headers)
+    routes.add_middleware(with_security_headers)
     # Without a response model: the handlers return responses, not data to be validated.
     for path, get in (
         ("/scene", handlers.scene),
@@ -142,6 +182,9 @@ def application(transport: InteractiveTransport) -> FastAPI:
     for path, post in (
         ("/picture.exr", handlers.picture),
         ("/light.png", handlers.light),
+        ("/split", handlers.split),
+        ("/numbers", handlers.numbers),
+        ("/tool/{name}", handlers.tool),
         ("/read/{kind}", handlers.read),
     ):
         routes.post(path, response_model=None)(post)

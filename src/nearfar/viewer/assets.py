@@ -1,14 +1,11 @@
 """The files that the pages in the browser are made of, and the headers they are served with."""
 
-from collections.abc import Awaitable, Callable
 from importlib.resources import files
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 from nearfar.errors import MissingFileError
 from nearfar.report.page import STYLE
-
-if TYPE_CHECKING:
-    from fastapi import Request, Response
+from nearfar.viewer.access_control import Application, Receive, Scope, Send
 
 MEDIA_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 # Scripts, styles and requests are those of this server alone, whatever a dropped file contains.
@@ -69,10 +66,19 @@ def read_page(page: str) -> dict[str, Asset]:
     return assets
 
 
-async def with_security_headers(
-    request: "Request", respond: Callable[["Request"], Awaitable["Response"]]
-) -> "Response":
-    """Add `SECURITY_HEADERS` to each response (an HTTP middleware)."""
-    response = await respond(request)
-    response.headers.update(SECURITY_HEADERS)
-    return response
+def with_security_headers(application: Application) -> Application:
+    """Add `SECURITY_HEADERS` to each response of an ASGI application.
+
+    Requests pass through as they are, so that handlers are told of clients that are gone.
+    """
+    headers = [(name.lower().encode(), value.encode()) for name, value in SECURITY_HEADERS.items()]
+
+    async def secured(scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_secured(message: dict[str, Any]) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message.get("headers", ()), *headers]}
+            await send(message)
+
+        await application(scope, receive, send_secured)
+
+    return secured

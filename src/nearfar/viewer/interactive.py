@@ -9,10 +9,10 @@ components being direct, near and far. Frames have 1 colour or 3.
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from nearfar.transport.colour import as_channels_see
 from nearfar.transport.model import Transport
 from nearfar.transport.rows import FACTORS, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.stored import StoredTransport, open_transport
-from nearfar.viewer.messages import Light
+from nearfar.viewer.messages import Gains, Light, Split
 from nearfar.viewer.pace import Pace
 
 # Factors of the coarse copy: relighting them takes some tens of milliseconds.
@@ -62,12 +62,27 @@ class Frame(NamedTuple):
         Every how many rows and columns of the camera are there.
     exact : bool
         Whether every camera pixel that is displayed is there, under the light itself.
+    split : {"model", "physical"}
+        Whose components they are.
     """
 
     parts: NDArray[np.float16]
     scale: float
     stride: int
     exact: bool
+    split: Split = "model"
+
+
+class Relighting(Protocol):
+    """What relights a scene for a page, into the three components of a split."""
+
+    def relight_coarsely(self, light: Light) -> Frame:
+        """Relight as finely as the pictures before allow, while the light may move on."""
+        ...
+
+    def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
+        """Relight every camera pixel that is displayed: None after each step, then the frame."""
+        ...
 
 
 class InteractiveTransport:
@@ -154,7 +169,7 @@ class InteractiveTransport:
         parts = self._parts(transport, self._analysed(transport, light), light)
         stride = self.coarse_stride * 2**level
         exact = is_whole and self.light_block == 1 and stride == self.display_stride
-        frame = _frame(parts, stride, exact=exact)
+        frame = packed_frame(parts, stride, exact=exact)
         self._pace.took(time.perf_counter() - began)
         return frame
 
@@ -176,24 +191,24 @@ class InteractiveTransport:
                 analysed = analysed or self._analysed(block, light)
                 parts.append(self._parts(block, analysed, light))
             yield None
-        yield _frame(np.concatenate(parts, axis=1), self.display_stride, exact=True)
+        yield packed_frame(np.concatenate(parts, axis=1), self.display_stride, exact=True)
 
-    def relight(self, light: Light, *, direct: float, near: float, far: float) -> Floats:
+    def relight(self, light: Light, gains: Gains) -> Floats:
         """Relight every camera pixel with gains of the components, as ``nearfar relight`` does.
 
         Returns
         -------
         ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
         """
-        channel_light = self._for_channels(light.as_array())
+        channel_light = self.for_channels(light.as_array())
         # Free rows are in the place of far-range light.
-        slots = {"direct": direct, "near": near, "far": far, "free": far}
-        gains = {part: slots[part] for part in self.stored.parts}
+        slots = {**gains.of(("direct", "near", "far")), "free": gains.far}
+        given = {part: slots[part] for part in self.stored.parts}
         analysed: AnalysedLight | None = None
         pictures = []
         for block in self.blocks():
             analysed = analysed or block.analyse(channel_light)
-            pictures.append(block.relight(analysed, **gains).astype(np.float32))
+            pictures.append(block.relight(analysed, **given).astype(np.float32))
         return np.concatenate(pictures)
 
     def camera_row(self, y: int) -> Transport:
@@ -204,6 +219,22 @@ class InteractiveTransport:
                 return of_rows(block, slice(y - first, y - first + 1))
             first += block.camera.height
         return self.stored.rows(slice(y, y + 1))
+
+    def whole(self) -> Transport:
+        """Return the transport of all camera pixels.
+
+        Raises
+        ------
+        InputError
+            If it is larger than the memory for it.
+        """
+        if self._blocks_in_memory is None:
+            needed = -(-self.stored.nbytes // 10**9)
+            raise InputError(
+                f"this needs the whole transport in memory: view it again with `memory` of "
+                f"{needed}GB."
+            )
+        return self.coarse if self.coarse_stride == 1 else _join(self._blocks_in_memory)
 
     def at_display_stride(self, picture: NDArray[Any]) -> NDArray[Any]:
         """Return the rows and columns of a camera picture that are displayed."""
@@ -219,9 +250,13 @@ class InteractiveTransport:
         """
         blocks = self._blocks_in_memory
         for block in blocks if blocks is not None else self.stored.blocks(BLOCK_BYTES):
-            if self._stopped.is_set():
-                raise StoppedError("the page's server ends.")
+            self.require_running()
             yield block
+
+    def require_running(self) -> None:
+        """Raise `StoppedError` after `stop`."""
+        if self._stopped.is_set():
+            raise StoppedError("the page's server ends.")
 
     def stop(self) -> None:
         """End computations that are under way, when the server stops."""
@@ -233,7 +268,7 @@ class InteractiveTransport:
             return picture[..., :COLOUR]
         return picture if picture.shape[-1] == 1 else picture.mean(axis=-1, keepdims=True)
 
-    def _for_channels(self, light: Floats) -> Floats:
+    def for_channels(self, light: Floats) -> Floats:
         """Return the light that each channel of the camera sees of a coloured light."""
         try:
             return as_channels_see(light, self.stored.channels, self.stored.provenance)
@@ -241,21 +276,28 @@ class InteractiveTransport:
             # Without a colour calibration the channels are not red, green and blue.
             return luminance(light)
 
-    def _analysed(self, transport: Transport, light: Light) -> AnalysedLight:
-        """Return a light, without its tint, analysed for a transport."""
+    def untinted(self, light: Light) -> Floats:
+        """Return a light without its tint, (Py, Px) or (Py, Px, channels)."""
         if self._is_tinted(light):
             # Relighting once, for all channels, takes a third of the time.
-            return transport.analyse(light.levels)
-        return transport.analyse(self._for_channels(light.as_array()))
+            return light.levels
+        return self.for_channels(light.as_array())
+
+    def parts_in_colours(self, components: Sequence[Floats], camera: Size, light: Light) -> Floats:
+        """Give three components under a light its tint, as a frame has them, (3, y, x, colours)."""
+        tint = np.ones(1, dtype=np.float32)
+        if self._is_tinted(light):
+            tint = np.ravel(self.for_channels(light.colour[None, None]))
+        pictures = [part.reshape(*camera, -1) * tint for part in components]
+        return np.stack([self.to_colours(picture) for picture in pictures])
+
+    def _analysed(self, transport: Transport, light: Light) -> AnalysedLight:
+        """Return a light, without its tint, analysed for a transport."""
+        return transport.analyse(self.untinted(light))
 
     def _parts(self, transport: Transport, analysed: AnalysedLight, light: Light) -> Floats:
         """Return direct, near and far under a light, (3, y, x, colours)."""
-        tint = np.ones(1, dtype=np.float32)
-        if self._is_tinted(light):
-            tint = np.ravel(self._for_channels(light.colour[None, None]))
-        components = transport.components(analysed)
-        pictures = [part.reshape(*transport.camera, -1) * tint for part in components]
-        return np.stack([self.to_colours(picture) for picture in pictures])
+        return self.parts_in_colours(transport.components(analysed), transport.camera, light)
 
     @staticmethod
     def _is_tinted(light: Light) -> bool:
@@ -270,9 +312,10 @@ def to_float16(values: Floats) -> tuple[float, NDArray[np.float16]]:
     return float(scale), (values * np.float32(scale)).astype(np.float16)
 
 
-def _frame(parts: Floats, stride: int, *, exact: bool) -> Frame:
+def packed_frame(parts: Floats, stride: int, *, exact: bool, split: Split = "model") -> Frame:
+    """Return the parts of a picture, (3, y, x, colours), as a frame."""
     scale, halves = to_float16(parts)
-    return Frame(halves, scale, stride, exact)
+    return Frame(halves, scale, stride, exact, split)
 
 
 def _side_of_blocks(transport: Transport) -> int:

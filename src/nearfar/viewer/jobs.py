@@ -1,7 +1,7 @@
 """Computations that requests ask for, one at a time in a thread of their own."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -10,6 +10,23 @@ from nearfar.errors import NearfarError
 MAXIMUM_JOBS = 16
 
 R = TypeVar("R")
+
+
+class ExhaustedError(Exception):
+    """An iterator has no more items; a thread cannot raise StopIteration into a coroutine."""
+
+
+def next_of(iterator: Iterator[R]) -> R:
+    """Return the next item, as a job of its own.
+
+    Raises
+    ------
+    ExhaustedError
+        If there is none.
+    """
+    for item in iterator:
+        return item
+    raise ExhaustedError
 
 
 class BusyError(NearfarError):

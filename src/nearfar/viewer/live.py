@@ -5,16 +5,15 @@ rests, exactly.
 """
 
 import asyncio
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 from nearfar.errors import InputError, NearfarError
 from nearfar.packages import needed
-from nearfar.viewer.interactive import Frame, InteractiveTransport
-from nearfar.viewer.jobs import JobQueue
-from nearfar.viewer.messages import Light, pack, unpack_light
+from nearfar.viewer.interactive import Frame, InteractiveTransport, Relighting
+from nearfar.viewer.jobs import ExhaustedError, JobQueue, next_of
+from nearfar.viewer.messages import Light, Split, pack, unpack_light
+from nearfar.viewer.physical import PhysicalRelighting
 
 with needed(extra="viewer", what="a page in the browser"):
     from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -26,8 +25,6 @@ POLICY_VIOLATION, SERVER_ERROR = 1008, 1011
 # The protocol allows a close reason of 123 bytes.
 MAXIMUM_REASON_BYTES = 120
 
-R = TypeVar("R")
-
 
 @dataclass
 class _NewestLight:
@@ -36,9 +33,12 @@ class _NewestLight:
     arrived: asyncio.Event = field(default_factory=asyncio.Event)
     number: int = 0
     light: Light | None = None
+    split: Split = "model"
 
 
-async def run_session(transport: InteractiveTransport, jobs: JobQueue, socket: WebSocket) -> None:
+async def run_session(
+    transport: InteractiveTransport, physical: PhysicalRelighting, jobs: JobQueue, socket: WebSocket
+) -> None:
     """Send frames for the lights that a page sends, until it disconnects.
 
     An error closes the socket, with the error's message as the reason.
@@ -46,6 +46,8 @@ async def run_session(transport: InteractiveTransport, jobs: JobQueue, socket: W
     Parameters
     ----------
     transport : InteractiveTransport
+    physical : PhysicalRelighting
+        Of the same transport; until it is prepared, frames are of the model's split.
     jobs : JobQueue
         Relights for all pages.
     socket : WebSocket
@@ -54,7 +56,7 @@ async def run_session(transport: InteractiveTransport, jobs: JobQueue, socket: W
     newest = _NewestLight()
     tasks = [
         asyncio.create_task(_receive_lights(transport, newest, socket)),
-        asyncio.create_task(_send_frames(transport, jobs, newest, socket)),
+        asyncio.create_task(_send_frames(transport, physical, jobs, newest, socket)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -83,12 +85,16 @@ async def _receive_lights(
             raise WebSocketDisconnect
         data = message.get("bytes") or b""
         header, light = unpack_light(data, transport.projector, transport.light_block)
-        newest.number, newest.light = header.number, light
+        newest.number, newest.light, newest.split = header.number, light, header.split
         newest.arrived.set()
 
 
 async def _send_frames(
-    transport: InteractiveTransport, jobs: JobQueue, newest: _NewestLight, socket: WebSocket
+    transport: InteractiveTransport,
+    physical: PhysicalRelighting,
+    jobs: JobQueue,
+    newest: _NewestLight,
+    socket: WebSocket,
 ) -> None:
     """Send a coarse frame of each newest light, and an exact one once it rests."""
     while True:
@@ -96,36 +102,28 @@ async def _send_frames(
         newest.arrived.clear()
         number, light = newest.number, newest.light
         assert light is not None
-        frame = await jobs.run(transport.relight_coarsely, light)
+        is_physical = newest.split == "physical" and physical.is_prepared
+        relighting: Relighting = physical if is_physical else transport
+        frame = await jobs.run(relighting.relight_coarsely, light)
         await socket.send_bytes(_pack_frame(number, frame))
         # A page sends the light of blocks while it moves, and the whole light once it rests.
         if frame.exact or light.block > 1:
             continue
         if transport.light_block == 1 and await _arrives_within(newest, REST_SECONDS):
             continue
-        steps = transport.relight_exactly(light)
+        steps = relighting.relight_exactly(light)
         while not newest.arrived.is_set():
             try:
-                exact = await jobs.run(_next, steps)
-            except _ExhaustedError:
+                exact = await jobs.run(next_of, steps)
+            except ExhaustedError:
                 break
             if exact is not None:
                 await socket.send_bytes(_pack_frame(number, exact))
 
 
 def _pack_frame(number: int, frame: Frame) -> bytes:
-    header = {name: getattr(frame, name) for name in ("exact", "stride", "scale")}
+    header = {name: getattr(frame, name) for name in ("exact", "stride", "scale", "split")}
     return pack({"number": number, **header}, frame.parts)
-
-
-class _ExhaustedError(Exception):
-    """An iterator has no more items; a thread cannot raise StopIteration into a coroutine."""
-
-
-def _next(iterator: Iterator[R]) -> R:
-    for item in iterator:
-        return item
-    raise _ExhaustedError
 
 
 async def _arrives_within(newest: _NewestLight, seconds: float) -> bool:

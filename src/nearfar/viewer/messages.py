@@ -7,7 +7,8 @@ row-major, each padded to a multiple of 8 bytes.
 
 import json
 import struct
-from typing import Annotated, Any, Literal, NamedTuple
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,14 +32,28 @@ _TYPES = {"float32": "<f4", "float16": "<f2", "uint16": "<u2", "uint8": "|u1"}
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
+Gain = Annotated[float, Field(ge=0.0, le=4.0)]
+Split = Literal["model", "physical"]
+
+
 class Gains(BaseModel):
-    """Gains of the components, within the range of the page's sliders."""
+    """Gains of the components of either split, within the range of the page's sliders.
+
+    `direct` is of the split that a light's header names; `near` and `far` are of the model's,
+    `subsurface` and `interreflection` of the physical one.
+    """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
-    direct: float = Field(default=1.0, ge=0.0, le=4.0)
-    near: float = Field(default=1.0, ge=0.0, le=4.0)
-    far: float = Field(default=1.0, ge=0.0, le=4.0)
+    direct: Gain = 1.0
+    near: Gain = 1.0
+    far: Gain = 1.0
+    subsurface: Gain = 1.0
+    interreflection: Gain = 1.0
+
+    def of(self, names: Iterable[str]) -> dict[str, float]:
+        """Return the gains of some components, by name."""
+        return {name: getattr(self, name) for name in names}
 
 
 class Light(NamedTuple):
@@ -84,6 +99,8 @@ class LightHeader(BaseModel):
         Side, in projector pixels, of the blocks that levels are means over.
     colour : tuple of float
         Linear red, green and blue, which the levels are multiplied by.
+    split : {"model", "physical"}
+        Which components the picture is taken apart into.
     gains : Gains
         Used for pictures that are saved; pages apply the gains of live frames themselves.
     """
@@ -94,7 +111,11 @@ class LightHeader(BaseModel):
     shape: tuple[int, int, Literal[1, 3]]
     block: int = Field(default=1, ge=1, le=2**16)
     colour: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
+    split: Split = "model"
     gains: Gains = Gains()
+
+
+Header = TypeVar("Header", bound=LightHeader)
 
 
 def pack(header: dict[str, Any], *arrays: NDArray[Any]) -> bytes:
@@ -123,14 +144,31 @@ def maximum_light_bytes(projector: Size) -> int:
 
 
 def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[LightHeader, Light]:
+    """Read the message of a projector's light; see `unpack_levels`."""
+    return unpack_levels(LightHeader, message, projector, block=block)
+
+
+def unpack_levels(
+    header_type: type[Header],
+    message: bytes,
+    size: Size,
+    *,
+    block: int = 1,
+    side: str = "projector",
+) -> tuple[Header, Light]:
     """Read the message of a light: uint16 levels, `WHITE_LEVEL` for full white.
 
     Parameters
     ----------
+    header_type : type
+        `LightHeader`, or what extends it.
     message : bytes
-    projector : Size
+    size : Size
+        Of whatever sends the light.
     block : int, optional
-        Side of the blocks of projector pixels that the light may be made of as well.
+        Side of the blocks of pixels that the light may be made of as well.
+    side : {"projector", "camera"}
+        What sends the light, for error messages.
 
     Returns
     -------
@@ -150,7 +188,7 @@ def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[Light
     if length > min(MAXIMUM_HEADER_BYTES, len(message) - _LENGTH.size):
         raise InputError(f"the message claims a header of {length} bytes: send a light.")
     try:
-        header = LightHeader.model_validate_json(message[_LENGTH.size : _LENGTH.size + length])
+        header = header_type.model_validate_json(message[_LENGTH.size : _LENGTH.size + length])
     except ValidationError as error:
         fault = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, fault["loc"]))
@@ -158,11 +196,11 @@ def unpack_light(message: bytes, projector: Size, block: int = 1) -> tuple[Light
     channels = header.shape[2]
     if header.block not in (1, block):
         raise InputError(f"the light is of blocks of {header.block} pixels: send it whole.")
-    size = size_in_blocks(projector, header.block)
-    if header.shape[:2] != size or len(data) != 2 * channels * size.pixels:
+    sent = size_in_blocks(size, header.block)
+    if header.shape[:2] != sent or len(data) != 2 * channels * sent.pixels:
         raise InputError(
-            f"the light is {'x'.join(map(str, header.shape))} in {len(data)} bytes, the projector "
-            f"{projector}: send {size}x1 or x3 of 2 bytes each."
+            f"the light is {'x'.join(map(str, header.shape))} in {len(data)} bytes, the {side} "
+            f"{size}: send {sent}x1 or x3 of 2 bytes each."
         )
     levels = np.frombuffer(data, dtype="<u2").reshape(header.shape)
     first = levels[..., :1]

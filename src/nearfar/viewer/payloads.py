@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
@@ -83,9 +84,14 @@ def pack_map(maps: Mapping[str, Callable[[], Map]], name: str) -> bytes:
     return pack(header, values, saturated.astype(np.uint8))
 
 
-def encode_relit_exr(transport: InteractiveTransport, light: Light, gains: Gains) -> bytes:
-    """Relight every camera pixel and encode the picture as OpenEXR."""
-    picture = transport.relight(light, **gains.model_dump())
+def encode_relit_exr(
+    transport: InteractiveTransport,
+    relight: Callable[[Light, Gains], Floats],
+    light: Light,
+    gains: Gains,
+) -> bytes:
+    """Relight every camera pixel by `relight` and encode the picture as OpenEXR."""
+    picture = relight(light, gains)
     return encode_exr(transport.to_colours(picture.reshape(*picture.shape[:2], -1)).squeeze())
 
 
@@ -135,10 +141,29 @@ def read_photo_file(transport: InteractiveTransport, data: bytes, name: str) -> 
     return pack({"scale": scale}, halves)
 
 
+def read_wanted_file(transport: InteractiveTransport, data: bytes, name: str) -> bytes:
+    """Decode a linear picture that the scene is to look like, and pack it, 1 for its brightest.
+
+    Raises
+    ------
+    UnreadableFileError, InputError
+        If it is no picture, has another size than the camera, or is negative or black.
+    """
+    wanted = decode_in_process(data, name, transport.stored.camera).astype(np.float32)
+    if not (wanted.min() >= 0 and 0 < wanted.max() < np.inf):
+        raise InputError(
+            f"the wanted picture goes from {wanted.min():.4g} to {wanted.max():.4g}: give one "
+            f"without negative light that is not black."
+        )
+    levels = np.rint(_to_rgb(wanted / wanted.max()) * np.float32(WHITE_LEVEL)).astype(np.uint16)
+    return pack({}, levels)
+
+
 # Readers of uploaded files by the kind that a page asks for.
 FILE_READERS: dict[str, Callable[[InteractiveTransport, bytes, str], bytes]] = {
     "light": read_light_file,
     "photo": read_photo_file,
+    "wanted": read_wanted_file,
 }
 
 

@@ -170,7 +170,7 @@ def _application(exchange: _Exchange) -> Any:
         from fastapi import FastAPI
         from fastapi.responses import Response
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    application.middleware("http")(with_security_headers)
+    application.add_middleware(with_security_headers)
     assets = read_page("preview")
 
     @application.get("/state")

@@ -1,5 +1,6 @@
 """Synthetic translucent bodies, whose kernel and direct light are known, and scenes without."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -246,3 +247,16 @@ def test_a_transport_without_near_range_light_is_refused(wax):
     without = replace(transport, near=transport.near[..., :0, :0], parts=("direct", "far"))
     with pytest.raises(InputError, match="no near-range light"):
         split_physically(without)
+
+
+def test_a_notebook_shows_the_physical_components(wax):
+    transport, *_ = wax
+    shown = split_physically(transport)._repr_html_()
+    assert shown.count("<img") == 4
+    for name in ("floodlit", "direct", "subsurface", "inter-reflection", "translucent bodies"):
+        assert name in shown
+    for name in ("near", "far"):
+        assert f">{name}" not in shown
+    shares = [float(share) for share in re.findall(r"(-?[\d.]+)% of the light", shown)]
+    assert sum(shares) == pytest.approx(100, abs=0.2)
+    assert shares[1] > 20

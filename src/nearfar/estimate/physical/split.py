@@ -21,9 +21,11 @@ from nearfar.estimate.physical.kernels import enlarged, kernel
 from nearfar.estimate.physical.medium import SLOPES, is_even, media_of
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.translucent import SQUARE, translucent
+from nearfar.markup import card
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import Footprint, footprint, look_up
 from nearfar.transport.model import Transport
+from nearfar.transport.summary_card import floodlit_and_apart
 
 # Where kernels explain a lesser share of what direct light leaves, nothing is translucent: a whole
 # body, or camera pixels at its outline.
@@ -137,6 +139,18 @@ class PhysicalSplit:
         under = transport.picture(subsurface)
         rest = model.direct + model.near + model.far - direct - under
         return PhysicalComponents(direct, under, rest)
+
+    def _repr_html_(self) -> str:
+        """Show the split in a notebook: the scene floodlit, and its physical components."""
+        white = np.ones(self.transport.projector, dtype=np.float32)
+        names = ("direct", "subsurface", "inter-reflection")
+        parts = dict(zip(names, self.components(white), strict=True))
+        floodlit = sum(part.sum() for part in parts.values())
+        rows = [
+            ("translucent bodies", str(len(self.bodies))),
+            *((name, f"{part.sum() / floodlit:.1%} of the light") for name, part in parts.items()),
+        ]
+        return card("physical split", rows, floodlit_and_apart(parts))
 
     def relight(
         self,

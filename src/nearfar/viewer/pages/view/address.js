@@ -1,6 +1,6 @@
 // The page's state in its address: only what differs from the initial state.
 
-import { KINDS } from './state.js';
+import { ALL_ONE, CAMERA_LIGHTS, KINDS, RANGES, SPLITS, TABS, TOOLS } from './state.js';
 
 // Dropped pictures that take more than this are left out of the address.
 const MAXIMUM_PICTURE_CHARACTERS = 400000;
@@ -20,6 +20,10 @@ export function toAddress(state, initial) {
   return Object.keys(changed).length ? '#' + encodeURIComponent(JSON.stringify(changed)) : '#';
 }
 
+// What sliders go to; those of the light go as far as the projector.
+const LIMITS = { exposure: [-6, 12], gamma: [0.5, 3], wipe: [0, 100], reach: [0.5, 1e4], broad: [0.5, 1e4],
+  ...Object.fromEntries(Object.keys(ALL_ONE).map(name => [name, [0, 4]])) };
+
 // Anyone may have written the address: values of the wrong type or range are left out.
 export function fromAddress(hash, initial) {
   let given = {};
@@ -31,8 +35,11 @@ export function fromAddress(hash, initial) {
     if (typeof before === 'number' && Number.isFinite(value)) state[name] = value;
     if (typeof before === 'string' && typeof value === 'string') state[name] = value;
   }
+  for (const [name, [low, high]] of Object.entries(LIMITS)) state[name] = Math.min(high, Math.max(low, state[name]));
   if (!COLOUR.test(state.colour)) state.colour = initial.colour;
-  if (!KINDS.includes(state.kind)) state.kind = initial.kind;
+  for (const [name, known] of [['kind', KINDS], ['tool', TOOLS], ['range', RANGES], ['cameraLight', CAMERA_LIGHTS], ['tab', TABS]])
+    if (!known.includes(state[name])) state[name] = initial[name];
+  if (!Object.hasOwn(SPLITS, state.split)) state.split = initial.split;
   for (const name of ['pixel', 'column'])
     if (Array.isArray(given[name]) && given[name].length === 2 && given[name].every(Number.isInteger))
       state[name] = given[name];

@@ -20,7 +20,7 @@ export class Connection {
   #onFrame;
   #onFault;
 
-  // light() gives { sent, colour }; onFrame(header, parts, isNewest); onFault(text), '' for none.
+  // light() gives { sent, colour, split }; onFrame(header, parts, isNewest); onFault(text), '' for none.
   constructor({ light, onFrame, onFault }) {
     this.#light = light;
     this.#onFrame = onFrame;
@@ -51,8 +51,8 @@ export class Connection {
     if (full || !this.#changed || this.#socket.readyState !== WebSocket.OPEN) return;
     this.#changed = false;
     this.#sent += 1;
-    const { sent: { values, shape, block }, colour } = this.#light();
-    this.#socket.send(pack({ number: this.#sent, shape, block, colour }, values));
+    const { sent: { values, shape, block }, colour, split } = this.#light();
+    this.#socket.send(pack({ number: this.#sent, shape, block, colour, split }, values));
   }
 
   #receive({ header, arrays }) {

@@ -4,11 +4,11 @@ import { all, get, set } from './dom.js';
 import { zoomLight } from './light-canvas.js';
 import { ONE_PIXEL } from './painting.js';
 import { canPlay } from './playback.js';
-import { PARTS, hasPart, isFree } from './state.js';
+import { ALL_ONE, hasPart, isFree, soloOf } from './state.js';
 
-const UNITS = { radius: ' px', width: ' px', brush: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
+const UNITS = { radius: ' px', width: ' px', brush: ' px', reach: ' px', broad: ' px', cameraRadius: ' px', side: ' px', shift: ' px', angle: '°', phase: '°', wipe: ' %' };
 const BROADEST = 8;
-const TWO_DECIMALS = [...PARTS, 'gamma', 'soft'];
+const TWO_DECIMALS = [...Object.keys(ALL_ONE), 'gamma', 'soft'];
 
 // What the page is of, and how far its sliders go.
 export function describe(scene) {
@@ -19,12 +19,11 @@ export function describe(scene) {
     (hasPart(scene, 'direct') ? `projector ${height}x${width}` : `${height * width} lamps`) + (scene.parts.includes('near') ? `; W = ${scene.window}` : '') +
     (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') +
     (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
-  PARTS.forEach((name, i) => { get('part' + i).parentElement.hidden = !hasPart(scene, name); });
-  document.querySelector('.parts').hidden = scene.parts.length === 1;
+  get('parts').hidden = scene.parts.length === 1;
   if (isFree(scene)) {
-    document.querySelector('[data-solo=far]').textContent = 'lamp by lamp';
-    get('row-far').nextElementSibling.textContent = 'each lamp, log scale';
-    for (const id of ['row-window', 'row-spectrum']) get(id).parentElement.hidden = true;
+    get('row-far-title').textContent = document.querySelector('.far-text').textContent = 'each lamp';
+    document.querySelector('.near-text').textContent = 'direct';
+    for (const id of ['row-window', 'row-spectrum']) get(id).closest('figure').hidden = true;
   }
   get('stage').style.setProperty('--aspect', columns / rows);
   // Lines of lamps and of pixels are drawn broad enough to point at.
@@ -48,20 +47,21 @@ export function bindControls({ store, scenePictures, playback, onTheme, show }) 
   get('play').onclick = () => playback.toggle();
   get('undo').onclick = () => store.update({ strokes: store.state.strokes.slice(0, -1) });
   get('clear').onclick = () => store.update({ strokes: [] });
-  get('reset').onclick = () => store.update({ exposure: 0, gamma: 1, direct: 1, near: 1, far: 1, solo: '' });
+  get('reset').onclick = () => store.update({ exposure: 0, gamma: 1, ...ALL_ONE, solo: '' });
   get('expose').onclick = () => {
     const exposure = scenePictures.exposure(store.state);
     if (exposure !== null) store.update({ exposure });
   };
+  get('difference').onclick = () => store.update({ difference: !store.state.difference });
   get('keep').onclick = () => { if (scenePictures.keepAsReference(store.state)) store.update({ wipe: 50 }); };
-  get('forget').onclick = () => { scenePictures.removeReference(); store.update({}); };
+  get('forget').onclick = () => { scenePictures.removeReference(); store.update({ difference: false }); };
   get('theme').onclick = () => { store.update({ theme: theme(store.state) === 'dark' ? 'light' : 'dark' }); onTheme(); };
   prefersDark.onchange = show;
 }
 
-export function showControls(state, { pictureCount, hasReference, isPlaying }) {
+export function showControls(state, { pictureCount, hasReference, isPlaying, split }) {
   for (const button of all('[data-kind]')) set(button, 'ariaPressed', String(button.dataset.kind === state.kind));
-  for (const button of all('[data-solo]')) set(button, 'ariaPressed', String(button.dataset.solo === state.solo));
+  for (const button of all('[data-solo]')) set(button, 'ariaPressed', String(button.dataset.solo === soloOf(state, split)));
   for (const part of all('[data-for]')) set(part, 'hidden', !part.dataset.for.split(' ').includes(state.kind));
   set(slider('shown'), 'max', String(Math.max(0, pictureCount - 1)));
   for (const input of all('[data-of]')) {
@@ -72,7 +72,8 @@ export function showControls(state, { pictureCount, hasReference, isPlaying }) {
   zoomLight(state.zoom);
   set(get('colour'), 'value', state.colour);
   set(get('maps'), 'value', state.map);
-  set(get('wiping'), 'hidden', !hasReference);
+  for (const id of ['wiping', 'comparing']) set(get(id), 'hidden', !hasReference);
+  set(get('difference'), 'ariaPressed', String(state.difference));
   set(get('forget'), 'hidden', !hasReference);
   set(document.documentElement.dataset, 'theme', theme(state));
   set(get('theme'), 'textContent', theme(state) === 'dark' ? 'light page' : 'dark page');
@@ -90,7 +91,7 @@ function valueText(name, state, pictureCount) {
   const value = state[name];
   if (name === 'exposure') return (value > 0 ? '+' : '') + value.toFixed(1) + ' EV';
   if (name === 'cycles') return value + ' cycles';
-  if (name === 'brush' && value <= ONE_PIXEL) return 'one pixel';
+  if (['brush', 'cameraRadius'].includes(name) && value <= ONE_PIXEL) return 'one pixel';
   if (name === 'zoom') return value + 'x';
   if (name === 'shown') return `${pictureCount ? value + 1 : 0} of ${pictureCount}`;
   return (TWO_DECIMALS.includes(name) ? value.toFixed(2) : +value.toFixed(1)) + (UNITS[name] || '');

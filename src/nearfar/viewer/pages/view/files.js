@@ -9,14 +9,18 @@ const PNG_HEAD_BYTES = 26;
 const PNG_BIT_DEPTH = 24;
 
 // Pictures of linear light are read by the server: a browser shows them wrong, or not at all.
-async function isLinear(file) {
+export async function isLinear(file) {
   if (/\.(tiff?|exr|npy)$/i.test(file.name)) return true;
   const head = new Uint8Array(await file.slice(0, PNG_HEAD_BYTES).arrayBuffer());
   return head[0] === 0x89 && head[1] === 0x50 && head[PNG_BIT_DEPTH] === 16;
 }
 
-const readByServer = (kind, file) =>
-  requestMessage(`read/${kind}?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file });
+export async function readByServer(kind, file) {
+  get('tool-status').textContent = `Reading ${file.name}.`;
+  try {
+    return await requestMessage(`read/${kind}?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file });
+  } finally { get('tool-status').textContent = ''; }
+}
 
 // The page's policy forbids fetching data: URLs, so they are decoded here.
 const blobOf = url => new Blob([Uint8Array.from(atob(url.split(',')[1]), c => c.charCodeAt(0))], { type: 'image/png' });
@@ -52,7 +56,7 @@ async function compareWithPhoto(file, { store, scenePictures }) {
   if (!file) return;
   showFault('');
   const { header, arrays: [{ shape, data }] } = await readByServer('photo', await asReadable(file));
-  scenePictures.compareWith({ height: shape[0], width: shape[1], colours: shape[2], values: fromFloat16(data, header.scale) });
+  scenePictures.compareWith({ height: shape[0], width: shape[1], colours: shape[2], values: fromFloat16(data, header.scale) }, 'photo');
   store.update({ wipe: 50 });
 }
 
@@ -64,6 +68,13 @@ async function asReadable(file) {
   return new File([await canvas.convertToBlob({ type: 'image/png' })], file.name + '.png');
 }
 
+// Dropped on the scene, a picture is a photo to compare with, or what the scene is to look like.
+async function dropped(files, isOnScene, page) {
+  if (!isOnScene) await addPictures(files, page);
+  else if (page.store.state.tool === 'compensation') await page.compensation.want(files[0]);
+  else await compareWithPhoto(files[0], page);
+}
+
 export function bindFiles(page) {
   get('pictures').onchange = showingFaults(async event => { await addPictures([...event.target.files], page); event.target.value = ''; });
   get('photo').onchange = showingFaults(async event => { await compareWithPhoto(event.target.files[0], page); event.target.value = ''; });
@@ -71,6 +82,6 @@ export function bindFiles(page) {
   addEventListener('drop', showingFaults(async event => {
     event.preventDefault();
     const files = [...event.dataTransfer.files];
-    if (files.length) await (get('stage').contains(event.target) ? compareWithPhoto(files[0], page) : addPictures(files, page));
+    if (files.length) await dropped(files, get('stage').contains(event.target), page);
   }));
 }

@@ -102,16 +102,21 @@ export class Light {
 
   // An sRGB picture of any size, cropped to the grid; returns it as a data URL for the address.
   async addPicture(source) {
-    const canvas = new OffscreenCanvas(this.width, this.height);
-    const pixels = await drawToFill(canvas, source);
-    const levels = new Uint16Array(3 * this.height * this.width);
-    for (let i = 0, j = 0; j < levels.length; i += 4)
-      for (let c = 0; c < 3; c++) levels[j++] = Math.round(WHITE_LEVEL * LINEAR_OF_BYTE[pixels[i + c]] * pixels[i + 3] / 255);
+    const { canvas, levels } = await levelsOfPicture(source, this.width, this.height);
     this.#addLevels(levels);
     const blob = await canvas.convertToBlob({ type: 'image/png' });
     return 'data:image/png;base64,' + btoa(Array.from(new Uint8Array(await blob.arrayBuffer()),
       byte => String.fromCharCode(byte)).join(''));
   }
+}
+
+// An sRGB picture of any size as levels of red, green and blue, cropped to a size, and the canvas it was drawn on.
+export async function levelsOfPicture(source, width, height) {
+  const canvas = new OffscreenCanvas(width, height), pixels = await drawToFill(canvas, source);
+  const levels = new Uint16Array(3 * height * width);
+  for (let i = 0, j = 0; j < levels.length; i += 4)
+    for (let c = 0; c < 3; c++) levels[j++] = Math.round(WHITE_LEVEL * LINEAR_OF_BYTE[pixels[i + c]] * pixels[i + 3] / 255);
+  return { canvas, levels };
 }
 
 async function drawToFill(canvas, source) {

@@ -1,9 +1,11 @@
 // Puts the page together; each part gets what it needs here, and knows nothing of the others.
 
 import { createAddressWriter, fromAddress } from './address.js';
+import { Compensation } from './compensation.js';
 import { Connection } from './connection.js';
 import { bindControls, describe, showControls } from './controls.js';
 import { get, nearestPixel, positionOn, showFault } from './dom.js';
+import { Dual } from './dual.js';
 import { bindFiles, restorePictures } from './files.js';
 import { Inspector } from './inspector.js';
 import { bindKeyboard } from './keyboard.js';
@@ -11,20 +13,30 @@ import { LightCanvas, bindPointer } from './light-canvas.js';
 import { Lamps } from './lamps.js';
 import { Light } from './light.js';
 import { Maps } from './maps.js';
+import { Numbers } from './numbers.js';
 import { Playback } from './playback.js';
 import { request } from './protocol.js';
+import { Reach } from './reach.js';
 import { bindSaving } from './saving.js';
 import { ScenePictures } from './scene-pictures.js';
+import { Splits } from './splits.js';
 import { Store, changesLight, initialState } from './state.js';
+import { Tabs } from './tabs.js';
+import { Tools } from './tools.js';
 import { showVerdict } from './verdict.js';
 
-async function open() {
+// The scene, and the state and the light that the address asks for.
+async function load() {
   const scene = await (await request('scene')).json();
-  const initial = initialState(scene.projector), state = fromAddress(location.hash, initial);
+  const initial = initialState(scene), state = fromAddress(location.hash, initial);
   const light = new Light(scene.projector, scene.light_block);
   const missing = await restorePictures(state.pictures, light);
   state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
+  return { scene, initial, state, light, missing };
+}
 
+async function open() {
+  const { scene, initial, state, light, missing } = await load();
   const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera);
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
@@ -32,17 +44,26 @@ async function open() {
       scenePictures.lightChanged();
       lightCanvas.requestDraw();
     } else {
-      show();
+      show(changes);
       scenePictures.draw(store.state);
     }
   });
-  const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store }), maps = new Maps({ scene, store });
-  const lamps = new Lamps(scene);
-  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); } });
-  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector };
-  function show() {
-    const { hasReference } = scenePictures, { isPlaying } = playback;
-    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying });
+  const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store, tabs: () => tabs }), maps = new Maps({ scene, store });
+  const tabs = new Tabs({ store, onShown: () => inspector.drawRow() });
+  const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
+  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); tools.lightChanged(); numbers.lightChanged(); } });
+  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
+  Object.assign(page, { dual: new Dual(page), compensation: new Compensation(page) });
+  const tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation });
+  const numbers = page.numbers = new Numbers(page);
+  function show(changes) {
+    const { hasReference, split } = scenePictures, { isPlaying } = playback;
+    splits.show(split);
+    splits.prepare();
+    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying, split });
+    tools.show(store.state, changes);
+    tabs.show(store.state);
+    numbers.refresh();
     writeAddress(store.state);
   }
 
@@ -53,16 +74,41 @@ async function open() {
   lightCanvas.draw();
   show();
   const connection = new Connection({
-    light: () => light,
-    onFrame: (header, parts, isNewest) =>
-      scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state),
+    light: () => ({ sent: light.sent, colour: light.colour, split: splits.current }),
+    onFrame: receiving(page, show),
     onFault: showFault,
   });
   if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
-  if (state.pixel) inspector.showRow(...state.pixel);
-  if (state.column) inspector.showColumn(...state.column);
+  inspect(state, { inspector, maps });
+}
+
+const receiving = ({ store, lightCanvas, scenePictures, splits, numbers }, show) => (header, parts, isNewest) => {
+  const { split } = scenePictures;
+  scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state);
+  if (header.split === split) numbers.refresh(); else show();
+  if (isNewest && header.split !== splits.current) splits.lost();
+};
+
+// The edge of what is compared with is dragged.
+function bindEdge(store) {
+  const edge = get('edge');
+  const drag = event => {
+    const box = get('stage').getBoundingClientRect();
+    store.update({ wipe: Math.min(100, Math.max(0, 100 * (event.clientX - box.left) / box.width)) });
+  };
+  edge.onpointerdown = event => { edge.setPointerCapture(event.pointerId); drag(event); };
+  edge.onpointermove = event => { if (edge.hasPointerCapture(event.pointerId)) drag(event); };
+}
+
+// Shows again what the address says was inspected.
+function inspect(state, { inspector, maps }) {
+  const { tab } = state;
+  if (state.pixel) inspector.showRow(...state.pixel, tab);
+  if (state.column) inspector.showColumn(...state.column, tab);
   if (state.map) maps.show(state.map);
 }
+
+const clicked = (event, size) => nearestPixel(positionOn(event, size), size);
 
 function bind(page, show) {
   const { scene, store, inspector } = page;
@@ -71,8 +117,11 @@ function bind(page, show) {
   bindFiles(page);
   bindSaving(page);
   bindKeyboard(page);
-  for (const id of ['map', 'picture'])
-    get(id).onclick = event => inspector.showRow(...nearestPixel(positionOn(event, scene.camera), scene.camera));
+  get('map').onclick = event => inspector.showRow(...clicked(event, scene.camera));
+  // A dual view is one of projector pixels.
+  get('picture').onclick = event =>
+    store.state.tool === 'dual' ? inspector.showColumn(...clicked(event, scene.projector)) : inspector.showRow(...clicked(event, scene.camera));
+  bindEdge(store);
   addEventListener('resize', () => inspector.drawRow());
   addEventListener('hashchange', () => location.reload());
 }

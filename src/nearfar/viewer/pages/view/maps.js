@@ -25,7 +25,12 @@ export class Maps {
     if (!name) return;
     get('map-caption').textContent = 'computing';
     const { header, arrays: [values, saturated] } = await requestMessage(`map/${name}`)
-      .catch(error => { get('map-caption').textContent = ''; throw error; });
+      .catch(error => {
+        this.#store.update({ map: '' });
+        for (const id of ['map', 'map-bar']) get(id).hidden = true;
+        get('map-caption').textContent = '';
+        throw error;
+      });
     if (this.#store.state.map !== name) return;
     this.#map = { ...values, saturated: saturated.data, unit: header.unit };
     drawMap(get('map'), values.data, values.shape, header.low, header.high, this.#scene.scale);

@@ -33,6 +33,10 @@ export function fromFloat16(bits, scale) {
   return values;
 }
 
+// A picture (y, x, colours) of a message, in photo units.
+export const pictureOf = ({ shape: [height, width, colours], data }, scale) =>
+  ({ height, width, colours, values: fromFloat16(data, scale) });
+
 // The sum of a frame's parts (3, y, x, colours), each with its gain, in photo units.
 export function sumOfParts({ shape, data, scale }, gains) {
   const count = data.length / 3, values = new Float32Array(count);

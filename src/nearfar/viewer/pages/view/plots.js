@@ -38,18 +38,51 @@ export function markPixels(canvas, marks, colour) {
 // Smaller values count as zero.
 const FLOOR = 1e-12;
 
-// Magnitudes on a log scale, down to a number of decades below the largest; grey at zero.
-// Returns the logarithm of the largest.
-export function drawLog(canvas, values, shape, scale, decades = 5) {
+const TICKS = 2;
+
+// Of negative values, from the dark end of the page's scale to red.
+const NEGATIVE = [[38, 20, 72], [125, 28, 82], [205, 62, 78], [255, 165, 130]];
+
+// Magnitudes on a log scale, as many decades below the largest as most of them take; grey at zero, negative values in red.
+// Returns the logarithm of the largest, and the share of negative values in the sum of magnitudes.
+export function drawLog(canvas, values, shape, scale) {
   const logarithms = new Float32Array(values.length);
-  let high = Math.log10(FLOOR);
+  let high = Math.log10(FLOOR), sum = 0, below = 0;
   for (let i = 0; i < values.length; i++) {
     const v = Math.abs(values[i]);
     logarithms[i] = v > FLOOR ? Math.log10(v) : NaN;
     if (logarithms[i] > high) high = logarithms[i];
+    if (v > 0) sum += v;
+    if (values[i] < 0) below += v;
   }
+  const decades = decadesOf(logarithms, high);
   drawMap(canvas, logarithms, shape, high - decades, high, scale);
-  return high;
+  if (below > 0) redden(canvas, values, logarithms, high - decades, high);
+  showBar(canvas, scale, Array.from({ length: TICKS + 1 }, (_, i) => tickText(10 ** (high - decades + i * decades / TICKS))));
+  return { high, negative: sum > 0 ? below / sum : 0 };
+}
+
+const tickText = value => value < 0.01 ? value.toExponential(1) : value.toPrecision(2);
+
+// Decades from one value in twenty of the smallest up to the largest, 1 to 5.
+function decadesOf(logarithms, high) {
+  const there = logarithms.filter(Number.isFinite).toSorted();
+  return Math.min(5, Math.max(1, Math.ceil(high - (there[Math.floor(there.length / 20)] ?? high))));
+}
+
+function redden(canvas, values, logarithms, low, high) {
+  const pen = canvas.getContext('2d', { willReadFrequently: true });
+  const image = pen.getImageData(0, 0, canvas.width, canvas.height);
+  for (let i = 0; i < values.length; i++)
+    if (values[i] < -FLOOR) image.data.set(colourOf(NEGATIVE, (logarithms[i] - low) / (high - low)).map(Math.round), 4 * i);
+  pen.putImageData(image, 0, 0);
+}
+
+// The colour bar below a canvas, with texts at even distances.
+function showBar(canvas, scale, texts) {
+  const figure = canvas.closest('figure'), bar = figure.querySelector('.bar'), ticks = figure.querySelector('.scale');
+  bar.style.background = gradient(scale);
+  ticks.replaceChildren(...texts.map(text => Object.assign(document.createElement('span'), { textContent: text })));
 }
 
 // The square of values around a position, NaN beyond the border.
@@ -71,6 +104,7 @@ export function drawSpectrum(canvas, values, [height, width], { measured, k_near
   for (let i = 0; i < values.length; i++) if (values[i] < low) low = values[i];
   low = Math.max(-80, low);
   drawMap(small, values, [height, width], low, 0, scale);
+  showBar(canvas, scale, [`${low.toFixed(0)} dB`, '0 dB']);
   const large = Math.max(1, Math.ceil(360 / Math.max(height, width)));
   // On the page the plot is some 300 pixels wide, whatever the canvas has.
   const thick = Math.max(1, large * Math.max(height, width) / 400);
@@ -86,47 +120,10 @@ export function drawSpectrum(canvas, values, [height, width], { measured, k_near
       pen.arc(at(sign * kx, width), at(sign * ky, height), 1.4 * thick, 0, 7);
       pen.fill();
     }
-  for (const [name, [ky, kx]] of [['--near', near], ['--far', far]]) {
-    pen.strokeStyle = css(name);
-    pen.lineWidth = 2 * thick;
+  for (const [colour, broad, [ky, kx]] of [['#000', 4, near], [css('--near'), 2, near], ['#000', 4, far], ['#fff', 2, far]]) {
+    pen.strokeStyle = colour;
+    pen.lineWidth = broad * thick;
     const x = at(-kx, width) - large / 2, y = at(-ky, height) - large / 2;
     pen.strokeRect(x, y, 2 * kx * width * large + large, 2 * ky * height * large + large);
-  }
-}
-
-// Lines over the same pixels on a log scale, each with a band of one standard deviation, which is the
-// whole plot where the deviation is infinite.
-export function drawProfile(canvas, lines, label) {
-  const ratio = devicePixelRatio || 1, w = canvas.clientWidth || 600, h = 170;
-  Object.assign(canvas, { width: w * ratio, height: h * ratio });
-  canvas.style.height = h + 'px';
-  const pen = canvas.getContext('2d', { willReadFrequently: true });
-  pen.scale(ratio, ratio);
-  let high = Math.log10(FLOOR);
-  for (const { values } of lines) for (const v of values) high = Math.max(high, Math.log10(Math.abs(v) + FLOOR));
-  const top = Math.ceil(high), low = top - 6, left = 38, bottom = h - 20;
-  const within = v => Math.min(top, Math.max(low, Math.log10(Math.max(v, FLOOR))));
-  const y = v => bottom - (within(v) - low) / (top - low) * (bottom - 6);
-  pen.font = '11px system-ui';
-  pen.fillStyle = css('--soft');
-  pen.strokeStyle = css('--line');
-  for (let power = low; power <= top; power += 2) {
-    pen.beginPath(); pen.moveTo(left, y(10 ** power)); pen.lineTo(w, y(10 ** power)); pen.stroke();
-    pen.fillText('1e' + power, 0, y(10 ** power) + 4);
-  }
-  pen.fillText(label, left, h - 5);
-  for (const { values, errors, colour } of lines) {
-    const x = i => left + (i + 0.5) / values.length * (w - left);
-    pen.fillStyle = pen.strokeStyle = css(colour);
-    pen.globalAlpha = 0.25;
-    pen.beginPath();
-    for (let i = 0; i < values.length; i++) pen.lineTo(x(i), y(values[i] + errors[i]));
-    for (let i = values.length - 1; i >= 0; i--) pen.lineTo(x(i), y(values[i] - errors[i]));
-    pen.fill();
-    pen.globalAlpha = 1;
-    pen.lineWidth = 1.5;
-    pen.beginPath();
-    for (let i = 0; i < values.length; i++) pen.lineTo(x(i), y(values[i]));
-    pen.stroke();
   }
 }

@@ -2,7 +2,7 @@
 
 import { get, showingFaults } from './dom.js';
 import { pack, request } from './protocol.js';
-import { gainsOf } from './state.js';
+import { SPLITS, gainsOf } from './state.js';
 
 const PATIENCE_MILLISECONDS = 60000;
 const POLLING_MILLISECONDS = 50;
@@ -17,21 +17,23 @@ function download(blob, name) {
 }
 
 // Saves the canvas as it is displayed, once it shows the exact picture of the newest light.
-async function savePng({ scenePictures, lightCanvas, playback }) {
+async function savePng({ store, scenePictures, lightCanvas, playback }) {
   const end = performance.now() + PATIENCE_MILLISECONDS;
   while (!scenePictures.isFinal || lightCanvas.isPending) {
     if (performance.now() > end || playback.isPlaying)
       throw new Error('The exact picture is not there yet: let the light rest, and save again.');
     await new Promise(resolve => { setTimeout(resolve, POLLING_MILLISECONDS); });
   }
-  get('picture').toBlob(blob => download(blob, 'relit.png'), 'image/png');
+  const { tool } = store.state, name = tool === 'compensation' ? 'relit' : tool;
+  get('picture').toBlob(blob => download(blob, `${name}.png`), 'image/png');
 }
 
 // Saves what the server makes of the light.
-async function saveResponse(path, name, { store, light, lightCanvas }) {
+async function saveResponse(path, name, { store, light, lightCanvas, scenePictures }) {
   lightCanvas.drawAtRest();
-  const [direct, near, far] = gainsOf(store.state), { sent: { values, shape }, colour } = light;
-  const response = await request(path, { method: 'POST', body: pack({ shape, colour, gains: { direct, near, far } }, values) });
+  const { split } = scenePictures, { sent: { values, shape }, colour } = light, given = gainsOf(store.state, split);
+  const gains = Object.fromEntries(SPLITS[split].map((part, i) => [part, given[i]]));
+  const response = await request(path, { method: 'POST', body: pack({ shape, colour, split, gains }, values) });
   download(await response.blob(), name);
 }
 

@@ -1,31 +1,45 @@
 // The page's state, all that its address keeps: replaced by every change, never changed in place.
 
-export const PARTS = ['direct', 'near', 'far'];
+// Components by the split of the scene's light that they are of; each has a gain.
+export const SPLITS = { model: ['direct', 'near', 'far'], physical: ['direct', 'subsurface', 'interreflection'] };
+const GAINS = [...new Set(Object.values(SPLITS).flat())];
 // Rows are free where there is neither a near nor a far range: they take the place of far-range light.
 export const isFree = scene => scene.parts.includes('free');
-// Whether a scene has the part of a place among PARTS.
-export const hasPart = (scene, name) => scene.parts.includes(name) || name === 'far' && isFree(scene);
+// Whether a scene has a component.
+export const hasPart = (scene, name) => scene.parts.includes(name) || name === 'far' && isFree(scene) ||
+  canSplitPhysically(scene) && SPLITS.physical.includes(name);
+export const canSplitPhysically = scene => scene.parts.includes('near');
+export const ALL_ONE = Object.freeze(Object.fromEntries(GAINS.map(name => [name, 1])));
+export const TOOLS = ['relit', 'reach', 'dual', 'compensation'];
+export const TABS = ['light', 'row', 'column', 'map', 'numbers'];
+export const RANGES = ['within', 'ring', 'beyond'];
+export const CAMERA_LIGHTS = ['spot', 'white'];
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
 
 // What a page opens with; the keys are those of the address.
-export function initialState([height, width]) {
+export function initialState({ projector: [height, width], camera: [rows, columns] }) {
   const side = Math.min(height, width);
   return Object.freeze({
     kind: 'spot', x: (width - 1) / 2, y: (height - 1) / 2, radius: Math.max(1, Math.round(side / 4)), soft: 0.5,
     angle: 90, width: Math.max(1, Math.round(side / 16)), cycles: 4, phase: 0, side: Math.max(1, Math.round(side / 16)),
     shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, zoom: 1, colour: '#ffffff', strokes: [], pictures: [],
-    direct: 1, near: 1, far: 1, solo: '', exposure: 0, gamma: 1, wipe: 50, map: '', pixel: null,
-    column: null, theme: '',
+    ...ALL_ONE, split: 'model', solo: '', exposure: 0, gamma: 1, wipe: 50, difference: false, map: '', pixel: null,
+    column: null, theme: '', tab: 'light', tool: 'relit', range: 'beyond', reach: 3, broad: 3,
+    cameraLight: 'spot', cameraX: (columns - 1) / 2, cameraY: (rows - 1) / 2, cameraRadius: Math.max(1, Math.round(Math.min(rows, columns) / 8)),
   });
 }
 
 // Everything else changes the light.
-const DISPLAY_ONLY = [...PARTS, 'solo', 'exposure', 'gamma', 'wipe', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures'];
+const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
+  'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius'];
 
 export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));
 
-// Gains of direct, near and far, as they are shown: one alone, or all.
-export const gainsOf = state => PARTS.map(name => !state.solo || state.solo === name ? state[name] : 0);
+// The component of a split that is shown alone; '' for all of them.
+export const soloOf = (state, split) => SPLITS[split].includes(state.solo) ? state.solo : '';
+
+// Gains of a split's components, as they are shown: one alone, or all.
+export const gainsOf = (state, split) => SPLITS[split].map(name => (soloOf(state, split) || name) === name ? state[name] : 0);
 
 export class Store {
   #state;

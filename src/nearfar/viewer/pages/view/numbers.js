@@ -1,0 +1,99 @@
+// Light under the pointer, or of the camera pixel that was chosen: of the whole and of its components, with sigma.
+
+import { BackgroundJob } from './background.js';
+import { get, nearestPixel, positionOn, set } from './dom.js';
+import { pack, request } from './protocol.js';
+import { titleOf } from './splits.js';
+import { SPLITS, hasPart } from './state.js';
+
+const REST_MILLISECONDS = 150;
+const CHANNELS = ['red', 'green', 'blue'];
+
+const mean = values => values.reduce((sum, value) => sum + value, 0) / values.length;
+const digits = value => {
+  if (value === null) return 'unknown';
+  return value === 0 ? '0' : Math.abs(value) < 0.001 ? value.toExponential(1) : value.toFixed(4);
+};
+
+export class Numbers {
+  #page;
+  #job = new BackgroundJob(text => this.#note(text === 'computing' ? '' : text));
+  #pointed = null;
+  #timer = 0;
+  // What the server told, and of what.
+  #told = { key: '', numbers: null };
+  #lights = 0;
+
+  constructor(page) {
+    this.#page = page;
+    const canvas = get('picture');
+    canvas.onpointermove = event => this.#point(nearestPixel(positionOn(event, this.#grid), this.#grid));
+    canvas.onpointerleave = () => this.#point(null);
+  }
+
+  get #isDual() { return this.#page.store.state.tool === 'dual'; }
+
+  get #grid() { return this.#isDual ? this.#page.scene.projector : this.#page.scene.camera; }
+
+  lightChanged() {
+    this.#lights += 1;
+    this.refresh();
+  }
+
+  #point(place) {
+    this.#pointed = place;
+    this.refresh();
+  }
+
+  // Shows the numbers of the newest frame at once, and sigma once the server has told it.
+  refresh() {
+    const { store: { state }, scenePictures } = this.#page;
+    const place = this.#pointed || (this.#isDual ? null : state.pixel), seen = place && scenePictures.valuesAt(place, this.#grid);
+    if (!seen) { set(get('readout'), 'textContent', ''); return; }
+    const key = [place, this.#lights, seen.split].join();
+    const told = this.#told.key === key ? this.#told.numbers : null;
+    this.#showReadout(place, seen, told);
+    if (this.#isDual) return;
+    this.#showTable(place, seen, told);
+    clearTimeout(this.#timer);
+    if (!told) this.#timer = setTimeout(() => this.#job.ask([signal => this.#ask(place, seen.split, key, signal)]), REST_MILLISECONDS);
+  }
+
+  async #ask([y, x], split, key, signal) {
+    const { light } = this.#page, { sent: { values, shape, block }, colour } = light;
+    // A light of blocks moves, and has no sigma.
+    if (block > 1) return;
+    const body = pack({ shape, colour, split, y, x }, values);
+    this.#told = { key, numbers: await (await request('numbers', { method: 'POST', body, signal })).json() };
+    this.refresh();
+  }
+
+  #showReadout([y, x], { shown, parts, split, isRelit }, told) {
+    const { scene } = this.#page;
+    const sigma = told?.sigma && isRelit ? ` ± ${digits(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
+    const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${digits(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
+    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${digits(mean(shown))}${sigma}`, ...apart].join(' · '));
+  }
+
+  #showTable([y, x], { parts, total, split }, told) {
+    const { scene } = this.#page, colours = total.length;
+    set(get('numbers-pixel'), 'textContent', `row ${y}, column ${x}`);
+    const names = SPLITS[split].filter(name => hasPart(scene, name));
+    const rows = [['light', total, told?.sigma], ...names.map(name =>
+      [titleOf(scene, name), parts[SPLITS[split].indexOf(name)], Object.values(told?.components || {})[names.indexOf(name)]?.sigma])];
+    const head = ['', ...(colours === CHANNELS.length ? CHANNELS : ['light']), 'share'];
+    get('numbers').replaceChildren(line('th', head), ...rows.map(([title, values, sigma]) =>
+      line('td', [title, ...values.map((value, c) => digits(value) + (sigma ? `\n± ${digits(sigma[c] ?? null)}` : '')),
+        `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`])));
+    get('numbers').hidden = false;
+  }
+
+  #note(text) { if (text) set(get('numbers-note'), 'textContent', text); }
+}
+
+// A row of the table, whose first cell is its head.
+function line(kind, texts) {
+  const row = document.createElement('tr');
+  row.append(...texts.map((textContent, i) => Object.assign(document.createElement(i ? kind : 'th'), { textContent })));
+  return row;
+}

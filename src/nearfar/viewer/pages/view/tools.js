@@ -1,0 +1,57 @@
+// What the scene's picture shows: the relit scene, or what a tool makes of it.
+
+import { all, get, set } from './dom.js';
+import { SPLITS, gainsOf, soloOf } from './state.js';
+import { titleOf } from './splits.js';
+
+export class Tools {
+  #page;
+  #tools;
+  #open = 'relit';
+
+  // tools: { name: { open, close, lightChanged, changed, label, show } }, of all but the relit scene.
+  constructor(page, tools) {
+    this.#page = page;
+    this.#tools = tools;
+    get('tools').hidden = !page.scene.parts.includes('direct');
+    for (const button of all('[data-tool]')) button.onclick = () => page.store.update({ tool: button.dataset.tool });
+  }
+
+  get #tool() { return this.#tools[this.#open]; }
+
+  lightChanged() { this.#tool?.lightChanged?.(); }
+
+  // The state has changed: opens the tool that it names.
+  show(state, changes = {}) {
+    const tool = this.#page.scene.parts.includes('direct') ? state.tool : 'relit';
+    if (tool !== this.#open) this.#choose(tool);
+    else this.#tool?.changed?.(changes);
+    for (const button of all('[data-tool]')) set(button, 'ariaPressed', String(button.dataset.tool === tool));
+    for (const panel of all('[data-of-tool]')) set(panel, 'hidden', !panel.dataset.ofTool.split(' ').includes(tool));
+    this.#tool?.show?.(state);
+    set(get('stage-label'), 'textContent', this.#label(state));
+  }
+
+  #choose(tool) {
+    const { scenePictures, store } = this.#page;
+    this.#tool?.close?.();
+    set(get('tool-status'), 'textContent', '');
+    scenePictures.replace(null, false, store.state);
+    this.#open = tool;
+    this.#tool?.open?.();
+  }
+
+  #label(state) {
+    const { scenePictures } = this.#page, { split } = scenePictures;
+    const label = this.#tool?.label(state) || this.#relitLabel(state, split);
+    if (!scenePictures.referenceName || this.#open === 'dual') return label;
+    return state.difference ? `${label} less ${scenePictures.referenceName}` : `${scenePictures.referenceName} | ${label}`;
+  }
+
+  #relitLabel(state, split) {
+    const { scene } = this.#page, solo = soloOf(state, split);
+    if (solo) return `${titleOf(scene, solo)} light only`;
+    const gains = gainsOf(state, split), changed = SPLITS[split].filter((_, i) => gains[i] !== 1);
+    return ['relit', ...changed.map(name => `${titleOf(scene, name)} × ${+state[name].toFixed(2)}`)].join(', ');
+  }
+}

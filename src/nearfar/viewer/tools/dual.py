@@ -1,0 +1,66 @@
+"""The scene as the projector sees it, lit from the camera, for a page."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from nearfar.applications.dual import dual_view
+from nearfar.arrays import Floats, Size, middles
+from nearfar.files import luminance
+from nearfar.viewer.interactive import (
+    COLOUR,
+    MAXIMUM_DISPLAYED_PIXELS,
+    InteractiveTransport,
+    to_float16,
+)
+from nearfar.viewer.messages import LightHeader, pack, unpack_levels
+
+# Rows and columns of projector pixels that are sent while the light moves.
+MAXIMUM_MOVING_PIXELS = 2**18
+
+
+class DualHeader(LightHeader):
+    """The header of a light on the camera's side.
+
+    Attributes
+    ----------
+    coarse : bool
+        Whether some projector pixels suffice.
+    """
+
+    coarse: bool = False
+
+
+def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iterator[bytes | None]:
+    """Make the dual view of a light at the camera, in one step for each block of camera rows.
+
+    Raises
+    ------
+    InputError
+        If the message is wrong.
+    """
+    camera = transport.stored.camera
+    header, light = unpack_levels(DualHeader, message, camera, side="camera")
+    channels = transport.stored.channels
+    picture: Floats = light.as_array().astype(np.float32)
+    if picture.ndim == 3 and channels != COLOUR:
+        picture = luminance(picture)
+    total, first = np.zeros((*transport.projector, channels), dtype=np.float32), 0
+    for block in transport.blocks():
+        rows = picture[first : first + block.camera.height]
+        if rows.any():
+            total += dual_view(block, rows).reshape(total.shape)
+        first += block.camera.height
+        yield None
+    most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
+    scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
+    # A projector pixel adds up the camera pixels that see its light.
+    usual = transport.projector.pixels / camera.pixels
+    yield pack({"scale": scale, "coarse": header.coarse, "brightness": usual}, halves)
+
+
+def _at_most(picture: Floats, pixels: int) -> Floats:
+    """Return every second row and column, every third and so on, of a picture that is too large."""
+    size = Size(*picture.shape[:2])
+    stride = int(np.ceil(np.sqrt(size.pixels / pixels)))
+    return picture[np.ix_(*(middles(side, stride) for side in size))] if stride > 1 else picture

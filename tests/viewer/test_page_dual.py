@@ -1,0 +1,102 @@
+"""The viewer's page in a real browser: the scene as the projector sees it, lit from the camera."""
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.transport.store import save_transport
+from nearfar.viewer.interactive import InteractiveTransport
+from tests.viewer.asking import CAMERA, PROJECTOR, ask, message, refused, unpack
+from tests.viewer.browsing import pictures, seen, settled, tone
+from tests.viewer.conftest import served_view
+from tests.waiting import wait_until
+from tests.worlds import model_transport
+
+pytestmark = pytest.mark.slow
+
+# A projector pixel adds up so many camera pixels.
+PER_PIXEL = CAMERA.pixels / PROJECTOR.pixels
+
+
+def _shows(page, expected):
+    """Wait until the scene's picture is what is expected, to a step of the screen."""
+    wait_until(
+        lambda: (
+            pictures(page).get("stage") is True
+            and seen(page).shape == expected.shape
+            and np.abs(seen(page) - tone(expected / PER_PIXEL)).max() <= 1
+        )
+    )
+
+
+def _column(transport, y, x):
+    """Return what light of one camera pixel makes of the projector's pixels: its row of T."""
+    pixel = y * CAMERA.width + x
+    row = transport.rows(slice(pixel, pixel + 1))[0]
+    return row.T.reshape(*PROJECTOR, 3)
+
+
+def test_light_on_the_cameras_side_is_dragged(open_page, address, transport):
+    page = open_page(address, {"kind": "white", "tool": "dual", "cameraLight": "white"})
+    whole = sum(
+        transport.rows(slice(i, i + CAMERA.width)).sum(axis=0)
+        for i in range(0, CAMERA.pixels, CAMERA.width)
+    )
+    _shows(page, whole.T.reshape(*PROJECTOR, 3))
+    assert page.inner_text("#stage-label") == "as the projector sees it, lit from the camera"
+    assert not page.is_visible("#light")
+    # The smallest spot is one camera pixel: its row of T.
+    page.click("[data-camera-light=spot]")
+    page.evaluate("""() => { const s = document.querySelector('[data-of=cameraRadius]');
+        s.value = 0.5; s.dispatchEvent(new Event('input')); }""")
+    box = page.locator("#camera-light").bounding_box()
+
+    def place(y, x):
+        across, down = box["width"] / CAMERA.width, box["height"] / CAMERA.height
+        return box["x"] + (x + 0.5) * across, box["y"] + (y + 0.5) * down
+
+    page.mouse.move(*place(5, 5))
+    page.mouse.down()
+    page.mouse.move(*place(12, 20), steps=4)
+    page.mouse.up()
+    _shows(page, _column(transport, 12, 20))
+    # By the keyboard, one pixel on and eight.
+    page.focus("#camera-light")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Shift+ArrowRight")
+    _shows(page, _column(transport, 13, 28))
+    # A click shows what is clicked: a camera pixel's row, in the scene a projector pixel's column.
+    page.mouse.click(*place(9, 30))
+    page.wait_for_selector("#pixel:has-text('row 9, column 30')")
+    page.click("#picture", position={"x": 3, "y": 3})
+    page.click("#tab-column")
+    page.wait_for_selector("#column:has-text('row 0, column 0')")
+    # The relit scene is of the camera's shape again.
+    page.click("[data-tool=relit]")
+    page.click("[data-tab=light]")
+    settled(page)
+    assert seen(page).shape[:2] == CAMERA
+    assert page.is_visible("#light")
+
+
+def test_the_address_keeps_the_light_on_the_cameras_side(open_page, address, transport):
+    state = {"tool": "dual", "cameraX": 7, "cameraY": 3, "cameraRadius": 0.5}
+    page = open_page(address, {**state, "cameraLight": "<b>"})
+    _shows(page, _column(transport, 3, 7))
+
+
+def test_a_camera_of_another_shape_and_a_transport_on_the_disk(stored, transport, tmp_path):
+    light = np.random.default_rng(1).random((*CAMERA, 3)).astype(np.float32)
+    expected = transport.adjoint(light)
+    with served_view(InteractiveTransport(stored, memory=10**4)) as address:
+        header, (halves,) = unpack(ask(address, "/tool/dual", message(light)))
+        np.testing.assert_allclose(halves / header["scale"], expected, rtol=2e-3, atol=1e-2)
+        assert header["brightness"] == pytest.approx(1 / PER_PIXEL)
+        status, said = refused(address, "/tool/dual", message(np.ones(PROJECTOR)))
+        assert status == 400
+        assert f"the camera {CAMERA}" in said
+    grey = model_transport(Size(12, 10), Size(8, 9), window=3, far=Size(3, 3), channels=1)
+    save_transport(grey, tmp_path / "grey.zarr")
+    with served_view(InteractiveTransport(tmp_path / "grey.zarr")) as address:
+        _, (halves,) = unpack(ask(address, "/tool/dual", message(np.ones((8, 9, 3)))))
+        assert halves.shape == (12, 10, 1)

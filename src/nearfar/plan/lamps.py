@@ -54,9 +54,7 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
             f"{projector.pixels} lamps are too many to tell one by one: plan for a grid of at most "
             f"{MOST_LAMPS}, or leave a range in the model."
         )
-    references = max(FEWEST, round(photos / PHOTOS_TO_A_REFERENCE))
-    checks = max(1, round(CHECKED_SHARE * photos)) if checked else 0
-    codes = photos - 2 * references - checks
+    references, checks, codes = _shares(photos, checked)
     if codes < 1:
         raise PlanError(
             f"{photos} photos are too few for two whites, two blacks, a code and one to check by: "
@@ -79,6 +77,25 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
         correspondence="none",
         patterns=with_references(shown, references, references),
     )
+
+
+def photos_of_every_code(projector: Size, *, checked: bool = True) -> int | None:
+    """Return the fewest photos whose plan shows as many codes as tell every lamp apart.
+
+    All codes of an order do so with the least noise; if a few are left out, some sums of lamps
+    remain unknown, or nearly so. None for more lamps than can be planned for.
+    """
+    if projector.pixels > MOST_LAMPS:
+        return None
+    order = _order_from(projector.pixels)
+    return next(photos for photos in count(order) if _shares(photos, checked)[2] >= order)
+
+
+def _shares(photos: int, checked: bool) -> tuple[int, int, int]:
+    """Return how many photos of white, check photos and codes a plan has."""
+    references = max(FEWEST, round(photos / PHOTOS_TO_A_REFERENCE))
+    checks = max(1, round(CHECKED_SHARE * photos)) if checked else 0
+    return references, checks, photos - 2 * references - checks
 
 
 def _row(number: int, order: int) -> int:

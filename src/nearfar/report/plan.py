@@ -3,6 +3,7 @@
 from nearfar.plan import Plan
 from nearfar.plan.choose import can_list_every_frequency, photos_of_every_frequency
 from nearfar.plan.expected_range import ExpectedRange
+from nearfar.plan.lamps import photos_of_every_code
 from nearfar.plan.look import Look
 from nearfar.plan.patterns import LampCode
 from nearfar.plan.recognition import summarise
@@ -127,15 +128,23 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
             f"the scene is not direct, near-range and far-range light alone: by its light, "
             f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
         )
+        if plan.is_of_lamps:
+            return (
+                f"{found}. Planned without them: each projector pixel counts as a lamp of its own"
+            )
         if not can_list_every_frequency(plan.projector):
             return f"{found}. The projector has too many frequencies to do without them"
+        of_codes = photos_of_every_code(plan.projector)
         if plan.transport_photos >= plan.projector.pixels:
-            return f"{found}. Planned without them: all frequencies are shown"
-        needed = photos_of_every_frequency(plan.projector)
-        return (
-            f"{found}. Planned without them: the lowest frequencies are shown; {needed} photos and "
-            f"the check photos show all"
-        )
+            said = "all frequencies are shown"
+            codes = f"; {of_codes} photos would be of codes, which tell them with half the variance"
+        else:
+            needed = photos_of_every_frequency(plan.projector)
+            said = (
+                f"the lowest frequencies are shown; {needed} photos and the check photos show all"
+            )
+            codes = f", and {of_codes} do so by codes, with half the variance"
+        return f"{found}. Planned without them: {said}{'' if of_codes is None else codes}"
     if look.reach is None:
         return f"the look shows hardly any near-range light: planned with W = {plan.window}"
     more = " or more" if look.reach >= look.window else ""

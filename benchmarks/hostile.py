@@ -1,8 +1,8 @@
 """Estimates of transports that are not direct + near + far, beside what assumes nothing of them.
 
 Run ``python benchmarks/hostile.py [--scenes] [--look] [--bars] [NAME ...]``. Transports are those
-of `nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in scenes
-with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels P, it
+of `nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in
+scenes with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels P, it
 prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of one
 projector pixel, for
 

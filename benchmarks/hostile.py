@@ -2,9 +2,9 @@
 
 Run ``python benchmarks/hostile.py [--scenes] [--look] [--bars] [NAME ...]``. Transports are those
 of `nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in
-scenes with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels P, it
-prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of one
-projector pixel, for
+scenes with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels
+P, it prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of
+one projector pixel, for
 
 - joint: the joint estimate from a plan that was chosen for the budget, q by phase;
 - DFT: the inverse DFT of the responses of the same photos, 0 where none was measured;

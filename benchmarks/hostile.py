@@ -1,15 +1,19 @@
 """Estimates of transports that are not direct + near + far, beside what assumes nothing of them.
 
-Run ``python benchmarks/hostile.py [--scenes] [--bars] [NAME ...]``. Transports are those of
-`nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in scenes
-with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels P, it
-prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of one
-projector pixel, for
+Run ``python benchmarks/hostile.py [--scenes] [--look] [--bars] [NAME ...]``. Transports are those
+of `nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in
+scenes with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels
+P, it prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of
+one projector pixel, for
 
 - joint: the joint estimate from a plan that was chosen for the budget, q by phase;
 - DFT: the inverse DFT of the responses of the same photos, 0 where none was measured;
 - paper: the best of the paper's plans that the budget allows;
 - Hadamard, brute force: where the budget allows them.
+
+With ``--look``, the plan is chosen by a first look of a fifth of P photos, which come on top of the
+budget, and "look" stands in place of "joint": where the look finds that no model describes the
+scene and the photos suffice, free rows from codes, otherwise the joint estimate.
 
 ``--alone`` leaves out all but the joint estimate; ``--budgets`` takes other shares of P. With
 ``--bars`` it prints for the joint estimate how many errors lie within one standard deviation,
@@ -18,7 +22,9 @@ in per cent, in place of the others.
 
 import argparse
 import sys
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -31,11 +37,15 @@ from nearfar.illumination.pictures import natural_picture, random_pattern
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.photometry.measurements import Measurements
+from nearfar.plan.by_look import plan_by_look
+from nearfar.plan.look import Look, look_at
+from nearfar.plan.model import Plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.hostile import HOSTILE, hostile_transport
 from nearfar.transport.model import Transport
-from nearfar.workflow.acquire import acquire_in_memory
+from nearfar.workflow.acquire import acquire, acquire_in_memory
+from nearfar.workflow.free_rows import reconstruct_free_rows
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.brute_force import BRUTE_FORCE
 from nearfar.workflow.rivals.hadamard import HADAMARD
@@ -61,6 +71,8 @@ NOISES = (1 / 2000, 1 / 200, 1 / 60)
 # Photos, as shares of the projector's pixels.
 BUDGETS = (0.2, 0.4, 0.7, 1.0, 1.2)
 SCENE_BUDGETS = (0.06, 0.12, 0.25, 0.5)
+# Photos of a look.
+LOOK_SHARE = 0.2
 RANDOM_LIGHTS = 4
 PICTURES = 5
 # White reaches this share of full scale; the black level keeps noise from being cut off.
@@ -133,12 +145,47 @@ def coverage(bench: Bench, found: Transport, lights: dict[str, list[Floats]]) ->
     return shares
 
 
-def estimates(bench: Bench, photos: int, *, rivals: bool) -> Iterator[tuple[str, Relights]]:
-    """Yield every estimate that a budget allows."""
-    plan, _ = choose_plan(bench.scene.projector, photos, window=bench.window or None, checks=0)
-    measurements = measure(acquire_in_memory(plan, bench.rig(1.0)))
+def measured(bench: Bench, plan: Plan) -> Measurements:
+    """Photograph a plan of sinusoids."""
+    return measure(acquire_in_memory(plan, bench.rig(1.0)))
+
+
+def jointly(measurements: Measurements, plan: Plan) -> Transport:
+    """Return the joint estimate."""
     q = correspond_by_phase(measurements, pitch=plan.pitch).q
-    yield "joint", estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+    return estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+
+
+def look(bench: Bench) -> Look:
+    """Return a first look at a scene."""
+    projector = bench.scene.projector
+    photos = max(24, round(LOOK_SHARE * projector.pixels))
+    plan, _ = choose_plan(projector, photos, window=bench.window or None, checks=0)
+    return look_at(jointly(measured(bench, plan), plan))
+
+
+def by_codes(bench: Bench, plan: Plan) -> Transport:
+    """Return free rows from photos of codes."""
+    with tempfile.TemporaryDirectory() as folder:
+        return reconstruct_free_rows(acquire(plan, Path(folder) / "c.zarr", bench.rig(1.0)))
+
+
+def estimates(
+    bench: Bench, photos: int, seen: Look | None, *, rivals: bool
+) -> Iterator[tuple[str, Relights]]:
+    """Yield every estimate that a budget allows."""
+    projector = bench.scene.projector
+    plan, _ = choose_plan(projector, photos, window=bench.window or None, checks=0)
+    measurements = measured(bench, plan)
+    if seen is None:
+        yield "joint", jointly(measurements, plan)
+    else:
+        chosen = plan_by_look(projector, photos, seen, checked=False)
+        is_by_codes = chosen.is_of_lamps
+        yield (
+            "look",
+            by_codes(bench, chosen) if is_by_codes else jointly(measured(bench, chosen), chosen),
+        )
     if not rivals:
         return
     yield "DFT", Dense(inverse_dft(measurements))
@@ -159,10 +206,12 @@ def run(
     gain = EXPOSURE if not options.scenes else 1.0
     bench = Bench(scene, camera, 0, gain)
     lights = lights_of(scene.projector)
+    seen = look(bench) if options.look else None
     for share in options.budgets or (SCENE_BUDGETS if options.scenes else BUDGETS):
         photos = max(24, round(share * scene.projector.pixels))
         best: dict[str, list[float]] = {}
-        for name, found in estimates(bench, photos, rivals=not (options.bars or options.alone)):
+        rivals = not (options.bars or options.alone)
+        for name, found in estimates(bench, photos, seen, rivals=rivals):
             if options.bars:
                 assert isinstance(found, Transport)
                 best[name] = coverage(bench, found, lights)
@@ -182,6 +231,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--scenes", action="store_true")
     parser.add_argument("--bars", action="store_true")
+    parser.add_argument("--look", action="store_true", help="plans by a first look")
     parser.add_argument("--alone", action="store_true", help="the joint estimate alone")
     parser.add_argument("--budgets", nargs="*", type=float, help="photos, as shares of P")
     options = parser.parse_args()

@@ -217,6 +217,11 @@ def test_a_look_at_what_is_not_direct_near_and_far_light_asks_for_every_frequenc
         ran = check_done(run_nearfar(*wanted, "--photos", photos, "--look", look))
         assert "is not direct, near-range and far-range light alone" in ran.out
         assert said in ran.out
+    codes = tmp_path / "codes.json"
+    ran = check_done(run_nearfar(*wanted, "--photos", 170, "--look", look, "-o", codes))
+    assert "each projector pixel counts as a lamp of its own" in ran.out
+    assert "nearfar reconstruct --no-near --no-far" in ran.out
+    assert read_plan(codes).is_of_lamps
     ran = check_done(run_nearfar(*wanted, "--photos", 150, "--look", look, "--json"))
     found = json.loads(ran.out)
     assert found["look"]["model_holds"] is False

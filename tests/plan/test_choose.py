@@ -218,6 +218,9 @@ def test_free_rows_say_that_the_model_does_not_hold():
     assert look_at(bound).model_holds
     assert look_at(free).free_share == 1.0
     assert not look_at(free).model_holds
+    # Light with edges is known to be weaker at high frequencies.
+    with_edges = _quick_look(PriorComponent(0.0, 64.0, FREE, far_power=1.5), 0.006)
+    assert look_at(with_edges).model_holds
 
 
 def test_a_look_without_prior_components_is_refused():

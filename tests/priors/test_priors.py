@@ -76,3 +76,21 @@ def test_eigenvectors_make_the_responses_independent(component):
     # The eigenbasis of all of the responses is the prior's own.
     again = prior.of_responses(np.arange(basis.count), centred, multiplicity)
     np.testing.assert_allclose(again.eigenvalues, prior.eigenvalues, atol=1e-5 * largest)
+
+
+def test_light_with_edges_falls_as_the_spectrum_of_a_disc_does():
+    (edged,) = (one for one in UNLIT_COMPONENTS if one.far_power)
+    side = 256
+    y, x = np.indices((side, side)) - side / 2
+    cycles = np.hypot(*np.meshgrid(*2 * [np.fft.fftfreq(side) * side], indexing="ij"))
+    power = np.zeros((side, side))
+    # Discs of many radii, so that none of their rings stands out.
+    for radius in np.linspace(60, 90, 31):
+        power += np.abs(np.fft.fft2(np.hypot(y, x) < radius)) ** 2
+    rings = np.arange(4, 40)
+    found = [power[np.abs(cycles - ring) < 0.5].mean() for ring in rings]
+    expected = spectral_density(rings.astype(float), edged)
+    slope, expected_slope = (
+        np.polyfit(np.log(1 + rings), np.log(p), 1)[0] for p in (found, expected)
+    )
+    assert expected_slope == pytest.approx(slope, rel=0.15)

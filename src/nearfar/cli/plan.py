@@ -192,6 +192,8 @@ class _Chosen(NamedTuple):
         found = []
         if self.look is not None:
             found.append(describe_look(self.look, self.plan, self.photos_for_window))
+            if self.plan.is_of_lamps:
+                found.append("reconstruct them with: nearfar reconstruct --no-near --no-far")
         if self.plan.expected_snr is not None:
             is_looked_at = self.look is not None
             found.append(describe_expected(self.plan.expected_snr, is_looked_at=is_looked_at))
@@ -224,26 +226,18 @@ def _choose(
 ) -> _Chosen:
     """Choose a plan, for the scene of a look if there is one."""
     from nearfar.plan import choose_plan
-    from nearfar.plan.choose import NOISE, can_list_every_frequency
+    from nearfar.plan.by_look import plan_by_look
     from nearfar.plan.look import photos_for_window
 
-    seen = None if look is None else _looked_at(look, projector)
-    if window is None and seen is not None:
-        window = seen.wanted_window if seen.model_holds else seen.window
-    plan, _ = choose_plan(
-        projector,
-        photos,
-        window=window,
-        typical=None if seen is None else seen.typical,
-        noise=NOISE if seen is None else seen.noise,
-        checks=None if checks else 0,
-        every_frequency=(
-            seen is not None and not seen.model_holds and can_list_every_frequency(projector)
-        ),
-        progress=progress,
-    )
+    if look is None:
+        plan, _ = choose_plan(
+            projector, photos, window=window, checks=None if checks else 0, progress=progress
+        )
+        return _Chosen(plan, None, None)
+    seen = _looked_at(look, projector)
+    plan = plan_by_look(projector, photos, seen, window=window, checked=checks, progress=progress)
     needed = None
-    if seen is not None and seen.model_holds and plan.window > seen.window:
+    if seen.model_holds and plan.window > seen.window:
         needed = photos_for_window(seen, projector, photos, plan.window)
     return _Chosen(plan, seen, needed)
 

@@ -1,6 +1,7 @@
 """Plans for lamps without a neighbourhood: codes that rely on no order of the lamps."""
 
 from itertools import count
+from typing import NamedTuple
 
 from nearfar.arrays import AnySize, Size, as_size
 from nearfar.checks import as_count
@@ -54,9 +55,7 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
             f"{projector.pixels} lamps are too many to tell one by one: plan for a grid of at most "
             f"{MOST_LAMPS}, or leave a range in the model."
         )
-    references = max(FEWEST, round(photos / PHOTOS_TO_A_REFERENCE))
-    checks = max(1, round(CHECKED_SHARE * photos)) if checked else 0
-    codes = photos - 2 * references - checks
+    references, checks, codes = shares_of_photos(photos, checked=checked)
     if codes < 1:
         raise PlanError(
             f"{photos} photos are too few for two whites, two blacks, a code and one to check by: "
@@ -79,6 +78,37 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
         correspondence="none",
         patterns=with_references(shown, references, references),
     )
+
+
+def photos_of_every_code(projector: Size, *, checked: bool = True) -> int | None:
+    """Return the fewest photos whose plan shows as many codes as tell every lamp apart.
+
+    All codes of an order do so with the least noise; if a few are left out, some sums of lamps
+    remain unknown, or nearly so. None for more lamps than can be planned for.
+    """
+    if projector.pixels > MOST_LAMPS:
+        return None
+    order = _order_from(projector.pixels)
+    return next(
+        photos
+        for photos in count(order)
+        if shares_of_photos(photos, checked=checked).codes >= order
+    )
+
+
+class SharesOfPhotos(NamedTuple):
+    """How many photos of each sort a plan for lamps has."""
+
+    references: int  # of white, and as many of black
+    checks: int
+    codes: int
+
+
+def shares_of_photos(photos: int, *, checked: bool) -> SharesOfPhotos:
+    """Return how many of its photos a plan for lamps gives to white and black, checks and codes."""
+    references = max(FEWEST, round(photos / PHOTOS_TO_A_REFERENCE))
+    checks = max(1, round(CHECKED_SHARE * photos)) if checked else 0
+    return SharesOfPhotos(references, checks, photos - 2 * references - checks)
 
 
 def _row(number: int, order: int) -> int:

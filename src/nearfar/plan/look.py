@@ -8,6 +8,7 @@ from nearfar.arrays import Size
 from nearfar.plan.choose import choose_frequencies
 from nearfar.plan.typical import noise_of, typical_of
 from nearfar.plan.window import largest_window, pitch_of
+from nearfar.priors.component import PriorComponent
 from nearfar.priors.fitted import FREE
 from nearfar.priors.typical import TypicalScenes
 from nearfar.transport.posterior import Posterior
@@ -76,7 +77,7 @@ def look_at(transport: "Transport") -> Look:
         If it was not estimated jointly.
     """
     typical = typical_of(transport)
-    free = [component.far_decay >= FREE for component, _ in typical.prior_components]
+    free = [_is_free(component) for component, _ in typical.prior_components]
     reach = _reach(transport)
     wanted = 0 if reach is None else 2 * round((WINDOW_OVER_REACH * reach - 1) / 2) + 1
     # All odd; a look tells little of what lies far beyond its own window.
@@ -126,6 +127,11 @@ def photos_for_window(look: Look, projector: Size, photos: int, window: int) -> 
     now, twice = (expected(count, window) for count in (photos, 2 * photos))
     doublings = max(before - now, 0.0) / max(twice - now, 1e-3)
     return round(photos * 2 ** min(doublings, 4.0))
+
+
+def _is_free(component: PriorComponent) -> bool:
+    """Return whether light anywhere on the projector is alike, in a prior component."""
+    return component.far_decay >= FREE and component.far_power == 0
 
 
 def _reach(transport: "Transport") -> float | None:

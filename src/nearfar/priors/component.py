@@ -1,4 +1,4 @@
-"""A Gaussian prior of a row of the transport, described by five numbers.
+"""A Gaussian prior of a row of the transport, described by six numbers.
 
 The near-range light of a bare wall, of wax and of a crease differs by orders of magnitude, and no
 single Gaussian describes them all. The prior is therefore a set of components. Each camera pixel's
@@ -29,6 +29,9 @@ class PriorComponent(NamedTuple):
     roughness : float
         Standard deviation of the part of a window entry that is independent of its neighbours,
         over that of the smooth part.
+    far_power : float
+        The standard deviation of far-range light's responses falls by (1 + r)^-far_power as well, r
+        in cycles per pattern grid: 2 for light with edges, whose spectrum has no end.
     """
 
     near_reach: float
@@ -36,3 +39,4 @@ class PriorComponent(NamedTuple):
     far_decay: float
     direct_spread: float = 0.0
     roughness: float = 0.0
+    far_power: float = 0.0

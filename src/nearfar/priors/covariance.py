@@ -42,6 +42,8 @@ def spectral_density(cycles: Floats, prior_component: PriorComponent) -> Floats:
         Distance of k from DC, in cycles per pattern grid.
     """
     falling = np.exp(-2 * cycles / prior_component.far_decay)
+    if prior_component.far_power:
+        falling = falling * (1 + cycles) ** (-2 * prior_component.far_power)
     return np.asarray(prior_component.far_deviation**2 * (falling + SPECTRAL_DENSITY_FLOOR))
 
 

@@ -47,8 +47,10 @@ LIT_COMPONENTS = (
 )
 # Components of camera pixels without direct light: far-range light alone, the last of them light of
 # which nothing is known.
-UNLIT_COMPONENTS = tuple(
-    PriorComponent(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0, 24.0, FREE)
+UNLIT_COMPONENTS = (
+    *(PriorComponent(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0, 24.0)),
+    PriorComponent(0.0, 64.0, FREE, far_power=1.5),
+    PriorComponent(0.0, 64.0, FREE),
 )
 # Where functions of near-range light are of several projector pixels: indices of the lit components
 # that the first sweep chooses from, and the later ones for differences from neighbours. All 25 take

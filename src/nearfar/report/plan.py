@@ -9,6 +9,11 @@ from nearfar.plan.recognition import summarise
 from nearfar.plan.recognition.own import recognised_in
 from nearfar.plan.window import largest_window
 
+BY_CODES = (
+    "Codes of half of the projector's pixels are expected to relight better than sinusoids. "
+    "Planned without a window and a band: each projector pixel counts as a lamp of its own"
+)
+
 
 def describe_plan(plan: Plan) -> str:
     """Return a description of a plan, in lines: sizes, photos, and savings over brute force.
@@ -123,19 +128,9 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
         Photos that leave as little unknown as a window of the look's size, if the plan's is larger.
     """
     if not look.model_holds:
-        found = (
-            f"the scene is not direct, near-range and far-range light alone: by its light, "
-            f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
-        )
-        if not can_list_every_frequency(plan.projector):
-            return f"{found}. The projector has too many frequencies to do without them"
-        if plan.transport_photos >= plan.projector.pixels:
-            return f"{found}. Planned without them: all frequencies are shown"
-        needed = photos_of_every_frequency(plan.projector)
-        return (
-            f"{found}. Planned without them: the lowest frequencies are shown; {needed} photos and "
-            f"the check photos show all"
-        )
+        return _describe_no_model(look, plan)
+    if plan.is_of_lamps:
+        return f"the look's photos have little noise. {BY_CODES}"
     if look.reach is None:
         return f"the look shows hardly any near-range light: planned with W = {plan.window}"
     more = " or more" if look.reach >= look.window else ""
@@ -150,6 +145,25 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
     return (
         f"{falls}: planned with W = {plan.window}{wanted}, for which about {photos_for_window} "
         f"photos leave as little unknown as {len(plan.patterns)} for W = {look.window}"
+    )
+
+
+def _describe_no_model(look: Look, plan: Plan) -> str:
+    """Describe a plan for a scene that no model describes."""
+    found = (
+        f"the scene is not direct, near-range and far-range light alone: by its light, "
+        f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
+    )
+    if plan.is_of_lamps:
+        return f"{found}. {BY_CODES}"
+    if not can_list_every_frequency(plan.projector):
+        return f"{found}. The projector has too many frequencies to do without them"
+    if plan.transport_photos >= plan.projector.pixels:
+        return f"{found}. Planned without them: all frequencies are shown"
+    needed = photos_of_every_frequency(plan.projector)
+    return (
+        f"{found}. Planned without them: the lowest frequencies are shown; {needed} photos and "
+        f"the check photos show all"
     )
 
 

@@ -18,10 +18,10 @@ from nearfar.workflow.acquire import acquire_in_memory
 PROJECTOR, CAMERA = Size(12, 12), Size(12, 12)
 
 
-def shot(name, photos, noise):
+def shot(name, photos, noise, projector=PROJECTOR):
     """Photograph a hostile transport: the truth in photo units, plan and measurements."""
-    scene = hostile_transport(name, PROJECTOR, CAMERA)
-    plan, _ = choose_plan(PROJECTOR, photos)
+    scene = hostile_transport(name, projector, CAMERA)
+    plan, _ = choose_plan(projector, photos)
     camera = SimulatedCamera(
         full_well=1e6, read_noise=1e6 * noise, bits=16, black_level=0.1, shot_noise=False
     )
@@ -84,3 +84,16 @@ def test_the_light_of_a_row_stays_where_direct_light_would_be_negative():
     error = np.linalg.norm(found.rows(slice(None)) - truth, axis=-1)
     assert found.direct.min() >= 0
     assert error.max() < 0.02 * np.linalg.norm(truth, axis=-1).max()
+
+
+def test_errors_of_lamps_with_an_edge_are_about_as_large_as_their_bars():
+    projector = Size(15, 15)
+    truth, plan, measurements = shot("lamps", 158, 1 / 2000, projector)
+    nowhere = np.full((*CAMERA, 2), np.nan, dtype=np.float32)
+    found = estimate_jointly(measurements, nowhere, plan.window, plan.far, pitch=plan.pitch)
+    bars = ErrorBars(found)
+    # Camera pixels see the same edge, so that it takes many lights to tell.
+    lights = np.random.default_rng(0).random((60, *projector))
+    errors = [(found @ light).ravel() - truth[:, 0] @ light.ravel() for light in lights]
+    expected = [bars.picture(light).ravel() for light in lights]
+    assert 0.6 < np.mean(np.square(errors)) / np.mean(np.square(expected)) < 1.8

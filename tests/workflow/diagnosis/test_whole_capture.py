@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved, NotLinear
+from nearfar.workflow.diagnosis.bend_of_pairs import Bend
 from nearfar.workflow.diagnosis.misfit import (
     BEND,
     CAUSES,
@@ -24,7 +25,9 @@ VALUES = 1000
 INFORMATION = 500.0
 
 
-def found(cause, sizes, *, regions=slice(None), information=INFORMATION, misfit=None):
+def found(
+    cause, sizes, *, regions=slice(None), information=INFORMATION, misfit=None, of_pairs=None
+):
     """Return the changes found in photos whose only difference is one cause, of these sizes."""
     every = REGIONS_A_SIDE**2
     effects = np.zeros((PHOTOS, every, CAUSES))
@@ -33,7 +36,8 @@ def found(cause, sizes, *, regions=slice(None), information=INFORMATION, misfit=
     vector = information * effects
     explained = np.einsum("nrc,nrc->n", effects, vector) / VALUES
     misfits = 1 + explained if misfit is None else np.full(PHOTOS, misfit)
-    return find_changes(NormalEquations(matrix, vector, VALUES), misfits, WHITES)
+    equations = NormalEquations(matrix, vector, VALUES)
+    return find_changes(equations, misfits, WHITES, of_pairs=of_pairs)
 
 
 def step(photo, size=1.0):
@@ -117,6 +121,15 @@ def test_a_bend_that_explains_next_to_nothing_of_bad_fits_is_none():
     (fault,) = found(BEND, np.full(PHOTOS, 0.2))
     assert fault == NotLinear("")
     assert found(BEND, np.full(PHOTOS, 0.2), misfit=20.0) == []
+
+
+@pytest.mark.parametrize("size", [0.2, -0.2])
+def test_a_bend_that_inverse_photos_surely_contradict_is_none(size):
+    bends = np.full(PHOTOS, size)
+    for of_pairs in (Bend(size, 0.01), Bend(2 * size, 0.01), Bend(0.0, 0.2)):
+        assert found(BEND, bends, of_pairs=of_pairs) == [NotLinear("")]
+    for of_pairs in (Bend(0.0, 0.05), Bend(-size, 0.05)):
+        assert found(BEND, bends, of_pairs=of_pairs) == []
 
 
 def test_what_explains_more_than_photos_differ_beyond_noise_is_noise():

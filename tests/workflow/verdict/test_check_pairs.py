@@ -52,6 +52,12 @@ def test_a_model_of_the_noise_that_is_wrong_in_scale_hides_no_error(claimed):
     assert pair.error > 0.9 * 0.02**2
 
 
+def test_noise_alone_sums_to_white_within_its_deviation():
+    pairs = [_compare(seed) for seed in range(40)]
+    scaled = [pair.excess_share / pair.excess_deviation for pair in pairs]
+    assert np.std(scaled) == pytest.approx(1.0, abs=0.3)
+
+
 def test_a_lamp_that_changed_is_no_noise():
     pair = _compare(error=0.0, noise=0.001, gain=1.05)
     assert pair.excess_share == pytest.approx(0.05, rel=0.02)

@@ -93,6 +93,20 @@ def test_pictures_and_half_screens_tell_a_bend_from_a_lamp(of_pictures, of_half_
     assert judged(*lights) == ("doubtful" if causes else "good", causes)
 
 
+@pytest.mark.parametrize("of_half_screens", [0.0, 0.013])
+def test_noise_that_pairs_do_not_sum_to_white_by_is_no_fault(of_half_screens):
+    def causes(noise):
+        lights = (
+            at(32, noise=noise, excess=0.013),
+            at(32, noise=noise, excess=of_half_screens, is_binary=True),
+        )
+        return judged(*lights)[1]
+
+    assert causes(1e-12) == (("lamp",) if of_half_screens else ("not-linear",))
+    # One photo has a noise of 0.06.
+    assert causes(4e-5) == ()
+
+
 @pytest.mark.parametrize("spoilt", [ExposureChanged((5, 9), 0.1, 0.01), LampFlickers(0.1)])
 def test_a_bend_that_is_sure_explains_photos_of_other_brightness(spoilt):
     def causes(of_pictures, of_half_screens, spoilt):

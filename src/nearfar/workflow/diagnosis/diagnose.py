@@ -12,6 +12,7 @@ from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
+from nearfar.workflow.diagnosis.bend_of_pairs import bend_of_pairs
 from nearfar.workflow.diagnosis.compression import find_compression
 from nearfar.workflow.diagnosis.inverse_pairs import (
     are_linear,
@@ -99,7 +100,13 @@ def find_what_spoils(
     if suspected is False:
         checks = serves(plan, "check")
         equations, misfit = equations.without(checks), np.where(checks, 1.0, misfit)
-    found = find_changes(equations, misfit, photos.drift.references.whites, inverse_photos(plan))
+    found = find_changes(
+        equations,
+        misfit,
+        photos.drift.references.whites,
+        inverse_photos(plan),
+        bend_of_pairs(fits),
+    )
     if not found:
         return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.

@@ -17,6 +17,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.faults.of_photos import (
     ColoursSwapped,
@@ -141,16 +142,16 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)
-        without = _fit_without(fits, good, suspects, known) if suspects else None
-        found = _explain_all(without, plan, suspects) if without is not None else {}
+        without = _estimate_without(fits, good, suspects, known) if suspects else None
+        found = _explain_all(fits, without, suspects, good) if without is not None else {}
         if not found:
             break
         explained |= found
         good[list(found)] = False
-        again = _fit_without(fits, good, [], known)
+        again = _estimate_without(fits, good, [], known)
         if again is None:
             break
-        fits = again
+        fits = fit_photos(fits.without_drift, again)
     explained |= _explain_by_turns(fits, good, explained, known)
     certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     probable = {n: e for n, e in explained.items() if n not in certain}
@@ -199,21 +200,33 @@ def _explain_by_turns(
     while open_photos:
         number = open_photos.pop()
         best = _simplest(list(_explanations(by_turns, plan, number)))
-        if number not in found and best.explains(float(by_turns.misfit[number])):
-            found[number] = best
-            other = best.other
-            # The other one may have its place in turn.
-            if best.what == "order" and other is not None and explained.get(other) is None:
-                open_photos.append(other)
+        is_explained = best.explains(float(by_turns.misfit[number]))
+        if number in found or not is_explained or _is_shared(by_turns, best, number, good):
+            continue
+        found[number] = best
+        other = best.other
+        # The other one may have its place in turn.
+        if best.what == "order" and other is not None and explained.get(other) is None:
+            open_photos.append(other)
     return found
 
 
-def _fit_without(
-    fits: PhotoFits, good: Booleans, left_out: list[int], known: Floats
-) -> PhotoFits | None:
-    """Return the fits of all photos to an estimate without some; None if too few remain."""
-    transport = _estimate_without(fits, good, left_out, known)
-    return None if transport is None else fit_photos(fits.without_drift, transport)
+def _is_shared(fits: PhotoFits, change: Explanation, number: int, good: Booleans) -> bool:
+    """Return whether it is of exposure, and another good photo of the pattern shows it too.
+
+    They were taken at different times: what both differ by is the error of the picture, which was
+    estimated without either of them.
+    """
+    if change.what != "exposure":
+        return False
+    pattern, mine = fits.plan.patterns[number], np.array([change.gain, change.offset])
+    for other in np.flatnonzero(good):
+        if other != number and fits.plan.patterns[other] == pattern:
+            theirs = exposure_change(fits, int(other))
+            left = np.abs(mine - [theirs.gain, theirs.offset]).max()
+            if left < LEAST_IN_SUM * np.abs(mine).max():
+                return True
+    return False
 
 
 def _estimate_without(
@@ -247,20 +260,48 @@ def _estimate_without(
     return estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS)
 
 
-def _explain_all(fits: PhotoFits, plan: Plan, suspects: list[int]) -> dict[int, Explanation | None]:
-    """Return the explanations of the suspects that are spoilt; None for those without one."""
+def _explain_all(
+    all_fits: PhotoFits, without: Transport, suspects: list[int], good: Booleans
+) -> dict[int, Explanation | None]:
+    """Return the explanations of the suspects that are spoilt; None for those without one.
+
+    Parameters
+    ----------
+    all_fits : PhotoFits
+    without : Transport
+        Estimated without the suspects.
+    suspects : list of int
+    good : ndarray of bool, shape (photos,)
+        Photos that are not explained yet, suspects among them.
+    """
+    fits = fit_photos(all_fits.without_drift, without)
     own = {number: float(fits.misfit[number]) for number in suspects}
     usual = max(1.0, float(np.median(list(own.values()))))
     found: dict[int, Explanation | None] = {}
     for number in suspects:
         if own[number] < SUSPECT_MISFIT:
             continue
-        best = _simplest(list(_explanations(fits, plan, number)))
+        best = _simplest(list(_explanations(fits, fits.plan, number)))
         if best.explains(own[number]):
-            found[number] = best
-        elif own[number] > UNEXPLAINED_RATIO * usual:
+            if not _is_shared(fits, best, number, good):
+                found[number] = best
+        elif own[number] > UNEXPLAINED_RATIO * usual and _surprises(fits, without, number):
             found[number] = None
     return found
+
+
+def _surprises(fits: PhotoFits, without: Transport, number: int) -> bool:
+    """Return whether a photo differs by more than the error bars of its picture expect.
+
+    Where no other photo tells of its pattern, it may well differ by far more than noise.
+    """
+    plan = fits.plan
+    light = plan.draw(number) / np.float32(255)
+    bars = ErrorBars(without).picture(light).reshape(fits.white.shape)
+    is_known = np.isfinite(bars)
+    variance = fits.variance[number] + np.where(is_known, bars, np.inf) ** 2
+    squares = (fits.photos[number] - fits.relit[number]) ** 2 / variance
+    return float(squares.sum() / max(1, is_known.sum())) > SUSPECT_MISFIT
 
 
 def _simplest(explanations: list[Explanation]) -> Explanation:

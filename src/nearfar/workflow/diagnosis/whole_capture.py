@@ -22,6 +22,7 @@ from nearfar.faults.of_photos import (
 from nearfar.files import from_srgb
 from nearfar.photometry.drift import find_references
 from nearfar.plan.checks import check_lights
+from nearfar.workflow.diagnosis.bend_of_pairs import Bend
 from nearfar.workflow.diagnosis.misfit import (
     ACROSS,
     BEND,
@@ -54,6 +55,9 @@ LEAST_SHARE_OF_BEND = 0.02
 # It explains no more than all of them: with much noise estimates are shrunk, and what is left is in
 # proportion to the light.
 LARGEST_SHARE_OF_BEND = 1.01
+# Photos of inverse patterns contradict a bend if theirs is less than this share of it, by so many
+# standard deviations.
+LEAST_SHARE_IN_PAIRS, SURE_DEVIATIONS = 0.5, 2.0
 # Exposure explains this many times what a bend does where it changes from photo to photo.
 EXPOSURE_OVER_BEND = 7.0
 # Above this, light changes from photo to photo, not in a few.
@@ -94,6 +98,7 @@ def find_changes(
     misfit: Floats,
     whites: Integers,
     inverses: Sequence[tuple[int, int]] = (),
+    of_pairs: Bend | None = None,
 ) -> list[Spoilt]:
     """Find the changes of rig and scene while photos were taken, at one moment or all the time.
 
@@ -105,6 +110,8 @@ def find_changes(
         Numbers of the photos of white.
     inverses : sequence of tuple of int
         Photos, and those of the inverses of their patterns.
+    of_pairs : Bend, optional
+        The bend of the response by photos of inverse patterns.
 
     Returns
     -------
@@ -154,8 +161,7 @@ def find_changes(
         pixels = _shift(equations, photo, whites, region)
         found.append((in_regions, Moved("scene", photo, pixels)))
     light = find_changes_of_light(whole, inverses)
-    bend = _explained(whole.matrix.sum(axis=(0, 1)), whole.vector.sum(axis=(0, 1)), [BEND])
-    bend /= whole.values
+    bend = _explained_by_bend(whole, of_pairs)
     least_bend = max(LEAST_BEND, LEAST_SHARE_OF_BEND * beyond_noise)
     is_bent = least_bend < bend < LARGEST_SHARE_OF_BEND * beyond_noise
     if is_bent and (light is None or light[0] < EXPOSURE_OVER_BEND * bend):
@@ -165,6 +171,25 @@ def find_changes(
     if not of_white:
         found.sort(key=lambda each: -each[0])
     return [each for explained, each in found if explained > found[0][0] / 4]
+
+
+def _explained_by_bend(whole: NormalEquations, of_pairs: Bend | None) -> float:
+    """Return the misfit that a bend of the response explains; 0 if inverse photos contradict it.
+
+    What an estimate is off by is often in proportion to the light, as a bend is, but cancels in the
+    sum of a pattern's photo and its inverse's.
+    """
+    matrix, vector = (part.sum(axis=(0, 1)) for part in (whole.matrix, whole.vector))
+    size = vector[BEND] / max(matrix[BEND, BEND], 1e-300)
+    if of_pairs is not None:
+        same = of_pairs.size * np.sign(size)
+        missing = abs(size) - same
+        if (
+            same < LEAST_SHARE_IN_PAIRS * abs(size)
+            and missing > SURE_DEVIATIONS * of_pairs.deviation
+        ):
+            return 0.0
+    return _explained(matrix, vector, [BEND]) / whole.values
 
 
 def _explained_of_white(equations: NormalEquations, whites: Integers) -> float:

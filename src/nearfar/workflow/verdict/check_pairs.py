@@ -80,6 +80,13 @@ class CheckPair:
         """Sum of the pattern's and the inverse's photo less white, as a share of white."""
         return self.excess / self.white if self.white > 0 else 0.0
 
+    @property
+    def excess_deviation(self) -> float:
+        """Standard deviation of `excess_share`, from the noise of the two photos."""
+        if self.white <= 0:
+            return 0.0
+        return float(np.sqrt(2 * self.photo_noise / max(1, self.values)) / self.white)
+
 
 class Means(Protocol):
     """A record of means over `values` values."""

@@ -127,6 +127,19 @@ class HeldOut:
         return _mean(pictures) - self.lamp_excess if pictures else 0.0
 
     @property
+    def lamp_excess_deviation(self) -> float:
+        """Standard deviation of `lamp_excess`, from the noise of the photos."""
+        return _deviation_of_mean(
+            light.pair.excess_deviation for light in self.lights if light.is_binary
+        )
+
+    @property
+    def nonlinear_excess_deviation(self) -> float:
+        """Standard deviation of `nonlinear_excess`, from the noise of the photos."""
+        pictures = [light.pair.excess_deviation for light in self.lights if not light.is_binary]
+        return float(np.hypot(_deviation_of_mean(pictures), self.lamp_excess_deviation))
+
+    @property
     def unmeasured_share(self) -> float | None:
         """Share of the expected error that comes from what was not measured, not from noise."""
         unmeasured = expected = 0.0
@@ -140,6 +153,23 @@ class HeldOut:
     @property
     def error_ratio(self) -> float | None:
         """Power of the errors over that which the error bars expect; None without error bars."""
+        relative = self._relative_errors()
+        if relative is None:
+            return None
+        measured, deviation, expected = relative
+        return float(max(measured, deviation) / expected)
+
+    @property
+    def error_ratio_deviation(self) -> float | None:
+        """Standard deviation of `error_ratio`, from the noise of the photos."""
+        relative = self._relative_errors()
+        return None if relative is None else relative[1] / relative[2]
+
+    def _relative_errors(self) -> tuple[float, float, float] | None:
+        """Return the errors' power over the lights', its deviation, and what is expected, summed.
+
+        None without error bars.
+        """
         measured = expected = variance = 0.0
         for light in self.lights:
             if light.expected_error is None:
@@ -148,7 +178,7 @@ class HeldOut:
             measured += light.pair.error / signal
             expected += light.expected_error / signal
             variance += (light.pair.error_deviation / signal) ** 2
-        return float(max(measured, np.sqrt(variance)) / max(expected, 1e-300))
+        return measured, float(np.sqrt(variance)), max(expected, 1e-300)
 
     @property
     def expected_snr(self) -> float | None:
@@ -164,6 +194,12 @@ class HeldOut:
 def _mean(values: Iterable[float]) -> float:
     listed = list(values)
     return float(np.mean(listed)) if listed else 0.0
+
+
+def _deviation_of_mean(deviations: Iterable[float]) -> float:
+    """Return the standard deviation of the mean of independent values; 0 without any."""
+    listed = list(deviations)
+    return float(np.linalg.norm(listed)) / len(listed) if listed else 0.0
 
 
 def _mean_known(values: Iterable[float | None]) -> float | None:

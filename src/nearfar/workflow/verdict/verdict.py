@@ -29,8 +29,9 @@ Cause = (
     of_photos.Cause | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "unchecked"]
 )
 
-# What a pattern and its inverse may show beyond white, as a share of white.
-LARGEST_EXCESS = 0.01
+# What a pattern and its inverse may show beyond white, as a share of white, and by how many
+# standard deviations more they have to.
+LARGEST_EXCESS, SURE_DEVIATIONS = 0.01, 2.0
 # Power of the errors over what the error bars expect: above the first the transport is doubtful,
 # above the second it is wrong.
 DOUBTFUL_ERROR_RATIO = 2.0
@@ -51,7 +52,8 @@ SURE_EXCESS = 0.05
 # Without error bars, errors as many dB above the noise of a photo are not due to it.
 NOISE_DECIBELS = 6.0
 
-# Below this, error bars expect so much more error than there is that photos contradict each other.
+# Below this, by as many standard deviations, error bars expect so much more error than there is
+# that photos contradict each other.
 SMALLEST_ERROR_RATIO = 0.5
 # Up to this, check photos that fit badly do so by the error of the estimate.
 USUAL_ERROR_RATIO = 1.5
@@ -241,9 +243,9 @@ def judge(
         wrong = any(reason.cause in WRONG_PHOTOS for reason in reasons)
         return Verdict("wrong" if wrong else "doubtful", None, tuple(reasons))
     if not spoilt:
-        if abs(held_out.nonlinear_excess) > LARGEST_EXCESS:
+        if _is_sure(held_out.nonlinear_excess, held_out.nonlinear_excess_deviation):
             add("not-linear")
-        elif abs(held_out.lamp_excess) > LARGEST_EXCESS and not reasons:
+        elif not reasons and _is_sure(held_out.lamp_excess, held_out.lamp_excess_deviation):
             add("lamp")
     surprises = _surprises(held_out, DOUBTFUL_ERROR_RATIO) or (
         held_out.fine and _surprises(HeldOut(held_out.fine), DOUBTFUL_FINE_ERROR_RATIO)
@@ -270,6 +272,11 @@ def _why_unchecked(transport: StoredTransport, plan: Plan) -> str:
     return OF_SATURATED if is_told or correspondence_lights(plan) else SENTENCES["unchecked"]
 
 
+def _is_sure(excess: float, deviation: float) -> bool:
+    """Return whether photos of patterns and their inverses surely do not sum to white."""
+    return abs(excess) - SURE_DEVIATIONS * deviation > LARGEST_EXCESS
+
+
 def _surprises(held_out: HeldOut, most: float) -> bool:
     """Return whether errors matter, and are larger than the error bars expect by so much."""
     return (held_out.error_ratio or 0.0) > most and held_out.snr < GOOD_DECIBELS
@@ -293,12 +300,12 @@ def _bends(held_out: HeldOut) -> bool:
 def _hints(held_out: HeldOut) -> bool | None:
     """Return whether error bars and check photos hint at spoilt photos; None if they may.
 
-    They do where error bars are far too large, as where photos contradict each other.
+    They do where error bars are surely far too large, as where photos contradict each other.
     """
     ratio = held_out.error_ratio
     if ratio is None or ratio > USUAL_ERROR_RATIO:
         return None
-    return ratio < SMALLEST_ERROR_RATIO
+    return ratio + SURE_DEVIATIONS * (held_out.error_ratio_deviation or 0.0) < SMALLEST_ERROR_RATIO
 
 
 def _is_of_brightness(each: Spoilt) -> bool:

@@ -93,6 +93,13 @@ class WeighedPhotos:
             return 0.0
         return 2 * self.mean_by_white / self.white
 
+    @property
+    def excess_deviation(self) -> float:
+        """Standard deviation of `excess_share`, from the noise of the photos."""
+        if self.mean_by_white is None or self.white <= 0:
+            return 0.0
+        return float(2 * np.sqrt(self.photo_noise / max(1, self.values) / self.white))
+
 
 def compare_weighed(
     shown: Floats,

@@ -1,5 +1,7 @@
 """STEREO.yml, as OpenCV writes and reads it, and bad ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,8 +25,17 @@ def same(one, other):
 def test_what_is_written_is_read(tmp_path):
     nearfar.save_stereo_calibration(STEREO, tmp_path / "s.yml")
     same(nearfar.read_stereo_calibration(tmp_path / "s.yml"), STEREO)
+    assert nearfar.read_stereo_calibration(tmp_path / "s.yml").error is None
     with pytest.raises(nearfar.NearfarError, match="force=True"):
         nearfar.save_stereo_calibration(STEREO, tmp_path / "s.yml")
+
+
+def test_the_reprojection_error_is_kept_if_it_is_a_number(tmp_path):
+    path = tmp_path / "s.yml"
+    nearfar.save_stereo_calibration(replace(STEREO, error=0.25), path)
+    assert nearfar.read_stereo_calibration(path).error == 0.25
+    path.write_text(path.read_text().replace("error: 0.25", f"error: {10**30}"))
+    assert nearfar.read_stereo_calibration(path).error is None
 
 
 def test_opencv_reads_what_is_written(tmp_path):
@@ -92,6 +103,7 @@ def test_a_bad_file_gets_a_sentence(old, new, words, tmp_path):
         ({"rotation": -np.eye(3)}, "no rotation"),
         ({"translation": np.zeros(3)}, "share a pinhole"),
         ({"translation": np.zeros(2)}, "T of"),
+        ({"translation": [[1.0], [2.0, 3.0]]}, "T of"),
         ({"camera_distortion": [1.0, 2.0]}, "D1 of"),
         ({"camera_matrix": np.eye(2)}, "M1 of"),
     ],

@@ -1,5 +1,7 @@
 """Depth of an exact scene under global light, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from nearfar.scenes.optics import pinhole, sub_rays
 from nearfar.scenes.rays import hit, surface
 from nearfar.scenes.stereo import stereo_of_scene
 from nearfar.workflow.depth import scale_of_rig, seen_in_capture
+from tests.worlds import model_transport
 
 # Scenes of these sizes are made for other tests, too.
 GRID, SIZE = Size(32, 32), Size(64, 64)
@@ -61,6 +64,14 @@ def test_a_real_rig_tells_its_blocks():
     other = {"kind": "real", "projector": {"size": [72, 96], "scale": 3}}
     with pytest.raises(nearfar.NearfarError, match="projector of 72x96"):
         scale_of_rig(other, stereo)
+
+
+def test_a_transport_without_direct_light_has_no_depth():
+    transport = model_transport(Size(16, 20), Size(8, 9), window=5, far=Size(3, 3))
+    free = replace(transport, parts=("free",))
+    stereo = stereo_of_scene("cornell-aside", Size(16, 20), Size(8, 9))
+    with pytest.raises(nearfar.NearfarError, match="no direct light"):
+        nearfar.depth(free, stereo)
 
 
 def test_only_captures_and_transports_have_depth():

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 # Rows and columns of inner corners, and the side of a square.
 BoardOptions = tuple[Size, float]
 FINISHED = "f"
+# What the name of a pose's capture begins with.
+POSE = "pose-"
 
 
 def from_captures(
@@ -84,7 +86,7 @@ def of_rig(
             f"nearfar acquire with --rig {quote(str(rig))}, and name the captures by --captures."
         )
     seen, folder = _board(board), output.with_suffix(".poses")
-    check_output(folder, force=force)
+    check_output(folder, force=force, replaceable=_is_of_poses)
     # Gray code needs no linear light, of which a rig without calibration warns; captures keep it.
     with open_rig_to_calibrate(rig, table) as opened:
         poses = shoot_poses(opened, opened.projector, folder, seen, input, quiet=quiet)
@@ -143,7 +145,7 @@ def shoot_poses(
         if answer.strip().lower() == FINISHED:
             return poses
         with progress_bar("photos", quiet=quiet) as report:
-            path = folder / f"pose-{number}.zarr"
+            path = folder / f"{POSE}{number}.zarr"
             capture = acquire(plan, path, rig, force=True, progress=report, on_alarm=warn)
         try:
             poses.append(pose_in(capture, board))
@@ -152,6 +154,11 @@ def shoot_poses(
             continue
         say(f"{len(poses[-1].places)} corners found", quiet=quiet)
         number += 1
+
+
+def _is_of_poses(folder: Path) -> bool:
+    """Return whether a folder holds poses alone, which may be replaced."""
+    return all(entry.name.startswith(POSE) for entry in folder.iterdir())
 
 
 def _board(options: BoardOptions) -> "Board":

@@ -42,8 +42,8 @@ def depth(
     colour: Annotated[
         Literal["direct", "white"] | None,
         typer.Option(
-            help="Colour of the points: direct light, as of a transport if left out; or the "
-            "picture under white, as of a capture."
+            help="Colour of the points: direct light, the default of a transport, or the picture "
+            "under white, that of a capture."
         ),
     ] = None,
     scale: Annotated[
@@ -51,8 +51,8 @@ def depth(
         typer.Option(
             metavar="N",
             min=1,
-            help="Projector pixels along each side of a pattern pixel; left out, what the rig "
-            "tells, or the most that fit.",
+            help="Projector pixels along each side of a pattern pixel; if left out, as many as the "
+            "rig tells, or as fit.",
         ),
     ] = None,
     as_json: AsJson = False,

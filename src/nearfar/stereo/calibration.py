@@ -141,7 +141,7 @@ def _rotation(rotation: ArrayLike, source: str) -> Floats:
 
 
 def _translation(translation: ArrayLike, source: str) -> Floats:
-    moved = _array(np.asarray(translation).ravel(), (3,), "T", source)
+    moved = _array(finite_numbers(translation, f"T of {source}").ravel(), (3,), "T", source)
     if not moved.any():
         raise InputError(
             f"T of {source} is 0: a camera and a projector that share a pinhole show no depth; "

@@ -103,7 +103,7 @@ def read_stereo_calibration(path: AnyPath) -> StereoCalibration:
         found["D2"],
         found["R"],
         found["T"],
-        float(error) if isinstance(error, int | float) and np.isfinite(error) else None,
+        error if isinstance(error, float) and np.isfinite(error) else None,
         source=str(path),
     )
 

@@ -36,7 +36,7 @@ SHARE_OF_PEAK = 0.1
 SHARE_OF_LIGHT = 0.02
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Waves:
     """Sinusoids in several phases.
 

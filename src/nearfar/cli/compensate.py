@@ -16,7 +16,7 @@ from nearfar.cli.options import (
     require_reconstructed,
     scene_names,
 )
-from nearfar.cli.refining import MOST, refined, require_rig
+from nearfar.cli.refining import MOST, check_rig, refined
 from nearfar.cli.saying import say, warn_if_wrong
 from nearfar.progress import progress_bar
 
@@ -111,7 +111,7 @@ def compensate(
     from nearfar.workflow.refine import describe_photos, summarise_photos
 
     given = _scale(scale)
-    require_rig(refine, rig)
+    check_rig(refine, rig)
     outputs = [output, *filter(None, (expected, out_of_reach))]
     for number, path in enumerate(outputs):
         check_picture_ending(path)

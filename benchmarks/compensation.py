@@ -1,8 +1,9 @@
 """Compensation on the exact scenes: what photos of the light that was computed look like.
 
-Run ``python benchmarks/compensation.py [--photos N] [--side SIDE] [--no-limit] [SCENE ...]``. The
-projector and the camera are SIDE x SIDE, else those of the scene; the camera is that of
-benchmarks/accuracy.py, the plan one of N photos (117) that were chosen for it. Wanted is a natural
+Run ``python benchmarks/compensation.py [--photos N] [--side SIDE [--camera SIDE]] [--no-limit]
+[SCENE ...]``. The projector and the camera are SIDE x SIDE, else those of the scene; the camera's
+noise is that of benchmarks/accuracy.py, the plan one of N photos (117) that were chosen for it.
+Wanted is a natural
 picture of the camera's size. For the scale that is chosen it prints, of the *true* photos of five
 lights, PSNR in dB below the brightest wanted value and RMSE, both over camera pixels with direct
 light, and SSIM (Wang et al. 2004) over the whole photo, where what is wanted stands at camera
@@ -52,10 +53,10 @@ class Judged(NamedTuple):
         return f"{self.psnr:.1f} dB / {self.rmse:.4f} / {self.ssim:.3f}"
 
 
-def run(name: str, photos: int, side: int | None, *, with_limit: bool) -> None:
+def run(name: str, photos: int, side: int | None, camera: int | None, *, with_limit: bool) -> None:
     """Measure one scene."""
-    size = None if side is None else Size(side, side)
-    scene = cached_known(name, size, size)
+    sizes = [None if one is None else Size(one, one) for one in (side, camera or side)]
+    scene = cached_known(name, *sizes)
     # Of the scene's own resolution, W in projector pixels follows from the plan's own choice.
     plan, _ = choose_plan(scene.projector, photos, window=WINDOWS[name] if side is None else None)
     transport = jointly(plan, shoot(plan, scene, SimulatedCamera()))
@@ -145,7 +146,8 @@ if __name__ == "__main__":
     parser.add_argument("scenes", nargs="*", default=list(WINDOWS))
     parser.add_argument("--photos", type=int, default=117)
     parser.add_argument("--side", type=int)
+    parser.add_argument("--camera", type=int)
     parser.add_argument("--no-limit", action="store_true")
     chosen = parser.parse_args()
     for scene_name in chosen.scenes:
-        run(scene_name, chosen.photos, chosen.side, with_limit=not chosen.no_limit)
+        run(scene_name, chosen.photos, chosen.side, chosen.camera, with_limit=not chosen.no_limit)

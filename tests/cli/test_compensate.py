@@ -116,6 +116,9 @@ def test_refine_and_rig_go_together(job, wanted, rig):
     out = job.folder / "l.npy"
     for alone in (("--refine", 1), ("--rig", rig), ("--refine", 7, "--rig", rig)):
         assert run_nearfar("compensate", job.transport, wanted, out, *alone).status == 2
+    for missing, words in (("nowhere", "is no rig"), (job.folder / "none.toml", "none.toml")):
+        ran = run_nearfar("compensate", job.transport, wanted, out, "--refine", 1, "--rig", missing)
+        check_sentence(ran, words)
     assert not out.exists()
 
 

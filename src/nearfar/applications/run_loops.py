@@ -84,10 +84,10 @@ def sum_along_rows(
         Of these rows.
     down, across : tuple of ndarray, shapes (Py, M) and (Px, M), float32
         A function is the sum of two products of one of `down` and one of `across`.
-    table : ndarray, shape (n, Px + 1, M), float32
-        Gets the sum of all pixels before each column.
+    table : ndarray, shape (n, Px + 1, M or more), float32
+        Gets the sum of all pixels before each column, in the first M of its last axis.
     """
-    count = table.shape[2]
+    count = down[0].shape[1]
     sums = np.empty(count)
     for y in range(len(light)):
         sums[:] = 0.0

@@ -81,16 +81,12 @@ def open_rig(
             f"of a transport or of a RIG.toml."
         )
     name, path = os.fspath(rig), Path(rig)
+    require_rig(name)
     table: SimulatedTable | RealTable
     if name in SCENES:
         table = SimulatedTable(scene=SceneTable(name=name))
     elif path.suffix.lower() == ".toml":
         table = read_rig_table(path)
-    elif not path.exists():
-        raise MissingFileError(
-            f"{name} is no rig: name a scene ({', '.join(SCENES)}), a Mitsuba scene, a stored "
-            f"transport or a RIG.toml."
-        )
     elif is_mitsuba(path):
         table = SimulatedTable(scene=SceneTable(mitsuba=path.name))
     else:
@@ -100,6 +96,20 @@ def open_rig(
     return open_real_rig(
         path, table, projector, exposure=exposure, on_alarm=on_alarm, on_start=on_start
     )
+
+
+def require_rig(name: str) -> None:
+    """Refuse what is neither the name of a scene nor a file.
+
+    Raises
+    ------
+    MissingFileError
+    """
+    if name not in SCENES and Path(name).suffix.lower() != ".toml" and not Path(name).exists():
+        raise MissingFileError(
+            f"{name} is no rig: name a scene ({', '.join(SCENES)}), a Mitsuba scene, a stored "
+            f"transport or a RIG.toml."
+        )
 
 
 def opened_rig(

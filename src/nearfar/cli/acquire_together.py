@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from nearfar.cli.options import keep_input
-from nearfar.cli.saying import say, say_captured, say_time, warn
+from nearfar.cli.other_projectors import OtherProjector
+from nearfar.cli.saying import say, say_captured, say_time, warn, warn_each
 from nearfar.files import UNFINISHED
 from nearfar.progress import Report, progress_bar
 
@@ -36,11 +37,12 @@ class Manner(NamedTuple):
 
 
 def acquire_projectors(
-    plan_file: Path, projectors: list[Projector], shared: Path | None, manner: Manner
+    plan_file: Path, given: list[OtherProjector], shared: Path | None, manner: Manner
 ) -> None:
     """Shoot a plan by several projectors: in turn, or at once where that is worth it."""
     from nearfar.plan import read_plan
 
+    projectors = [Projector(each.path, str(each.beside)) for each in given]
     made = read_plan(plan_file)
     made.require_real("shoot")
     outputs = [each.output for each in projectors] + ([] if shared is None else [shared])
@@ -74,7 +76,7 @@ def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Rep
         on_alarm=warn,
         on_start=partial(say_time, len(made.patterns) - before, quiet=manner.quiet),
     ) as rig:
-        _warn_of_notes(rig)
+        warn_each(rig.notes)
         taken = acquire(
             made,
             output,
@@ -117,7 +119,7 @@ def _share(
         on_alarm=warn,
         on_start=partial(say_time, len(rigs) * len(made.patterns) - before, quiet=manner.quiet),
     ) as rig:
-        _warn_of_notes(rig)
+        warn_each(rig.notes)
         if not begun and not _is_worth_it(rig, rigs, manner):
             return False
         taken = acquire_shared(
@@ -160,11 +162,6 @@ def _unfinished(output: Path) -> Path:
 
 def _is_begun(output: Path) -> bool:
     return output.exists() or _unfinished(output).exists()
-
-
-def _warn_of_notes(rig: "SimulatedRig | RealRig") -> None:
-    for note in rig.notes:
-        warn(note)
 
 
 def _say_written(taken: "list[Capture]", outputs: list[Path], manner: Manner) -> None:

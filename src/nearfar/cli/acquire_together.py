@@ -52,6 +52,7 @@ def acquire_projectors(
         if shared is None or not _share(made, projectors, shared, manner, report):
             for each in projectors:
                 _shoot_alone(made, each, manner, report)
+            _warn_of_exposures([each.output for each in projectors])
 
 
 def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Report) -> None:
@@ -87,6 +88,21 @@ def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Rep
             on_alarm=warn,
         )
     say_captured(taken, output, quiet=manner.quiet)
+
+
+def _warn_of_exposures(outputs: list[Path]) -> None:
+    """Warn of captures whose light does not add up, for their exposures differ."""
+    from nearfar.applications.several_projectors import exposures_differ
+    from nearfar.capture import open_capture
+
+    first, *others = [open_capture(output).exposure for output in outputs]
+    for output, exposure in zip(outputs[1:], others, strict=True):
+        if exposures_differ(first, exposure):
+            warn(
+                f"{outputs[0]} was exposed for {first:g} s and {output} for {exposure:g} s, and "
+                f"light adds up at one exposure: write it under [camera] of both rigs, and "
+                f"photograph again."
+            )
 
 
 def _share(

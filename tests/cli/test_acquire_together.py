@@ -71,6 +71,22 @@ def test_photos_in_turn_are_those_of_each_rig(folder):
     check_sentence(acquire(folder), "l.zarr", "--force")
 
 
+def test_exposures_that_differ_are_told(folder):
+    """As those of real rigs may, which their captures know in seconds."""
+    check_done(acquire(folder))
+    paths = [folder / "l.zarr", folder / "r.zarr"]
+    for path, seconds in zip(paths, (0.01, 0.02), strict=True):
+        taken = open_capture(path)
+        nearfar.write_capture(
+            taken.plan, path, taken.read(slice(None)), full_scale=1.0, exposure=seconds, force=True
+        )
+    ran = acquire(folder, "", "--resume")
+    assert ran.status == 0
+    assert "0.01 s" in ran.err
+    assert "0.02 s" in ran.err
+    assert ran.err.startswith("warning: ")
+
+
 def test_photos_are_shared_where_that_lowers_the_noise(folder):
     ran = check_done(acquire(folder, "-dim", "--shared", folder / "s.zarr"))
     assert "dB less noise" in ran.out

@@ -107,4 +107,4 @@ def test_an_unknown_method_is_refused():
 
 def test_no_two_of_nearfars_patterns_share_a_kind():
     kinds = [kind for pattern in OWN_PATTERNS for kind in kinds_of(pattern)]
-    assert len(kinds) == len(set(kinds)) == 12
+    assert len(kinds) == len(set(kinds)) == 13

@@ -18,6 +18,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.rigs.simulated.side_by_side import simulated_side_by_side
 from nearfar.rigs.tables import ScreenTable
 from nearfar.workflow.acquire import acquire_in_memory
+from nearfar.workflow.acquire_shared import gain_of_sharing
 from tests.rigs.table import TableCamera, TableScreen
 from tests.worlds import model_transport
 
@@ -85,6 +86,11 @@ def test_a_real_rig_shows_each_projector_its_part_by_its_own_response():
     made = choose_plan(GRID, 30, checks=1)[0]
     with rig:
         taken = acquire_in_memory(shared_plan(made, 2), rig)
+        gain = gain_of_sharing(rig, 2)
+    # Reading noise alone, and exposures by the brighter white in turn and by the sum of both.
+    white = [transport @ np.ones(GRID, np.float32) for transport in transports()]
+    room = np.max(sum(white)) / np.max(white)
+    assert gain.decibels == pytest.approx(3.01 - 20 * np.log10(room), abs=0.5)
     assert rig.alarms == []
     assert all(screen.closed for screen in screens)
     share = rig.camera.exposure / 0.1

@@ -134,7 +134,7 @@ def require_same_camera(transports: Sequence[OfACamera], names: Sequence[str]) -
                     f"light adds up in the photos of one camera, so give transports of the same."
                 )
         exposures = [_exposure_of(each) for each in (first, transport)]
-        if _differ(*exposures):
+        if exposures_differ(*exposures):
             raise InputError(
                 f"{names[0]} was photographed at {exposures[0]:g} s and {name} at "
                 f"{exposures[1]:g} s, and light adds up at one exposure: write the same exposure "
@@ -148,7 +148,7 @@ def _exposure_of(transport: OfACamera) -> Any:
     return rig.get("exposure") if isinstance(rig, Mapping) else None
 
 
-def _differ(one: Any, other: Any) -> bool:
-    """Return whether two exposures are known and not the same."""
+def exposures_differ(one: Any, other: Any) -> bool:
+    """Return whether two exposures in seconds are known and not the same."""
     known = all(isinstance(value, int | float) for value in (one, other))
     return known and bool(abs(one - other) > LARGEST_EXPOSURE_DIFFERENCE * max(one, other))

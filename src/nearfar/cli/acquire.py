@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.arrays import parse_bytes
-from nearfar.cli.acquire_together import Manner, Projector, acquire_projectors
+from nearfar.cli.acquire_together import Manner, acquire_projectors
 from nearfar.cli.choices import choice
 from nearfar.cli.flags import with_flags
 from nearfar.cli.options import Force, NewCapture, PlanFile, Quiet, keep_input, scene_names
-from nearfar.cli.other_projectors import others_of
+from nearfar.cli.other_projectors import OtherProjector, others_of
 from nearfar.cli.reshoot import photo_numbers, take_again
 from nearfar.cli.saying import (
     say,
@@ -25,6 +25,7 @@ from nearfar.cli.saying import (
     say_reconstructed,
     say_time,
     warn,
+    warn_each,
 )
 from nearfar.devices import Device
 from nearfar.errors import InputError
@@ -134,18 +135,15 @@ def acquire(
     from nearfar.workflow.acquire import acquire as shoot
     from nearfar.workflow.reconstruction.options import ReconstructionOptions
 
+    given = {"--until": until, "--transport": transport, "--memory": memory, "--device": device}
     if others := others_of(other, "RIGHT.zarr=RIGHT.toml"):
-        given = {"--until": until, "--transport": transport, "--memory": memory}
-        given |= {"--device": device, "--reshoot": reshoot}
-        _refuse(given, "does not go with --and.")
-        projectors = [Projector(output, rig), *(Projector(o.path, str(o.beside)) for o in others)]
-        acquire_projectors(plan_file, projectors, shared, Manner(resume, force, quiet))
+        _refuse(given | {"--reshoot": reshoot}, "does not go with --and.")
+        others.insert(0, OtherProjector(output, Path(rig)))
+        acquire_projectors(plan_file, others, shared, Manner(resume, force, quiet))
         return
     _refuse({"--shared": shared}, "is for photos of several projectors, given by --and.")
     if reshoot is not None:
-        given = {"--until": until, "--transport": transport, "--memory": memory}
-        given |= {"--device": device, "--resume": resume, "--force": force}
-        _refuse(given, "does not go with --reshoot.")
+        _refuse(given | {"--resume": resume, "--force": force}, "does not go with --reshoot.")
         take_again(plan_file, output, rig, photo_numbers(reshoot), quiet=quiet)
         return
     if transport is None:
@@ -170,8 +168,7 @@ def acquire(
             on_start=partial(say_time, len(made.patterns) - before, quiet=quiet),
         )
         stack.enter_context(opened)
-        for note in opened.notes:
-            warn(note)
+        warn_each(opened.notes)
         check = None if until is None else _quality_observer(made, until, opened, quiet=quiet)
         estimate = None
         if transport is not None:

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from nearfar.cli.options import keep_input
-from nearfar.cli.saying import say, say_captured, say_time, warn
+from nearfar.cli.other_projectors import OtherProjector
+from nearfar.cli.saying import say, say_captured, say_time, warn, warn_each
 from nearfar.files import UNFINISHED
 from nearfar.progress import Report, progress_bar
 
@@ -36,11 +37,12 @@ class Manner(NamedTuple):
 
 
 def acquire_projectors(
-    plan_file: Path, projectors: list[Projector], shared: Path | None, manner: Manner
+    plan_file: Path, given: list[OtherProjector], shared: Path | None, manner: Manner
 ) -> None:
     """Shoot a plan by several projectors: in turn, or at once where that is worth it."""
     from nearfar.plan import read_plan
 
+    projectors = [Projector(each.path, str(each.beside)) for each in given]
     made = read_plan(plan_file)
     made.require_real("shoot")
     outputs = [each.output for each in projectors] + ([] if shared is None else [shared])
@@ -50,6 +52,7 @@ def acquire_projectors(
         if shared is None or not _share(made, projectors, shared, manner, report):
             for each in projectors:
                 _shoot_alone(made, each, manner, report)
+            _warn_of_exposures([each.output for each in projectors])
 
 
 def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Report) -> None:
@@ -74,7 +77,7 @@ def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Rep
         on_alarm=warn,
         on_start=partial(say_time, len(made.patterns) - before, quiet=manner.quiet),
     ) as rig:
-        _warn_of_notes(rig)
+        warn_each(rig.notes)
         taken = acquire(
             made,
             output,
@@ -85,6 +88,21 @@ def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Rep
             on_alarm=warn,
         )
     say_captured(taken, output, quiet=manner.quiet)
+
+
+def _warn_of_exposures(outputs: list[Path]) -> None:
+    """Warn of captures whose light does not add up, for their exposures differ."""
+    from nearfar.applications.several_projectors import exposures_differ
+    from nearfar.capture import open_capture
+
+    first, *others = [open_capture(output).exposure for output in outputs]
+    for output, exposure in zip(outputs[1:], others, strict=True):
+        if exposures_differ(first, exposure):
+            warn(
+                f"{outputs[0]} was exposed for {first:g} s and {output} for {exposure:g} s, and "
+                f"light adds up at one exposure: write it under [camera] of both rigs, and "
+                f"photograph again."
+            )
 
 
 def _share(
@@ -117,7 +135,7 @@ def _share(
         on_alarm=warn,
         on_start=partial(say_time, len(rigs) * len(made.patterns) - before, quiet=manner.quiet),
     ) as rig:
-        _warn_of_notes(rig)
+        warn_each(rig.notes)
         if not begun and not _is_worth_it(rig, rigs, manner):
             return False
         taken = acquire_shared(
@@ -160,11 +178,6 @@ def _unfinished(output: Path) -> Path:
 
 def _is_begun(output: Path) -> bool:
     return output.exists() or _unfinished(output).exists()
-
-
-def _warn_of_notes(rig: "SimulatedRig | RealRig") -> None:
-    for note in rig.notes:
-        warn(note)
 
 
 def _say_written(taken: "list[Capture]", outputs: list[Path], manner: Manner) -> None:

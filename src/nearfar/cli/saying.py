@@ -1,6 +1,7 @@
 """Output of commands: results on stdout, warnings on stderr."""
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,12 @@ def say(text: str, *, quiet: bool = False) -> None:
 def warn(text: str) -> None:
     """Print a warning on stderr, with options for the Python in it; see `nearfar.cli.flags`."""
     print(f"warning: {printable(with_flags(text))}", file=sys.stderr)
+
+
+def warn_each(texts: Iterable[str]) -> None:
+    """Print warnings on stderr, one after the other."""
+    for text in texts:
+        warn(text)
 
 
 def warn_if_wrong(path: Path, verdict: "KeptVerdict | None") -> None:

@@ -10,8 +10,8 @@ from nearfar.plan.recognition.own import recognised_in
 from nearfar.plan.window import largest_window
 
 BY_CODES = (
-    "Codes of half of the projector's pixels are expected to relight better than sinusoids. "
-    "Planned without a window and a band: each projector pixel counts as a lamp of its own"
+    "codes of half of the projector's pixels are expected to relight better than sinusoids: "
+    "planned without a window and a band, each projector pixel counts as a lamp of its own"
 )
 
 
@@ -130,7 +130,7 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
     if not look.model_holds:
         return _describe_no_model(look, plan)
     if plan.is_of_lamps:
-        return f"the look's photos have little noise. {BY_CODES}"
+        return BY_CODES
     if look.reach is None:
         return f"the look shows hardly any near-range light: planned with W = {plan.window}"
     more = " or more" if look.reach >= look.window else ""
@@ -155,7 +155,7 @@ def _describe_no_model(look: Look, plan: Plan) -> str:
         f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
     )
     if plan.is_of_lamps:
-        return f"{found}. {BY_CODES}"
+        return f"{found}; {BY_CODES}"
     if not can_list_every_frequency(plan.projector):
         return f"{found}. The projector has too many frequencies to do without them"
     if plan.transport_photos >= plan.projector.pixels:

@@ -83,6 +83,12 @@ def test_the_address_keeps_the_light_on_the_cameras_side(open_page, address, tra
     state = {"tool": "dual", "cameraX": 7, "cameraY": 3, "cameraRadius": 0.5}
     page = open_page(address, {**state, "cameraLight": "<b>"})
     _shows(page, _column(transport, 3, 7))
+    # The light falls on a dark picture of the scene, so that one sees where.
+    under = seen(page, "camera-light")
+    assert under.shape[:2] == CAMERA
+    assert under[3, 7].min() > 150
+    assert np.ptp(under[10:].max(axis=-1)) > 20
+    assert under[10:].max() < 150
 
 
 def test_a_camera_of_another_shape_and_a_transport_on_the_disk(stored, transport, tmp_path):

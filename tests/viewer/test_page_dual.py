@@ -5,6 +5,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.transport.store import save_transport
+from nearfar.viewer import interactive
 from nearfar.viewer.interactive import InteractiveTransport
 from tests.viewer.asking import CAMERA, PROJECTOR, ask, message, refused, unpack
 from tests.viewer.browsing import pictures, seen, settled, tone
@@ -83,9 +84,19 @@ def test_the_address_keeps_the_light_on_the_cameras_side(open_page, address, tra
     state = {"tool": "dual", "cameraX": 7, "cameraY": 3, "cameraRadius": 0.5}
     page = open_page(address, {**state, "cameraLight": "<b>"})
     _shows(page, _column(transport, 3, 7))
+    # The light falls on a dark picture of the scene, so that one sees where.
+    under = seen(page, "camera-light")
+    assert under.shape[:2] == CAMERA
+    assert under[3, 7].min() > 150
+    assert np.ptp(under[10:].max(axis=-1)) > 20
+    assert under[10:].max() < 150
 
 
-def test_a_camera_of_another_shape_and_a_transport_on_the_disk(stored, transport, tmp_path):
+def test_a_camera_of_another_shape_and_a_transport_on_the_disk(
+    stored, transport, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(interactive, "BLOCK_BYTES", 50_000)
+    assert len(list(InteractiveTransport(stored, memory=10**4).blocks())) > 3
     light = np.random.default_rng(1).random((*CAMERA, 3)).astype(np.float32)
     expected = transport.adjoint(light)
     with served_view(InteractiveTransport(stored, memory=10**4)) as address:

@@ -178,8 +178,9 @@ def test_negative_light_and_q_are_seen_in_a_row(open_page, transport, tmp_path):
         assert told == pytest.approx(100 * share, abs=0.6)
         red = seen(page, "row-far").astype(int)
         strong = np.abs(values) > 0.5 * np.abs(values).max()
-        assert (red[..., 0] > red[..., 2])[strong & (values < 0)].all()
-        assert (red[..., 0] <= red[..., 1])[strong & (values > 0)].all()
+        # The page's own scale ends in yellow, which is hardly redder than green.
+        assert (red[..., 0] > 1.4 * red[..., 1])[strong & (values < 0)].all()
+        assert (red[..., 0] < 1.2 * red[..., 1])[strong & (values > 0)].all()
         q = transport.correspondence[10, 10]
         cross, canvas = _box(page, "#row-q"), _box(page, "#row-far")
         at = (cross["x"] + cross["width"] / 2 - canvas["x"]) / canvas["width"]

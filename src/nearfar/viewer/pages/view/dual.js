@@ -36,6 +36,8 @@ export class Dual {
 
   close() { this.#job.cancel(); }
 
+  frameArrived() { this.#draw(this.#page.store.state); }
+
   changed(changes) { if (KEYS.some(name => name in changes)) this.#ask(); }
 
   label() { return 'as the projector sees it, lit from the camera'; }
@@ -70,7 +72,6 @@ export class Dual {
     // As bright as the relit scene, however many camera pixels there are for each of the projector.
     const picture = pictureOf(found, header.scale / header.brightness);
     scenePictures.replace(picture, !coarse && !KEYS.some(name => store.state[name] !== state[name]), store.state, { ofProjector: true });
-    this.#draw(store.state);
   }
 
   // The relit scene, dark but where the light falls.

@@ -54,7 +54,7 @@ async function open() {
   const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); tools.lightChanged(); numbers.lightChanged(); } });
   const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
   Object.assign(page, { dual: new Dual(page), compensation: new Compensation(page) });
-  const tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation });
+  const tools = page.tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation });
   const numbers = page.numbers = new Numbers(page);
   function show(changes) {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
@@ -82,9 +82,10 @@ async function open() {
   inspect(state, { inspector, maps });
 }
 
-const receiving = ({ store, lightCanvas, scenePictures, splits, numbers }, show) => (header, parts, isNewest) => {
+const receiving = ({ store, lightCanvas, scenePictures, splits, numbers, tools }, show) => (header, parts, isNewest) => {
   const { split } = scenePictures;
   scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state);
+  tools.frameArrived();
   if (header.split === split) numbers.refresh(); else show();
   if (isNewest && header.split !== splits.current) splits.lost();
 };

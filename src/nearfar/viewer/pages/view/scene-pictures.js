@@ -16,6 +16,7 @@ export class ScenePictures {
   #stage = null;
   #status = new FrameStatus();
   #frameCount = 0;
+  #aspect = 0;
 
   constructor(camera) {
     this.#camera = camera;
@@ -58,7 +59,7 @@ export class ScenePictures {
   draw(state) {
     if (!this.#frame) return;
     const picture = this.#picture(state), [height, width] = this.#stage?.ofProjector ? [picture.height, picture.width] : this.#camera;
-    get('stage').style.setProperty('--aspect', width / height);
+    this.#shape(width / height);
     if (!this.#drawDifference(picture, state)) drawPicture(get('picture'), picture, this.#stage?.look || state);
     SPLITS[this.split].forEach((name, i) =>
       drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
@@ -111,6 +112,11 @@ export class ScenePictures {
   relit(state) { return this.#frame && sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
 
   #picture(state) { return this.#stage?.picture || this.relit(state); }
+
+  #shape(aspect) {
+    if (this.#aspect !== aspect) get('stage').style.setProperty('--aspect', aspect);
+    this.#aspect = aspect;
+  }
 
   get #isCompared() { return Boolean(this.#reference) && !this.#stage?.ofProjector; }
 

@@ -9,7 +9,7 @@ export class Tools {
   #tools;
   #open = 'relit';
 
-  // tools: { name: { open, close, lightChanged, changed, label, show } }, of all but the relit scene.
+  // tools: { name: { open, close, lightChanged, frameArrived, changed, label, show } }, of all but the relit scene.
   constructor(page, tools) {
     this.#page = page;
     this.#tools = tools;
@@ -20,6 +20,9 @@ export class Tools {
   get #tool() { return this.#tools[this.#open]; }
 
   lightChanged() { this.#tool?.lightChanged?.(); }
+
+  // The relit scene is new.
+  frameArrived() { this.#tool?.frameArrived?.(); }
 
   // The state has changed: opens the tool that it names.
   show(state, changes = {}) {

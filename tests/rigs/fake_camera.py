@@ -8,6 +8,7 @@ packets of the real protocol. The file that ``control`` names tells it what to d
 
 import ctypes
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -75,7 +76,8 @@ class Scene:
 
 
 def serve(settings: dict[str, Any]) -> None:
-    """Serve frames until the process is ended."""
+    """Serve frames until the process is ended, or its parent has ended."""
+    parent = os.getppid()
     library = ctypes.CDLL("libaravis-0.8.so.0")
     objects = ctypes.CDLL("libgobject-2.0.so.0")
     scene = Scene(settings)
@@ -118,8 +120,9 @@ def serve(settings: dict[str, Any]) -> None:
     library.arv_fake_camera_set_fill_pattern.argtypes = (ctypes.c_void_p, fill, ctypes.c_void_p)
     library.arv_fake_camera_set_fill_pattern(camera, callback, None)
     print("ready", flush=True)
-    while True:
-        time.sleep(1.0)
+    # Left behind by a test run that was killed, it would answer the cameras' next tests.
+    while os.getppid() == parent:
+        time.sleep(0.5)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """``nearfar compensate``."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -133,3 +134,15 @@ def test_a_photo_may_be_wanted(job):
     error = np.load(expected) + transport.black - np.load(photo)
     assert np.abs(error).mean() < 0.02 * np.load(photo).max()
     assert transport.black.mean() > 0.02
+
+
+def test_black_of_shared_photos_is_not_taken_for_ambient_light(job, tmp_path):
+    transport = nearfar.load_transport(job.transport)
+    rig = {**transport.provenance["rig"], "shared_photos": 2}
+    shared = replace(transport, provenance={**transport.provenance, "rig": rig})
+    nearfar.save_transport(shared, tmp_path / "shared.zarr")
+    wanted, out = tmp_path / "wanted.npy", tmp_path / "light.npy"
+    np.save(wanted, np.full(transport.camera, 0.2, dtype=np.float32))
+    ran = run_nearfar("compensate", tmp_path / "shared.zarr", wanted, out, "--as-photo")
+    check_sentence(ran, "leave out --as-photo")
+    assert not out.exists()

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,7 +20,12 @@ from nearfar.cli.options import (
 from nearfar.cli.other_projectors import OtherProjector, others_of
 from nearfar.cli.refining import MOST, check_rig, refined
 from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.errors import InputError
 from nearfar.progress import progress_bar
+
+if TYPE_CHECKING:
+    from nearfar.arrays import Floats
+    from nearfar.transport.model import Transport
 
 
 def _scale(text: str) -> float | None:
@@ -33,6 +38,23 @@ def _scale(text: str) -> float | None:
         raise typer.BadParameter(
             f"{text!r} is no scale: write auto or a number.", param_hint="--scale"
         ) from None
+
+
+def _black_of(transport: "Transport", path: Path) -> "Floats":
+    """Return the photo under black.
+
+    Raises
+    ------
+    InputError
+        If it holds light of other projectors, whose photos were shared.
+    """
+    if "shared_photos" in transport.provenance.get("rig", {}):
+        raise InputError(
+            f"{path} is of photos that several projectors share, so that its photo under black "
+            f"holds half of the others' white: leave out --as-photo, and give WANTED without "
+            f"ambient light."
+        )
+    return transport.black
 
 
 def compensate(
@@ -149,7 +171,7 @@ def compensate(
         warn_if_wrong(transport, opened.verdict)
         picture = read_camera_picture(wanted, opened.camera, opened.channels, srgb=srgb)
         rows = opened.rows()
-        black = rows.black if as_photo else None
+        black = _black_of(rows, transport) if as_photo else None
         found = found_by(rows, picture, given, black=black, progress=report)
         if expected is not None:
             write_picture(expected, found.expected, force=force)

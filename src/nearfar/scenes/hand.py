@@ -117,7 +117,7 @@ def _skin(position: Floats) -> Floats:
     """Draw creases and veins on the hand."""
     place = ((position - WRIST) / SCALE)[..., :2]
     veins = [_curve(*np.array(points)) for points in VEINS]
-    return 1.08 * _shade(place, _creases(), *CREASE) * _shade(place, veins, *VEIN)
+    return _shade(place, _creases(), *CREASE) * _shade(place, veins, *VEIN)
 
 
 def _planks(position: Floats) -> Floats:

@@ -53,7 +53,7 @@ export class ScenePictures {
   #describeFrame() {
     if (!this.#frame) return;
     const { exact, split, isNewest } = this.#frame;
-    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, split, newest: isNewest, stage: this.#stage ? this.isStageFinal : null });
+    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, newest: isNewest, split, stage: this.#stage ? this.isStageFinal : null });
   }
 
   draw(state) {

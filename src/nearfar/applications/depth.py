@@ -253,14 +253,14 @@ def _by_camera_pixel(
 
 
 def _factor(miss: Floats) -> float:
-    """Return what deviations of q are multiplied by, so that they explain the misses."""
+    """Return the factor for the deviations of q by which they explain the epipolar distances."""
     if np.isfinite(miss).sum() < FEWEST_MISSES:
         return USUAL_FACTOR
     return max(LEAST_FACTOR, _within_one(miss))
 
 
 def _within_one(values: Floats) -> float:
-    """Return what the share of `ONE_DEVIATION` is below; infinity if there is nothing."""
+    """Return the quantile of `ONE_DEVIATION`; infinity if there are no values."""
     known = values[np.isfinite(values)]
     return float(np.quantile(known, ONE_DEVIATION)) if len(known) else np.inf
 

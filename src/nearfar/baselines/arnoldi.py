@@ -148,7 +148,7 @@ def _multiply(shooting: Shooting, wanted: Floats) -> tuple[Floats, Floats]:
 
 
 def _beyond(basis: Floats, vector: Floats) -> Floats:
-    """Return what of a vector, (P,), is orthogonal to a basis, (P, K)."""
+    """Return the part of a vector, (P,), that is orthogonal to a basis, (P, K)."""
     # Once more, as rounding leaves a rest of the basis in what is small beside it.
     for _ in range(2):
         vector = vector - basis @ (basis.T @ vector)
@@ -156,7 +156,7 @@ def _beyond(basis: Floats, vector: Floats) -> Floats:
 
 
 def _next_light(basis: Floats, picture: Floats, generator: np.random.Generator) -> Floats:
-    """Return what of a picture, (P,), the lights so far do not hold, or a random light."""
+    """Return the part of a picture, (P,), outside the basis; a random one if it is negligible."""
     rest = _beyond(basis, picture)
     if np.linalg.norm(rest) > LEAST_NEWS * np.linalg.norm(picture):
         return rest

@@ -128,7 +128,7 @@ class _Received(NamedTuple):
     values: Floats
 
     def at(self, pixels: Integers) -> Floats:
-        """Return what chosen ones of the camera pixels receive, (channels, n)."""
+        """Return the light at some of the camera pixels, (channels, n)."""
         return self.values[np.searchsorted(self.asked, pixels)].T
 
 

@@ -154,7 +154,7 @@ def _share(
 
 
 def _is_worth_it(rig: "SimulatedRig | RealRig", rigs: list[str], manner: Manner) -> bool:
-    """Say what it gains that projectors share photos, and return whether it does."""
+    """Print how many dB shared photos gain, and return whether they are worth it."""
     from nearfar.rigs.simulated.rig import SimulatedRig
     from nearfar.workflow.acquire_shared import gain_of_sharing
 

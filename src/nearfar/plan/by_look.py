@@ -70,7 +70,7 @@ def plan_by_look(
 
 
 def _expected_of_codes(projector: Size, photos: int, look: Look, checked: bool) -> Expected | None:
-    """Return what codes are expected to reach; None if there are no photos for all of them."""
+    """Return the expected SNR_b of codes; None if the photos do not suffice for all of them."""
     needed = photos_of_every_code(projector, checked=checked)
     if needed is None or photos < needed:
         return None

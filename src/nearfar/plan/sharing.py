@@ -23,7 +23,7 @@ FEWEST, MOST = 2, 16
 
 
 def signs(projectors: int) -> NDArray[np.int64]:
-    """Return what projectors show in the photos of one pattern: 1 the pattern, -1 its inverse.
+    """Return the signs of the patterns that projectors show: 1 a pattern, -1 its inverse.
 
     Returns
     -------

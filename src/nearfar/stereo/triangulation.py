@@ -90,7 +90,7 @@ def _residuals(
     projector: Floats,
     deviation: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return what q differs from p(z) by, and the derivative of p by z, in deviations, (n, 2)."""
+    """Return the residual q - p(z) and the derivative of p by z, in deviations, (n, 2)."""
     pixels, motion = stereo.projector.project(depth[:, None] * directions + stereo.translation)
     along = np.einsum("nij,nj->ni", motion, directions)
     return (projector - pixels) / deviation, along / deviation

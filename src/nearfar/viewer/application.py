@@ -82,7 +82,7 @@ class _Handlers:
         return _bytes_response(await self._pixels.run(pack_row, self._transport, y, x))
 
     async def numbers(self, request: Request) -> dict[str, Any]:
-        """Return what one camera pixel sees under the light of the request."""
+        """Return the numbers of one camera pixel under the light of the request."""
         body = await read_body(request, self._maximum_light_bytes)
         header, light = unpack_levels(PixelHeader, body, self._transport.projector)
         _require_pixel("camera", self._transport.stored.camera, header.y, header.x)

@@ -12,6 +12,9 @@ from nearfar.applications.least_squares import roughness
 from nearfar.applications.several_projectors import added_deviations
 from nearfar.arrays import Size
 from nearfar.errors import InputError
+from nearfar.illumination.frequencies import DC
+from nearfar.illumination.near_basis import NearBasis
+from nearfar.illumination.real_basis import real_basis
 from nearfar.transport.model import Transport
 from tests.worlds import model_transport
 
@@ -152,6 +155,28 @@ def test_light_is_handed_over_without_a_seam(right):
     # So that half a pixel aside is no edge.
     photo = relight_together(of_rows(0.6, right, moved=0.5), found.lights)
     np.testing.assert_allclose(photo, 0.25, atol=0.15 * 0.25)
+
+
+def test_a_projector_of_another_pitch_takes_part():
+    """One of hats of four projector pixels beside one of single pixels."""
+    coarse, grid, near = two()[0], Size(20, 24), NearBasis(5, 4)
+    fine = replace(
+        coarse,
+        projector=grid,
+        correspondence=coarse.correspondence * np.float32(2.5),
+        near=np.full((*CAMERA, 1, near.count), 1e-3, np.float32) * coarse.lit[..., None, None],
+        far=coarse.far[..., :1],
+        far_basis=real_basis([DC], grid),
+        pitch=4,
+        footprint=np.full((*CAMERA, 4), 2.0, np.float32),
+    )
+    transports = [fine, two()[1]]
+    lights = [np.full(grid, 0.4, np.float32), np.full(GRIDS[1], 0.6, np.float32)]
+    wanted = relight_together(transports, lights)
+    np.testing.assert_allclose(wanted, fine @ lights[0] + transports[1] @ lights[1], atol=1e-6)
+    found = compensate_together(transports, wanted, 1.0)
+    assert [light.shape for light in found.lights] == [grid, GRIDS[1]]
+    assert found.psnr > 40
 
 
 def test_a_scale_of_its_own_does_not_depend_on_the_unit_of_the_picture():

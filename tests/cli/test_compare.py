@@ -104,7 +104,7 @@ def test_a_method_that_fails_leaves_the_others_their_results(finished: Job, tmp_
     assert {failure["method"] for failure in found["failures"]} == {"failing"}
     for text in (page.read_text(), (out / "index.html").read_text()):
         assert "not to my taste" in text
-    assert 'src="data:image/png;base64,' in page.read_text()
+    assert '<svg role="img" aria-label="SNR against photos and exposure"' in page.read_text()
     assert f"open {page}" in ran.out
 
 

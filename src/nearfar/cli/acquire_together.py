@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from nearfar.cli.options import keep_input
 from nearfar.cli.other_projectors import OtherProjector
 from nearfar.cli.saying import say, say_captured, say_time, warn, warn_each
-from nearfar.files import UNFINISHED
 from nearfar.progress import Report, progress_bar
 
 # What shared photos must gain: what is said is up to 0.9 dB more than relighting gains, and a lamp
@@ -173,6 +172,8 @@ def _is_worth_it(rig: "SimulatedRig | RealRig", rigs: list[str], manner: Manner)
 
 
 def _unfinished(output: Path) -> Path:
+    from nearfar.files import UNFINISHED
+
     return output.with_name(f"{output.name}{UNFINISHED}")
 
 

@@ -64,12 +64,14 @@ def posterior_variance(prior: ResponsePrior, state: PixelState, functionals: Fun
     """
     squared = (state.scale.astype(np.float64) ** 2)[..., None]
     weight = 1.0 / (squared * prior.eigenvalues + state.noise.astype(np.float64)[..., None] ** 2)
-    covariance = functionals.near @ prior.to_near.T + functionals.far @ prior.to_far.T
+    # In double precision: with little noise, variances are small differences of these.
+    near, far = functionals.near.astype(np.float64), functionals.far.astype(np.float64)
+    covariance = near @ prior.to_near.T + far @ prior.to_far.T
     # Of each functional with the eigenvectors' weights, at unit prior scale.
     covariance = covariance[:, None]
     before = (
-        np.einsum("nw,nw->n", functionals.near @ prior.covariance, functionals.near)
-        + functionals.far.astype(np.float64) ** 2 @ prior.far_variance
+        np.einsum("nw,nw->n", near @ prior.covariance, near)
+        + far**2 @ prior.far_variance
         + functionals.truncated
     )
     given = squared[..., 0] * (before[:, None] - np.sum(squared * weight * covariance**2, axis=-1))

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from nearfar.arrays import Floats, Size
-from nearfar.transport.known import KnownTransport
 
 if TYPE_CHECKING:
+    from nearfar.transport.known import KnownTransport
     from nearfar.workflow.rivals.bench import Bench
 
 
@@ -96,6 +96,6 @@ class Rival:
     line: Mapping[str, Any]
     attempts: "Callable[[Bench, Budget], Iterable[Attempt]]"
     assumes: str = ""
-    unsuited: Callable[[KnownTransport], str | None] | None = None
+    unsuited: "Callable[[KnownTransport], str | None] | None" = None
     is_dense: bool = False
     photos: Callable[[Size], int] | None = None

@@ -4,6 +4,8 @@ import sys
 import warnings
 from pathlib import Path
 
+from numpydoc.xref import DEFAULT_LINKS
+
 import nearfar
 from nearfar.release import version as _version
 
@@ -37,7 +39,8 @@ autosummary_generate = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
-# Types of parameters and results link to their pages.
+# Types of parameters and results link to their pages; those of Python and NumPy have none here.
+DEFAULT_LINKS.clear()
 numpydoc_xref_param_type = True
 numpydoc_xref_ignore = "all"
 numpydoc_xref_aliases = {

@@ -116,7 +116,7 @@ class _Handlers:
         return {"bodies": await self._splitting.run(self._physical.prepare)}
 
     async def tool(self, name: str, request: Request) -> Response:
-        """Return what a tool makes of a light; given up once the page does not wait for it."""
+        """Return the result of a tool for a light; it is given up once the page is gone."""
         if name not in TOOLS:
             raise InputError(f"there is no tool {name!r}: choose one of {', '.join(TOOLS)}.")
         largest = max(self._maximum_light_bytes, self._maximum_picture_bytes)

@@ -31,7 +31,7 @@ class PixelHeader(LightHeader):
 def numbers_at(
     transport: InteractiveTransport, physical: PhysicalRelighting, header: PixelHeader, light: Light
 ) -> dict[str, Any]:
-    """Return what a camera pixel sees, for JSON, channel by channel.
+    """Return the light at a camera pixel as JSON types, channel by channel.
 
     Returns
     -------

@@ -181,7 +181,7 @@ def refinements(
 
 
 def describe_photos(refined: Refinement) -> dict[str, Any]:
-    """Return what photos of the lights showed, as JSON types."""
+    """Return the errors of the photos of the lights, as JSON types."""
     found = {"psnr_before_dB": refined.psnr_before, "psnr_refined_dB": refined.psnr}
     return {
         "photo_rmse": list(refined.errors),
@@ -261,7 +261,7 @@ def _shown(
 
 
 def _slope(change: Floats, seen: Floats) -> Floats:
-    """Return what a change of light did to photos over what D says, (Py, Px, colours)."""
+    """Return the ratio of the change in photos to that expected by D, (Py, Px, colours)."""
     width = (SLOPE_WIDTH, SLOPE_WIDTH, 0)
     both = ndimage.gaussian_filter(seen * change, width)
     squares = ndimage.gaussian_filter(change**2, width)

@@ -31,7 +31,7 @@ def _shows(page, expected):
 
 
 def _column(transport, y, x):
-    """Return what light of one camera pixel makes of the projector's pixels: its row of T."""
+    """Return the row of T of one camera pixel, at the projector's pixels."""
     pixel = y * CAMERA.width + x
     row = transport.rows(slice(pixel, pixel + 1))[0]
     return row.T.reshape(*PROJECTOR, 3)

@@ -7,7 +7,7 @@ the camera pixels of a; light on a alone those of its columns, at the camera pix
 T_ba = T_ab^T. If T_ab is of rank one, it is their outer product, over its sum.
 
 All blocks are cut into four, level by level. T_ab predicts what its parts receive. Where it does so
-within a tolerance, it is not cut any more; the blocks on the diagonal, which direct light fills, are
+within a tolerance, it is not cut any more; blocks on the diagonal, which direct light fills, are
 cut down to single pixels. Once all blocks are within the tolerance and photos are left, the
 tolerance is halved, down to the noise of a dark photo. Blocks share a photo if no camera pixel is
 asked about two of them; light that is known already is subtracted from it.

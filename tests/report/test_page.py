@@ -75,6 +75,14 @@ def test_marked_pixels_are_explained_where_there_are_some(number):
     assert "<b>Map.</b> Read &lt;it&gt; so." in text
 
 
+def test_the_best_rows_and_cells_of_a_table_are_bold():
+    table = numbers(["", "one", "other"], [["a", "1", "2"], ["b", "4", "3"]], [0], {(1, 1)})
+    assert table.count('class="best"') == 2
+    assert '<tr class="best"><td>a' in table
+    assert '<td class="best">4</td>' in table
+    assert ".numbers tr.best td, .numbers td.best { font-weight: 650" in STYLE
+
+
 @pytest.mark.parametrize("low", [3.0, 7.0])
 def test_a_map_of_one_value_can_be_drawn(low):
     assert "dB" in colour_map(np.full((2, 2), low), low, low, "dB", "flat")

@@ -1,6 +1,7 @@
 """Reports of reconstruct and evaluate, from the command line to what a browser would show."""
 
 import html
+import json
 import re
 import shutil
 
@@ -213,6 +214,21 @@ def test_an_evaluation_by_truth(made, world, tmp_path):
     assert "by frequency-space decomposition [1]" in text
     found = float(re.search(r"white +(\d+\.\d+) dB", ran.out).group(1))
     assert f"<td>{found:.1f} dB</td>" in text
+
+
+def test_noise_of_the_arithmetic_is_no_figure_but_in_json(made, tmp_path):
+    """A transport beside its own rows: what is left is rounding."""
+    transport = load_transport(made / "t.zarr")
+    np.save(tmp_path / "T.npy", np.moveaxis(transport.dense(), 1, 2))
+    command = ("evaluate", made / "t.zarr", "--truth", tmp_path / "T.npy")
+    ran = check_done(run_nearfar(*command, "--report", tmp_path / "e.html"))
+    text = (tmp_path / "e.html").read_text()
+    for shown in (ran.out, text):
+        assert "exact to rounding" in shown
+        # What is taken apart anew, the components, is no better than before.
+        assert not re.search(r"(white|random)\W+(td\W+)*1[2-9]\d\.\d+ dB", shown)
+    kept = json.loads(check_done(run_nearfar(*command, "--json")).out)
+    assert kept["snr_b"]["random"] > 120
 
 
 def test_an_evaluation_by_photos(made, world, tmp_path):

@@ -17,6 +17,7 @@ from nearfar.cli.options import (
     require_reconstructed,
 )
 from nearfar.cli.saying import say, warn, warn_if_wrong
+from nearfar.decibels import EXACT, ROUNDING
 from nearfar.progress import progress_bar
 
 # What is compared, where the key alone does not tell which split it is of.
@@ -110,6 +111,10 @@ def evaluate(
         say("\n".join([_lines(shown), *describe_units(found)]), quiet=quiet)
 
 
+def _shown(decibels: float) -> str:
+    return f"{decibels:8.2f} dB" if decibels <= ROUNDING else f"  {EXACT}"
+
+
 def _lines(found: dict[str, Any], indent: str = "") -> str:
     lines = []
     for name, value in found.items():
@@ -117,6 +122,6 @@ def _lines(found: dict[str, Any], indent: str = "") -> str:
             heading = f"{name}: {EXPLAINED[name]}" if name in EXPLAINED else name
             lines += [f"{indent}{heading}", _lines(value, indent + "  ")]
         else:
-            shown = f"{value:8.2f} dB" if isinstance(value, float) else str(value)
+            shown = _shown(value) if isinstance(value, float) else str(value)
             lines.append(f"{indent}{name:<16}{shown}")
     return "\n".join(lines)

@@ -127,6 +127,13 @@ def test_a_shared_capture_is_gone_on_with(folder, monkeypatch):
     ran = check_done(acquire(folder, "-dim", "--shared", folder / "s.zarr", "--resume"))
     assert "l.zarr" in ran.out
     np.testing.assert_array_equal(open_capture(folder / "l.zarr").photos[:], wanted)
+    # The photos of one projector alone are missing.
+    before = (folder / "r.zarr").stat().st_mtime_ns
+    (folder / "l.zarr").rename(folder / "first-l.zarr")
+    ran = check_done(acquire(folder, "-dim", "--shared", folder / "s.zarr", "--resume"))
+    assert f"{folder / 'r.zarr'} is there already" in ran.out
+    assert (folder / "r.zarr").stat().st_mtime_ns == before
+    np.testing.assert_array_equal(open_capture(folder / "l.zarr").photos[:], wanted)
     # Stopped among the photos.
     for name in ("l.zarr", "r.zarr", "s.zarr"):
         (folder / name).rename(folder / f"again-{name}")

@@ -57,6 +57,8 @@ def test_what_does_not_fit_gets_a_sentence(job, wanted):
     check_sentence(run_nearfar("compensate", job.capture, wanted, out), "is a capture")
     check_sentence(run_nearfar("compensate", job.transport, wanted, wanted, "--force"), "input")
     check_sentence(run_nearfar("compensate", job.transport, wanted, out, "--scale", -1), "above 0")
+    ran = run_nearfar("compensate", job.transport, wanted, out, "--expected", out)
+    check_sentence(ran, out, "two outputs")
     ran = run_nearfar("compensate", job.transport, wanted, out, "--scale", "big")
     assert ran.status == 2
     assert "no scale" in ran.err

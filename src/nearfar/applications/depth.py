@@ -99,9 +99,21 @@ class Depth:
             "factor": self.factor,
         }
 
+    @property
+    def _cure(self) -> str:
+        """What to do where no camera pixel has a point."""
+        if self.unsure >= max(self.missed, self.behind):
+            return "accept less confidence"
+        return (
+            "check that the calibration is of this rig as it stands, R and T from the camera's "
+            "frame to the projector's, and that no picture is turned or mirrored"
+        )
+
     def warnings(self) -> list[str]:
         """Return warnings, one sentence each."""
         found, typical = [], _median(self.miss)
+        if not self.kept:
+            found.append(f"no point was found of {self.lit} camera pixels with q: {self._cure}.")
         if typical is not None and typical > LARGEST_TYPICAL_MISS:
             found.append(
                 f"q misses the epipolar lines by {typical:.1f} pattern pixels, typically, so that "

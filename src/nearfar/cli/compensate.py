@@ -13,6 +13,7 @@ from nearfar.cli.options import (
     Force,
     Quiet,
     TransportPath,
+    keep_apart,
     keep_input,
     require_reconstructed,
     scene_names,
@@ -161,9 +162,10 @@ def compensate(
         )
         return
     outputs = [output, *filter(None, (expected, out_of_reach))]
-    for number, path in enumerate(outputs):
+    keep_apart(outputs)
+    for path in outputs:
         check_picture_ending(path)
-        keep_input(path, transport, wanted, *outputs[:number], *([Path(rig)] if rig else []))
+        keep_input(path, transport, wanted, *([Path(rig)] if rig else []))
         check_output(path, force=force)
     with progress_bar("compensation", quiet=quiet) as report:
         require_reconstructed(transport)

@@ -35,7 +35,7 @@ def _mask(
     given = [value for value in (within, ring, beyond, epipolar, matrix) if value is not None]
     if len(given) != 1:
         raise typer.BadParameter(
-            f"{len(given) or 'none'} of the masks was given: give exactly one of --within, --ring, "
+            f"{len(given) or 'no'} masks were given: give exactly one of --within, --ring, "
             f"--beyond, --epipolar and --mask."
         )
     if within is not None:

@@ -5,10 +5,10 @@ The light l minimises
 
     |W (T l + b - s wanted)|^2 + mu |gradient of l|^2    over 0 <= l <= 1
 
-by accelerated projected gradients, each step divided by the diagonal of D^T W^2 D. b is the photo
-under black where what is wanted is a photo, with ambient light, and 0 where it is light alone. W is
-1 where the camera sees direct light, and 0 elsewhere and where it is saturated. Colours that the
-projector and the camera mix are part of T where a calibration knows them.
+by accelerated projected gradients, preconditioned by the diagonal of D^T W^2 D. If a photo with
+ambient light is wanted, b is the photo under black; if light alone is wanted, b is 0. W is 1 where
+the camera sees direct light, and 0 elsewhere and at saturated camera pixels. Where a calibration
+knows how projector and camera mix colours, the mixing is part of T.
 
 Truncated series for T^-1, such as stratified inverses (Ng et al. 2009; Bai et al. 2010), diverge
 where much light is reflected on; a projected gradient does not.

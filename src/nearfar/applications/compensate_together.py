@@ -7,10 +7,10 @@ The lights l_1, l_2 ... minimise
 which is the problem of `nearfar.applications.compensate` with T = [T_1 | T_2 | ...].
 
 Where several projectors reach a camera pixel, the picture determines only the sum of what they add.
-The solution is begun from lights of which each fades towards the edge of its projector's reach, and
-gradients leave what makes no difference to the picture as it was. So one projector hands over to
-the other little by little: edge blending (Raskar et al., "Multi-projector displays using
-camera-based registration", IEEE Visualization 1999, from whom the shares are).
+The iteration starts from lights that fade towards the edge of their projector's reach. Gradient
+steps leave what makes no difference to the picture as it was, so the solution fades there, too.
+This is edge blending, with the shares of Raskar et al., "Multi-projector displays using
+camera-based registration", IEEE Visualization 1999.
 """
 
 from collections.abc import Sequence

@@ -8,6 +8,7 @@ import typer
 
 from nearfar.cli.compensate_together import Wanted, compensate_projectors
 from nearfar.cli.lights import read_camera_picture
+from nearfar.cli.opening import open_reconstructed
 from nearfar.cli.options import (
     AsJson,
     Force,
@@ -15,12 +16,11 @@ from nearfar.cli.options import (
     TransportPath,
     keep_apart,
     keep_input,
-    require_reconstructed,
     scene_names,
 )
 from nearfar.cli.other_projectors import OtherProjector, others_of
 from nearfar.cli.refining import MOST, check_rig, refined
-from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
@@ -141,7 +141,6 @@ def compensate(
     from nearfar.applications.compensate import compensate as found_by
     from nearfar.applications.compensate import describe, summarise
     from nearfar.files import check_output, check_picture_ending, write_light, write_picture
-    from nearfar.transport.stored import open_transport
     from nearfar.workflow.refine import describe_photos, summarise_photos
 
     given = _scale(scale)
@@ -168,9 +167,7 @@ def compensate(
         keep_input(path, transport, wanted, *([Path(rig)] if rig else []))
         check_output(path, force=force)
     with progress_bar("compensation", quiet=quiet) as report:
-        require_reconstructed(transport)
-        opened = open_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
+        opened = open_reconstructed(transport)
         picture = read_camera_picture(wanted, opened.camera, opened.channels, srgb=srgb)
         rows = opened.rows()
         black = _black_of(rows, transport) if as_photo else None

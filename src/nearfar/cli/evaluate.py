@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from nearfar.cli.command_line import command_line
+from nearfar.cli.opening import load_reconstructed
 from nearfar.cli.options import (
     AsJson,
     Force,
@@ -14,9 +15,8 @@ from nearfar.cli.options import (
     ReportPath,
     TransportPath,
     check_report_page,
-    require_reconstructed,
 )
-from nearfar.cli.saying import say, warn, warn_if_wrong
+from nearfar.cli.saying import say, warn
 from nearfar.decibels import EXACT, ROUNDING
 from nearfar.progress import progress_bar
 
@@ -61,7 +61,6 @@ def evaluate(
     Example: nearfar evaluate transport.zarr --truth truth.zarr --json
     """
     from nearfar.transport.exact_store import load_exact
-    from nearfar.transport.store import load_transport
     from nearfar.workflow.evaluate import row_snr
     from nearfar.workflow.judge import (
         REMARKS,
@@ -80,9 +79,7 @@ def evaluate(
             report, transport, *(path for path in (truth, photos) if path), force=force
         )
     with progress_bar("evaluating", quiet=quiet) as told:
-        require_reconstructed(transport)
-        opened = load_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
+        opened = load_reconstructed(transport)
         if truth is not None:
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
             rows = row_snr(opened, known, progress=told)

@@ -1,10 +1,10 @@
 """Lights that compensate a scene, corrected by photos of them on a rig.
 
-What a transport does not know of a rig, such as a response that is not linear, shows in a photo of
-the light: where it is darker than wanted, the light is raised there by D^-1 of what is missing.
-What a correction changes in the next photo tells the slope of the projector's response at each
-projector pixel, by which later corrections are divided (Broyden's method with a diagonal matrix).
-A correction that the photos do not confirm is taken back.
+A photo of the light shows what the transport does not know of a rig, such as a response that is not
+linear. Where the photo is darker than wanted, the light is raised by D^-1 of what is missing. The
+change of the next photo tells the slope of the projector's response at each projector pixel, by
+which later corrections are divided (Broyden's method with a diagonal matrix). A correction that
+makes the photo worse is taken back.
 """
 
 from collections.abc import Iterator
@@ -33,14 +33,15 @@ from nearfar.transport.colour import mixing_of
 from nearfar.transport.model import Transport
 
 MOST_CORRECTIONS = 3
-# Slope of the response that the first correction takes for granted: it falls short of what a
-# linear projector needs, as one of gamma 2.2 has twice its slope at white.
+# Slope of the response before any is known: between 1, of a linear projector, and 2.2, which a
+# projector of gamma 2.2 has at white.
 FIRST_SLOPE = 1.4
 SLOPES = (0.3, 4.0)
-# Slopes are those of projector pixels within so many, and of the first where little has changed.
+# Slopes are averaged over about so many projector pixels. Where the light changed by less than
+# `LEAST_CHANGE` they stay near the first one.
 SLOPE_WIDTH = 1.5
 LEAST_CHANGE = 0.01
-# Where a correction made a photo worse, the next one is at most so much of it.
+# After a correction that made the photo worse, the next one is this share of a full step.
 BACK = 0.4
 
 
@@ -149,7 +150,7 @@ def refine_compensation(
 def refinements(
     transport: Transport, found: Compensation, rig: Rig, corrections: int
 ) -> Iterator[Refinement]:
-    """Yield what is best after each photo; see `refine_compensation`."""
+    """Yield the best light so far after each photo; see `refine_compensation`."""
     require_instance(transport, Transport, "transport", "nearfar.load_transport")
     require_instance(found, Compensation, "compensation", "nearfar.compensate")
     if not 1 <= as_count(corrections, "the number of corrections") <= MOST_CORRECTIONS:

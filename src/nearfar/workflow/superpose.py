@@ -5,13 +5,13 @@ their photos. The weights find
 
     min |l - sum_k w_k l_k|^2 + ridge |w|^2  with  sum_k w_k = 0,
 
-so that black, ambient light and black level go out by themselves, whatever they are; in place of
-a pattern, its difference from another counts. The ridge is the photos' noise over the mean square
-of an entry of T: weights that would gain less light than noise stay small. What is left of l was
-never shown; a sum of photos cannot tell its picture.
+so that ambient light and black level cancel, whatever they are: only differences of patterns count.
+The ridge is the photos' noise over the mean square of an entry of T; it keeps weights small that
+would add more noise than light. The residual of l was never shown, and a sum of photos does not
+tell its picture.
 
-Some sums of patterns are nothing: an inverse pair less another, a pattern less its repeat. The same
-sums of photos are noise alone, which tells how large it is.
+Some sums of patterns vanish: an inverse pair less another, a pattern less its repeat. The same sums
+of photos are noise alone, from which its size is estimated.
 
 Index convention: k and j run over photos, i over channels of the camera.
 """
@@ -35,7 +35,7 @@ from nearfar.progress import Report, ignore_progress
 VALUES_AT_ONCE = 1 << 24
 # Camera rows by which noise is estimated, spread over the photo.
 ROWS_OF_NOISE = 32
-# Sums of patterns below this share of the largest, squared, are nothing.
+# A sum of patterns vanishes if its eigenvalue is below this share of the largest one.
 LEAST_SHARE = 1e-9
 # A photo that is saturated spoils the picture if its weight is above this share of the largest.
 LEAST_WEIGHT = 1e-3
@@ -51,7 +51,7 @@ class Superposition:
         In photo units: photo(shown) - photo(black).
     sigma : ndarray, shape (Cy, Cx, channels), float32, or None
         Its standard deviation by the photos' noise; infinite where a photo that counts is
-        saturated. None where no patterns add up to nothing, so that the noise is not known.
+        saturated. None if no sum of patterns vanishes, so that the noise is not known.
     shown : ndarray, shape (Py, Px) or (Py, Px, channels), float32
         The sum of patterns whose picture this is.
     missing : float

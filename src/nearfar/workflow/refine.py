@@ -170,7 +170,8 @@ def refinements(
     target = found.target.astype(np.float64).reshape(shape)
     correction = _correction(transport)
     counted = camera_weights(transport)[..., 0] > 0
-    best = shown = _shown(transport, rig, found.light, target, counted, 0)
+    light = found.light.reshape(*transport.projector, -1)
+    best = shown = _shown(transport, rig, light, target, counted, 0)
     errors = [shown.error]
     yield _refinement(best, errors, target, counted)
     slope, share = np.full_like(best.light, FIRST_SLOPE), 1.0

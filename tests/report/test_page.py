@@ -10,7 +10,7 @@ from nearfar.files import encode_png
 from nearfar.markup import MARK, card, false_colour, numbers, picture
 from nearfar.report.comparison import comparison_page
 from nearfar.report.page import STYLE, colour_map, facts, gallery, listed, page
-from nearfar.workflow.compare import Comparison
+from nearfar.workflow.comparison import Comparison
 
 EVIL = "<img src=x onerror=alert(1)>\"'&"
 

@@ -14,7 +14,7 @@ from nearfar.markup import numbers
 from nearfar.report.figures.style import new_figure, save, styled
 from nearfar.report.methods import comparison_methods
 from nearfar.report.page import figure_caption, listed, page, plot
-from nearfar.workflow.compare import Comparison, Trial
+from nearfar.workflow.comparison import Comparison, Trial
 from nearfar.workflow.rivals import RIVALS
 
 INDEX = "index.html"

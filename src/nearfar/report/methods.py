@@ -13,7 +13,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.check import ModelCheck
-from nearfar.workflow.compare import Comparison
+from nearfar.workflow.comparison import Comparison
 from nearfar.workflow.rivals import RIVALS
 from nearfar.workflow.verdict.held_out import PICTURES, HeldOut
 

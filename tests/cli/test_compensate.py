@@ -125,6 +125,18 @@ def test_refine_and_rig_go_together(job, wanted, rig):
     assert not out.exists()
 
 
+def test_nothing_is_left_of_a_command_whose_rig_does_not_fit(job, wanted):
+    out, expected = job.folder / "l.npy", job.folder / "e.npy"
+    np.save(job.folder / "other.npy", np.eye(6, dtype=np.float32))
+    ran = run_nearfar(
+        "compensate", job.transport, wanted, out, "--expected", expected,
+        "--refine", 1, "--rig", job.folder / "other.npy", "--quiet",
+    )  # fmt: skip
+    check_sentence(ran, "other.npy")
+    assert not out.exists()
+    assert not expected.exists()
+
+
 def test_a_photo_may_be_wanted(job):
     transport = nearfar.load_transport(job.transport)
     photo = job.folder / "photo.npy"

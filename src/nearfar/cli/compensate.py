@@ -172,10 +172,6 @@ def compensate(
         rows = opened.rows()
         black = _black_of(rows, transport) if as_photo else None
         found = found_by(rows, picture, given, black=black, progress=report)
-        if expected is not None:
-            write_picture(expected, found.expected, force=force)
-        if out_of_reach is not None:
-            write_picture(out_of_reach, found.out_of_reach.astype(np.float32), force=force)
         if refine is None:
             write_light(output, found.light, force=force)
     numbers, words = describe(found), summarise(found)
@@ -184,6 +180,11 @@ def compensate(
             say(words, quiet=quiet)
         better = refined(rows, found, rig, refine, output=output, force=force, quiet=quiet)
         numbers, words = numbers | describe_photos(better), summarise_photos(better)
+    # After the light, so that nothing is left of a command whose rig does not fit.
+    if expected is not None:
+        write_picture(expected, found.expected, force=force)
+    if out_of_reach is not None:
+        write_picture(out_of_reach, found.out_of_reach.astype(np.float32), force=force)
     if as_json:
         print(json.dumps(numbers, allow_nan=False))
     else:

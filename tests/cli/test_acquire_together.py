@@ -174,3 +174,14 @@ def test_wrong_usage_and_wrong_files_get_a_sentence(folder):
     rig.write_text(rig.read_text().replace("bits = 16", "bits = 12"))
     check_sentence(acquire(folder, "", "--shared", folder / "s.zarr"), "right.toml", "[camera]")
     assert not (folder / "l.zarr").exists()
+
+
+def test_no_photo_is_taken_before_all_rigs_and_captures_are_checked(folder):
+    right = folder / "right.toml"
+    right.rename(folder / "elsewhere.toml")
+    check_sentence(acquire(folder), "right.toml")
+    assert not (folder / "l.zarr").exists()
+    (folder / "elsewhere.toml").rename(right)
+    (folder / "r.zarr").mkdir()
+    check_sentence(acquire(folder), "r.zarr")
+    assert not (folder / "l.zarr").exists()

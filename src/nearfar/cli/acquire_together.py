@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from nearfar.cli.opening import check_rig
 from nearfar.cli.options import keep_apart, keep_input
 from nearfar.cli.other_projectors import OtherProjector
 from nearfar.cli.saying import say, say_captured, say_time, warn, warn_each
@@ -48,6 +49,8 @@ def acquire_projectors(
     keep_apart(outputs)
     for output in outputs:
         keep_input(output, plan_file, *(Path(each.rig) for each in projectors))
+    for each in projectors:
+        _check(each, manner)
     with progress_bar("opening the rig", quiet=manner.quiet) as report:
         if shared is None or not _share(made, projectors, shared, manner, report):
             for each in projectors:
@@ -55,10 +58,20 @@ def acquire_projectors(
             _warn_of_exposures([each.output for each in projectors])
 
 
+def _check(projector: Projector, manner: Manner) -> None:
+    """Check, before the photos of any projector, that its rig is there and its capture is not."""
+    from nearfar.capture.unfinished import RESUMABLE_CAPTURE
+    from nearfar.files import check_resumable
+
+    check_rig(projector.rig)
+    begun = manner.resume and _unfinished(projector.output).exists()
+    if begun or not (manner.resume and projector.output.exists()):
+        check_resumable(projector.output, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
+
+
 def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Report) -> None:
     """Shoot a plan by one projector; a capture that is whole is kept when resuming."""
-    from nearfar.capture.unfinished import RESUMABLE_CAPTURE, unfinished_capture
-    from nearfar.files import check_resumable
+    from nearfar.capture.unfinished import unfinished_capture
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire
 
@@ -66,7 +79,6 @@ def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Rep
     begun = manner.resume and _unfinished(output).exists()
     if manner.resume and not begun and _is_there(output, manner):
         return
-    check_resumable(output, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
     before, exposure = unfinished_capture(output) if begun else (0, None)
     with open_rig(
         projector.rig,

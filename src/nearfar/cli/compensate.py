@@ -19,7 +19,7 @@ from nearfar.cli.options import (
     scene_names,
 )
 from nearfar.cli.other_projectors import OtherProjector, others_of
-from nearfar.cli.refining import MOST, check_rig, refined
+from nearfar.cli.refining import MOST, check_refinement, refined
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
@@ -144,7 +144,7 @@ def compensate(
     from nearfar.workflow.refine import describe_photos, summarise_photos
 
     given = _scale(scale)
-    check_rig(refine, rig)
+    check_refinement(refine, rig)
     if others := others_of(other, "RIGHT.zarr=RIGHT_LIGHT_OUT"):
         if as_photo or refine is not None:
             raise typer.BadParameter(

@@ -1,4 +1,4 @@
-"""Transports that commands open: a reconstructed one, with a warning if it was judged wrong."""
+"""What commands open: a reconstructed transport, with a warning if it was judged wrong; a rig."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,3 +41,18 @@ def load_reconstructed(path: Path) -> "Transport":
     loaded = load_transport(path)
     warn_if_wrong(path, loaded.verdict)
     return loaded
+
+
+def check_rig(rig: str) -> None:
+    """Check, before any work, that a rig is there and its RIG.toml can be read.
+
+    Raises
+    ------
+    InputError, MissingFileError, UnreadableFileError
+    """
+    from nearfar.rigs.opening import require_rig
+    from nearfar.rigs.tables import read_rig_table
+
+    require_rig(rig)
+    if Path(rig).suffix.lower() == ".toml":
+        read_rig_table(Path(rig))

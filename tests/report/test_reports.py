@@ -210,6 +210,10 @@ def test_an_evaluation_by_truth(made, world, tmp_path):
     stands_alone(text)
     assert "SNR_t of every camera pixel" in text
     assert ran.out.index("snr_b_pictures") < ran.out.index("white")
+    # Means and percentiles are a table.
+    (head,) = re.findall(r"^dB +mean .*", ran.out, re.MULTILINE)
+    (row,) = re.findall(r"^snr_t +\d.*", ran.out, re.MULTILINE)
+    assert len(row.split()) == len(head.split())
     assert re.search(r"<td>random</td>.*<td>white</td>", text)
     assert "by frequency-space decomposition [1]" in text
     found = float(re.search(r"white +(\d+\.\d+) dB", ran.out).group(1))
@@ -227,6 +231,8 @@ def test_noise_of_the_arithmetic_is_no_figure_but_in_json(made, tmp_path):
         assert "exact to rounding" in shown
         # What is taken apart anew, the components, is no better than before.
         assert not re.search(r"(white|random)\W+(td\W+)*1[2-9]\d\.\d+ dB", shown)
+    assert "All rows and all frequencies are exact to rounding" in text
+    assert "difference × 1<" in text
     kept = json.loads(check_done(run_nearfar(*command, "--json")).out)
     assert kept["snr_b"]["random"] > 120
 

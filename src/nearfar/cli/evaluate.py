@@ -108,14 +108,39 @@ def evaluate(
         say("\n".join([_lines(shown), *describe_units(found)]), quiet=quiet)
 
 
+def _is_spread(value: object) -> bool:
+    """Return whether it is a mean and percentiles."""
+    return isinstance(value, dict) and "p50" in value
+
+
+def _table(spreads: dict[str, dict[str, float]], indent: str) -> list[str]:
+    """Return means and percentiles as the lines of a table, in dB."""
+    columns = next(iter(spreads.values()))
+    rows = [["dB", *columns]]
+    rows += [
+        [name, *(_cell(value[column]) for column in columns)] for name, value in spreads.items()
+    ]
+    width = max(len(cell) for row in rows for cell in row[1:]) + 2
+    return [
+        f"{indent}{row[0]:<16}{''.join(f'{cell:>{width}}' for cell in row[1:])}" for row in rows
+    ]
+
+
+def _cell(decibels: float) -> str:
+    return f"{decibels:.2f}" if decibels <= ROUNDING else "exact"
+
+
 def _shown(decibels: float) -> str:
     return f"{decibels:8.2f} dB" if decibels <= ROUNDING else f"  {EXACT}"
 
 
 def _lines(found: dict[str, Any], indent: str = "") -> str:
     lines = []
+    spreads = {name: value for name, value in found.items() if _is_spread(value)}
     for name, value in found.items():
-        if isinstance(value, dict):
+        if name in spreads:
+            lines += _table(spreads, indent) if name == next(iter(spreads)) else []
+        elif isinstance(value, dict):
             heading = f"{name}: {EXPLAINED[name]}" if name in EXPLAINED else name
             lines += [f"{indent}{heading}", _lines(value, indent + "  ")]
         else:

@@ -105,6 +105,11 @@ def _row_section(rows: Rows | None, transport: Transport) -> str:
         return ""
     saturated = None if transport.quality is None else transport.quality.saturated
     snr_t = rows.snr_t if saturated is None else np.where(saturated, np.nan, rows.snr_t)
+    title = "<h2>Every camera pixel, every frequency</h2>"
+    known = np.concatenate([snr_t.ravel(), rows.snr_b_of_frequency.ravel()])
+    known = known[np.isfinite(known)]
+    if known.size and known.min() > ROUNDING:
+        return f"{title}<p>All rows and all frequencies are {EXACT}.</p>"
     with styled():
         figure = new_figure(2.2)
         axes = figure.subplots()
@@ -130,11 +135,7 @@ def _row_section(rows: Rows | None, transport: Transport) -> str:
     # A sample of rows makes no map.
     for values, marked, caption, how in maps[rows.compared < rows.snr_t.size :]:
         shown = np.minimum(values, ROUNDING)
-        known = shown[np.isfinite(shown)]
-        low, high = map(float, np.percentile(known, [1, 99]) if known.size else (0.0, 1.0))
+        finite = shown[np.isfinite(shown)]
+        low, high = map(float, np.percentile(finite, [1, 99]) if finite.size else (0.0, 1.0))
         drawn += colour_map(shown, low, high, "dB", caption, reading=how, saturated=marked)
-    return (
-        f"<h2>Every camera pixel, every frequency</h2>"
-        f"{plot(figure, 'histogram of SNR_t', reading)}"
-        f'<div class="maps">{drawn}</div>'
-    )
+    return f'{title}{plot(figure, "histogram of SNR_t", reading)}<div class="maps">{drawn}</div>'

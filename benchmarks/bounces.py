@@ -31,6 +31,7 @@ from nearfar import (
     split_physically,
 )
 from nearfar.arrays import Floats
+from nearfar.decibels import in_figures
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes import sizes
 from nearfar.scenes.bounces import bounces_between, exact_bounces
@@ -79,7 +80,7 @@ def report(name: str, find: Callable[[], Bounces], truth: Floats) -> None:
     found = find()
     seconds = time.perf_counter() - started
     pairs = zip(truth, found.pictures, strict=True)
-    decibels = " ".join(f"{snr(true, picture):6.2f}" for true, picture in pairs)
+    decibels = ", ".join(in_figures(snr(true, picture)) for true, picture in pairs)
     print(f"  {name:18s} dB   {decibels}  {seconds:5.1f} s", flush=True)
     for fault in found.faults:
         print(f"    {fault}")

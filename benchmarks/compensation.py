@@ -28,7 +28,11 @@ from accuracy import shoot
 from components import WINDOWS
 from fewer_photos import jointly
 from nearfar import Size, Transport, choose_plan, compensate, natural_picture
-from nearfar.applications.compensate import camera_weights, compensation_problem, direct_alone
+from nearfar.applications.compensation_problem import (
+    camera_weights,
+    compensation_problem,
+    direct_alone,
+)
 from nearfar.applications.onto_projector import onto_projector
 from nearfar.arrays import Floats
 from nearfar.rigs.simulated.camera import SimulatedCamera

@@ -57,12 +57,33 @@ def false_colour(
     return np.asarray(np.rint(colours).astype(np.uint8))
 
 
-def numbers(head: list[str], rows: list[list[str]], marked: Collection[int] = ()) -> str:
-    """Return a table of figures; the rows whose numbers are `marked` stand out."""
+BEST = ' class="best"'
+
+
+def numbers(
+    head: list[str],
+    rows: list[list[str]],
+    marked: Collection[int] = (),
+    best: Collection[tuple[int, int]] = (),
+) -> str:
+    """Return a table of figures, in which the best ones are bold.
+
+    Parameters
+    ----------
+    head : list of str
+    rows : list of list of str
+    marked : collection of int
+        Numbers of rows that are bold.
+    best : collection of (int, int)
+        Row and column of single cells that are.
+    """
     top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
     body = "".join(
         ('<tr class="best">' if place in marked else "<tr>")
-        + "".join(f"<td>{escape(cell)}</td>" for cell in row)
+        + "".join(
+            f"<td{BEST if (place, column) in best else ''}>{escape(cell)}</td>"
+            for column, cell in enumerate(row)
+        )
         + "</tr>"
         for place, row in enumerate(rows)
     )

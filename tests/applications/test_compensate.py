@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage, optimize
 
 from nearfar import compensate
-from nearfar.applications.compensate import camera_weights, compensation_problem
+from nearfar.applications.compensation_problem import camera_weights, compensation_problem
 from nearfar.applications.least_squares import roughness
 from nearfar.arrays import Size
 from nearfar.errors import InputError
@@ -115,6 +115,12 @@ def test_camera_pixels_without_direct_light_are_out_of_reach_and_do_not_count():
 def test_what_does_not_fit_gets_a_sentence(wanted, scale, words):
     with pytest.raises(InputError, match=words):
         compensate(world(), wanted, scale)
+
+
+def test_a_photo_that_ambient_light_alone_outshines_gets_a_sentence():
+    wanted, black = np.full(CAMERA, 0.1), np.full(CAMERA, 0.2)
+    with pytest.raises(InputError, match="brighter than the wanted picture everywhere"):
+        compensate(world(), wanted, 1.0, black=black)
 
 
 def test_other_objects_are_refused():

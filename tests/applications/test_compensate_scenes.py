@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from nearfar import Size, choose_plan, compensate, natural_picture
-from nearfar.applications.compensate import camera_weights, compensation_problem, direct_alone
+from nearfar.applications.compensation_problem import (
+    camera_weights,
+    compensation_problem,
+    direct_alone,
+)
 from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.photometry.measure import measure

@@ -1,5 +1,7 @@
 """Depth from correspondence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,17 @@ def test_a_calibration_of_another_rig_is_told():
     turned = Q[::-1]
     (warning,) = nearfar.triangulate(seen(turned), STEREO, PROJECTOR).warnings()
     assert "misses the epipolar lines" in warning
+
+
+def test_no_point_at_all_is_told_with_its_cause():
+    other_way = replace(STEREO, translation=-STEREO.translation)
+    (warning,) = nearfar.triangulate(seen(Q), other_way, PROJECTOR).warnings()
+    assert "no point was found" in warning
+    assert "R and T from the camera's frame" in warning
+    (warning,) = nearfar.triangulate(
+        nearfar.Correspondence(Q, np.zeros(CAMERA)), STEREO, PROJECTOR, least_confidence=0.5
+    ).warnings()
+    assert "accept less confidence" in warning
 
 
 @pytest.mark.parametrize(

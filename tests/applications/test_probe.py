@@ -115,6 +115,9 @@ def test_without_q_all_light_comes_from_beyond():
     assert not nearfar.probe(transport, light, MASK.within(30))[unlit].any()
     found = nearfar.probe(transport, light, MASK.beyond(30))
     np.testing.assert_allclose(found[unlit], (transport @ light)[unlit], atol=1e-6)
+    # A ring without an outer edge is all that is beyond its inner one.
+    open_ring = nearfar.probe(transport, light, MASK.ring(30, np.inf))
+    np.testing.assert_allclose(open_ring, found, atol=1e-6)
 
 
 def test_a_projector_pixel_on_the_edge_belongs_to_the_outer_ring():

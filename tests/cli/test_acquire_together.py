@@ -127,6 +127,13 @@ def test_a_shared_capture_is_gone_on_with(folder, monkeypatch):
     ran = check_done(acquire(folder, "-dim", "--shared", folder / "s.zarr", "--resume"))
     assert "l.zarr" in ran.out
     np.testing.assert_array_equal(open_capture(folder / "l.zarr").photos[:], wanted)
+    # The photos of one projector alone are missing.
+    before = (folder / "r.zarr").stat().st_mtime_ns
+    (folder / "l.zarr").rename(folder / "first-l.zarr")
+    ran = check_done(acquire(folder, "-dim", "--shared", folder / "s.zarr", "--resume"))
+    assert f"{folder / 'r.zarr'} is there already" in ran.out
+    assert (folder / "r.zarr").stat().st_mtime_ns == before
+    np.testing.assert_array_equal(open_capture(folder / "l.zarr").photos[:], wanted)
     # Stopped among the photos.
     for name in ("l.zarr", "r.zarr", "s.zarr"):
         (folder / name).rename(folder / f"again-{name}")
@@ -166,4 +173,15 @@ def test_wrong_usage_and_wrong_files_get_a_sentence(folder):
     rig = folder / "right.toml"
     rig.write_text(rig.read_text().replace("bits = 16", "bits = 12"))
     check_sentence(acquire(folder, "", "--shared", folder / "s.zarr"), "right.toml", "[camera]")
+    assert not (folder / "l.zarr").exists()
+
+
+def test_no_photo_is_taken_before_all_rigs_and_captures_are_checked(folder):
+    right = folder / "right.toml"
+    right.rename(folder / "elsewhere.toml")
+    check_sentence(acquire(folder), "right.toml")
+    assert not (folder / "l.zarr").exists()
+    (folder / "elsewhere.toml").rename(right)
+    (folder / "r.zarr").mkdir()
+    check_sentence(acquire(folder), "r.zarr")
     assert not (folder / "l.zarr").exists()

@@ -57,6 +57,8 @@ def test_what_does_not_fit_gets_a_sentence(job, wanted):
     check_sentence(run_nearfar("compensate", job.capture, wanted, out), "is a capture")
     check_sentence(run_nearfar("compensate", job.transport, wanted, wanted, "--force"), "input")
     check_sentence(run_nearfar("compensate", job.transport, wanted, out, "--scale", -1), "above 0")
+    ran = run_nearfar("compensate", job.transport, wanted, out, "--expected", out)
+    check_sentence(ran, out, "two outputs")
     ran = run_nearfar("compensate", job.transport, wanted, out, "--scale", "big")
     assert ran.status == 2
     assert "no scale" in ran.err
@@ -121,6 +123,18 @@ def test_refine_and_rig_go_together(job, wanted, rig):
         ran = run_nearfar("compensate", job.transport, wanted, out, "--refine", 1, "--rig", missing)
         check_sentence(ran, words)
     assert not out.exists()
+
+
+def test_nothing_is_left_of_a_command_whose_rig_does_not_fit(job, wanted):
+    out, expected = job.folder / "l.npy", job.folder / "e.npy"
+    np.save(job.folder / "other.npy", np.eye(6, dtype=np.float32))
+    ran = run_nearfar(
+        "compensate", job.transport, wanted, out, "--expected", expected,
+        "--refine", 1, "--rig", job.folder / "other.npy", "--quiet",
+    )  # fmt: skip
+    check_sentence(ran, "other.npy")
+    assert not out.exists()
+    assert not expected.exists()
 
 
 def test_a_photo_may_be_wanted(job):

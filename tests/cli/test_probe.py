@@ -91,3 +91,13 @@ def test_what_does_not_fit_gets_a_sentence(job):
     check_sentence(run_nearfar("dual", job.transport, out, "--light", small), small, "8x9")
     check_sentence(run_nearfar("dual", job.capture, out), "is a capture")
     assert not out.exists()
+
+
+@pytest.mark.parametrize("command", [("dual",), ("probe", "--within", 2), ("bounces",)])
+def test_srgb_is_of_a_light_that_is_named(job, command):
+    name, *mask = command
+    out = job.folder / "out.npy"
+    ran = run_nearfar(name, job.transport, out, *mask, "--srgb")
+    assert ran.status == 2
+    assert "goes with --light only" in ran.err
+    assert not out.exists()

@@ -159,3 +159,13 @@ def test_the_plan_is_shared_where_that_is_expected_to_relight_better():
 def test_without_light_there_is_nothing_to_compare():
     with pytest.raises(InputError, match="no projector lights"):
         sharing_gain(0 * SAME, 0 * SAME[0], [READ])
+
+
+def test_a_hot_pixel_does_not_bound_exposures():
+    whites, black = np.full((2, 4, 5, 1), 0.3), np.full((4, 5, 1), 0.1)
+    known = largest_exposures(whites, black)
+    assert known == (pytest.approx(4), pytest.approx(2))
+    black[1, 2], whites[:, 1, 2] = 0.99, 1.0
+    assert largest_exposures(whites, black) == known
+    with pytest.raises(InputError, match="above 90% of full scale"):
+        largest_exposures(whites, np.full_like(black, 0.95))

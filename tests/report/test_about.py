@@ -17,7 +17,7 @@ from nearfar.report.about import PAPER, software_reference, time_of_page
 from nearfar.report.methods import checked_by_photos, comparison_methods, reconstruction_methods
 from nearfar.report.page import page
 from nearfar.transport.model import Transport
-from nearfar.workflow.compare import Comparison, Trial
+from nearfar.workflow.comparison import Comparison, Trial
 from tests.cli.conftest import run_nearfar
 from tests.worlds import model_transport
 

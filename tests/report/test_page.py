@@ -10,7 +10,7 @@ from nearfar.files import encode_png
 from nearfar.markup import MARK, card, false_colour, numbers, picture
 from nearfar.report.comparison import comparison_page
 from nearfar.report.page import STYLE, colour_map, facts, gallery, listed, page
-from nearfar.workflow.compare import Comparison
+from nearfar.workflow.comparison import Comparison
 
 EVIL = "<img src=x onerror=alert(1)>\"'&"
 
@@ -73,6 +73,14 @@ def test_marked_pixels_are_explained_where_there_are_some(number):
     assert ("saturated: not measured" in text) == (number > 0)
     assert "--saturated: #{:02x}{:02x}{:02x};".format(*MARK) in STYLE
     assert "<b>Map.</b> Read &lt;it&gt; so." in text
+
+
+def test_the_best_rows_and_cells_of_a_table_are_bold():
+    table = numbers(["", "one", "other"], [["a", "1", "2"], ["b", "4", "3"]], [0], {(1, 1)})
+    assert table.count('class="best"') == 2
+    assert '<tr class="best"><td>a' in table
+    assert '<td class="best">4</td>' in table
+    assert ".numbers tr.best td, .numbers td.best { font-weight: 650" in STYLE
 
 
 @pytest.mark.parametrize("low", [3.0, 7.0])

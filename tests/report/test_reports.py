@@ -1,6 +1,7 @@
 """Reports of reconstruct and evaluate, from the command line to what a browser would show."""
 
 import html
+import json
 import re
 import shutil
 
@@ -209,10 +210,31 @@ def test_an_evaluation_by_truth(made, world, tmp_path):
     stands_alone(text)
     assert "SNR_t of every camera pixel" in text
     assert ran.out.index("snr_b_pictures") < ran.out.index("white")
+    # Means and percentiles are a table.
+    (head,) = re.findall(r"^dB +mean .*", ran.out, re.MULTILINE)
+    (row,) = re.findall(r"^snr_t +\d.*", ran.out, re.MULTILINE)
+    assert len(row.split()) == len(head.split())
     assert re.search(r"<td>random</td>.*<td>white</td>", text)
     assert "by frequency-space decomposition [1]" in text
     found = float(re.search(r"white +(\d+\.\d+) dB", ran.out).group(1))
     assert f"<td>{found:.1f} dB</td>" in text
+
+
+def test_noise_of_the_arithmetic_is_no_figure_but_in_json(made, tmp_path):
+    """A transport beside its own rows: what is left is rounding."""
+    transport = load_transport(made / "t.zarr")
+    np.save(tmp_path / "T.npy", np.moveaxis(transport.dense(), 1, 2))
+    command = ("evaluate", made / "t.zarr", "--truth", tmp_path / "T.npy")
+    ran = check_done(run_nearfar(*command, "--report", tmp_path / "e.html"))
+    text = (tmp_path / "e.html").read_text()
+    for shown in (ran.out, text):
+        assert "exact to rounding" in shown
+        # What is taken apart anew, the components, is no better than before.
+        assert not re.search(r"(white|random)\W+(td\W+)*1[2-9]\d\.\d+ dB", shown)
+    assert "All rows and all frequencies are exact to rounding" in text
+    assert "difference × 1<" in text
+    kept = json.loads(check_done(run_nearfar(*command, "--json")).out)
+    assert kept["snr_b"]["random"] > 120
 
 
 def test_an_evaluation_by_photos(made, world, tmp_path):

@@ -5,7 +5,7 @@ import numpy as np
 from nearfar.arrays import Size
 from nearfar.errors import LostPhotoError
 from nearfar.rigs.cameras.base import Camera
-from nearfar.rigs.screens import Monitor
+from nearfar.rigs.monitors import Monitor
 from nearfar.rigs.simulated.camera import SimulatedCamera
 
 REFRESH = 60.0

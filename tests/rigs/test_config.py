@@ -11,8 +11,8 @@ from nearfar.errors import DeviceError, UnreadableFileError
 from nearfar.rigs.cameras.driver import FoundCamera
 from nearfar.rigs.cameras.folder import FolderCamera
 from nearfar.rigs.initial import draft_rig
+from nearfar.rigs.monitors import Monitor
 from nearfar.rigs.opening import open_rig
-from nearfar.rigs.screens import Monitor
 from nearfar.rigs.tables import RealTable, read_rig_table
 from tests.cli.conftest import run_nearfar
 

@@ -14,7 +14,8 @@ from tests.waiting import LONGEST_WAIT
 
 SHOWN = """
 import sys, mss, numpy as np
-from nearfar.rigs.screens import Window, find_monitors
+from nearfar.rigs.monitors import find_monitors
+from nearfar.rigs.screens import Window
 monitors = find_monitors()
 wanted = {wanted}
 generator = np.random.default_rng(0)
@@ -37,7 +38,8 @@ print(window.monitor)
 SEEN = """
 import mss, numpy as np
 from nearfar.arrays import Size
-from nearfar.rigs.screens import Window, find_monitors
+from nearfar.rigs.monitors import find_monitors
+from nearfar.rigs.screens import Window
 from nearfar.rigs.side_by_side import SideBySideScreen
 eye = mss.MSS()
 def seen(monitor):
@@ -116,7 +118,8 @@ def test_patterns_are_on_the_second_monitor_pixel_for_pixel(tmp_path):
 
 FAULT = """
 from nearfar.errors import NearfarError
-from nearfar.rigs.screens import Window, find_monitors
+from nearfar.rigs.monitors import find_monitors
+from nearfar.rigs.screens import Window
 import numpy as np
 try:
     {body}
@@ -137,7 +140,7 @@ def test_without_a_display_there_is_a_sentence():
 
 
 def test_without_its_packages_there_is_a_sentence():
-    said = said_without("glfw", "from nearfar.rigs.screens import find_monitors\nfind_monitors()")
+    said = said_without("glfw", "from nearfar.rigs.monitors import find_monitors\nfind_monitors()")
     assert "pip install 'nearfar[window]'" in said
 
 

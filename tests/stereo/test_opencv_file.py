@@ -123,6 +123,15 @@ def test_arrays_of_other_kinds_get_a_sentence(changed, words):
         nearfar.StereoCalibration.from_opencv(**{**given, **changed})
 
 
+def test_a_short_file_does_not_stand_for_a_huge_matrix(tmp_path):
+    path = tmp_path / "s.yml"
+    nearfar.save_stereo_calibration(STEREO, path)
+    text = path.read_text() + "a: &a [1, 1]\nb: [*a, *a]\n"
+    path.write_text(text)
+    with pytest.raises(nearfar.NearfarError, match="aliases"):
+        nearfar.read_stereo_calibration(path)
+
+
 def test_what_is_no_calibration_gets_a_sentence(tmp_path):
     for content in (b"", b"a b", b"[1, 2]", b"\xff\xfe\x00", b"&a [*a, *a]", b"[" * 5000):
         (tmp_path / "s.yml").write_bytes(content)

@@ -28,7 +28,8 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_operator, cached_scene
 from nearfar.transport.exact import ExactTransport
-from nearfar.workflow.compare import Comparison, Trial, compare, default_budgets, suited
+from nearfar.workflow.compare import compare, default_budgets, suited
+from nearfar.workflow.comparison import Comparison, Trial
 from nearfar.workflow.rivals import RIVALS
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.paper import paper_plans

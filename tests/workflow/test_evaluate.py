@@ -152,4 +152,6 @@ def test_differences_are_made_as_bright_as_can_be_seen():
         assert str(gain)[0] in "125"
     assert difference_gain([np.full((3, 3), 7.0)]) == 1
     assert difference_gain([np.zeros((3, 3))]) == 1
+    # Noise of the arithmetic is not made visible.
+    assert difference_gain([np.full((3, 3), 1e-7)]) == 1
     assert difference_gain([]) == 1

@@ -84,11 +84,15 @@ def test_ambient_light_is_taken_off():
 def test_what_does_not_fit_gets_a_sentence():
     transport = world()
     found = asked(transport)
-    other = rig_of(model_transport(Size(4, 4), Size(5, 5), window=3, far=Size(1, 1)))
+    small = model_transport(Size(4, 4), Size(5, 5), window=3, far=Size(1, 1))
+    other = rig_of(small)
     with pytest.raises(InputError, match="the rig has 4x4"):
         nearfar.refine_compensation(transport, found, other)
     with pytest.raises(InputError, match="photos are 20x22x3"):
         nearfar.refine_compensation(transport, found, rig_of(world(3)))
+    for compensation in (asked(world(3)), nearfar.compensate(small, np.ones((5, 5)), 1.0)):
+        with pytest.raises(InputError, match="give the transport that it was computed with"):
+            nearfar.refine_compensation(transport, compensation, rig_of(transport))
     for corrections in (0, 4):
         with pytest.raises(InputError, match="give 1 to 3"):
             nearfar.refine_compensation(transport, found, rig_of(transport), corrections)

@@ -12,6 +12,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.exact import ExactTransport
+from nearfar.workflow import superpose as superposing
 from tests.conftest import QUIET
 from tests.shown import captured, cornell, random_binary, white_and_black
 
@@ -142,3 +143,16 @@ def test_lights_that_cannot_be_summed_are_refused(plan, world, tmp_path):
     ):
         with pytest.raises(InputError, match=said):
             nearfar.superpose(capture, light)
+
+
+def test_patterns_that_are_drawn_a_few_at_a_time_make_the_same_picture(
+    world, tmp_path, monkeypatch
+):
+    plan = _plan("reference")
+    capture, light = _capture(tmp_path, world, plan, QUIET), _light_of(plan)
+    whole = nearfar.superpose(capture, light)
+    monkeypatch.setattr(superposing, "PATTERN_VALUES", 2 * 7 * PROJECTOR.pixels)
+    monkeypatch.setattr(superposing, "PIXELS_AT_ONCE", 50)
+    few = nearfar.superpose(capture, light)
+    np.testing.assert_allclose(few.picture, whole.picture, atol=1e-6)
+    np.testing.assert_allclose(few.shown, whole.shown, atol=1e-6)

@@ -40,13 +40,13 @@ from nearfar.transport.model import Transport
 
 # Takes the first bounce and all the rest of the picture under a light apart.
 Apart = Callable[[Floats], tuple[Floats, Floats]]
-# Of the light y_n: relative, for GMRES, and its steps before it begins anew, and such beginnings.
+# Of GMRES: relative tolerance of y_n, steps of a cycle, and cycles.
 TOLERANCE = 1e-5
 STEPS = 40
-BEGINNINGS = 3
-# What is worse than this breaks what the method assumes: shares of the projector's pixels that the
-# camera does not see, and of a bounce's light that is negative. Where a third of a picture is dark,
-# noise alone is 1 % of its light.
+CYCLES = 3
+# Beyond these a scene breaks what the method assumes: the share of the projector's pixels that the
+# camera does not see, and the share of a bounce's light that is negative. Where a third of the
+# picture is dark, noise alone makes 1 % of the light negative.
 MOST_UNSEEN = 0.02
 MOST_NEGATIVE = 0.03
 
@@ -65,7 +65,7 @@ class Bounces:
         Share of the projector's pixels, of those that light anything, that no camera pixel sees
         directly.
     residual : float
-        Of the worst solution y_n: relative, 0 if all are as good as asked for.
+        Relative residual of the worst solution y_n; 0 if all are within the tolerance.
 
     Examples
     --------
@@ -260,9 +260,7 @@ def _solved(bounce: Callable[[Floats], Floats], wanted: Floats) -> tuple[Floats,
         return (light + bounce(light)).ravel()
 
     operator = LinearOperator((wanted.size, wanted.size), matvec=product, dtype=np.float64)
-    flat, failed = gmres(
-        operator, wanted.ravel(), rtol=TOLERANCE, restart=STEPS, maxiter=BEGINNINGS
-    )
+    flat, failed = gmres(operator, wanted.ravel(), rtol=TOLERANCE, restart=STEPS, maxiter=CYCLES)
     if not failed:
         return flat.reshape(wanted.shape), 0.0
     left = np.linalg.norm(wanted.ravel() - product(flat)) / np.linalg.norm(wanted)

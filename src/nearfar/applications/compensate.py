@@ -5,40 +5,45 @@ The light l minimises
 
     |W (T l + b - s wanted)|^2 + mu |gradient of l|^2    over 0 <= l <= 1
 
-by accelerated projected gradients, each step divided by the diagonal of D^T W^2 D. b is the photo
-under black where what is wanted is a photo, with ambient light, and 0 where it is light alone. W is
-1 where the camera sees direct light, and 0 elsewhere and where it is saturated. Colours that the
-projector and the camera mix are part of T where a calibration knows them.
+by accelerated projected gradients, preconditioned by the diagonal of D^T W^2 D. If a photo with
+ambient light is wanted, b is the photo under black; if light alone is wanted, b is 0. W is 1 where
+the camera sees direct light, and 0 elsewhere and at saturated camera pixels. Where a calibration
+knows how projector and camera mix colours, the mixing is part of T.
 
 Truncated series for T^-1, such as stratified inverses (Ng et al. 2009; Bai et al. 2010), diverge
 where much light is reflected on; a projected gradient does not.
 """
 
 from dataclasses import dataclass
-from math import inf, isfinite, log10, sqrt
+from math import inf
 from typing import Any
 
 import numpy as np
 
+from nearfar.applications.compensation_problem import (
+    at_q,
+    camera_weights,
+    compensation_problem,
+    direct_alone,
+    error_bar_under,
+    picture_of_camera,
+    scale_of_needed,
+    wanted_picture,
+)
 from nearfar.applications.least_squares import LeastSquares
-from nearfar.applications.onto_projector import onto_projector
-from nearfar.arrays import Booleans, Floats, Size
+from nearfar.applications.likeness import (
+    decibels_below,
+    distance_from,
+    finite_or_none,
+    greatest_wanted,
+    out_of_reach,
+    without_single_channel,
+)
+from nearfar.arrays import Booleans, Floats
 from nearfar.callbacks import Report, as_report
-from nearfar.checks import as_image, as_number, require_instance
+from nearfar.checks import as_number, require_instance
 from nearfar.errors import InputError
-from nearfar.estimate.error_bars import ErrorBars
-from nearfar.transport.colour import mixing_of
-from nearfar.transport.direct import footprint, look_up
 from nearfar.transport.model import Transport
-
-# A scale is chosen so that this share of the camera pixels needs no more than full white.
-REACHABLE = 0.95
-# mu, as a share of the usual diagonal of D^T W^2 D.
-SMOOTHNESS = 1e-4
-# Diagonal of projector pixels that hardly light the camera directly, as a share of the usual.
-LEAST_DIAGONAL = 0.03
-# Camera pixels further from what is wanted, as a share of its greatest value, are out of reach.
-OUT_OF_REACH = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +95,12 @@ class Compensation:
     @property
     def psnr(self) -> float:
         """`rmse` below `peak`, in dB."""
-        return _decibels(self.peak, self.rmse)
+        return decibels_below(self.peak, self.rmse)
 
     @property
     def psnr_of_direct(self) -> float:
         """`rmse_of_direct` below `peak`, in dB."""
-        return _decibels(self.peak, self.rmse_of_direct)
+        return decibels_below(self.peak, self.rmse_of_direct)
 
     @property
     def out_of_reach_share(self) -> float:
@@ -136,7 +141,8 @@ def compensate(
     ------
     InputError
         If the transport is another object or has no direct light, if the picture does not fit the
-        camera, is negative or black, or if the scale is not above 0.
+        camera, is negative or black, if the scale is not above 0, or if the photo under black is
+        brighter than what is wanted everywhere.
 
     Examples
     --------
@@ -155,7 +161,7 @@ def compensate(
     dark = (
         np.zeros_like(target)
         if black is None
-        else _picture(black, transport.camera, transport.channels)
+        else picture_of_camera(black, transport.camera, transport.channels)
     )
     if scale is None:
         # Without an upper limit the light for each of both is proportional to it.
@@ -167,21 +173,22 @@ def compensate(
     else:
         start = np.full_like(problem.diagonal, 0.5)
     goal = scale * target - dark
+    peak = greatest_wanted(goal, weights[..., 0] > 0)
     light = problem.solve(goal, start, 1.0, report)
     alone = compensation_problem(direct_alone(transport), weights)
     of_direct = alone.solve(goal, light, 1.0)
     report("compensation", 1.0)
-    return _judged(transport, problem, weights, (light, of_direct), scale, goal)
+    return _judged(transport, problem, weights, (light, of_direct), scale, goal, peak)
 
 
 def describe(found: Compensation) -> dict[str, Any]:
     """Return the scale and what to expect, as JSON types; null for dB of a perfect match."""
-    decibels = {"psnr_dB": found.psnr, "psnr_of_direct_dB": found.psnr_of_direct}
     return {
         "scale": found.scale,
         "expected_rmse": found.rmse,
         "rmse_of_direct": found.rmse_of_direct,
-        **{name: value if isfinite(value) else None for name, value in decibels.items()},
+        "psnr_dB": finite_or_none(found.psnr),
+        "psnr_of_direct_dB": finite_or_none(found.psnr_of_direct),
         "out_of_reach_share": found.out_of_reach_share,
     }
 
@@ -206,80 +213,6 @@ def _target(transport: Transport, wanted: Floats) -> Floats:
     return wanted_picture(wanted, transport.camera, transport.channels, transport.lit)
 
 
-def wanted_picture(wanted: Floats, camera: Size, channels: int, lit: Booleans) -> Floats:
-    """Return a wanted picture as (Cy, Cx, channels), float64; `lit` is where a light makes one.
-
-    Raises
-    ------
-    InputError
-        If it does not fit the camera, is negative, or black where `lit`.
-    """
-    target = _picture(wanted, camera, channels)
-    if target.min() < 0:
-        raise InputError(
-            "the wanted picture has negative values, and there is no negative light: set them to 0."
-        )
-    if not target[lit].any():
-        raise InputError(
-            "the wanted picture is black wherever the projector lights the scene: give another one."
-        )
-    return target
-
-
-def _picture(given: Floats, camera: Size, channels: int) -> Floats:
-    """Return a picture of the camera as (Cy, Cx, channels), float64."""
-    picture = np.asarray(given)
-    if picture.ndim == 2 and channels > 1:
-        picture = np.repeat(picture[..., None], channels, axis=2)
-    flat = as_image(picture, camera, channels)
-    return np.asarray(flat, dtype=np.float64).reshape(*camera, channels)
-
-
-def camera_weights(transport: Transport) -> Floats:
-    """Return W^2, shape (Cy, Cx, 1)."""
-    seen = transport.lit
-    if transport.posterior is not None:
-        black = np.zeros(transport.projector, dtype=np.float32)
-        bars = np.reshape(ErrorBars(transport).picture(black), (*transport.camera, -1))
-        seen = seen & np.isfinite(bars).all(axis=-1)
-    return np.asarray(seen[..., None], dtype=np.float64)
-
-
-def direct_alone(transport: Transport) -> Transport:
-    """Return a transport of the same direct light and nothing else."""
-    absent = {part: 0.0 for part in transport.parts if part != "direct"}
-    return transport.with_gains(**absent)
-
-
-def compensation_problem(transport: Transport, weights: Floats) -> LeastSquares:
-    """State the problem for lights (Py, Px, colours) and pictures (Cy, Cx, channels)."""
-    camera, projector, channels = transport.camera, transport.projector, transport.channels
-    mixing = mixing_of(channels, transport.provenance) if channels > 1 else None
-    shares = np.eye(channels) if mixing is None else mixing
-
-    def forward(light: Floats) -> Floats:
-        seen = (light @ shares.T).astype(np.float32)
-        return (transport @ seen).reshape(*camera, channels).astype(np.float64)
-
-    def adjoint(picture: Floats) -> Floats:
-        image = picture.astype(np.float32).reshape(camera if channels == 1 else (*camera, channels))
-        back = transport.adjoint(image).reshape(*projector, channels)
-        return np.asarray(back @ shares, dtype=np.float64)
-
-    white = np.where(weights.reshape(-1, 1) > 0, transport.direct.reshape(-1, channels), 0.0)
-    found = onto_projector(transport.correspondence, white, projector).weights
-    diagonal = found @ shares**2
-    lighting = diagonal[diagonal > 0]
-    if not lighting.size:
-        raise InputError(
-            "the transport has no direct light above black, so that no light makes a picture on "
-            "the scene: photograph the scene with more light."
-        )
-    usual = float(np.median(lighting))
-    diagonal = np.maximum(diagonal, LEAST_DIAGONAL * usual)
-    return LeastSquares(forward, adjoint, weights, diagonal, SMOOTHNESS * usual)
-
-
 def _scale_within_reach(
     transport: Transport, light: Floats, saved: Floats, target: Floats, weights: Floats
 ) -> float:
@@ -292,42 +225,9 @@ def _scale_within_reach(
     saved : ndarray, shape (Py, Px, colours)
         Light that a photo under black stands for; what a target needs is less by it.
     """
-    needed, less = (_at_q(transport, each) for each in (light, saved))
+    needed, less = (at_q(transport, each) for each in (light, saved))
     counted = (weights.ravel() > 0) & (target.reshape(weights.size, -1).max(axis=1) > 0)
     return scale_of_needed((needed / (1.0 + less)).max(axis=0)[counted])
-
-
-def light_needed(transport: Transport, light: Floats) -> Floats:
-    """Return the light at each camera pixel's q, of the brightest colour, shape (C,)."""
-    return np.asarray(_at_q(transport, light).max(axis=0))
-
-
-def _at_q(transport: Transport, light: Floats) -> Floats:
-    """Return a light (Py, Px, colours) at each camera pixel's q, shape (colours, C)."""
-    where = footprint(transport.correspondence, transport.projector)
-    return np.stack([look_up(one.ravel(), where) for one in np.moveaxis(light, -1, 0)])
-
-
-def scale_of_needed(needed: Floats) -> float:
-    """Return the scale at which most camera pixels need no more than full white.
-
-    Parameters
-    ----------
-    needed : ndarray, shape (n,)
-        Light that camera pixels need for a scale of 1.
-
-    Raises
-    ------
-    InputError
-        If they need none.
-    """
-    most = np.quantile(needed, REACHABLE) if needed.size else 0.0
-    if most <= 0:
-        raise InputError(
-            "no light makes anything of the wanted picture on this scene: give a picture that is "
-            "bright where the projector lights the scene."
-        )
-    return float(1.0 / most)
 
 
 def _judged(
@@ -337,42 +237,21 @@ def _judged(
     lights: tuple[Floats, Floats],
     scale: float,
     target: Floats,
+    peak: float,
 ) -> Compensation:
     """Say how near to a target the photos under two lights will come."""
     chosen = lights[0].astype(np.float32)
     expected, of_direct = (problem.forward(light) for light in lights)
     bars = error_bar_under(transport, chosen)
-    counted = weights[..., 0] > 0
-    noise = 0.0 if bars is None else np.reshape(bars, target.shape)[counted] ** 2
-
-    def distance(picture: Floats) -> float:
-        return sqrt(float(np.mean((picture - target)[counted] ** 2 + noise)))
-
-    peak = float(target[counted].max())
-    far = np.abs(expected - target).max(axis=2) > OUT_OF_REACH * peak
-    shape = transport.camera if transport.channels == 1 else target.shape
+    distance = distance_from(target, weights[..., 0] > 0)
     return Compensation(
-        light=chosen[..., 0] if chosen.shape[2] == 1 else chosen,
+        light=without_single_channel(chosen),
         scale=scale,
-        expected=expected.reshape(shape).astype(np.float32),
+        expected=without_single_channel(expected).astype(np.float32),
         standard_deviation=bars,
-        out_of_reach=far | ~transport.lit,
-        rmse=distance(expected),
-        rmse_of_direct=distance(of_direct),
+        out_of_reach=out_of_reach(expected, target, peak, transport.lit),
+        rmse=distance(expected, bars),
+        rmse_of_direct=distance(of_direct, bars),
         peak=peak,
-        target=target.reshape(shape).astype(np.float32),
+        target=without_single_channel(target).astype(np.float32),
     )
-
-
-def error_bar_under(transport: Transport, light: Floats) -> Floats | None:
-    """Return the error bar of the picture under a light (Py, Px, colours); None without any."""
-    if transport.posterior is None:
-        return None
-    mixing = mixing_of(transport.channels, transport.provenance)
-    seen = light if mixing is None or transport.channels == 1 else light @ mixing.T
-    projected = seen[..., 0] if seen.shape[2] == 1 else seen
-    return ErrorBars(transport).picture(projected.astype(np.float32))
-
-
-def _decibels(peak: float, rmse: float) -> float:
-    return 20 * log10(peak / rmse) if rmse > 0 else inf

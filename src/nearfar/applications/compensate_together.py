@@ -7,22 +7,21 @@ The lights l_1, l_2 ... minimise
 which is the problem of `nearfar.applications.compensate` with T = [T_1 | T_2 | ...].
 
 Where several projectors reach a camera pixel, the picture determines only the sum of what they add.
-The solution is begun from lights of which each fades towards the edge of its projector's reach, and
-gradients leave what makes no difference to the picture as it was. So one projector hands over to
-the other little by little: edge blending (Raskar et al., "Multi-projector displays using
-camera-based registration", IEEE Visualization 1999, from whom the shares are).
+The iteration starts from lights that fade towards the edge of their projector's reach. Gradient
+steps leave what makes no difference to the picture as it was, so the solution fades there, too.
+This is edge blending, with the shares of Raskar et al., "Multi-projector displays using
+camera-based registration", IEEE Visualization 1999.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, log10, sqrt
+from math import inf
 from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
-from nearfar.applications.compensate import (
-    OUT_OF_REACH,
+from nearfar.applications.compensation_problem import (
     camera_weights,
     compensation_problem,
     direct_alone,
@@ -32,6 +31,14 @@ from nearfar.applications.compensate import (
     wanted_picture,
 )
 from nearfar.applications.least_squares import LeastSquares, roughness
+from nearfar.applications.likeness import (
+    decibels_below,
+    distance_from,
+    finite_or_none,
+    greatest_wanted,
+    out_of_reach,
+    without_single_channel,
+)
 from nearfar.applications.several_projectors import added_deviations, require_transports
 from nearfar.arrays import Booleans, Floats
 from nearfar.callbacks import Report, as_report
@@ -85,12 +92,12 @@ class JointCompensation:
     @property
     def psnr(self) -> float:
         """`rmse` below `peak`, in dB."""
-        return _below(self.peak, self.rmse)
+        return decibels_below(self.peak, self.rmse)
 
     @property
     def psnr_alone(self) -> tuple[float, ...]:
         """`rmse_alone` below `peak`, in dB."""
-        return tuple(_below(self.peak, rmse) for rmse in self.rmse_alone)
+        return tuple(decibels_below(self.peak, rmse) for rmse in self.rmse_alone)
 
     @property
     def out_of_reach_share(self) -> float:
@@ -257,8 +264,8 @@ def describe(found: JointCompensation) -> dict[str, Any]:
         "scale": found.scale,
         "expected_rmse": found.rmse,
         "rmse_alone": list(found.rmse_alone),
-        "psnr_dB": _or_none(found.psnr),
-        "psnr_alone_dB": [_or_none(value) for value in found.psnr_alone],
+        "psnr_dB": finite_or_none(found.psnr),
+        "psnr_alone_dB": [finite_or_none(value) for value in found.psnr_alone],
         "out_of_reach_share": found.out_of_reach_share,
     }
 
@@ -313,10 +320,7 @@ def _judged(
     expected = problem.forward(_flat(lights))
     counted = problem.weights[..., 0] > 0
 
-    def distance(picture: Floats, deviation: Floats | None) -> float:
-        noise = 0.0 if deviation is None else np.reshape(deviation, target.shape)[counted] ** 2
-        return sqrt(float(np.mean((picture - target)[counted] ** 2 + noise)))
-
+    distance = distance_from(target, counted)
     bars = [
         error_bar_under(transport, light)
         for transport, light in zip(transports, lights, strict=True)
@@ -327,33 +331,19 @@ def _judged(
         distance(each.forward(light), error_bar_under(transport, light))
         for transport, each, light in zip(transports, problem.problems, alone, strict=True)
     ]
-    peak = float(target[counted].max())
-    far = np.abs(expected - target).max(axis=2) > OUT_OF_REACH * peak
+    peak = greatest_wanted(target, counted)
     lit = np.any([transport.lit for transport in transports], axis=0)
     return JointCompensation(
-        lights=tuple(map(_without_single_channel, lights)),
+        lights=tuple(map(without_single_channel, lights)),
         scale=scale,
-        expected=_without_single_channel(expected).astype(np.float32),
+        expected=without_single_channel(expected).astype(np.float32),
         standard_deviation=together,
-        out_of_reach=far | ~lit,
+        out_of_reach=out_of_reach(expected, target, peak, lit),
         rmse=distance(expected, together),
         rmse_alone=tuple(rmse_alone),
         peak=peak,
     )
 
 
-def _without_single_channel(values: Floats) -> Floats:
-    """Return (y, x) of values of one channel, and others as they are."""
-    return values[..., 0] if values.shape[2] == 1 else values
-
-
 def _flat(lights: Sequence[Floats]) -> Floats:
     return np.concatenate([light.ravel() for light in lights])
-
-
-def _below(peak: float, rmse: float) -> float:
-    return 20 * log10(peak / rmse) if rmse > 0 else inf
-
-
-def _or_none(value: float) -> float | None:
-    return value if isfinite(value) else None

@@ -16,17 +16,17 @@ from nearfar.errors import InputError
 from nearfar.illumination.frames import fit_frame
 from nearfar.stereo import StereoCalibration, Triangulated, triangulate_pixels
 
-# Rays that miss each other by more deviations than this are of a wrong correspondence, and so are
-# those that miss by this many times the typical distance: wrong places scatter more themselves.
+# Correspondence is wrong where q misses its epipolar line by more standard deviations than this, or
+# by more than this many times the typical distance: wrong q scatter, and so have large deviations.
 LARGEST_MISS = 5.0
-# Deviations within which so large a share of misses lies, if they are normal.
+# Share of normally distributed misses that lie within one standard deviation.
 ONE_DEVIATION = 0.6827
-# The deviation of q is multiplied by what makes it explain the misses; of fewer points than these,
-# by what does on exact scenes (benchmarks/depth.py).
+# The deviation of q is multiplied by the factor with which it explains the misses. If there are
+# fewer misses than these, the factor is that of exact scenes (benchmarks/depth.py).
 FEWEST_MISSES = 50
 USUAL_FACTOR = 1.1
 LEAST_FACTOR = 0.1
-# Misses typically above this many pattern pixels are of a calibration that does not fit.
+# A calibration does not fit if misses are typically above this many pattern pixels.
 LARGEST_TYPICAL_MISS = 1.0
 PIXELS_AT_ONCE = 2**18
 
@@ -41,21 +41,20 @@ class Depth:
         (x, y, z) in the camera's frame, x to the right, y down, z forwards, in the unit of the
         calibration; NaN where there is none.
     deviation : ndarray, shape (Cy, Cx), float64
-        Standard deviation of a point along the camera's ray, by the error bar of q; errors of the
-        calibration, which all points share, are left out.
+        Standard deviation of a point along the camera's ray, from the error bar of q, in the unit
+        of the calibration. Errors of the calibration, which all points share, are left out.
     confidence : ndarray, shape (Cy, Cx), float32
         That of q.
     miss : ndarray, shape (Cy, Cx), float64
-        By how many pattern pixels q misses the epipolar line of its camera pixel; NaN where rays do
-        not meet at all.
+        Distance of q from the epipolar line of its camera pixel, in pattern pixels; NaN where the
+        rays do not meet in front of camera and projector.
     factor : float
         What the deviation of q was multiplied by, so that it explains the misses.
     lit : int
-        Camera pixels with q, whose points are kept or left out: by how many `unsure`, `missed` and
-        `behind` tell.
+        Number of camera pixels with q. Each has a point or is counted in one of the following.
     unsure, missed, behind : int
-        Camera pixels that were left out: of too little confidence; whose rays miss each other by
-        more than chance; whose rays do not meet in front of camera and projector.
+        Numbers of camera pixels that were left out: confidence is too low; the rays miss each other
+        by more than chance; the rays do not meet in front of camera and projector.
 
     Examples
     --------
@@ -99,9 +98,21 @@ class Depth:
             "factor": self.factor,
         }
 
+    @property
+    def _cure(self) -> str:
+        """What to do where no camera pixel has a point."""
+        if self.unsure >= max(self.missed, self.behind):
+            return "accept less confidence"
+        return (
+            "check that the calibration is of this rig as it stands, R and T from the camera's "
+            "frame to the projector's, and that no picture is turned or mirrored"
+        )
+
     def warnings(self) -> list[str]:
         """Return warnings, one sentence each."""
         found, typical = [], _median(self.miss)
+        if not self.kept:
+            found.append(f"no point was found of {self.lit} camera pixels with q: {self._cure}.")
         if typical is not None and typical > LARGEST_TYPICAL_MISS:
             found.append(
                 f"q misses the epipolar lines by {typical:.1f} pattern pixels, typically, so that "
@@ -171,7 +182,7 @@ def triangulate(
         )
     sure = lit & (confidence >= least)
     on_screen = side * (q + 0.5) - 0.5 + corner
-    # What is far off every epipolar line is no q, and would spoil the error bars of its neighbours.
+    # A q that is far off its epipolar line would spoil the error bars of its neighbours.
     first = _by_camera_pixel(stereo, sure, on_screen, np.ones(q.shape))
     typical = max(_within_one(first.distance), side * LEAST_FACTOR * LEAST_DEVIATION)
     near = first.distance <= LARGEST_MISS * typical

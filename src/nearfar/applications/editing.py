@@ -24,8 +24,12 @@ from nearfar.transport.model import Transport
 from nearfar.transport.parts import PLACES, require_parts
 
 SUBSURFACE = "subsurface"
+# Light that travels farther by this is the same all over any window.
+LARGEST_FACTOR = 1e6
 # Bytes of patterns that are drawn at once.
 PATTERN_BYTES = 2**26
+# Rows of F, one for each camera pixel and channel, that are cut at once.
+ROWS_AT_ONCE = 2**14
 
 
 def widen_subsurface(transport: Transport, factor: float) -> Transport:
@@ -49,7 +53,7 @@ def widen_subsurface(transport: Transport, factor: float) -> Transport:
     Raises
     ------
     InputError
-        If the factor is not above 0, or nothing in the scene is translucent.
+        If the factor is not above 0 or above a million, or nothing in the scene is translucent.
 
     Examples
     --------
@@ -58,8 +62,11 @@ def widen_subsurface(transport: Transport, factor: float) -> Transport:
     ...
     nearfar.errors.InputError: nothing in the scene is translucent, so that no light travels ...
     """
-    if as_number(factor, "the factor") <= 0:
-        raise InputError(f"the factor is {factor}: give one above 0, 1 for no change.")
+    if not 0 < as_number(factor, "the factor") <= LARGEST_FACTOR:
+        raise InputError(
+            f"the factor is {factor:g}: give one above 0 and up to {LARGEST_FACTOR:g}, 1 for no "
+            f"change."
+        )
     return widened(_translucent(transport), factor)
 
 
@@ -95,7 +102,8 @@ def recolour(transport: Transport, component: str, colour: ArrayLike) -> Transpo
     Raises
     ------
     InputError
-        If there is no such component, or the colour is of another shape or not finite.
+        If there is no such component, if the colour is of another shape or not finite, or if the
+        component would leave the range of float32.
 
     Examples
     --------
@@ -118,7 +126,7 @@ def recolour(transport: Transport, component: str, colour: ArrayLike) -> Transpo
     name = ("direct", "near", "far")[PLACES[chosen[0]]]
     factor = getattr(transport, name)
     flat = factor.reshape(transport.camera.pixels, transport.channels, -1)
-    mixed = np.einsum("ij,cjw->ciw", matrix, flat).astype(np.float32)
+    mixed = _float32(np.einsum("ij,cjw->ciw", matrix, flat))
     return _edited(transport, edit, **{name: mixed.reshape(factor.shape)})
 
 
@@ -128,7 +136,7 @@ def recoloured_under_surfaces(split: PhysicalSplit, matrix: Floats) -> Transport
     change = np.einsum("ij,cjw->ciw", matrix - np.eye(len(matrix)), under)
     near = transport.near + change.reshape(transport.near.shape)
     edit = {"recolour": SUBSURFACE, "matrix": matrix.tolist()}
-    return _edited(transport, edit, near=near.astype(np.float32))
+    return _edited(transport, edit, near=_float32(near))
 
 
 class Cut(NamedTuple):
@@ -197,13 +205,15 @@ def cut_far(transport: Transport, camera_mask: Floats, projector_mask: Floats) -
     weights = basis.weights
     # Coefficients of the masked row, by least squares, of those of the row: w f.
     to_cut = np.linalg.lstsq(products, masked, rcond=None)[0]
-    flat = transport.far.reshape(-1, basis.count).astype(np.float64)
+    flat = transport.far.reshape(-1, basis.count)
     shares = np.repeat(of_camera.ravel(), transport.channels)[:, None]
-    rows = flat * weights * shares
-    cut = rows @ to_cut.T
-    wanted = np.einsum("cm,cm->", rows @ squared, rows)
-    found = np.einsum("cm,cm->", cut @ products, cut)
-    far = (flat - cut / weights).reshape(transport.far.shape)
+    far, wanted, found = np.empty_like(flat), 0.0, 0.0
+    for some in blocks(len(flat), ROWS_AT_ONCE):
+        rows = flat[some] * weights * shares[some]
+        cut = rows @ to_cut.T
+        wanted += float(np.einsum("cm,cm->", rows @ squared, rows))
+        found += float(np.einsum("cm,cm->", cut @ products, cut))
+        far[some] = flat[some] - cut / weights
     edit = {
         "cut_far": {
             "camera_share": float(of_camera.mean()),
@@ -211,11 +221,22 @@ def cut_far(transport: Transport, camera_mask: Floats, projector_mask: Floats) -
         }
     }
     error = float(np.sqrt(max(0.0, 1.0 - found / wanted))) if wanted > 0 else 0.0
-    return Cut(_edited(transport, edit, far=far.astype(np.float32)), error)
+    return Cut(_edited(transport, edit, far=far.reshape(transport.far.shape)), error)
+
+
+def _float32(values: Floats) -> Floats:
+    """Return values as float32, those beyond its range as infinite ones."""
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32)
 
 
 def _edited(transport: Transport, edit: dict[str, Any], **factors: Floats) -> Transport:
     """Return a transport with some other factors, and one edit more in its provenance."""
+    if not all(np.isfinite(factor).all() for factor in factors.values()):
+        raise InputError(
+            "the edited transport would have values beyond the range of float32: edit by smaller "
+            "numbers."
+        )
     changed: dict[str, Any] = {**factors, "provenance": with_edit(transport.provenance, edit)}
     return replace(transport, posterior=None, verdict=None, **changed)
 

@@ -1,7 +1,7 @@
 """Least squares for lights between limits, by accelerated projected gradients.
 
 Beck and Teboulle, "A fast iterative shrinkage-thresholding algorithm for linear inverse problems",
-SIAM J. Imaging Sciences 2009; begun anew where a step leads uphill, after O'Donoghue and Candes,
+SIAM J. Imaging Sciences 2009; restarted where a step leads uphill, after O'Donoghue and Candes,
 "Adaptive restart for accelerated gradient schemes", Found. Comput. Math. 2015.
 """
 
@@ -13,10 +13,11 @@ import numpy as np
 from nearfar.arrays import Floats
 from nearfar.callbacks import Report
 
-# Steps end where the light changes by less, root mean square over its own, or after so many.
+# Iteration ends once a step changes the light by less than this share of its norm, or after so many
+# steps.
 LEAST_CHANGE = 1e-5
 STEPS = 400
-# Products by which the greatest eigenvalue is found; the margin covers what they miss.
+# Steps of power iteration for the greatest eigenvalue; the margin covers what they leave.
 POWER_STEPS = 15
 EIGENVALUE_MARGIN = 1.1
 
@@ -51,7 +52,7 @@ class LeastSquares:
         return np.asarray(back + self.smoothness * roughness(light))
 
     def greatest_eigenvalue(self) -> float:
-        """Return about the greatest eigenvalue of the preconditioned information matrix."""
+        """Return about the greatest eigenvalue of the preconditioned matrix, with a margin."""
         root = np.sqrt(self.diagonal)
         light = np.random.default_rng(0).random(self.diagonal.shape) + 1.0
         value = 1.0
@@ -71,7 +72,7 @@ class LeastSquares:
         picture : ndarray
             v.
         start : ndarray
-            A light to begin with.
+            The light at which the iteration starts.
         most : float
             Greatest value of the light; may be infinite.
         progress : callable, optional

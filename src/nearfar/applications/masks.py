@@ -86,7 +86,8 @@ class ProbingMask:
         Parameters
         ----------
         radius : float
-            Above 0, in projector pixels.
+            Above 0, in projector pixels. If it is infinite, everything is allowed, also at camera
+            pixels without q.
 
         Raises
         ------
@@ -104,12 +105,13 @@ class ProbingMask:
         """Allow what is at least `inner` and less than `outer` from q.
 
         Camera pixels without q are at an infinite distance from all projector pixels: they get
-        light by no ring, and all of it by `beyond`.
+        light by no ring of a finite outer radius, and all of it by `beyond`.
 
         Parameters
         ----------
         inner, outer : float
-            Projector pixels, 0 or more; inner < outer.
+            Projector pixels, 0 or more; inner < outer. A ring whose outer radius is infinite has
+            all that `beyond` the inner one has.
 
         Raises
         ------

@@ -9,9 +9,9 @@ b_ci^2, as noise of v asks for, gives x_pi:
 
     x_pi = sum_c h_cp b_ci v_ci / sum_c h_cp b_ci^2.
 
-What one mean blurs, the mean of what it leaves of v brings back. Projector pixels that no camera
-pixel is lit by have the values around them, coarse ones where the gap is wide (pull-push: Gortler
-et al., The Lumigraph, 1996).
+A mean blurs. So the same mean of the residual, v less the first bounce under x, is added to x.
+Projector pixels that light no camera pixel directly are filled in from the values around them, from
+coarser ones where the gap is wide (pull-push: Gortler et al., The Lumigraph, 1996).
 """
 
 from collections.abc import Callable
@@ -23,10 +23,11 @@ from scipy import ndimage
 from nearfar.arrays import Booleans, Floats, Size
 from nearfar.transport.direct import Footprint, footprint, spread
 
-# Projector pixels with less direct light than this share of the usual are not lit by it.
+# Projector pixels that give less direct light than this share of the usual count as giving none.
 LEAST_LIGHT = 0.01
-# Of projector pixels that light nothing an estimate has up to 3 % of the usual light, either way;
-# of surfaces that the camera does not see, 8 % reach it after a reflection.
+# A projector pixel lights something if more than this share of the usual light reaches the camera
+# from it. An estimate has up to 3 %, of either sign, where nothing is lit; surfaces that the camera
+# does not see send it 8 % by way of others.
 LEAST_REACHING = 0.05
 
 

@@ -3,12 +3,12 @@
 After Sen and others 2005, "Dual Photography", section on adaptive multiplexed illumination. The
 whole projector is cut into four blocks, these into four, and so on. Of each block, the camera
 pixels that receive more than a threshold from it are asked about its parts; the others keep what
-they received as light that is spread evenly over the block. Blocks that no camera pixel is asked
-about together are lit in one photo.
+they received as light that is spread evenly over the block. Blocks share a photo if no camera pixel
+is asked about two of them.
 
-Where all are answered and photos are left, the threshold is halved, until a photo's own noise would
-exceed it; where the photos end, all keep what they know. Light that a camera pixel receives from
-blocks that it is not asked about is foretold as evenly spread, and subtracted.
+Once all questions are answered and photos are left, the threshold is halved, down to the noise of a
+dark photo. When the photos end, all camera pixels keep what they know. Light that a camera pixel
+receives from blocks that it is not asked about is predicted as evenly spread, and subtracted.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Integers
-from nearfar.baselines.projector_blocks import Block, Question, ask
+from nearfar.baselines.projector_blocks import LEAST_LIGHT, Block, Question, ask, first_limit
 from nearfar.baselines.shooting import Shooting
-from nearfar.errors import InputError
 from nearfar.transport.exact import ExactTransport
 
 FEWEST_PHOTOS = 2
-# In photo units; about the noise of a dark photo.
-LEAST_THRESHOLD = 5e-4
+NAME = "adaptive dual photography"
 
 
 class _Known(NamedTuple):
@@ -42,8 +40,8 @@ def adaptive_dual(shooting: Shooting, threshold: float) -> ExactTransport:
     ----------
     shooting : Shooting
     threshold : float
-        In photo units: what a camera pixel must receive from a block, in any channel, to be asked
-        about its parts, at first.
+        In photo units: at first, a camera pixel is asked about the parts of blocks from which it
+        receives more than this, in any channel. Less than the noise of a dark photo counts as that.
 
     Returns
     -------
@@ -55,19 +53,14 @@ def adaptive_dual(shooting: Shooting, threshold: float) -> ExactTransport:
     InputError
         If there are no photos for black and white, or the threshold is below 0.
     """
-    if shooting.left < FEWEST_PHOTOS or threshold < 0:
-        raise InputError(
-            f"{shooting.left} photos and a threshold of {threshold} do not do for adaptive dual "
-            f"photography: allow {FEWEST_PHOTOS} photos or more, and 0 or more."
-        )
+    threshold = first_limit(shooting, threshold, FEWEST_PHOTOS, NAME)
     projector = shooting.projector
-    whole = Block(0, projector.height, 0, projector.width)
     levels = np.stack([np.zeros(projector, np.uint8), np.full(projector, 255, np.uint8)])
     black, white = shooting.shoot(levels)
     light = white - black
     estimate = np.repeat(light.T[:, :, None] / projector.pixels, projector.pixels, axis=2)
-    known = [_Known(whole, np.arange(len(light)), light.max(axis=1))]
-    while shooting.left and threshold >= LEAST_THRESHOLD:
+    known = [_Known(Block.whole(projector), np.arange(len(light)), light.max(axis=1))]
+    while shooting.left and threshold >= LEAST_LIGHT:
         questions, known = _about_parts(known, threshold)
         if not questions:
             threshold /= 2
@@ -76,8 +69,7 @@ def adaptive_dual(shooting: Shooting, threshold: float) -> ExactTransport:
             lit = block.pixels(projector)
             estimate[:, asked[:, None], lit] = received.T[:, :, None] / len(lit)
             known.append(_Known(block, asked, received.max(axis=1)))
-    name = "adaptive dual photography"
-    return ExactTransport(projector, shooting.camera, (), (), estimate, name)
+    return ExactTransport(projector, shooting.camera, (), (), estimate, NAME)
 
 
 def _about_parts(known: Sequence[_Known], threshold: float) -> tuple[list[Question], list[_Known]]:

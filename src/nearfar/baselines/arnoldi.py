@@ -11,7 +11,7 @@ level, so that no photo of black is needed.
 
 The orthonormal lights V and their pictures L = T V leave (1 - V V^T) T (1 - V V^T) of a symmetric T
 undetermined. It is taken to be 0, which gives T = L V^T + V L^T (1 - V V^T): light outside of V is
-relit by symmetry. A T of rank n is exact after n photos' worth of lights beyond the first.
+relit by symmetry. A T of rank n is exact after at most n + 1 lights, the first being white.
 
 Direct light alone makes T of full rank. `estimate_direct` finds it beforehand by a checkerboard and
 its inverse, under which it alone differs; the lights then explore T - D.
@@ -66,15 +66,36 @@ class LowRankTransport:
         return np.asarray((lit.T + self.direct * flat[:, None]).reshape(*self.camera, -1))
 
 
-def arnoldi(shooting: Shooting, *, direct_first: bool) -> LowRankTransport:
+def arnoldi(shooting: Shooting) -> LowRankTransport:
     """Measure T by as many lights as the photos allow.
 
     Parameters
     ----------
     shooting : Shooting
         Of a coaxial rig whose camera has the projector's pixels.
-    direct_first : bool
-        Whether two photos go to direct light, which is then left out of what the lights explore.
+
+    Returns
+    -------
+    LowRankTransport
+        Without direct light of its own: it is part of the pictures.
+
+    Raises
+    ------
+    InputError
+        If the photos do not suffice for one light, or the camera has other pixels than the
+        projector.
+    """
+    _require_photos(shooting, PHOTOS_PER_LIGHT)
+    return _explored(shooting, np.zeros((1, 1)))
+
+
+def arnoldi_after_direct(shooting: Shooting) -> LowRankTransport:
+    """Measure direct light D by two photos, and T - D by as many lights as the others allow.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        Of a coaxial rig whose camera has the projector's pixels.
 
     Returns
     -------
@@ -83,25 +104,31 @@ def arnoldi(shooting: Shooting, *, direct_first: bool) -> LowRankTransport:
     Raises
     ------
     InputError
-        If the photos do not suffice for one light, or the camera has other pixels than the
-        projector.
+        If the photos do not suffice for direct light and one light, or the camera has other pixels
+        than the projector.
     """
-    photos = shooting.left - (PHOTOS_OF_DIRECT if direct_first else 0)
-    count = min(photos // PHOTOS_PER_LIGHT, shooting.projector.pixels)
-    if count < 1:
+    _require_photos(shooting, PHOTOS_OF_DIRECT + PHOTOS_PER_LIGHT)
+    return _explored(shooting, estimate_direct(shooting))
+
+
+def _require_photos(shooting: Shooting, fewest: int) -> None:
+    if shooting.left < fewest:
         raise InputError(
-            f"{shooting.left} photos are too few for a light of optical Arnoldi: allow "
-            f"{PHOTOS_PER_LIGHT + (PHOTOS_OF_DIRECT if direct_first else 0)} or more."
+            f"{shooting.left} photos are too few for a light of optical Arnoldi: allow {fewest} or "
+            f"more."
         )
-    direct = estimate_direct(shooting) if direct_first else None
+
+
+def _explored(shooting: Shooting, direct: Floats) -> LowRankTransport:
+    """Explore T less direct light, (P, channels) or (1, 1), with all photos that are left."""
+    count = min(shooting.left // PHOTOS_PER_LIGHT, shooting.projector.pixels)
     generator = np.random.default_rng(2010)
     basis = np.empty((shooting.projector.pixels, count))
     lights, pictures = [], []
     wanted: Floats = np.ones(len(basis))
     for k in range(count):
         shown, picture = _multiply(shooting, wanted)
-        if direct is not None:
-            picture = picture - direct * shown[:, None]
+        picture = picture - direct * shown[:, None]
         lights.append(shown)
         pictures.append(picture)
         rest = _beyond(basis[:, :k], shown)
@@ -115,7 +142,7 @@ def arnoldi(shooting: Shooting, *, direct_first: bool) -> LowRankTransport:
         shooting.camera,
         basis,
         np.moveaxis(normalised.reshape(products.shape), 1, 0),
-        np.zeros_like(products[..., 0]) if direct is None else direct,
+        np.broadcast_to(direct, products.shape[:2]),
     )
 
 

@@ -1,8 +1,8 @@
 """Blocks of projector pixels that are cut into parts, and lit at once where they do not conflict.
 
-Two blocks conflict if a camera pixel is asked about both of them: from the photo of both alone it
-would not know which of them lit it. What a camera pixel receives from blocks that it is not asked
-about is foretold by the estimate so far, and subtracted.
+Two blocks conflict if a camera pixel is asked about both of them: a photo of both would not tell
+which of them lit it. What a camera pixel receives from blocks that it is not asked about is
+predicted by the estimate so far, and subtracted.
 """
 
 from collections.abc import Sequence
@@ -12,6 +12,10 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.baselines.shooting import Shooting
+from nearfar.errors import InputError
+
+# In photo units, about the noise of a dark photo: light below it is not told from none.
+LEAST_LIGHT = 5e-4
 
 
 class Block(NamedTuple):
@@ -26,6 +30,11 @@ class Block(NamedTuple):
         """Return the flat indices of its pixels."""
         y, x = np.arange(self.top, self.bottom), np.arange(self.left, self.right)
         return np.asarray((y[:, None] * projector.width + x).ravel())
+
+    @classmethod
+    def whole(cls, projector: Size) -> "Block":
+        """Return the block of all pixels."""
+        return cls(0, projector.height, 0, projector.width)
 
     def parts(self) -> "list[Block]":
         """Cut it in half along both axes, as far as these are longer than a pixel.
@@ -83,8 +92,8 @@ def ask(
     """Light parts of blocks, as many at once as do not conflict, until all are lit or photos end.
 
     What a camera pixel receives from the parts of a block is made to sum to what it is known to
-    receive from the block: noise would otherwise grow with each cut. Where the photos ended before
-    some parts were lit, these give the rest.
+    receive from the block; otherwise noise would grow with each cut. If the photos end before some
+    parts are lit, these parts are taken to give the rest.
 
     Parameters
     ----------
@@ -110,9 +119,9 @@ def ask(
         for number in group:
             light[asked[number][0].block.pixels(projector)] = 1
     patterns = (255 * lights).astype(np.uint8).reshape(-1, *projector)
-    unforeseen = shooting.shoot(patterns) - black - np.moveaxis(estimate @ lights.T, (0, 2), (2, 0))
+    residual = shooting.shoot(patterns) - black - np.moveaxis(estimate @ lights.T, (0, 2), (2, 0))
     news: dict[int, dict[Block, Floats]] = {}
-    for rest, group in zip(unforeseen, groups, strict=True):
+    for rest, group in zip(residual, groups, strict=True):
         for number in group:
             part, question = asked[number]
             news.setdefault(question, {})[part.block] = rest[part.asked]
@@ -121,6 +130,33 @@ def ask(
         for question, found in news.items()
         for answer in _answers(questions[question], found, estimate, projector)
     ]
+
+
+def first_limit(shooting: Shooting, limit: float, fewest: int, method: str) -> float:
+    """Return the limit of light with which a method begins, which halves it later on.
+
+    Parameters
+    ----------
+    shooting : Shooting
+    limit : float
+        In photo units; less than `LEAST_LIGHT` counts as that.
+    fewest : int
+        Photos that the method takes before any block is cut.
+    method : str
+        Its name, for the message.
+
+    Raises
+    ------
+    InputError
+        If fewer photos may be taken, or the limit is below 0.
+    """
+    if shooting.left < fewest:
+        raise InputError(
+            f"{shooting.left} photos are too few for {method}: allow {fewest} or more."
+        )
+    if limit < 0:
+        raise InputError(f"the limit of light for {method} is {limit}: give 0 or more.")
+    return max(limit, LEAST_LIGHT)
 
 
 def parts_or_itself(block: Block) -> list[Block]:
@@ -146,7 +182,7 @@ def _parts_of(
 def _answers(
     question: Question, found: dict[Block, Floats], estimate: Floats, projector: Size
 ) -> list[Answer]:
-    """Add what was foreseen to what was not, so that all parts sum to the block."""
+    """Add what was predicted to what was not, so that all parts sum to the block."""
     parts = question.block.parts()
     unlit = [part for part in parts if part not in found]
     total: Floats = np.sum(list(found.values()), axis=0)
@@ -158,8 +194,8 @@ def _answers(
         found = {part: rest - total / len(parts) for part, rest in found.items()}
     answers = []
     for part, rest in found.items():
-        foreseen = estimate[:, question.asked[:, None], part.pixels(projector)].sum(axis=2).T
-        answers.append(Answer(part, question.asked, foreseen + rest))
+        predicted = estimate[:, question.asked[:, None], part.pixels(projector)].sum(axis=2).T
+        answers.append(Answer(part, question.asked, predicted + rest))
     return answers
 
 

@@ -6,11 +6,11 @@ Blocks a and b of pixels cut a block T_ab out of it. Light on b alone gives the 
 the camera pixels of a; light on a alone those of its columns, at the camera pixels of b, as
 T_ba = T_ab^T. If T_ab is of rank one, it is their outer product, over its sum.
 
-All blocks are cut into four, level by level. Where T_ab foretells what its parts receive, within a
-tolerance, it is not asked about any more; the blocks on the diagonal, which direct light fills, are
-cut down to single pixels. Where all is foretold and photos are left, the tolerance is halved, until
-a photo's own noise would exceed it. Blocks that no camera pixel is asked about together are lit in
-one photo, and light that is known already is subtracted from it.
+All blocks are cut into four, level by level. T_ab predicts what its parts receive. Where it does so
+within a tolerance, it is not cut any more; blocks on the diagonal, which direct light fills, are
+cut down to single pixels. Once all blocks are within the tolerance and photos are left, the
+tolerance is halved, down to the noise of a dark photo. Blocks share a photo if no camera pixel is
+asked about two of them; light that is known already is subtracted from it.
 
 Index convention: a and b are blocks of one level.
 """
@@ -22,7 +22,15 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Integers, Size
-from nearfar.baselines.projector_blocks import Block, Question, ask, parts_or_itself
+from nearfar.baselines.projector_blocks import (
+    LEAST_LIGHT,
+    Answer,
+    Block,
+    Question,
+    ask,
+    first_limit,
+    parts_or_itself,
+)
 from nearfar.baselines.shooting import Shooting
 from nearfar.errors import InputError
 from nearfar.transport.exact import ExactTransport
@@ -31,9 +39,7 @@ FEWEST_PHOTOS = 3
 # A block whose sum is below so many standard deviations of it is taken to be even: an outer product
 # over next to nothing would be noise.
 DEVIATIONS_OF_RANK_ONE = 5.0
-
-# In photo units; about the noise of a dark photo.
-LEAST_TOLERANCE = 5e-4
+NAME = "symmetric photography"
 
 # Two blocks of one level, whose block of T is asked about together with its transpose.
 Pair = tuple[Block, Block]
@@ -47,8 +53,8 @@ def symmetric_photography(shooting: Shooting, tolerance: float) -> ExactTranspor
     shooting : Shooting
         Of a coaxial rig whose camera has the projector's pixels.
     tolerance : float
-        In photo units, the root-mean-square error of what a block of T foretells for its parts,
-        up to which it is not asked about any more, at first.
+        In photo units: at first, blocks of T are cut only where what they foretell for their parts
+        is off by more, root mean square. Less than the noise of a dark photo counts as that.
 
     Returns
     -------
@@ -61,11 +67,7 @@ def symmetric_photography(shooting: Shooting, tolerance: float) -> ExactTranspor
         If there are no photos for two of black and one of white, the tolerance is below 0, or the
         camera has other pixels than the projector.
     """
-    if shooting.left < FEWEST_PHOTOS or tolerance < 0:
-        raise InputError(
-            f"{shooting.left} photos and a tolerance of {tolerance} do not do for symmetric "
-            f"photography: allow {FEWEST_PHOTOS} photos or more, and 0 or more."
-        )
+    tolerance = first_limit(shooting, tolerance, FEWEST_PHOTOS, NAME)
     projector = shooting.projector
     dark = np.zeros((2, *projector), dtype=np.uint8)
     one, other = shooting.shoot(dark)
@@ -76,11 +78,11 @@ def symmetric_photography(shooting: Shooting, tolerance: float) -> ExactTranspor
         )
     black, noise = (one + other) / 2, float(np.std(one - other)) / np.sqrt(2)
     light = (shooting.shoot(np.full((1, *projector), 255, dtype=np.uint8))[0] - black).T
-    whole = Block(0, projector.height, 0, projector.width)
+    whole = Block.whole(projector)
     estimate = rank_one(light, light, noise)
-    # What is left to be cut, with the error by which it was foretold.
+    # What is left to be cut, with the error by which it was predicted.
     errors: dict[Pair, float] = {(whole, whole): np.inf}
-    while errors and shooting.left and tolerance >= LEAST_TOLERANCE:
+    while errors and shooting.left and tolerance >= LEAST_LIGHT:
         pairs = [pair for pair, error in errors.items() if error > tolerance]
         if not pairs:
             tolerance /= 2
@@ -89,11 +91,11 @@ def symmetric_photography(shooting: Shooting, tolerance: float) -> ExactTranspor
         for pair in pairs:
             del errors[pair]
         for a, b in _parts_of_pairs(pairs):
-            if a in received and b in received:
+            if _tells(received, (a, b), projector) and _tells(received, (b, a), projector):
                 error = _refine(estimate, (a, b), received, projector, noise)
                 if a.parts() or b.parts():
                     errors[a, b] = error
-    return ExactTransport(projector, shooting.camera, (), (), estimate, "symmetric photography")
+    return ExactTransport(projector, shooting.camera, (), (), estimate, NAME)
 
 
 def rank_one(rows: Floats, columns: Floats, noise: float) -> Floats:
@@ -144,10 +146,22 @@ def _ask_about_parts(
     for block, others in partners.items():
         pixels = [other.pixels(shooting.projector) for other in others]
         questions.append(Question(block, np.sort(np.concatenate(pixels))))
-    return {
-        answer.block: _Received(answer.asked, answer.received)
-        for answer in ask(shooting, questions, estimate, black)
-    }
+    answers: dict[Block, list[Answer]] = {}
+    for answer in ask(shooting, questions, estimate, black):
+        answers.setdefault(answer.block, []).append(answer)
+    return {block: _merged(found) for block, found in answers.items()}
+
+
+def _tells(received: Mapping[Block, _Received], pair: Pair, projector: Size) -> bool:
+    """Return whether all camera pixels of the first block were asked about the second."""
+    seen, lit = pair
+    return lit in received and bool(np.isin(seen.pixels(projector), received[lit].asked).all())
+
+
+def _merged(answers: Sequence[Answer]) -> _Received:
+    """Merge the answers about one block; a single pixel is also asked about by itself."""
+    asked, first = np.unique(np.concatenate([each.asked for each in answers]), return_index=True)
+    return _Received(asked, np.concatenate([each.received for each in answers])[first])
 
 
 def _parts_of_pairs(pairs: Sequence[Pair]) -> Iterator[Pair]:
@@ -167,8 +181,11 @@ def _refine(
 ) -> float:
     """Put a block of rank one and its transpose into the estimate (channels, P, P).
 
-    Returns the root-mean-square error of what the estimate foretold of its sums, or these sums'
-    own mean square where it is less: what gives next to no light need not be known better.
+    Returns
+    -------
+    float
+        Root-mean-square error of its sums as the estimate predicted them, photo units; at most
+        the root mean square of the sums themselves, as a dark block need not be known better.
     """
     a, b = (block.pixels(projector) for block in pair)
     rows, columns = received[pair[1]].at(a), received[pair[0]].at(b)

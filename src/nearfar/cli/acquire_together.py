@@ -4,7 +4,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from nearfar.cli.options import keep_input
+from nearfar.cli.opening import check_rig
+from nearfar.cli.options import keep_apart, keep_input
 from nearfar.cli.other_projectors import OtherProjector
 from nearfar.cli.saying import say, say_captured, say_time, warn, warn_each
 from nearfar.progress import Report, progress_bar
@@ -45,8 +46,11 @@ def acquire_projectors(
     made = read_plan(plan_file)
     made.require_real("shoot")
     outputs = [each.output for each in projectors] + ([] if shared is None else [shared])
-    for number, output in enumerate(outputs):
-        keep_input(output, plan_file, *(Path(each.rig) for each in projectors), *outputs[:number])
+    keep_apart(outputs)
+    for output in outputs:
+        keep_input(output, plan_file, *(Path(each.rig) for each in projectors))
+    for each in projectors:
+        _check(each, manner)
     with progress_bar("opening the rig", quiet=manner.quiet) as report:
         if shared is None or not _share(made, projectors, shared, manner, report):
             for each in projectors:
@@ -54,19 +58,27 @@ def acquire_projectors(
             _warn_of_exposures([each.output for each in projectors])
 
 
+def _check(projector: Projector, manner: Manner) -> None:
+    """Check, before the photos of any projector, that its rig is there and its capture is not."""
+    from nearfar.capture.unfinished import RESUMABLE_CAPTURE
+    from nearfar.files import check_resumable
+
+    check_rig(projector.rig)
+    begun = manner.resume and _unfinished(projector.output).exists()
+    if begun or not (manner.resume and projector.output.exists()):
+        check_resumable(projector.output, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
+
+
 def _shoot_alone(made: "Plan", projector: Projector, manner: Manner, report: Report) -> None:
     """Shoot a plan by one projector; a capture that is whole is kept when resuming."""
-    from nearfar.capture.unfinished import RESUMABLE_CAPTURE, unfinished_capture
-    from nearfar.files import check_resumable
+    from nearfar.capture.unfinished import unfinished_capture
     from nearfar.rigs.opening import open_rig
     from nearfar.workflow.acquire import acquire
 
     output = projector.output
     begun = manner.resume and _unfinished(output).exists()
-    if manner.resume and not begun and output.exists():
-        say(f"{output} is there already", quiet=manner.quiet)
+    if manner.resume and not begun and _is_there(output, manner):
         return
-    check_resumable(output, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
     before, exposure = unfinished_capture(output) if begun else (0, None)
     with open_rig(
         projector.rig,
@@ -116,14 +128,16 @@ def _share(
 
     outputs, rigs = [each.output for each in projectors], [each.rig for each in projectors]
     begun = manner.resume and _unfinished(shared).exists()
+    if manner.resume and not begun and shared.exists():
+        missing = [None if _is_there(output, manner) else output for output in outputs]
+        taken = take_apart(open_capture(shared), missing, progress=report)
+        _say_written(taken, list(filter(None, missing)), manner)
+        return True
     if manner.resume and not begun and any(_is_begun(output) for output in outputs):
         # Photos in turn were found to be better before.
         return False
     for output in outputs:
         check_output(output, force=manner.force)
-    if manner.resume and not begun and shared.exists():
-        _say_written(take_apart(open_capture(shared), outputs, progress=report), outputs, manner)
-        return True
     check_resumable(shared, RESUMABLE_CAPTURE, resume=begun, force=manner.force)
     before, exposure = unfinished_capture(shared) if begun else (0, None)
     with open_side_by_side(
@@ -175,6 +189,13 @@ def _unfinished(output: Path) -> Path:
     from nearfar.files import UNFINISHED
 
     return output.with_name(f"{output.name}{UNFINISHED}")
+
+
+def _is_there(output: Path, manner: Manner) -> bool:
+    """Return whether a capture is there, which is kept when resuming; if so, print it."""
+    if output.exists():
+        say(f"{output} is there already", quiet=manner.quiet)
+    return output.exists()
 
 
 def _is_begun(output: Path) -> bool:

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-from nearfar.cli.lights import Resize, Srgb, read_light_for, say_resized
-from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
-from nearfar.cli.saying import say, warn, warn_if_wrong
+from nearfar.cli.lights import Resize, Srgb, light_or_white, require_light, say_resized
+from nearfar.cli.opening import open_reconstructed
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
+from nearfar.cli.saying import say, warn
 from nearfar.progress import progress_bar
 
 
@@ -35,8 +36,6 @@ def bounces(
     Example: nearfar bounces transport.zarr bounces --light light.png --srgb --n 3
     """
     from nearfar.files import check_output
-    from nearfar.illumination.pictures import white
-    from nearfar.transport.stored import open_transport
     from nearfar.workflow.bounces import (
         bounces_of_stored,
         describe_bounces,
@@ -45,19 +44,12 @@ def bounces(
         write_bounces,
     )
 
-    if light is None and (srgb or resize):
-        raise typer.BadParameter(
-            "goes with --light only.", param_hint="--srgb" if srgb else "--resize"
-        )
+    require_light(light, srgb=srgb, resize=resize)
     keep_input(output, transport, *([light] if light else []))
     check_output(output, force=force, replaceable=is_bounces)
     with progress_bar("bounces", quiet=quiet) as report:
-        require_reconstructed(transport)
-        opened = open_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
-        projected, given = white(opened.projector), opened.projector
-        if light is not None:
-            projected, given = read_light_for(opened, light, srgb=srgb, resize=resize)
+        opened = open_reconstructed(transport)
+        projected, given = light_or_white(opened, light, srgb=srgb, resize=resize)
         found = bounces_of_stored(opened, projected, count, progress=report)
         numbers = describe_bounces(found)
         write_bounces(output, found, numbers, force=force)

@@ -29,7 +29,7 @@ from nearfar.workflow.rivals import RIVALS
 
 if TYPE_CHECKING:
     from nearfar.transport.known import KnownTransport
-    from nearfar.workflow.compare import Comparison
+    from nearfar.workflow.comparison import Comparison
 
 
 def method_names(start: str) -> list[str]:

@@ -8,18 +8,19 @@ import typer
 
 from nearfar.cli.compensate_together import Wanted, compensate_projectors
 from nearfar.cli.lights import read_camera_picture
+from nearfar.cli.opening import open_reconstructed
 from nearfar.cli.options import (
     AsJson,
     Force,
     Quiet,
     TransportPath,
+    keep_apart,
     keep_input,
-    require_reconstructed,
     scene_names,
 )
 from nearfar.cli.other_projectors import OtherProjector, others_of
-from nearfar.cli.refining import MOST, check_rig, refined
-from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.cli.refining import MOST, check_refinement, refined
+from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
@@ -140,11 +141,10 @@ def compensate(
     from nearfar.applications.compensate import compensate as found_by
     from nearfar.applications.compensate import describe, summarise
     from nearfar.files import check_output, check_picture_ending, write_light, write_picture
-    from nearfar.transport.stored import open_transport
     from nearfar.workflow.refine import describe_photos, summarise_photos
 
     given = _scale(scale)
-    check_rig(refine, rig)
+    check_refinement(refine, rig)
     if others := others_of(other, "RIGHT.zarr=RIGHT_LIGHT_OUT"):
         if as_photo or refine is not None:
             raise typer.BadParameter(
@@ -161,22 +161,17 @@ def compensate(
         )
         return
     outputs = [output, *filter(None, (expected, out_of_reach))]
-    for number, path in enumerate(outputs):
+    keep_apart(outputs)
+    for path in outputs:
         check_picture_ending(path)
-        keep_input(path, transport, wanted, *outputs[:number], *([Path(rig)] if rig else []))
+        keep_input(path, transport, wanted, *([Path(rig)] if rig else []))
         check_output(path, force=force)
     with progress_bar("compensation", quiet=quiet) as report:
-        require_reconstructed(transport)
-        opened = open_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
+        opened = open_reconstructed(transport)
         picture = read_camera_picture(wanted, opened.camera, opened.channels, srgb=srgb)
         rows = opened.rows()
         black = _black_of(rows, transport) if as_photo else None
         found = found_by(rows, picture, given, black=black, progress=report)
-        if expected is not None:
-            write_picture(expected, found.expected, force=force)
-        if out_of_reach is not None:
-            write_picture(out_of_reach, found.out_of_reach.astype(np.float32), force=force)
         if refine is None:
             write_light(output, found.light, force=force)
     numbers, words = describe(found), summarise(found)
@@ -185,6 +180,11 @@ def compensate(
             say(words, quiet=quiet)
         better = refined(rows, found, rig, refine, output=output, force=force, quiet=quiet)
         numbers, words = numbers | describe_photos(better), summarise_photos(better)
+    # After the light, so that nothing is left of a command whose rig does not fit.
+    if expected is not None:
+        write_picture(expected, found.expected, force=force)
+    if out_of_reach is not None:
+        write_picture(out_of_reach, found.out_of_reach.astype(np.float32), force=force)
     if as_json:
         print(json.dumps(numbers, allow_nan=False))
     else:

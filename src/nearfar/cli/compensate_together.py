@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nearfar.cli.lights import read_camera_picture
-from nearfar.cli.options import keep_input
+from nearfar.cli.options import keep_apart, keep_input
 from nearfar.cli.other_projectors import OtherProjector, open_transports
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
@@ -46,9 +46,10 @@ def compensate_projectors(
 
     paths, lights = zip(*projectors, strict=True)
     outputs = [*lights, *filter(None, (wanted.expected, wanted.out_of_reach))]
-    for number, path in enumerate(outputs):
+    keep_apart(outputs)
+    for path in outputs:
         check_picture_ending(path)
-        keep_input(path, *paths, wanted.picture, *outputs[:number])
+        keep_input(path, *paths, wanted.picture)
         check_output(path, force=force)
     with progress_bar("compensation", quiet=quiet) as report:
         opened = open_transports(paths)

@@ -8,6 +8,7 @@ import typer
 from nearfar.cli.command_line import command_line
 from nearfar.cli.options import Force, Quiet
 from nearfar.cli.saying import say
+from nearfar.decibels import in_words
 from nearfar.progress import progress_bar
 
 
@@ -29,8 +30,8 @@ def demo(
     with progress_bar("demo", quiet=quiet) as report:
         found = run_demo(output, force=force, progress=report, command=command_line())
     say(
-        f"SNR_b {found['snr_b_pictures']:.1f} dB under pictures (mean of five), "
-        f"{found['snr_b']['white']:.1f} dB under white; SNR_t {found['snr_t']['p50']:.1f} dB "
+        f"SNR_b {in_words(found['snr_b_pictures'])} under pictures (mean of five), "
+        f"{in_words(found['snr_b']['white'])} under white; SNR_t {in_words(found['snr_t']['p50'])} "
         f"(median)\nopen {output / 'report.html'}",
         quiet=quiet,
     )

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from nearfar.cli.options import AsJson, Force, Quiet, keep_input, require_reconstructed
-from nearfar.cli.saying import say, warn, warn_if_wrong
+from nearfar.cli.opening import open_reconstructed
+from nearfar.cli.options import AsJson, Force, Quiet, keep_input
+from nearfar.cli.saying import say, warn
 from nearfar.progress import Report, progress_bar
 
 if TYPE_CHECKING:
@@ -91,7 +92,6 @@ def depth(
 def _seen(source: Path, colour: Literal["direct", "white"] | None, report: Report) -> "Seen":
     from nearfar.capture import open_capture
     from nearfar.files import kind_of_store
-    from nearfar.transport.stored import open_transport
     from nearfar.workflow.depth import seen_in_capture, seen_in_stored
 
     if kind_of_store(source) == "nearfar capture":
@@ -101,10 +101,7 @@ def _seen(source: Path, colour: Literal["direct", "white"] | None, report: Repor
                 param_hint="--colour",
             )
         return seen_in_capture(open_capture(source), report)
-    require_reconstructed(source)
-    opened = open_transport(source)
-    warn_if_wrong(source, opened.verdict)
-    return seen_in_stored(opened, colour or "direct")
+    return seen_in_stored(open_reconstructed(source), colour or "direct")
 
 
 def _summary(found: "Depth") -> str:

@@ -16,7 +16,7 @@ def devices(quiet: Quiet = False) -> None:
     """
     from nearfar.errors import DeviceError, MissingPackageError
     from nearfar.rigs.cameras.registry import find_cameras
-    from nearfar.rigs.screens import find_monitors
+    from nearfar.rigs.monitors import find_monitors
 
     say("monitors:", quiet=quiet)
     try:

@@ -7,9 +7,10 @@ import typer
 
 from nearfar.arrays import Size
 from nearfar.cli.gains import MODEL, gains_of
-from nearfar.cli.lights import Srgb, read_camera_picture, read_grey
-from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
-from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.cli.lights import Srgb, read_camera_picture, read_grey, require_light
+from nearfar.cli.opening import open_reconstructed
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
+from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
@@ -56,8 +57,8 @@ def dual(
     """
     from nearfar.applications.dual import dual_view_of_stored
     from nearfar.files import check_output, check_picture_ending, write_picture
-    from nearfar.transport.stored import open_transport
 
+    require_light(light, srgb=srgb, resize=False)
     gains = gains_of(gain or [])
     for name in gains:
         if name not in MODEL:
@@ -69,9 +70,7 @@ def dual(
     keep_input(output, transport, *filter(None, (light, camera_flat, projector_flat)))
     check_output(output, force=force)
     with progress_bar("making the dual view", quiet=quiet):
-        require_reconstructed(transport)
-        opened = open_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
+        opened = open_reconstructed(transport)
         camera, channels = opened.camera, opened.channels
         sent = None if light is None else read_camera_picture(light, camera, channels, srgb=srgb)
         flats = {

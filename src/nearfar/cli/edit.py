@@ -7,8 +7,9 @@ import numpy as np
 import typer
 
 from nearfar.cli.lights import read_grey
-from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
-from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.cli.opening import load_reconstructed
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
+from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def edit(
     Example: nearfar edit transport.zarr waxen.zarr --widen 1.5
     """
     from nearfar.files import check_output
-    from nearfar.transport.store import load_transport, save_transport
+    from nearfar.transport.store import save_transport
 
     if sum(value is not None for value in (widen, recolour, cut_far)) != 1:
         raise typer.BadParameter("give one of --widen, --recolour and --cut-far.")
@@ -85,9 +86,7 @@ def edit(
     keep_input(output, transport, *(masks or ()))
     check_output(output, force=force)
     with progress_bar("editing", quiet=quiet):
-        require_reconstructed(transport)
-        opened = load_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
+        opened = load_reconstructed(transport)
         edited, words = _edited(opened, widen, colour, masks)
         save_transport(edited, output, force=force)
     say(f"{words}\nedited transport written to {output}", quiet=quiet)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from nearfar.cli.command_line import command_line
+from nearfar.cli.opening import load_reconstructed
 from nearfar.cli.options import (
     AsJson,
     Force,
@@ -14,9 +15,9 @@ from nearfar.cli.options import (
     ReportPath,
     TransportPath,
     check_report_page,
-    require_reconstructed,
 )
-from nearfar.cli.saying import say, warn, warn_if_wrong
+from nearfar.cli.saying import say, warn
+from nearfar.decibels import EXACT, ROUNDING
 from nearfar.progress import progress_bar
 
 # What is compared, where the key alone does not tell which split it is of.
@@ -60,7 +61,6 @@ def evaluate(
     Example: nearfar evaluate transport.zarr --truth truth.zarr --json
     """
     from nearfar.transport.exact_store import load_exact
-    from nearfar.transport.store import load_transport
     from nearfar.workflow.evaluate import row_snr
     from nearfar.workflow.judge import (
         REMARKS,
@@ -79,9 +79,7 @@ def evaluate(
             report, transport, *(path for path in (truth, photos) if path), force=force
         )
     with progress_bar("evaluating", quiet=quiet) as told:
-        require_reconstructed(transport)
-        opened = load_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
+        opened = load_reconstructed(transport)
         if truth is not None:
             known = load_exact(truth, projector=opened.projector, camera=opened.camera)
             rows = row_snr(opened, known, progress=told)
@@ -110,13 +108,42 @@ def evaluate(
         say("\n".join([_lines(shown), *describe_units(found)]), quiet=quiet)
 
 
+def _is_spread(value: object) -> bool:
+    """Return whether it is a mean and percentiles."""
+    return isinstance(value, dict) and "p50" in value
+
+
+def _table(spreads: dict[str, dict[str, float]], indent: str) -> list[str]:
+    """Return means and percentiles as the lines of a table, in dB."""
+    columns = next(iter(spreads.values()))
+    rows = [["dB", *columns]]
+    rows += [
+        [name, *(_cell(value[column]) for column in columns)] for name, value in spreads.items()
+    ]
+    width = max(len(cell) for row in rows for cell in row[1:]) + 2
+    return [
+        f"{indent}{row[0]:<16}{''.join(f'{cell:>{width}}' for cell in row[1:])}" for row in rows
+    ]
+
+
+def _cell(decibels: float) -> str:
+    return f"{decibels:.2f}" if decibels <= ROUNDING else "exact"
+
+
+def _shown(decibels: float) -> str:
+    return f"{decibels:8.2f} dB" if decibels <= ROUNDING else f"  {EXACT}"
+
+
 def _lines(found: dict[str, Any], indent: str = "") -> str:
     lines = []
+    spreads = {name: value for name, value in found.items() if _is_spread(value)}
     for name, value in found.items():
-        if isinstance(value, dict):
+        if name in spreads:
+            lines += _table(spreads, indent) if name == next(iter(spreads)) else []
+        elif isinstance(value, dict):
             heading = f"{name}: {EXPLAINED[name]}" if name in EXPLAINED else name
             lines += [f"{indent}{heading}", _lines(value, indent + "  ")]
         else:
-            shown = f"{value:8.2f} dB" if isinstance(value, float) else str(value)
+            shown = _shown(value) if isinstance(value, float) else str(value)
             lines.append(f"{indent}{name:<16}{shown}")
     return "\n".join(lines)

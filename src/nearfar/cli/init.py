@@ -28,7 +28,7 @@ def init(
     from nearfar.files import check_output, new_output
     from nearfar.rigs.cameras.registry import find_cameras
     from nearfar.rigs.initial import draft_rig
-    from nearfar.rigs.screens import Monitor, find_monitors
+    from nearfar.rigs.monitors import Monitor, find_monitors
 
     if rig.suffix.lower() != ".toml":
         raise InputError(f"{rig} does not end in .toml: choose a name such as rig.toml.")

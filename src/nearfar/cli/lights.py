@@ -36,6 +36,25 @@ def read_light_for(
     return as_channels_see(light, transport.channels, transport.provenance), given
 
 
+def require_light(light: Path | None, *, srgb: bool, resize: bool) -> None:
+    """Refuse --srgb and --resize without --light."""
+    if light is None and (srgb or resize):
+        raise typer.BadParameter(
+            "goes with --light only.", param_hint="--srgb" if srgb else "--resize"
+        )
+
+
+def light_or_white(
+    transport: "StoredTransport", path: Path | None, *, srgb: bool, resize: bool
+) -> "tuple[Floats, Size]":
+    """Read a light as `read_light_for` does; white where none is named."""
+    from nearfar.illumination.pictures import white
+
+    if path is None:
+        return white(transport.projector), transport.projector
+    return read_light_for(transport, path, srgb=srgb, resize=resize)
+
+
 def read_light_for_capture(
     capture: "Capture", path: Path, *, srgb: bool, resize: bool
 ) -> "tuple[Floats, Size]":

@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+from collections.abc import Sequence
 from os.path import realpath
 from pathlib import Path
 from shlex import quote
@@ -40,6 +41,20 @@ def keep_input(output: Path, *inputs: Path) -> None:
         raise InputError(
             f"{output} is an input of this command and is kept: choose another name for the output."
         )
+
+
+def keep_apart(outputs: Sequence[Path]) -> None:
+    """Refuse two outputs of one name, of which the later would replace the earlier.
+
+    Raises
+    ------
+    InputError
+    """
+    for number, output in enumerate(outputs):
+        if realpath(output) in map(realpath, outputs[:number]):
+            raise InputError(
+                f"{output} is named for two outputs of this command: give each a name of its own."
+            )
 
 
 def check_report_page(page: Path, *others: Path, force: bool) -> None:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
-from nearfar.cli.options import require_reconstructed
-from nearfar.cli.saying import warn_if_wrong
+from nearfar.cli.opening import open_reconstructed
 
 if TYPE_CHECKING:
     from nearfar.transport.stored import StoredTransport
@@ -52,12 +51,7 @@ def open_transports(paths: Sequence[Path]) -> "list[StoredTransport]":
         If one is no transport.
     """
     from nearfar.applications.several_projectors import require_same_camera
-    from nearfar.transport.stored import open_transport
 
-    opened = []
-    for path in paths:
-        require_reconstructed(path)
-        opened.append(open_transport(path))
-        warn_if_wrong(path, opened[-1].verdict)
+    opened = [open_reconstructed(path) for path in paths]
     require_same_camera(opened, [str(path) for path in paths])
     return opened

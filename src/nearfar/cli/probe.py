@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nearfar.cli.lights import Resize, Srgb, read_light_for, say_resized
-from nearfar.cli.options import Force, Quiet, TransportPath, keep_input, require_reconstructed
-from nearfar.cli.saying import say, warn_if_wrong
+from nearfar.cli.lights import Resize, Srgb, light_or_white, require_light, say_resized
+from nearfar.cli.opening import open_reconstructed
+from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
+from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def _mask(
     given = [value for value in (within, ring, beyond, epipolar, matrix) if value is not None]
     if len(given) != 1:
         raise typer.BadParameter(
-            f"{len(given) or 'none'} of the masks was given: give exactly one of --within, --ring, "
+            f"{len(given) or 'no'} masks were given: give exactly one of --within, --ring, "
             f"--beyond, --epipolar and --mask."
         )
     if within is not None:
@@ -106,24 +107,15 @@ def probe(
     """
     from nearfar.applications.probe import probe_stored
     from nearfar.files import check_output, check_picture_ending, write_picture
-    from nearfar.illumination.pictures import white
-    from nearfar.transport.stored import open_transport
 
-    if light is None and (srgb or resize):
-        raise typer.BadParameter(
-            "goes with --light only.", param_hint="--srgb" if srgb else "--resize"
-        )
+    require_light(light, srgb=srgb, resize=resize)
     chosen, files = _mask(within, ring, beyond, epipolar, mask)
     check_picture_ending(output)
     keep_input(output, transport, *files, *([light] if light else []))
     check_output(output, force=force)
     with progress_bar("probing", quiet=quiet):
-        require_reconstructed(transport)
-        opened = open_transport(transport)
-        warn_if_wrong(transport, opened.verdict)
-        projected, given = white(opened.projector), opened.projector
-        if light is not None:
-            projected, given = read_light_for(opened, light, srgb=srgb, resize=resize)
+        opened = open_reconstructed(transport)
+        projected, given = light_or_white(opened, light, srgb=srgb, resize=resize)
         picture = probe_stored(opened, projected, chosen)
         write_picture(output, picture, force=force)
     if light is not None:

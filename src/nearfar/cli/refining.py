@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from nearfar.cli.opening import check_rig
 from nearfar.cli.saying import say_memory, warn
 from nearfar.errors import DeviceError, KeptInterrupt
 from nearfar.progress import progress_bar
@@ -17,23 +18,18 @@ if TYPE_CHECKING:
 MOST = 3
 
 
-def check_rig(refine: int | None, rig: str | None) -> None:
+def check_refinement(refine: int | None, rig: str | None) -> None:
     """Refuse --refine without --rig, --rig without --refine, and a rig that is not there.
 
     Before a light is computed, which takes a while.
     """
-    from nearfar.rigs.opening import require_rig
-    from nearfar.rigs.tables import read_rig_table
-
     if (refine is None) != (rig is None):
         raise typer.BadParameter(
             "goes with --rig only." if rig is None else "is for --refine.",
             param_hint="--refine" if rig is None else "--rig",
         )
     if rig is not None:
-        require_rig(rig)
-        if Path(rig).suffix.lower() == ".toml":
-            read_rig_table(Path(rig))
+        check_rig(rig)
 
 
 def refined(

@@ -66,8 +66,8 @@ def superpose(
     if found.missing > MOST_MISSING:
         warn(
             f"{light} is not a sum of the patterns of {capture_path}: a part of it ({how_much}) is "
-            f"missing from the picture, of which error bars do not tell. Reconstruct a transport "
-            f"and relight by it, or shoot patterns of that kind."
+            f"missing from the picture and from its error bars. Reconstruct a transport and "
+            f"relight by it, or shoot patterns of that kind."
         )
     if as_json:
         numbers = {

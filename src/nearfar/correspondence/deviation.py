@@ -1,12 +1,12 @@
 """The error bar of q: a standard deviation on each axis, right up to one factor for all of it.
 
-No method of correspondence tells the error of q, and most of it is no noise. A camera pixel sees a
+No method of correspondence tells the error of q, and most of it is not noise. A camera pixel sees a
 few whole projector pixels, so that the centroid of their light is not where the middle of the
-camera pixel looks; and at edges it sees two surfaces. All of these show as scatter: the variance of
-q(c - 1) - 2 q(c) + q(c + 1) is 6 times that of q, where the surface is flat so far.
+camera pixel looks; and at edges it sees two surfaces. All of these show as scatter: where the
+surface is flat, the variance of q(c - 1) - 2 q(c) + q(c + 1) is 6 times that of q.
 
-What neighbours err by alike does not show, so that the deviation is right up to a factor. What q
-misses the epipolar lines by tells it (`nearfar.applications.depth`).
+Errors that neighbours share do not show, so that the deviation is right up to a factor. The factor
+follows from the distances of q from the epipolar lines (`nearfar.applications.depth`).
 """
 
 import numpy as np

@@ -100,12 +100,24 @@ def largest_exposures(whites: Floats, black: Floats, level: float = 0.9) -> tupl
     -------
     tuple of float
         Over that of `whites`. All projectors have the same exposure, so that their light adds up.
+        Camera pixels that are brighter than the level under black do not count.
+
+    Raises
+    ------
+    InputError
+        If no camera pixel is lit and below the level under black.
     """
     light = np.asarray(whites, dtype=np.float64) - black
     room = level - black
 
     def largest(lit: Floats) -> float:
-        return float(np.min(np.where(lit > 0, room / np.where(lit > 0, lit, 1.0), np.inf)))
+        counted = (lit > 0) & (room > 0)
+        if not counted.any():
+            raise InputError(
+                f"every camera pixel that a projector lights is above {level:.0%} of full scale "
+                f"under black: expose less, or keep ambient light out."
+            )
+        return float(np.min(room[counted] / lit[counted]))
 
     return largest(light.max(axis=0)), largest(light.sum(axis=0))
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from nearfar.arrays import middles
 from nearfar.capture import Capture
+from nearfar.decibels import in_figures
 from nearfar.markup import numbers
 from nearfar.plan import Plan
 from nearfar.progress import Report, ignore_progress
@@ -131,4 +132,4 @@ def _name(capture: Capture, light: CheckedLight) -> str:
 
 
 def _decibels(value: float | None) -> str:
-    return "" if value is None or not np.isfinite(value) else f"{value:.1f}"
+    return "" if value is None or not np.isfinite(value) else in_figures(value)

@@ -8,12 +8,13 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from nearfar.decibels import in_figures, in_words
 from nearfar.files import new_output
 from nearfar.markup import numbers
 from nearfar.report.figures.style import new_figure, save, styled
 from nearfar.report.methods import comparison_methods
 from nearfar.report.page import figure_caption, listed, page, plot
-from nearfar.workflow.compare import Comparison, Trial
+from nearfar.workflow.comparison import Comparison, Trial
 from nearfar.workflow.rivals import RIVALS
 
 INDEX = "index.html"
@@ -88,8 +89,8 @@ def draw(comparison: Comparison) -> Figure:
         _draw_lines(axes, trials)
     # After both plots, which share the axis, have set its limits.
     left.set_ylim(bottom=max(MINIMUM_PLOTTED_SNR, left.get_ylim()[0]))
-    left.set_xlabel("photos in all, each exposed alike")
-    right.set_xlabel("total exposure, photos' worth")
+    left.set(xlabel="photos in all, each exposed alike", title="equal photos")
+    right.set(xlabel="total exposure, photos' worth", title="equal total exposure")
     left.set_ylabel("SNR$_b$, mean over pictures, dB")
     handles, labels = left.get_legend_handles_labels()
     # In rows of about the same length.
@@ -176,9 +177,9 @@ def winners(trials: Sequence[Trial]) -> list[str]:
     for budget in sorted({trial.budget for trial in trials}):
         rivals = (trial for trial in trials if trial.budget == budget)
         best, *others = sorted(rivals, key=lambda trial: trial.pictures, reverse=True)
-        text = f"{budget}: {RIVALS[best.method].title} {best.pictures:.1f} dB"
+        text = f"{budget}: {RIVALS[best.method].title} {in_words(best.pictures)}"
         if others:
-            text += f", then {RIVALS[others[0].method].title} {others[0].pictures:.1f} dB"
+            text += f", then {RIVALS[others[0].method].title} {in_words(others[0].pictures)}"
         lines.append(text)
     return lines
 
@@ -191,7 +192,7 @@ def table_rows(trials: Sequence[Trial]) -> list[list[str]]:
             RIVALS[trial.method].title,
             f"{trial.photos}",
             f"{trial.exposure:.0f}",
-            *(f"{value:.1f}" for value in (trial.pictures, trial.white, trial.random)),
+            *map(in_figures, (trial.pictures, trial.white, trial.random)),
             ", ".join(map(str, best.get(trial, []))),
         ]
         for trial in _ordered(trials)
@@ -229,7 +230,7 @@ def comparison_page(comparison: Comparison, command: str | None = None) -> str:
     """Return the page beside whose file those of the plot and the data lie."""
     sheet = (
         f'<figure class="sheet"><img src="{PLOT}.png" alt="{PLOT_SHOWS}">'
-        f"{figure_caption('', READING)}</figure>"
+        f"{figure_caption(PLOT_SHOWS, READING)}</figure>"
     )
     links = f'<a href="{PLOT}.pdf">PDF</a>, <a href="{DATA}">data</a>.'
     return _page(comparison, sheet, links, command)

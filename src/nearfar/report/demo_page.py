@@ -7,6 +7,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.correspondence import Correspondence
+from nearfar.decibels import in_words
 from nearfar.estimate.physical import PhysicalSplit, split_physically
 from nearfar.markup import numbers, picture
 from nearfar.plan import Plan
@@ -58,9 +59,9 @@ def demo_page(
         [
             (str(photos), "photos in all, those of white and black too"),
             (f"{brute_force / photos:.1f}×", f"fewer than {brute_force} by brute force"),
-            (f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of five pictures"),
-            (f"{snr_b['white']:.1f} dB", "SNR_b under floodlight, which was measured itself"),
-            (f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"),
+            (in_words(judgement["snr_b_pictures"]), "SNR_b, mean of five pictures"),
+            (in_words(snr_b["white"]), "SNR_b under floodlight, which was measured itself"),
+            (in_words(judgement["snr_t"]["p50"]), "SNR_t, median camera pixel"),
         ]
     )
     gain = difference_gain((transport @ light) - (truth @ light) for light in lights.values())
@@ -74,7 +75,7 @@ def demo_page(
     ceiling = judgement["ceiling"]["snr_b"]
     table = numbers(
         ["light", "SNR_b", "ceiling of the model, no noise"],
-        [[name, f"{value:.1f} dB", f"{ceiling[name]:.1f} dB"] for name, value in snr_b.items()],
+        [[name, in_words(value), in_words(ceiling[name])] for name, value in snr_b.items()],
     )
     times = ", ".join(f"{name} {value:.1f} s" for name, value in seconds.items())
     body = f"""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from nearfar.decibels import EXACT, ROUNDING, in_words
 from nearfar.markup import numbers
 from nearfar.report.beside import pictures_beside
 from nearfar.report.figures.style import new_figure, styled
@@ -58,17 +59,17 @@ def evaluation_page(
     snr_b: Mapping[str, float] = judgement["snr_b"]
     ceiling = judgement.get("ceiling", {}).get("snr_b", {})
     if "snr_b_pictures" in judgement:
-        cards = [(f"{judgement['snr_b_pictures']:.1f} dB", "SNR_b, mean of natural pictures")]
+        cards = [(in_words(judgement["snr_b_pictures"]), "SNR_b, mean of natural pictures")]
     else:
-        cards = [(f"{judgement['snr_b_mean']:.1f} dB", f"SNR_b, mean of {len(snr_b)} lights")]
+        cards = [(in_words(judgement["snr_b_mean"]), f"SNR_b, mean of {len(snr_b)} lights")]
     if rows is not None:
-        cards.append((f"{judgement['snr_t']['p50']:.1f} dB", "SNR_t, median camera pixel"))
+        cards.append((in_words(judgement["snr_t"]["p50"]), "SNR_t, median camera pixel"))
         cards.append(
-            (f"{judgement['snr_t']['p5']:.1f} dB", "SNR_t that 95 of 100 camera pixels exceed")
+            (in_words(judgement["snr_t"]["p5"]), "SNR_t that 95 of 100 camera pixels exceed")
         )
     head = ["light", "SNR_b", *(["ceiling of the model, no noise"] if ceiling else [])]
     table = [
-        [name, f"{value:.1f} dB", *([f"{ceiling[name]:.1f} dB"] if ceiling else [])]
+        [name, in_words(value), *([in_words(ceiling[name])] if ceiling else [])]
         for name, value in white_last(snr_b).items()
     ]
     exposure = exposure_of(transport)
@@ -104,15 +105,23 @@ def _row_section(rows: Rows | None, transport: Transport) -> str:
         return ""
     saturated = None if transport.quality is None else transport.quality.saturated
     snr_t = rows.snr_t if saturated is None else np.where(saturated, np.nan, rows.snr_t)
+    title = "<h2>Every camera pixel, every frequency</h2>"
+    known = np.concatenate([snr_t.ravel(), rows.snr_b_of_frequency.ravel()])
+    known = known[np.isfinite(known)]
+    if known.size and known.min() > ROUNDING:
+        return f"{title}<p>All rows and all frequencies are {EXACT}.</p>"
     with styled():
         figure = new_figure(2.2)
         axes = figure.subplots()
-        axes.hist(snr_t[np.isfinite(snr_t)], bins=60, color="#1f4e9c")
+        # Beyond it there is noise of the arithmetic alone.
+        axes.hist(np.minimum(snr_t[np.isfinite(snr_t)], ROUNDING), bins=60, color="#1f4e9c")
         axes.set(xlabel="SNR_t, dB", ylabel="camera pixels")
     reading = (
         "The further to the right, the better. A second hump at the left is of camera pixels "
         "that the model does not hold, or that see little light; the maps show where they are."
     )
+    if (snr_t > ROUNDING).any():
+        reading += f" Rows at {ROUNDING:.0f} dB are {EXACT}."
     maps = (
         (snr_t, saturated, "SNR_t of every camera pixel", ROWS_READING),
         (
@@ -125,11 +134,8 @@ def _row_section(rows: Rows | None, transport: Transport) -> str:
     drawn = ""
     # A sample of rows makes no map.
     for values, marked, caption, how in maps[rows.compared < rows.snr_t.size :]:
-        known = values[np.isfinite(values)]
-        low, high = map(float, np.percentile(known, [1, 99]) if known.size else (0.0, 1.0))
-        drawn += colour_map(values, low, high, "dB", caption, reading=how, saturated=marked)
-    return (
-        f"<h2>Every camera pixel, every frequency</h2>"
-        f"{plot(figure, 'histogram of SNR_t', reading)}"
-        f'<div class="maps">{drawn}</div>'
-    )
+        shown = np.minimum(values, ROUNDING)
+        finite = shown[np.isfinite(shown)]
+        low, high = map(float, np.percentile(finite, [1, 99]) if finite.size else (0.0, 1.0))
+        drawn += colour_map(shown, low, high, "dB", caption, reading=how, saturated=marked)
+    return f'{title}{plot(figure, "histogram of SNR_t", reading)}<div class="maps">{drawn}</div>'

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from nearfar.arrays import Size
+from nearfar.decibels import in_words
 from nearfar.plan import Plan
 from nearfar.release import version
 from nearfar.report.about import PAPER, Methods, software_reference
@@ -12,7 +13,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.check import ModelCheck
-from nearfar.workflow.compare import Comparison
+from nearfar.workflow.comparison import Comparison
 from nearfar.workflow.rivals import RIVALS
 from nearfar.workflow.verdict.held_out import PICTURES, HeldOut
 
@@ -187,8 +188,8 @@ def _checked_by(verdict: KeptVerdict) -> str:
     least = "at least " if verdict.is_least else ""
     return (
         f"Photos that were left out of an estimate of a sample of camera pixels ("
-        f"{verdict.checked_by}) were foretold with an SNR_b of {least}{verdict.held_out_snr:.1f} "
-        f"dB{beside}."
+        f"{verdict.checked_by}) were foretold with an SNR_b of {least}"
+        f"{in_words(verdict.held_out_snr)}{beside}."
     )
 
 
@@ -204,7 +205,7 @@ def checked_by_photos(held_out: HeldOut | None) -> str:
     least = "at least " if held_out.is_least else ""
     return (
         f"Relit under {counted(len(held_out.lights), 'pattern')} whose photos {use}, the transport "
-        f"has a mean SNR_b of {least}{held_out.snr:.1f} dB{beside}."
+        f"has a mean SNR_b of {least}{in_words(held_out.snr)}{beside}."
     )
 
 

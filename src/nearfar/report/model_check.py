@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Size
+from nearfar.decibels import in_words
 from nearfar.markup import numbers
 from nearfar.report.methods import check_methods
 from nearfar.report.page import colour_map, facts, listed, page, verdict_box
@@ -67,8 +68,8 @@ def check_rows(check: Mapping[str, Any]) -> list[list[str]]:
         [
             "the best that the model can do, without noise",
             "",
-            f"{check['best_pictures']:.1f} dB under pictures, {check['best_rows']:.1f} dB SNR_t of "
-            f"the median camera pixel",
+            f"{in_words(check['best_pictures'])} under pictures, {in_words(check['best_rows'])} in "
+            f"SNR_t of the median camera pixel",
         ],
         ["camera pixels with direct light", "all", f"{check['lit']:.1%}"],
         ["N outside the window", "none", f"{check['near_outside']:.2%} of its energy"],

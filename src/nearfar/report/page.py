@@ -78,7 +78,7 @@ img { display: block; width: 100%; min-width: 110px; image-rendering: pixelated;
 .numbers td:first-child, .numbers th:first-child { text-align: left; }
 .numbers tr:last-child td { border-bottom: 0; }
 .numbers th { color: var(--soft); font-weight: 500; font-size: .85rem; }
-.numbers tr.best td { font-weight: 650; color: var(--far); }
+.numbers tr.best td, .numbers td.best { font-weight: 650; color: var(--far); }
 .broad .numbers { max-width: none; }
 .broad .numbers td:first-child { min-width: 14rem; }
 .maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 1.2rem; }

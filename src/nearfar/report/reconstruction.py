@@ -4,6 +4,7 @@ from collections.abc import Callable
 from html import escape
 
 from nearfar.capture import Capture
+from nearfar.decibels import in_figures
 from nearfar.markup import numbers
 from nearfar.plan import Plan
 from nearfar.report.methods import checked_by_photos, reconstruction_methods
@@ -82,7 +83,7 @@ def _held_out(verdict: Verdict) -> str:
         return ""
 
     def written(decibels: float | None) -> str:
-        return "" if decibels is None else f"{decibels:.1f}"
+        return "" if decibels is None else in_figures(decibels)
 
     fine = verdict.held_out.fine
     rows = [

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from nearfar.decibels import in_words
 from nearfar.markup import numbers
 from nearfar.workflow.evaluate import HIGHEST
 
@@ -45,7 +46,7 @@ def _physical(judgement: Mapping[str, Any]) -> str:
     table = numbers(
         ["component", "its floodlit picture"],
         [
-            [shown, f"{found[name]:.1f} dB" if name in found else "the scene has none"]
+            [shown, in_words(found[name]) if name in found else "the scene has none"]
             for name, shown in PHYSICAL_NAMES.items()
         ],
     )
@@ -70,4 +71,4 @@ def _model(judgement: Mapping[str, Any]) -> str:
 
 
 def _decibels(value: float) -> str:
-    return f"{value:.1f} dB" if value > -HIGHEST else "the scene has none"
+    return in_words(value) if value > -HIGHEST else "the scene has none"

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from nearfar.arrays import Floats
 from nearfar.capture import Capture
+from nearfar.decibels import in_words
 from nearfar.faults.of_capture import find_faults
 from nearfar.illumination.pictures import natural_picture, white
 from nearfar.markup import numbers, picture
@@ -179,7 +180,7 @@ def _thinned(step: int) -> str:
 
 def _median(snr: Map) -> str:
     finite = snr.values[np.isfinite(snr.values)]
-    return f"{np.median(finite):.1f} dB" if finite.size else "none"
+    return in_words(float(np.median(finite))) if finite.size else "none"
 
 
 def _relit_pictures(verdict: KeptVerdict) -> list[tuple[str, str]]:
@@ -191,7 +192,7 @@ def _relit_pictures(verdict: KeptVerdict) -> list[tuple[str, str]]:
         beside += "; planned for {:.0f} to {:.0f} dB".format(*verdict.planned_snr)
     least = "at least " if verdict.is_least else ""
     lights = f"{verdict.checked_by} no estimate saw"
-    return [(f"{least}{verdict.held_out_snr:.1f} dB", f"held-out SNR_b: {lights}{beside}")]
+    return [(f"{least}{in_words(verdict.held_out_snr)}", f"held-out SNR_b: {lights}{beside}")]
 
 
 def _saturated(transport: Transport) -> list[tuple[str, str]]:

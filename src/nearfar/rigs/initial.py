@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from nearfar.rigs.cameras.driver import FoundCamera
 from nearfar.rigs.cameras.registry import CAMERAS
-from nearfar.rigs.screens import Monitor, choose_monitor
+from nearfar.rigs.monitors import Monitor, choose_monitor
 
 ADVICE = """\
 # Exposure in seconds, rounded to whole refreshes of the projector; "auto" fits it to white.

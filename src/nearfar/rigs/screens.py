@@ -1,4 +1,4 @@
-"""A projector on a video output: its monitors, and a window that shows frames pixel for pixel.
+"""A projector on a video output: a window that shows frames pixel for pixel.
 
 Index convention: frames are (height, width) for grey or (height, width, 3), 8 bits, at the
 monitor's native size.
@@ -7,27 +7,29 @@ monitor's native size.
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Size
 from nearfar.errors import DeviceError, InputError
 from nearfar.packages import needed
+from nearfar.rigs.monitors import (
+    Monitor,
+    choose_monitor,
+    dark_monitors,
+    handle_of,
+    monitors_of,
+    text_of,
+    window_system,
+)
 
-# Refreshes a second of a monitor that does not report them.
-DEFAULT_REFRESH_RATE = 60.0
 # Seconds between readings of the keyboard while waiting.
 KEYBOARD_INTERVAL_SECONDS = 0.01
 # Refreshes that are timed. The measured period counts if it is within this share of the nominal.
 TIMED_REFRESHES = 24
 PERIOD_TOLERANCE = 0.02
-
-# The window system once for each that uses it.
-_USERS: list[Any] = []
 
 VERTEX_SHADER = """
 #version 330
@@ -46,33 +48,6 @@ void main() {
     colour = texelFetch(frame, ivec2(place.x, textureSize(frame, 0).y - 1 - place.y), 0);
 }
 """
-
-
-@dataclass(frozen=True)
-class Monitor:
-    """A video output.
-
-    Attributes
-    ----------
-    index : int
-        0 is the main one.
-    name : str
-    size : Size
-        In its pixels.
-    place : tuple of int
-        Its upper left corner (y, x) on the desktop.
-    refresh : float
-        Refreshes a second.
-    """
-
-    index: int
-    name: str
-    size: Size
-    place: tuple[int, int]
-    refresh: float
-
-    def __str__(self) -> str:
-        return f"{self.index}: {self.name}, {self.size} at {self.refresh:g} Hz"
 
 
 class Screen(Protocol):
@@ -107,54 +82,6 @@ class Screen(Protocol):
         ...
 
 
-def find_monitors() -> tuple[Monitor, ...]:
-    """List the video outputs.
-
-    Raises
-    ------
-    MissingPackageError
-        If the window's packages are not installed.
-    DeviceError
-        If there is no display at all.
-    """
-    with _window_system() as glfw:
-        return _monitors(glfw)
-
-
-def choose_monitor(monitors: Sequence[Monitor], wanted: str | int | None) -> Monitor:
-    """Choose a monitor by name or index; the only one, or the second, where nothing is wanted.
-
-    Raises
-    ------
-    InputError
-        If there is no such monitor, or more than one of that name.
-    """
-    if not monitors:
-        raise DeviceError("no monitor is connected: connect the projector and turn it on.")
-    if wanted is None:
-        # The first monitor is usually the one that people work at.
-        return monitors[min(1, len(monitors) - 1)]
-    found = [m for m in monitors if wanted in {m.index, m.name}]
-    if len(found) == 1:
-        return found[0]
-    listed = "; ".join(map(str, monitors))
-    problem = "there is no monitor" if not found else "there are several monitors"
-    raise InputError(f"{problem} {wanted!r}: name one of these by its index: {listed}.")
-
-
-def _dark_monitors(
-    monitors: Sequence[Monitor], wanted: Sequence[str | int], lit: Monitor
-) -> list[Monitor]:
-    """Choose monitors to hold black, and refuse the one that shows patterns."""
-    chosen = [choose_monitor(monitors, name) for name in wanted]
-    if lit in chosen:
-        raise InputError(
-            f"monitor {lit.name} is to show patterns and to be held black: name the monitors of "
-            f"other projectors alone under dark."
-        )
-    return chosen
-
-
 class Window:
     """A full-screen window on a monitor; shows frames pixel for pixel, in step with its refresh.
 
@@ -176,10 +103,10 @@ class Window:
     def __init__(self, wanted: str | int | None = None, dark: Sequence[str | int] = ()) -> None:
         self._stack = ExitStack()
         try:
-            self._glfw = self._stack.enter_context(_window_system())
-            monitors = _monitors(self._glfw)
+            self._glfw = self._stack.enter_context(window_system())
+            monitors = monitors_of(self._glfw)
             self.monitor = choose_monitor(monitors, wanted)
-            others = _dark_monitors(monitors, dark, self.monitor)
+            others = dark_monitors(monitors, dark, self.monitor)
             self._stack.enter_context(_kept_awake())
             self._stopped = self._gone = False
             self._dark: list[Window] = []
@@ -267,7 +194,7 @@ class Window:
         import moderngl
 
         glfw, size = self._glfw, self.monitor.size
-        handle = _handle(glfw, self.monitor)
+        handle = handle_of(glfw, self.monitor)
         mode = glfw.get_video_mode(handle)
         for hint, value in (
             (glfw.CONTEXT_VERSION_MAJOR, 3),
@@ -329,54 +256,7 @@ class Window:
     def _on_monitor(self, monitor: Any, event: int) -> None:
         if event == self._glfw.DISCONNECTED:
             name = self._glfw.get_monitor_name(monitor)
-            self._gone = self._gone or _text(name) == self.monitor.name
-
-
-@contextmanager
-def _window_system() -> Iterator[Any]:
-    with needed(extra="window", what="a window on the projector"):
-        import glfw
-        import moderngl  # noqa: F401
-    glfw.ERROR_REPORTING = "raise"
-    try:
-        there = glfw.init()
-    except glfw.GLFWError as error:
-        raise _no_display(str(error)) from None
-    if not there:
-        raise _no_display("no display")
-    _USERS.append(glfw)
-    try:
-        yield glfw
-    finally:
-        _USERS.pop()
-        # Terminating closes the windows of all.
-        if not _USERS:
-            glfw.terminate()
-
-
-def _no_display(reason: str) -> DeviceError:
-    return DeviceError(
-        f"there is no display to show patterns on ({reason}): run where one is, or set DISPLAY."
-    )
-
-
-def _monitors(glfw: Any) -> tuple[Monitor, ...]:
-    found = []
-    for index, handle in enumerate(glfw.get_monitors()):
-        mode = glfw.get_video_mode(handle)
-        x, y = glfw.get_monitor_pos(handle)
-        size = Size(mode.size.height, mode.size.width)
-        refresh = float(mode.refresh_rate) or DEFAULT_REFRESH_RATE
-        found.append(Monitor(index, _text(glfw.get_monitor_name(handle)), size, (y, x), refresh))
-    return tuple(found)
-
-
-def _handle(glfw: Any, monitor: Monitor) -> Any:
-    return glfw.get_monitors()[monitor.index]
-
-
-def _text(name: bytes | str) -> str:
-    return name.decode(errors="replace") if isinstance(name, bytes) else name
+            self._gone = self._gone or text_of(name) == self.monitor.name
 
 
 @contextmanager

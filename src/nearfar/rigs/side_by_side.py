@@ -18,9 +18,10 @@ from nearfar.progress import Report
 from nearfar.rigs.calibration import Calibration, calibration_folder, read_calibration
 from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.linear import LinearProjector, identity
+from nearfar.rigs.monitors import Monitor
 from nearfar.rigs.opening import exposure_of, open_rig
 from nearfar.rigs.real.rig import RealRig
-from nearfar.rigs.screens import Monitor, Screen, Window
+from nearfar.rigs.screens import Screen, Window
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.rigs.simulated.side_by_side import simulated_side_by_side
 from nearfar.rigs.tables import RealTable, ScreenTable, read_rig_table

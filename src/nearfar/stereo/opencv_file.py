@@ -24,14 +24,25 @@ MATRIX = "!!opencv-matrix"
 NEEDED = ("size1", "M1", "D1", "size2", "M2", "D2", "R", "T")
 ERROR = "reprojection_error"
 LARGEST_SIDE = 2**20
-# Of values that are no numbers, and of lists in lists without end.
-MALFORMED = (KeyError, TypeError, ValueError, OverflowError, RecursionError)
+# Of values that are no numbers, and of lists nested too deep.
+MALFORMED = (yaml.YAMLError, KeyError, TypeError, ValueError, OverflowError, RecursionError)
 # A calibration is some thousand characters.
 LONGEST = 2**20
 
 
 class _Loader(yaml.SafeLoader):  # type: ignore[misc]
     """Reads YAML and OpenCV's matrices, and makes numbers, text, lists and arrays alone."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Read a node; refuse an alias, by which a short file could stand for a huge matrix.
+
+        Raises
+        ------
+        yaml.YAMLError
+        """
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("it holds aliases, which OpenCV does not write")
+        return super().compose_node(parent, index)
 
 
 def _matrix(loader: _Loader, node: yaml.Node) -> Floats:
@@ -157,14 +168,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     try:
         # A loader that knows no objects.
         found = yaml.load(text, Loader=_Loader)
-    except (
-        yaml.YAMLError,
-        KeyError,
-        TypeError,
-        ValueError,
-        OverflowError,
-        RecursionError,
-    ) as error:
+    except MALFORMED as error:
         reason = " ".join(str(error).split())[:200]
         raise UnreadableFileError(
             f"{path} is no calibration that can be read ({reason}): write it by nearfar "

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
+from nearfar.decibels import in_words
+
 Grade = Literal["good", "doubtful", "wrong"]
 
 # Of a transport without a verdict.
@@ -100,7 +102,7 @@ class KeptVerdict:
         if self.widening > 1:
             widened = f"; error bars are made {self.widening:.2g} times as wide, to hold"
         least = "at least " if self.is_least else ""
-        held_out = ", ".join([f"{least}{self.held_out_snr:.1f} dB", *beside])
+        held_out = ", ".join([f"{least}{in_words(self.held_out_snr)}", *beside])
         return (
             f"Relit {self.checked_by} are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % "
             f"(held-out SNR_b {held_out}){widened}."

@@ -80,7 +80,7 @@ def acquire_shared(
 
 def take_apart(
     shared: Capture,
-    outputs: Sequence[AnyPath],
+    outputs: Sequence[AnyPath | None],
     *,
     force: bool = False,
     progress: Report | None = None,
@@ -90,8 +90,8 @@ def take_apart(
     Parameters
     ----------
     shared : Capture
-    outputs : sequence of str or Path
-        Captures to make, one for each projector.
+    outputs : sequence of str, Path or None
+        Captures to make, one for each projector; None where none is to be made.
     force : bool
         Replace captures that are there.
     progress : callable, optional
@@ -100,6 +100,7 @@ def take_apart(
     Returns
     -------
     list of Capture
+        Those that were made.
 
     Raises
     ------
@@ -120,6 +121,8 @@ def take_apart(
     rigs = shared.rig.get("projectors") or [shared.rig] * len(each)
     written = []
     for number, (photos, output, rig) in enumerate(zip(each, outputs, rigs, strict=True)):
+        if output is None:
+            continue
         count = len(photos.plan.patterns)
         write_capture(
             photos.plan,

@@ -88,11 +88,8 @@ def depth(
     ----------
     source : Capture or Transport
     stereo : StereoCalibration
-    scale : int, optional
-        Side of a pattern pixel in the projector's; by default what the rig tells, or else the
-        largest that fits.
-    least_confidence : float
-        Camera pixels whose q is less sure are left out.
+    scale, least_confidence
+        As `nearfar.triangulate` takes them; a real rig tells its own scale.
     progress : callable, optional
         Called with the step and the share of it that is done, 0 to 1.
 

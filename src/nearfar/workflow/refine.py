@@ -1,28 +1,30 @@
 """Lights that compensate a scene, corrected by photos of them on a rig.
 
-What a transport does not know of a rig, such as a response that is not linear, shows in a photo of
-the light: where it is darker than wanted, the light is raised there by D^-1 of what is missing.
-What a correction changes in the next photo tells the slope of the projector's response at each
-projector pixel, by which later corrections are divided (Broyden's method with a diagonal matrix).
-A correction that the photos do not confirm is taken back.
+A photo of the light shows what the transport does not know of a rig, such as a response that is not
+linear. Where the photo is darker than wanted, the light is raised by D^-1 of what is missing. The
+change of the next photo tells the slope of the projector's response at each projector pixel, by
+which later corrections are divided (Broyden's method with a diagonal matrix). A correction that
+makes the photo worse is taken back.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import inf, isfinite, log10, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from nearfar.applications.compensate import (
-    LEAST_DIAGONAL,
-    Compensation,
-    camera_weights,
+from nearfar.applications.compensate import Compensation
+from nearfar.applications.compensation_problem import LEAST_DIAGONAL, camera_weights
+from nearfar.applications.likeness import (
+    decibels_below,
+    distance_from,
+    finite_or_none,
+    without_single_channel,
 )
 from nearfar.applications.onto_projector import OntoProjector, onto_projector
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, Size
 from nearfar.callbacks import Report, as_report
 from nearfar.checks import as_count, require_instance
 from nearfar.errors import InputError
@@ -31,14 +33,15 @@ from nearfar.transport.colour import mixing_of
 from nearfar.transport.model import Transport
 
 MOST_CORRECTIONS = 3
-# Slope of the response that the first correction takes for granted: it falls short of what a
-# linear projector needs, as one of gamma 2.2 has twice its slope at white.
+# Slope of the response before any is known: between 1, of a linear projector, and 2.2, which a
+# projector of gamma 2.2 has at white.
 FIRST_SLOPE = 1.4
 SLOPES = (0.3, 4.0)
-# Slopes are those of projector pixels within so many, and of the first where little has changed.
+# Slopes are averaged over about so many projector pixels. Where the light changed by less than
+# `LEAST_CHANGE` they stay near the first one.
 SLOPE_WIDTH = 1.5
 LEAST_CHANGE = 0.01
-# Where a correction made a photo worse, the next one is at most so much of it.
+# After a correction that made the photo worse, the next one is this share of a full step.
 BACK = 0.4
 
 
@@ -81,15 +84,12 @@ class Refinement:
     @property
     def psnr(self) -> float:
         """`rmse` below `peak`, in dB."""
-        return self._decibels(self.rmse)
+        return decibels_below(self.peak, self.rmse)
 
     @property
     def psnr_before(self) -> float:
         """The same of the light as it was given."""
-        return self._decibels(self.errors[0])
-
-    def _decibels(self, rmse: float) -> float:
-        return 20 * log10(self.peak / rmse) if rmse > 0 else inf
+        return decibels_below(self.peak, self.errors[0])
 
 
 def refine_compensation(
@@ -150,7 +150,7 @@ def refine_compensation(
 def refinements(
     transport: Transport, found: Compensation, rig: Rig, corrections: int
 ) -> Iterator[Refinement]:
-    """Yield what is best after each photo; see `refine_compensation`."""
+    """Yield the best light so far after each photo; see `refine_compensation`."""
     require_instance(transport, Transport, "transport", "nearfar.load_transport")
     require_instance(found, Compensation, "compensation", "nearfar.compensate")
     if not 1 <= as_count(corrections, "the number of corrections") <= MOST_CORRECTIONS:
@@ -160,12 +160,20 @@ def refinements(
             f"the transport is of a projector of {transport.projector}, the rig has "
             f"{rig.projector}: give the rig that the transport was measured with."
         )
-    target = found.target.astype(np.float64).reshape(*transport.camera, transport.channels)
+    shape = (*transport.camera, transport.channels)
+    if found.target.shape not in {shape, shape[: 2 + (transport.channels > 1)]}:
+        raise InputError(
+            f"the compensation is of photos of {Size(*found.target.shape[:2])}, the transport of "
+            f"{transport.camera} with {transport.channels} channels: give the transport that it "
+            f"was computed with."
+        )
+    target = found.target.astype(np.float64).reshape(shape)
     correction = _correction(transport)
     counted = camera_weights(transport)[..., 0] > 0
-    best = shown = _shown(transport, rig, found.light, target, counted, 0)
+    light = found.light.reshape(*transport.projector, -1)
+    best = shown = _shown(transport, rig, light, target, counted, 0)
     errors = [shown.error]
-    yield _refinement(best, errors, target, counted, transport)
+    yield _refinement(best, errors, target, counted)
     slope, share = np.full_like(best.light, FIRST_SLOPE), 1.0
     for number in range(1, corrections + 1):
         step = share * correction.of(best.missing) / slope
@@ -177,15 +185,15 @@ def refinements(
             best, share = shown, 1.0
         else:
             share *= BACK
-        yield _refinement(best, errors, target, counted, transport)
+        yield _refinement(best, errors, target, counted)
 
 
 def describe_photos(refined: Refinement) -> dict[str, Any]:
     """Return the errors of the photos of the lights, as JSON types."""
-    found = {"psnr_before_dB": refined.psnr_before, "psnr_refined_dB": refined.psnr}
     return {
         "photo_rmse": list(refined.errors),
-        **{name: value if isfinite(value) else None for name, value in found.items()},
+        "psnr_before_dB": finite_or_none(refined.psnr_before),
+        "psnr_refined_dB": finite_or_none(refined.psnr),
     }
 
 
@@ -242,8 +250,8 @@ def _shown(
     first: int,
 ) -> _Shown:
     """Photograph black and a light, and compare them with what is wanted."""
-    pattern = np.rint(255 * np.clip(light, 0.0, 1.0)).astype(np.uint8)
-    pattern = pattern[..., 0] if pattern.ndim == 3 and pattern.shape[2] == 1 else pattern
+    projected = np.clip(without_single_channel(light), 0.0, 1.0)
+    pattern = np.rint(255 * projected).astype(np.uint8)
     black = np.zeros(transport.projector, dtype=np.uint8)
     photos: list[NDArray[Any]] = list(rig.shoot([black, pattern], first))
     under_black, photo = (one.astype(np.float64) / rig.full_scale for one in photos)
@@ -254,10 +262,10 @@ def _shown(
             f"the rig's photos are {shape}, those of the transport {wanted} (height x width x "
             f"channels): give the rig that the transport was measured with."
         )
-    missing = target - (photo - under_black)
-    error = sqrt(float(np.mean(missing[counted] ** 2)))
+    seen = photo - under_black
+    error = distance_from(target, counted)(seen, None)
     levels = pattern.astype(np.float64) / 255
-    return _Shown(levels.reshape(*transport.projector, -1), missing, error)
+    return _Shown(levels.reshape(*transport.projector, -1), target - seen, error)
 
 
 def _slope(change: Floats, seen: Floats) -> Floats:
@@ -269,15 +277,10 @@ def _slope(change: Floats, seen: Floats) -> Floats:
     return np.clip((both + FIRST_SLOPE * known) / (squares + known), *SLOPES)
 
 
-def _refinement(
-    best: _Shown, errors: list[float], target: Floats, counted: Booleans, transport: Transport
-) -> Refinement:
-    one = transport.channels == 1
-    photo = (target - best.missing).astype(np.float32)
-    light = best.light.astype(np.float32)
+def _refinement(best: _Shown, errors: list[float], target: Floats, counted: Booleans) -> Refinement:
     return Refinement(
-        light=light[..., 0] if light.shape[2] == 1 else light,
-        photo=photo[..., 0] if one else photo,
+        light=without_single_channel(best.light).astype(np.float32),
+        photo=without_single_channel(target - best.missing).astype(np.float32),
         errors=tuple(errors),
         peak=float(target[counted].max()),
     )

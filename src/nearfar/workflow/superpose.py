@@ -5,13 +5,13 @@ their photos. The weights find
 
     min |l - sum_k w_k l_k|^2 + ridge |w|^2  with  sum_k w_k = 0,
 
-so that black, ambient light and black level go out by themselves, whatever they are; in place of
-a pattern, its difference from another counts. The ridge is the photos' noise over the mean square
-of an entry of T: weights that would gain less light than noise stay small. What is left of l was
-never shown; a sum of photos cannot tell its picture.
+so that ambient light and black level cancel, whatever they are: only differences of patterns count.
+The ridge is the photos' noise over the mean square of an entry of T; it keeps weights small that
+would add more noise than light. The residual of l was never shown, and a sum of photos does not
+tell its picture.
 
-Some sums of patterns are nothing: an inverse pair less another, a pattern less its repeat. The same
-sums of photos are noise alone, which tells how large it is.
+Some sums of patterns vanish: an inverse pair less another, a pattern less its repeat. The same sums
+of photos are noise alone, from which its size is estimated.
 
 Index convention: k and j run over photos, i over channels of the camera.
 """
@@ -31,11 +31,15 @@ from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few
 from nearfar.photometry.photos import Photos
 from nearfar.progress import Report, ignore_progress
 
-# Values of patterns, or of photos, in memory at once.
+# Values of photos in memory at once.
 VALUES_AT_ONCE = 1 << 24
+# Values of patterns, of two blocks together: the fewer blocks, the less often patterns are drawn.
+PATTERN_VALUES = 1 << 26
+# Projector pixels whose products are summed at once, in double precision.
+PIXELS_AT_ONCE = 1 << 16
 # Camera rows by which noise is estimated, spread over the photo.
 ROWS_OF_NOISE = 32
-# Sums of patterns below this share of the largest, squared, are nothing.
+# A sum of patterns vanishes if its eigenvalue is below this share of the largest one.
 LEAST_SHARE = 1e-9
 # A photo that is saturated spoils the picture if its weight is above this share of the largest.
 LEAST_WEIGHT = 1e-3
@@ -51,7 +55,7 @@ class Superposition:
         In photo units: photo(shown) - photo(black).
     sigma : ndarray, shape (Cy, Cx, channels), float32, or None
         Its standard deviation by the photos' noise; infinite where a photo that counts is
-        saturated. None where no patterns add up to nothing, so that the noise is not known.
+        saturated. None if no sum of patterns vanishes, so that the noise is not known.
     shown : ndarray, shape (Py, Px) or (Py, Px, channels), float32
         The sum of patterns whose picture this is.
     missing : float
@@ -143,19 +147,17 @@ class _Patterns:
         self.capture = capture
         self.count = len(capture.plan.patterns)
         # Two blocks are in memory at once.
-        self.blocks = list(
-            blocks(self.count, max(1, VALUES_AT_ONCE // 2 // capture.plan.projector.pixels))
-        )
+        self.blocks = list(blocks(self.count, PATTERN_VALUES // 2 // capture.plan.projector.pixels))
 
     def draw(self, block: slice) -> Floats:
-        """Return patterns, (n, P), float64."""
+        """Return patterns, (n, P), float32."""
         drawn = [self.capture.pattern(k) for k in range(*block.indices(self.count))]
         if any(pattern.ndim == 3 for pattern in drawn):
             raise InputError(
                 f"{self.capture.path} holds coloured patterns, whose photos are not superposed: "
                 f"give a capture of grey ones."
             )
-        return np.stack(drawn).reshape(len(drawn), -1).astype(np.float64)
+        return np.stack(drawn).reshape(len(drawn), -1)
 
     def products(self, lights: Floats, progress: Report) -> tuple[Floats, Floats]:
         """Return the products of patterns with each other, (K, K), and with lights, (K, n)."""
@@ -163,10 +165,10 @@ class _Patterns:
         cross = np.empty((self.count, lights.shape[1]))
         for number, rows in enumerate(self.blocks):
             mine = self.draw(rows)
-            cross[rows] = mine @ lights
-            gram[rows, rows] = mine @ mine.T
+            cross[rows] = _products(mine, lights.T)
+            gram[rows, rows] = _products(mine, mine)
             for columns in self.blocks[number + 1 :]:
-                gram[rows, columns] = mine @ self.draw(columns).T
+                gram[rows, columns] = _products(mine, self.draw(columns))
                 gram[columns, rows] = gram[rows, columns].T
             progress("patterns", (number + 1) / len(self.blocks))
         return gram, cross
@@ -175,8 +177,18 @@ class _Patterns:
         """Return weighted sums of all patterns, (P, n), of weights (K, n)."""
         total = np.zeros((self.capture.plan.projector.pixels, weights.shape[1]))
         for block in self.blocks:
-            total += self.draw(block).T @ weights[block]
+            drawn = self.draw(block)
+            for some in blocks(len(total), PIXELS_AT_ONCE):
+                total[some] += drawn[:, some].T.astype(np.float64) @ weights[block]
         return total
+
+
+def _products(one: Floats, other: Floats) -> Floats:
+    """Return the products of patterns (n, P) with others (m, P), (n, m), in double precision."""
+    total = np.zeros((len(one), len(other)))
+    for some in blocks(one.shape[1], PIXELS_AT_ONCE):
+        total += one[:, some].astype(np.float64) @ other[:, some].T.astype(np.float64)
+    return total
 
 
 def _centre(gram: Floats, cross: Floats) -> tuple[Floats, Floats]:

@@ -7,8 +7,8 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.plan.patterns import HalfScreen
+from nearfar.workflow.diagnosis.explanations import exposure_change
 from nearfar.workflow.diagnosis.misfit import PhotoFits
-from nearfar.workflow.diagnosis.single_photos import exposure_change
 
 HALVES = (HalfScreen(kind="left half-screen"), HalfScreen(kind="left half-screen", inverse=True))
 SHAPE = (12, 15, 2)

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nearfar.arrays import Floats
+from nearfar.decibels import in_words
 from nearfar.report.figures.components import PARTS, draw_parts
 from nearfar.report.figures.style import (
     SEQUENTIAL,
@@ -60,7 +61,8 @@ def _mark(axes: Axes, x: int, y: int, values: Floats) -> None:
     left, right = sorted(axes.get_xlim())
     side = -1 if x > (left + right) / 2 else 1
     axes.annotate(
-        f"lowest {np.nanmin(values):.1f} dB", (x, y), (8 * side, 8), textcoords="offset points",
+        f"lowest {in_words(float(np.nanmin(values)))}",
+        (x, y), (8 * side, 8), textcoords="offset points",
         ha="right" if side < 0 else "left", color="white", fontsize=7,
         bbox={"boxstyle": "round,pad=0.15", "fc": "#00000099", "ec": "none"},
     )  # fmt: skip

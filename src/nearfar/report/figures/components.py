@@ -5,6 +5,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from nearfar.decibels import in_words
 from nearfar.report.figures.style import new_figure, note, row_name, show_picture
 from nearfar.workflow.experiments.data import Data
 
@@ -54,4 +55,4 @@ def draw_parts(
             if row == "white":
                 panel.set_title(title if gain == 1.0 else f"{title} × {gain:g}")
         row_name(axes[0], label)
-        note(axes[-2], f"SNR$_b$ {data.numbers['snr_b'][row]:.1f} dB")
+        note(axes[-2], f"SNR$_b$ {in_words(data.numbers['snr_b'][row])}")

@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from nearfar.decibels import in_words
 from nearfar.report.figures.style import new_figure, note, row_name, show_picture
 from nearfar.workflow.experiments.data import Data
 
@@ -29,7 +30,7 @@ def draw(data: Data) -> Figure:
             relit = data.arrays[f"{light}/{method}"]
             show_picture(axes, relit)
             show_picture(error, ERROR_GAIN * np.abs(relit - data.arrays[f"{light}/exact"]))
-            note(error, f"SNR$_b$ {snr_b[method][light]:.1f} dB")
+            note(error, f"SNR$_b$ {in_words(snr_b[method][light])}")
     names = [name for label in METHODS.values() for name in (label, f"error × {ERROR_GAIN:g}")]
     for axes, label in zip(grid[:, 0], ("light", "exact", *names), strict=True):
         row_name(axes, label)

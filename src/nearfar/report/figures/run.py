@@ -11,7 +11,7 @@ from nearfar.markup import numbers
 from nearfar.report.figures import NAMES
 from nearfar.report.figures.sheets import SHEETS
 from nearfar.report.figures.style import save, styled
-from nearfar.report.figures.table import relighting_rows, table
+from nearfar.report.figures.table import relighting_table, table
 from nearfar.report.methods import figures_methods
 from nearfar.report.model_check import HEAD, check_rows
 from nearfar.report.page import page
@@ -150,7 +150,6 @@ def index_page(
 
 
 def _tables(found: dict[str, Data]) -> list[str]:
-    beside = ["", "this method", "CLT", "difference"]
     patterns = found["6"].numbers["CLT"]["patterns"]
     return [
         '<h2 id="table">What the paper states, and what was measured</h2>',
@@ -160,7 +159,7 @@ def _tables(found: dict[str, Data]) -> list[str]:
         f'<div class="broad">{table(found)}</div>',
         "<h2>Beside compressive light transport</h2>",
         f"<p>Under figure 6's lights and over all camera pixels, {patterns} patterns each.</p>",
-        numbers(beside, relighting_rows(found["6"])),
+        relighting_table(found["6"]),
         "<h2>Where the model holds</h2>",
         "<p>What the method assumes, and what was measured on the box of figures 2 and 3.</p>",
         numbers(list(HEAD), check_rows(found["3"].numbers["check"])),

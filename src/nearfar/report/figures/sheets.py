@@ -6,6 +6,7 @@ from functools import partial
 
 from matplotlib.figure import Figure
 
+from nearfar.decibels import in_words
 from nearfar.report.figures import accuracy, components, rival, spectra, transport_slice
 from nearfar.workflow.experiments.data import Data
 
@@ -81,8 +82,8 @@ def _accuracy(data: Data) -> str:
     return (
         f"{data.numbers['plan']['transport_photos']} complex patterns without noise; near- and "
         f"far-range light is shown four times as bright. The lowest SNR_b, "
-        f"{data.numbers['snr_b_frequency']['p0']:.1f} dB, is at (kx, ky) = ({kx}, {ky}); the "
-        f"lowest SNR_t, {data.numbers['snr_t']['p0']:.1f} dB, at camera pixel ({x}, {y})."
+        f"{in_words(data.numbers['snr_b_frequency']['p0'])}, is at (kx, ky) = ({kx}, {ky}); the "
+        f"lowest SNR_t, {in_words(data.numbers['snr_t']['p0'])}, at camera pixel ({x}, {y})."
     )
 
 

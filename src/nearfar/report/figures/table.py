@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from nearfar.decibels import in_words
 from nearfar.markup import numbers
 from nearfar.report.figures.rival import LIGHTS
 from nearfar.workflow.experiments.data import Data
@@ -54,16 +55,27 @@ def _measured(found: Mapping[str, Any]) -> list[str]:
         photos,
         f"{found['savings_in_theory']:.2f}",
         f"{plan['savings']:.2f}",
-        f"{found['snr_b_frequency']['p0']:.1f} dB",
-        f"{found['snr_b_frequency']['mean']:.1f} dB",
-        f"{found['snr_t']['p0']:.1f} dB",
-        f"{found['snr_t']['mean']:.1f} dB",
+        in_words(found["snr_b_frequency"]["p0"]),
+        in_words(found["snr_b_frequency"]["mean"]),
+        in_words(found["snr_t"]["p0"]),
+        in_words(found["snr_t"]["mean"]),
         f"{found['seconds']['reconstruction']:.1f} s",
     ]
 
 
-def relighting_rows(found: Data) -> list[list[str]]:
-    """Return a row for each of figure 6's lights: this method, CLT, and their difference."""
+def relighting_table(found: Data) -> str:
+    """Return the SNR of this method and of CLT in figure 6 as HTML; the better one is bold."""
+    values = _relighting(found)
+    rows = [
+        [name, in_words(one), in_words(other), f"{one - other:+.1f} dB"]
+        for name, one, other in values
+    ]
+    best = {(row, 1 if one > other else 2) for row, (_, one, other) in enumerate(values)}
+    return numbers(["", "this method", "CLT", "difference"], rows, best=best)
+
+
+def _relighting(found: Data) -> list[tuple[str, float, float]]:
+    """Return the SNR of this method and of CLT under each of figure 6's lights, and of rows."""
     ours, theirs = found.numbers, found.numbers["CLT"]
     pairs = [
         (f"SNR_b, {LIGHTS[light]}", value, theirs["snr_b"][light])
@@ -73,10 +85,7 @@ def relighting_rows(found: Data) -> list[list[str]]:
         (f"SNR_t, {name}", ours["snr_t"][key], theirs["snr_t"][key])
         for name, key in (("mean", "mean"), ("lowest", "p0"))
     ]
-    return [
-        [name, f"{one:.1f} dB", f"{other:.1f} dB", f"{one - other:+.1f} dB"]
-        for name, one, other in pairs
-    ]
+    return pairs
 
 
 def table(found: Mapping[str, Data]) -> str:

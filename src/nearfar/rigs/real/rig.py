@@ -19,13 +19,14 @@ from nearfar.rigs.base import Photo
 from nearfar.rigs.calibration import Calibration
 from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.linear import LinearProjector, identity
+from nearfar.rigs.monitors import Monitor
 from nearfar.rigs.real.alarms import AlarmLog
 from nearfar.rigs.real.black_and_white import BlackAndWhite
 from nearfar.rigs.real.shoot import CheckedShoot
 from nearfar.rigs.real.shutter import Shutter
 from nearfar.rigs.real.superposition import check_superposition
 from nearfar.rigs.real.synchronising import MAXIMUM_SETTLE_REFRESHES, synchronise
-from nearfar.rigs.screens import Monitor, Screen
+from nearfar.rigs.screens import Screen
 
 
 def _layout(projector: Size, scale: int | None, monitor: Monitor) -> FrameLayout:

@@ -18,9 +18,9 @@ from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.pair_sums import sum_pairs
 from nearfar.photometry.photos import PhotosWithNoise
 from nearfar.plan import Sinusoid
+from nearfar.workflow.diagnosis.explanations import SUSPECT_MISFIT
 from nearfar.workflow.diagnosis.misfit import Fits, model_variance, normal_equations
 from nearfar.workflow.diagnosis.sample import CameraSample
-from nearfar.workflow.diagnosis.single_photos import SUSPECT_MISFIT
 from nearfar.workflow.diagnosis.whole_capture import FROM_THE_ENDS, find_changes
 
 WHITE = Sinusoid(kind="cosine", frequency=DC, purpose="reference")

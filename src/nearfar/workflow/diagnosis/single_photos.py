@@ -7,9 +7,8 @@ with other colours, or brighter or darker. Photos that fit well though they were
 back.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from itertools import permutations
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,21 +29,25 @@ from nearfar.faults.of_photos import (
 )
 from nearfar.photometry.by_inverse import find_pairs
 from nearfar.photometry.measure import measure
-from nearfar.plan import Plan, Sinusoid
+from nearfar.plan import Sinusoid
 from nearfar.transport.model import Transport
+from nearfar.workflow.diagnosis.explanations import (
+    SUSPECT_MISFIT,
+    TURNS,
+    Explanation,
+    explanations,
+    exposure_change,
+    simplest,
+)
 from nearfar.workflow.diagnosis.misfit import (
     LEAST_IN_SUM,
-    SMALLEST_CHANGE,
     PhotoFits,
     fit_photos,
     is_white_or_black,
-    mean_white,
     relight,
     serves,
 )
 
-# A photo is suspect above this misfit, in multiples of the usual one, which is at least 1.
-SUSPECT_MISFIT = 4.0
 # Share of all photos that are left out at once, and at least so many.
 LEFT_OUT_SHARE = 1 / 8
 LEFT_OUT_AT_ONCE = 6
@@ -52,56 +55,13 @@ LEFT_OUT_AT_ONCE = 6
 ROUNDS = 3
 # Every frequency is left out in one of so many estimates.
 TURNS_OF_LEAVING = 8
-# An explanation leaves at most this share of the misfit: by exposure, and by anything else.
-EXPOSURE_SHARE = 0.4
-OTHER_SHARE = 0.1
-# An explanation that leaves at most this many times the misfit of the best is as good, if simpler.
-AS_GOOD = 1.3
 # A photo is explained by nothing known, yet spoilt, above this many times the misfit of the others
 # that were left out with it.
 UNEXPLAINED_RATIO = 40.0
-# The pattern of a photo so many places away may show in part of another.
-TORN_REACH = 3
 # Photos of these purposes are not estimated from.
 HELD_OUT = ("check", "correspondence")
 # Sweeps of the estimate.
 SWEEPS = 2
-
-TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
-    ("rotated by 180 degrees", lambda picture: picture[::-1, ::-1]),
-    ("mirrored left to right", lambda picture: picture[:, ::-1]),
-    ("mirrored top to bottom", lambda picture: picture[::-1]),
-)
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """A hypothesis on how a photo was spoilt, and the misfit that it leaves.
-
-    Attributes
-    ----------
-    what : str
-        "order", "turned", "torn", "interlaced", "colours" or "exposure".
-    misfit : float
-    other : int or None
-        Number of the other photo that it is like.
-    how : str
-        How it is turned.
-    gain, offset : float
-        Changes of lamp or exposure, and of ambient light.
-    """
-
-    what: str
-    misfit: float
-    other: int | None = None
-    how: str = ""
-    gain: float = 0.0
-    offset: float = 0.0
-
-    def explains(self, misfit: float) -> bool:
-        """Return whether it explains a photo whose misfit is so large without it."""
-        most = EXPOSURE_SHARE if self.what == "exposure" else OTHER_SHARE
-        return misfit >= SUSPECT_MISFIT and self.misfit < most * misfit
 
 
 class SpoiltPhotos(NamedTuple):
@@ -199,7 +159,7 @@ def _explain_by_turns(
     open_photos += [number for number, explanation in explained.items() if explanation is None]
     while open_photos:
         number = open_photos.pop()
-        best = _simplest(list(_explanations(by_turns, plan, number)))
+        best = simplest(list(explanations(by_turns, plan, number)))
         is_explained = best.explains(float(by_turns.misfit[number]))
         if number in found or not is_explained or _is_shared(by_turns, best, number, good):
             continue
@@ -281,7 +241,7 @@ def _explain_all(
     for number in suspects:
         if own[number] < SUSPECT_MISFIT:
             continue
-        best = _simplest(list(_explanations(fits, fits.plan, number)))
+        best = simplest(list(explanations(fits, fits.plan, number)))
         if best.explains(own[number]):
             if not _is_shared(fits, best, number, good):
                 found[number] = best
@@ -302,82 +262,6 @@ def _surprises(fits: PhotoFits, without: Transport, number: int) -> bool:
     variance = fits.variance[number] + np.where(is_known, bars, np.inf) ** 2
     squares = (fits.photos[number] - fits.relit[number]) ** 2 / variance
     return float(squares.sum() / max(1, is_known.sum())) > SUSPECT_MISFIT
-
-
-def _simplest(explanations: list[Explanation]) -> Explanation:
-    """Return the first of those that explain a photo about as well as the best."""
-    least = min(each.misfit for each in explanations)
-    return next(each for each in explanations if each.misfit <= AS_GOOD * least)
-
-
-def _explanations(fits: PhotoFits, plan: Plan, number: int) -> Iterator[Explanation]:
-    """Yield what a photo could be; the simplest first."""
-    photo, relit = fits.photos[number], fits.relit[number]
-    weight = 1 / fits.variance[number]
-
-    def squares(picture: Floats) -> Floats:
-        return np.asarray(weight * (photo - picture) ** 2)
-
-    values = photo.size
-    for other in range(len(fits.photos)):
-        if plan.patterns[other] != plan.patterns[number]:
-            yield Explanation("order", float(squares(fits.relit[other]).mean()), other)
-    for how, turn in TURNS:
-        turned = weight * (photo - turn(relit)) ** 2
-        yield Explanation("turned", float(turned.mean()), how=how)
-    channels = photo.shape[2]
-    for order in list(permutations(range(channels)))[1:] if 1 < channels <= 4 else []:
-        yield Explanation("colours", float(squares(relit[..., list(order)]).mean()))
-    yield exposure_change(fits, number)
-    own = squares(relit).sum(axis=(1, 2))
-    for other in range(max(0, number - TORN_REACH), min(len(fits.photos), number + TORN_REACH + 1)):
-        if plan.patterns[other] == plan.patterns[number]:
-            continue
-        theirs = squares(fits.relit[other]).sum(axis=(1, 2))
-        # Rows up to each are of one pattern, all others of the other.
-        above = np.concatenate([[0.0], np.cumsum(theirs - own)])[1:-1]
-        if len(above):
-            below = (theirs - own).sum() - above
-            torn = own.sum() + min(above.min(), below.min())
-            yield Explanation("torn", float(torn / values), other)
-        odd = np.arange(len(own)) % 2 == 1
-        interlaced = min(np.where(odd, own, theirs).sum(), np.where(odd, theirs, own).sum())
-        yield Explanation("interlaced", float(interlaced / values), other)
-
-
-def exposure_change(fits: PhotoFits, number: int) -> Explanation:
-    """Return the change of lamp and ambient light that fits a photo best.
-
-    It explains nothing if it is small; nor if the photo and that of the inverse pattern sum to
-    white without it, as then the model is wrong and the light was not.
-
-    Parameters
-    ----------
-    fits : PhotoFits
-    number : int
-        Of the photo.
-    """
-    lit = fits.relit[number] - fits.black
-    effects = np.stack([lit.ravel(), np.ones(lit.size, dtype=np.float32)]).astype(np.float64)
-    weight = 1 / fits.variance[number].ravel()
-    weighted = effects * weight
-    # What is left of the photo, and of its sum with that of the inverse pattern.
-    differences = [(fits.photos[number] - fits.relit[number]).ravel()]
-    for inverse in fits.inverses.get(number, ()):
-        differences.append(differences[0] + (fits.photos[inverse] - fits.relit[inverse]).ravel())
-    solved, *of_sums = (
-        np.linalg.lstsq(weighted @ effects.T, weighted @ difference, rcond=None)[0]
-        * [1.0, 1.0 / mean_white(fits)]
-        for difference in differences
-    )
-    rest = differences[0] - (solved * [1.0, mean_white(fits)]) @ effects
-    misfit = float((weight * rest**2).mean())
-    largest = float(np.abs(solved).max())
-    if largest < SMALLEST_CHANGE or any(
-        float(np.abs(of_sum).max()) < LEAST_IN_SUM * largest for of_sum in of_sums
-    ):
-        misfit = np.inf
-    return Explanation("exposure", misfit, gain=float(solved[0]), offset=float(solved[1]))
 
 
 def _as_faults(explained: Mapping[int, Explanation | None]) -> list[Spoilt]:

@@ -17,11 +17,12 @@ from nearfar.workflow.geometry.opencv import opencv
 from nearfar.workflow.geometry.poses import Pose
 
 FEWEST_POSES = 3
-# Boards all of which stand within this angle of one another, in degrees, tell no focal length.
+# Boards within this angle of one another, in degrees, do not determine a focal length.
 LEAST_ANGLE = 8.0
-# Focal length over the longer side of the picture, to compare how boards stand.
+# Focal length over the longer side of the picture, by which the angles of boards are compared.
 NOMINAL_FOCAL = 1.2
-# A pose is named if its error is above this many times that of the median pose, and pixels.
+# A pose is named if its error is above this many times that of the median pose, and above so many
+# pixels.
 WORSE_POSE = 3.0
 WORSE_PIXELS = 0.5
 # Reprojection error in pixels above which a calibration is doubtful.

@@ -12,6 +12,7 @@ import numpy as np
 from nearfar.arrays import AnyPath, Floats, Size
 from nearfar.errors import InputError
 from nearfar.files import kind_of_store
+from nearfar.report.methods import counted
 from nearfar.transport.exact_store import load_exact
 from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
@@ -96,9 +97,9 @@ def _require_sizes(
     stored = first.stored
     if (projector, camera, channels) != (stored.projector, stored.camera, stored.channels):
         raise InputError(
-            f"{path} is of a projector of {projector}, a camera of {camera} and {channels} "
-            f"channels, {first.path} of {stored.projector}, {stored.camera} and "
-            f"{stored.channels}: view two of the same scene and sizes."
+            f"{path} is of a projector of {projector}, a camera of {camera} and "
+            f"{counted(channels, 'channel')}, {first.path} of {stored.projector}, "
+            f"{stored.camera} and {stored.channels}: view two of the same scene and sizes."
         )
 
 

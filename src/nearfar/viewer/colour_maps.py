@@ -7,7 +7,7 @@ import numpy as np
 
 from nearfar.markup import SCALE
 
-STOPS = 17
+STOPS = 33
 
 Colour = tuple[int, int, int]
 

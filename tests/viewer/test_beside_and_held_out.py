@@ -95,6 +95,12 @@ def test_what_does_not_fit_beside_it_gets_a_sentence(first, stored, tmp_path):
     save_exact(grey, tmp_path / "grey.zarr")
     with pytest.raises(InputError, match=r"1 channel, .* of the same scene and sizes"):
         open_beside(tmp_path / "grey.zarr", first)
+    np.save(tmp_path / "dense.npy", np.ones((CAMERA.pixels, 100), np.float32))
+    with pytest.raises(InputError, match=r"100 columns, .* of 20x24 has 480: view two"):
+        open_beside(tmp_path / "dense.npy", first)
+    np.save(tmp_path / "nan.npy", np.full((CAMERA.pixels, PROJECTOR.pixels), np.nan, np.float32))
+    with pytest.raises(InputError, match="holds NaN"):
+        open_beside(tmp_path / "nan.npy", first)
     with pytest.raises(UnreadableFileError, match="a nearfar capture"):
         open_beside(stored.parent / "capture.zarr", first)
     ran = run_nearfar("view", stored, "--beside", tmp_path / "small.zarr", "--no-browser")

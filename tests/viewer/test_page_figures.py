@@ -124,7 +124,7 @@ def test_the_colour_map_is_chosen_for_all_figures(open_page, address, transport)
         last = ", ".join(str(int(value)) for value in COLOUR_MAPS[name].stops[-1])
         assert f"rgb({last})" in bar
     # It is kept in the address, and other figures have it.
-    wait_until(lambda: "colourMap" in page.url)
+    wait_until(lambda: "colourMap" in page.evaluate("location.href"))
     page.click("#tab-row")
     page.wait_for_selector("#row:not([hidden])")
     assert page.locator("#row-ranges [data-colours]").first.input_value() == "grey"
@@ -207,7 +207,7 @@ def test_the_error_bars_of_the_picture_are_a_map(open_page, address, transport):
         box["x"] + (x + 0.5) / CAMERA.width * box["width"],
         box["y"] + (y + 0.5) / CAMERA.height * box["height"],
     )
-    told = float(page.inner_text("#readout").split(": ")[1])
+    told = float(page.inner_text("#readout").split("± ")[1])
     assert told == pytest.approx(sigma[y, x], abs=1e-4)
     # Under another light, with other gains, and as a share of the light.
     page.mouse.move(2, 2)

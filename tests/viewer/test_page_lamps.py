@@ -55,7 +55,7 @@ def page_of_stage(viewed):
 
 
 def test_the_scene_names_its_parts_and_directions(viewed):
-    described = describe_scene(viewed, [])
+    described = describe_scene(viewed, {})
     assert described["parts"] == ["free"]
     assert described["directions"] == DIRECTIONS
 
@@ -63,7 +63,7 @@ def test_the_scene_names_its_parts_and_directions(viewed):
 @pytest.mark.parametrize("directions", [None, [[1, 0, 0]], "up", [[1, 2], [3]], [[np.nan] * 3] * 6])
 def test_directions_that_are_none_are_not_shown(viewed, directions, monkeypatch):
     monkeypatch.setitem(viewed.stored.provenance, "directions", directions)
-    assert describe_scene(viewed, [])["directions"] is None
+    assert describe_scene(viewed, {})["directions"] is None
 
 
 def test_maps_are_of_the_parts_that_are_there(viewed, page_of_stage):

@@ -129,7 +129,7 @@ def test_a_region_is_typed_by_the_keyboard_alone(open_page, address, transport):
     page.focus("#region-about")
     page.keyboard.press("Enter")
     _ready(page, np.s_[11:20, 17:26])
-    wait_until(lambda: '"region":[11,17,20,26]' in unquote(page.url))
+    wait_until(lambda: '"region":[11,17,20,26]' in unquote(page.evaluate("location.href")))
     page.focus("#region-none")
     page.keyboard.press("Enter")
     assert not page.is_visible("#region-mark")

@@ -79,7 +79,7 @@ def open_beside(
         stored = second.stored
         _require_sizes(first, path, stored.projector, stored.camera, stored.channels)
         return Beside(path.name, "", is_apart=True, relight=_relights_stored(second))
-    known = load_exact(path, projector=first.projector, camera=first.stored.camera)
+    known = _load_known(path, first)
     _require_sizes(first, path, known.projector, known.camera, known.channels)
     exposure = exposure_of(first.whole(), known)
     fitted = f"{path.name} times {exposure.factor:.4g}, the exposure that fits best"
@@ -89,6 +89,17 @@ def open_beside(
         known.is_apart,
         _relights_known(known, exposure.factor, first),
     )
+
+
+def _load_known(path: Path, first: InteractiveTransport) -> KnownTransport:
+    try:
+        return load_exact(path, projector=first.projector, camera=first.stored.camera)
+    except InputError as error:
+        # Sizes are given here: what does not fit them is of another scene.
+        found, _, cure = str(error).rpartition(": ")
+        if "`projector`" in cure or "`camera`" in cure:
+            raise InputError(f"{found}: view two of the same scene and sizes.") from None
+        raise
 
 
 def _require_sizes(

@@ -23,7 +23,7 @@ from nearfar.viewer.transport_row import transport_row
 
 
 def describe_scene(
-    transport: InteractiveTransport, maps: Mapping[str, str], beside: Beside | None
+    transport: InteractiveTransport, maps: Mapping[str, str], beside: Beside | None = None
 ) -> dict[str, Any]:
     """Return a transport's verdict and sizes, its plan and what there is of it, for JSON.
 

@@ -3,15 +3,17 @@
 import { BackgroundJob } from './background.js';
 import { all, get, set } from './dom.js';
 import { drawBarOf, drawFalseColour, usualRange } from './false-colour.js';
+import { valueText } from './numbers.js';
 import { pack, requestMessage } from './protocol.js';
 import { SPLITS, gainsOf } from './state.js';
 
 const PERCENT = 100;
+const known = (value, text) => Number.isFinite(value) ? `± ${text}` : 'unknown';
 
 // How it is shown, by its name in the state.
 const SHOWN = {
-  absolute: { figure: 'error-bars', unit: '', of: sigma => sigma },
-  relative: { figure: 'error-bars-share', unit: '%', of: (sigma, light) => light > 0 ? PERCENT * sigma / light : NaN },
+  absolute: { figure: 'error-bars', unit: '', of: sigma => sigma, textOf: value => known(value, valueText(value)) },
+  relative: { figure: 'error-bars-share', unit: '%', of: (sigma, light) => light > 0 ? PERCENT * sigma / light : NaN, textOf: value => known(value, `${value.toPrecision(2)} %`) },
 };
 
 export class ErrorBars {
@@ -75,7 +77,9 @@ export class ErrorBars {
     const { scenePictures, store: { state } } = this.#page, { sigma, relit, isFinal } = this.#found;
     const { of } = SHOWN[this.#shown = state.errorBars], [height, width] = sigma.shape;
     this.#values = sigma.data.map((value, i) => of(value, relit.data[i]));
-    scenePictures.replace({ height, width, colours: 1, values: this.#values }, isFinal, state, { paint: canvas => this.#paint(canvas, sigma.shape) });
+    scenePictures.replace({ height, width, colours: 1, values: this.#values }, isFinal, state, {
+      paint: canvas => this.#paint(canvas, sigma.shape), textOf: SHOWN[this.#shown].textOf,
+    });
   }
 
   #paint(canvas, shape) {

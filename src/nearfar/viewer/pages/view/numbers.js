@@ -71,13 +71,13 @@ export class Numbers {
     this.refresh();
   }
 
-  #showReadout([y, x], { shown, parts, split, isRelit }, told) {
+  #showReadout([y, x], { shown, parts, split, isRelit, textOf }, told) {
     const { scene } = this.#page;
     const sigma = told?.sigma && isRelit ? ` ± ${valueText(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
     const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${valueText(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
     const { scenePictures } = this.#page, beside = !this.#isDual && isRelit && scenePictures.referenceAt([y, x]);
     const heldOut = this.#isDual ? '' : this.#heldOut.at([y, x], scene.camera);
-    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${valueText(mean(shown))}${sigma}`, ...apart,
+    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${sigma}`, ...apart,
       ...(beside ? [`${scenePictures.referenceName} ${valueText(mean(beside))}`] : []), ...(heldOut ? [`off at held-out photos ${heldOut}`] : [])].join(' · '));
   }
 

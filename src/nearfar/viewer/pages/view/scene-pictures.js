@@ -97,10 +97,10 @@ export class ScenePictures {
 
   // Shows another picture in place of the relit scene, until the next one; the relit scene again for null.
   // isFinal: whether nothing finer will follow; ofProjector: whether it is one of projector pixels; look: in place of the page's;
-  // paint(canvas): draws what is no light.
-  replace(picture, isFinal, state, { ofProjector = false, look = null, paint = null } = {}) {
+  // paint(canvas): draws what is no light; textOf(value): its values in words.
+  replace(picture, isFinal, state, { ofProjector = false, look = null, paint = null, textOf = null } = {}) {
     if (!picture && !this.#stage) return;
-    this.#stage = picture && { picture, ofProjector, look, paint };
+    this.#stage = picture && { picture, ofProjector, look, paint, textOf };
     this.isStageFinal = isFinal;
     this.draw(state);
     this.#describeFrame();
@@ -111,11 +111,11 @@ export class ScenePictures {
     if (!this.#frame) return null;
     const parts = partsAt(this.#frame.parts, place, size), total = parts[0].map((_, c) => parts.reduce((sum, part) => sum + part[c], 0));
     const stage = this.#stage?.picture, shown = stage ? valuesAt(stage, place, size) : total;
-    return { shown, parts, total, split: this.split, isRelit: !stage };
+    return { shown, parts, total, split: this.split, isRelit: !stage, textOf: this.#stage?.textOf };
   }
 
   // The exposure that suits the picture; null before there is one.
-  exposure(state) { return this.#frame && exposureFor(this.#picture(state)); }
+  exposure(state) { return this.#frame && exposureFor(this.#stage?.paint ? this.relit(state) : this.#picture(state)); }
 
   // The relit scene, whatever is shown in its place.
   relit(state) { return this.#frame && sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }

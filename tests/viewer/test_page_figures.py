@@ -24,6 +24,7 @@ def _type(page, place, end, text):
     """Type an end of a range by the keyboard alone, once its fields are open."""
     page.focus(f"{place} [data-end={end}]")
     page.keyboard.press("Control+a")
+    page.keyboard.press("Backspace")
     page.keyboard.type(text)
     page.keyboard.press("Enter")
 
@@ -64,6 +65,12 @@ def test_the_range_of_a_map_is_typed_and_its_ticks_follow(open_page, address, tr
     page.keyboard.press("Enter")
     assert _close(seen(page, "map"), false_colour(values.values, values.low, values.high))
     assert page.input_value("#map-range [data-end=low]") == ""
+    # An automatic end gives way to one that was typed beyond it.
+    _type(page, "#map-range", "low", "900")
+    assert _ticks(page, "#panel-map")[0] == "900"
+    _type(page, "#map-range", "low", "")
+    _type(page, "#map-range", "high", "-900")
+    assert _ticks(page, "#panel-map")[-1] == "-900 dB"
 
 
 def test_a_map_on_a_logarithmic_scale(open_page, address, transport):

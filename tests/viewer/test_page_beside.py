@@ -90,6 +90,16 @@ def test_numbers_and_clicks_are_those_of_the_first(open_page, two, transport, se
     page.mouse.click(*at)
     page.wait_for_selector("#mark:not([hidden])")
     assert page.inner_text("#pixel") == "row 12, column 33"
+    # Pointing at the second picture is pointing at the same camera pixel.
+    before = page.inner_text("#readout")
+    page.mouse.move(2, 2)
+    beside = _box(page, "#before")
+    page.mouse.move(at[0] + beside["x"] - box["x"], at[1])
+    wait_until(lambda: page.inner_text("#readout") == before)
+    page.mouse.click(beside["x"] + 5.5 / CAMERA.width * beside["width"], at[1])
+    wait_until(lambda: page.inner_text("#pixel") == "row 12, column 5")
+    page.mouse.click(*at)
+    wait_until(lambda: page.inner_text("#pixel") == "row 12, column 33")
     mark = _box(page, "#mark")
     assert mark["x"] + mark["width"] / 2 == pytest.approx(at[0], abs=2)
 

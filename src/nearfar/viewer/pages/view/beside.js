@@ -1,6 +1,7 @@
 // A second transport under the same light: its picture is what the scene is compared with, and follows the light.
 
 import { BackgroundJob } from './background.js';
+import { shareThePointer } from './comparison.js';
 import { get, set } from './dom.js';
 import { pictureOf, sumOfParts } from './picture.js';
 import { pack, requestMessage } from './protocol.js';
@@ -21,6 +22,7 @@ export class Beside {
     this.#page = page;
     this.#second = page.scene.beside;
     get('compare-beside').hidden = !this.#second;
+    shareThePointer();
     get('arrangement').onclick = () =>
       page.store.update({ arrangement: page.store.state.arrangement === 'pair' ? 'wipe' : 'pair', difference: false });
     if (!this.#second) return;

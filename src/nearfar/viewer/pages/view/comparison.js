@@ -2,6 +2,16 @@
 
 import { get, set } from './dom.js';
 
+// Pointing at the second picture, or clicking it, is pointing at the same camera pixel of the first.
+export function shareThePointer() {
+  const before = get('before'), picture = get('picture');
+  for (const type of ['pointermove', 'pointerleave', 'click'])
+    before.addEventListener(type, ({ clientX, clientY, pointerId, pointerType }) => {
+      const from = before.getBoundingClientRect(), to = picture.getBoundingClientRect();
+      picture.dispatchEvent(new PointerEvent(type, { pointerId, pointerType, clientX: clientX - from.left + to.left, clientY: clientY - from.top + to.top }));
+    });
+}
+
 // isCompared: whether there is something to compare with; isPair: whether both are shown whole; name: of the second.
 export function showComparison({ difference, wipe, arrangement }, { isCompared, isPair, name }) {
   const before = get('before'), isWiped = isCompared && !difference && !isPair;

@@ -38,6 +38,8 @@ export function bindRegionDrag({ scene: { camera }, store, onMove, onEnd }) {
     const { first } = press;
     press = null;
     if (wasDragged) onEnd(between(first, place(event)));
+    // The click of this press, if there is one, comes before.
+    setTimeout(() => { wasDragged = false; });
   });
   canvas.addEventListener('pointercancel', () => {
     press = null;

@@ -89,7 +89,7 @@ def test_numbers_and_clicks_are_those_of_the_first(open_page, two, transport, se
     assert told == pytest.approx((second @ WHITE)[12, 33].mean(), abs=2e-4)
     page.mouse.click(*at)
     page.wait_for_selector("#mark:not([hidden])")
-    assert page.inner_text("#pixel") == "row 12, column 33"
+    wait_until(lambda: page.inner_text("#pixel") == "row 12, column 33")
     # Pointing at the second picture is pointing at the same camera pixel.
     before = page.inner_text("#readout")
     page.mouse.move(2, 2)

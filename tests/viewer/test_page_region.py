@@ -95,7 +95,7 @@ def test_a_region_is_dragged_on_the_scene(open_page, address, transport):
     # A click is one as before, and the region stays.
     page.mouse.click(*_at(page, 20, 30))
     page.wait_for_selector("#mark:not([hidden])")
-    assert page.inner_text("#pixel") == "row 20, column 30"
+    wait_until(lambda: page.inner_text("#pixel") == "row 20, column 30")
     assert page.is_visible("#region-mark")
     # Its numbers follow the light.
     page.click("#tab-region")

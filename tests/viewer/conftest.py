@@ -58,9 +58,9 @@ def transport(stored: Path) -> Transport:
 
 @contextmanager
 def served_view(
-    transport: InteractiveTransport, listening: ListeningAddress = ANYWHERE
+    transport: InteractiveTransport, listening: ListeningAddress = ANYWHERE, **shown: Any
 ) -> Iterator[str]:
-    """Serve a page; gives its address."""
+    """Serve a page, with what is shown beside the transport; gives its address."""
     ended, addresses = threading.Event(), []
     there = threading.Event()
 
@@ -69,7 +69,7 @@ def served_view(
         there.set()
 
     thread = threading.Thread(
-        target=run_view, args=(transport, listening, started, ended), daemon=True
+        target=run_view, args=(transport, listening, started, ended), kwargs=shown, daemon=True
     )
     thread.start()
     assert there.wait(LONGEST_WAIT)

@@ -16,7 +16,7 @@ from nearfar.viewer.payloads import describe_scene
 from nearfar.viewer.transport_row import transport_row
 from nearfar.workflow.free_rows import free_basis
 from tests.viewer.asking import ask
-from tests.viewer.browsing import settled
+from tests.viewer.browsing import settled, show
 from tests.viewer.conftest import served_view
 
 LAMPS, CAMERA = Size(1, 6), Size(12, 16)
@@ -55,7 +55,7 @@ def page_of_stage(viewed):
 
 
 def test_the_scene_names_its_parts_and_directions(viewed):
-    described = describe_scene(viewed, [])
+    described = describe_scene(viewed, {})
     assert described["parts"] == ["free"]
     assert described["directions"] == DIRECTIONS
 
@@ -63,7 +63,7 @@ def test_the_scene_names_its_parts_and_directions(viewed):
 @pytest.mark.parametrize("directions", [None, [[1, 0, 0]], "up", [[1, 2], [3]], [[np.nan] * 3] * 6])
 def test_directions_that_are_none_are_not_shown(viewed, directions, monkeypatch):
     monkeypatch.setitem(viewed.stored.provenance, "directions", directions)
-    assert describe_scene(viewed, [])["directions"] is None
+    assert describe_scene(viewed, {})["directions"] is None
 
 
 def test_maps_are_of_the_parts_that_are_there(viewed, page_of_stage):
@@ -120,3 +120,27 @@ def test_a_camera_pixel_shows_light_from_each_lamp(open_page, page_of_stage):
     summary = page.locator("#pixel-summary").inner_text()
     assert summary.startswith("floodlit")
     assert "direct" not in summary
+
+
+def test_a_region_of_lamps_has_no_absent_part_and_no_error_bars(open_page, page_of_stage, stage):
+    page = open_page(page_of_stage, {"kind": "white", "tab": "region", "region": [2, 3, 6, 9]})
+    settled(page)
+    page.wait_for_selector("#region-numbers:not([hidden])")
+    rows = page.locator("#region-numbers tr").all_inner_texts()
+    names = [row.split("\t")[0] for row in rows]
+    assert names == [
+        "mean of",
+        "light",
+        "lamp by lamp",
+        "spread over the region",
+        "noise of one measurement",
+    ]
+    mean = (stage @ np.ones(LAMPS, np.float32))[2:6, 3:9].reshape(-1, 3).mean(axis=0)
+    told = [float(cell) for cell in rows[1].split("\t")[1:4]]
+    np.testing.assert_allclose(told, mean, atol=1e-4)
+    assert page.locator("#region-window").is_hidden()
+    # Without error bars and places there is nothing but the relit scene.
+    assert page.locator("#tools").is_hidden()
+    # A tool that an address asks for is not opened.
+    show(page, page_of_stage, {"tool": "error-bars"})
+    assert page.inner_text("#stage-label") == "relit"

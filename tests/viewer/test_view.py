@@ -356,10 +356,14 @@ def test_addresses_that_cannot_be_listened_at(listening, words):
 
 def test_the_command_serves_until_it_is_interrupted(stored):
     command = [sys.executable, "-m", "nearfar", "view", str(stored), "--port", "0", "--no-browser"]
+    command += ["--beside", str(stored), "--capture", str(stored.parent / "capture.zarr")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         line = running.stdout.readline().decode()
         address = line.split(" at ")[1].split(",")[0]
-        assert json.loads(ask(address, "/scene"))["camera"] == list(CAMERA)
+        scene = json.loads(ask(address, "/scene"))
+        assert scene["camera"] == list(CAMERA)
+        assert scene["beside"]["name"] == stored.name
+        assert "held-out" in [each["name"] for each in scene["maps"]]
         os.kill(running.pid, signal.SIGINT)
         rest, faults = running.communicate(timeout=LONGEST_WAIT)
     assert (running.returncode, rest.decode().strip(), faults) == (0, "view ended", b"")

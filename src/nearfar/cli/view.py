@@ -1,8 +1,10 @@
 """``nearfar view``."""
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,9 +13,29 @@ from nearfar.cli.options import Browser, Port, Quiet, TransportPath, require_rec
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
+if TYPE_CHECKING:
+    from nearfar.report.maps import Map
+    from nearfar.viewer.beside import Beside
+
 
 def view(
     transport: TransportPath,
+    beside: Annotated[
+        Path | None,
+        typer.Option(
+            help="Second transport to show under the same light: another reconstruction, what "
+            "render wrote, or a dense T (.npy, .npz, Zarr), of the same projector and camera.",
+            metavar="SECOND.zarr",
+        ),
+    ] = None,
+    capture: Annotated[
+        Path | None,
+        typer.Option(
+            help="Photos that it was reconstructed from: shows where it is off at those that no "
+            "estimate used.",
+            metavar="CAPTURE.zarr",
+        ),
+    ] = None,
     port: Port = 8628,
     host: Annotated[
         str,
@@ -25,7 +47,7 @@ def view(
     memory: Annotated[
         str,
         typer.Option(
-            help="Memory for the transport; a larger one is read again whenever the light comes "
+            help="Memory for each transport; a larger one is read again whenever the light comes "
             "to rest.",
             metavar="2GB",
         ),
@@ -35,20 +57,36 @@ def view(
 ) -> None:
     """Relight the scene in the browser: drag a light, and see its direct, near and far parts.
 
-    Example: nearfar view transport.zarr
+    With --beside a second transport is shown next to it, with their signed difference and SNR.
+
+    Example: nearfar view transport.zarr --beside truth.zarr
     """
     import webbrowser
 
+    from nearfar.capture import open_capture
+    from nearfar.viewer.beside import open_beside
+    from nearfar.viewer.held_out import photo_maps
     from nearfar.viewer.interactive import InteractiveTransport
     from nearfar.viewer.server import ListeningAddress
     from nearfar.viewer.view import run_view
 
     available = parse_bytes(memory)
     require_reconstructed(transport)
+    second: Beside | None = None
+    maps: Mapping[str, Map] = {}
     with progress_bar("reading", quiet=quiet) as report:
         interactive = InteractiveTransport(
             transport, memory=available, progress=lambda share: report("reading", share)
         )
+        if beside is not None:
+            second = open_beside(
+                beside,
+                interactive,
+                memory=available,
+                progress=lambda share: report(f"reading {beside}", share),
+            )
+        if capture is not None:
+            maps = photo_maps(interactive.stored, open_capture(capture), report)
 
     _tell_of_memory(interactive.stored.nbytes, available, quiet=quiet)
 
@@ -59,7 +97,8 @@ def view(
 
     # Ctrl-C is how it ends.
     with suppress(KeyboardInterrupt):
-        run_view(interactive, ListeningAddress(host, port), on_start)
+        listening = ListeningAddress(host, port)
+        run_view(interactive, listening, on_start, beside=second, photo_maps=maps)
     say("view ended", quiet=quiet)
 
 

@@ -1,6 +1,8 @@
 """The viewer's web application: its requests and their responses."""
 
+from collections.abc import Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -9,8 +11,9 @@ from nearfar.arrays import Size
 from nearfar.errors import InputError, NearfarError
 from nearfar.files import encode_png
 from nearfar.packages import needed
-from nearfar.report.maps import maps_of
+from nearfar.report.maps import TITLES, Map, maps_of
 from nearfar.viewer.assets import read_page, with_security_headers
+from nearfar.viewer.beside import Beside
 from nearfar.viewer.decoding import MAXIMUM_FILE_BYTES
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.jobs import BusyError, JobQueue, next_of
@@ -31,7 +34,7 @@ from nearfar.viewer.payloads import (
     pack_row,
 )
 from nearfar.viewer.physical import PhysicalRelighting
-from nearfar.viewer.tools import TOOLS
+from nearfar.viewer.tools import tools_of
 from nearfar.viewer.uploads import read_body
 
 with needed(extra="viewer", what="a page in the browser"):
@@ -49,20 +52,30 @@ CLIENT_CLOSED_REQUEST = 499
 class _Handlers:
     """Handlers of the viewer's requests, one method for each path."""
 
-    def __init__(self, transport: InteractiveTransport) -> None:
+    def __init__(
+        self,
+        transport: InteractiveTransport,
+        beside: Beside | None,
+        photo_maps: Mapping[str, Map],
+    ) -> None:
         self._transport, self._physical = transport, PhysicalRelighting(transport)
         # A light moves on while pixels are inspected, both while a map or an exact picture is
         # computed, and all of them while a file is decoded.
         self._relighting, self._pixels = JobQueue(), JobQueue()
         self._whole_pictures, self._files = JobQueue(), JobQueue()
         self._splitting = JobQueue()
-        self._tools = {name: JobQueue() for name in TOOLS}
-        self._maps = maps_of(transport.coarse)
+        self._tools = tools_of(self._physical, beside)
+        self._queues = {name: JobQueue() for name in self._tools}
+        self._maps = {
+            **maps_of(transport.coarse),
+            **{name: partial(_given, found) for name, found in photo_maps.items()},
+        }
         self._packed_maps: dict[str, bytes] = {}
         self._assets = read_page("view")
         self._maximum_light_bytes = maximum_light_bytes(transport.projector)
         self._maximum_picture_bytes = maximum_light_bytes(transport.stored.camera)
-        self._scene = describe_scene(transport, self._maps)
+        titles = {**TITLES, **{name: found.title for name, found in photo_maps.items()}}
+        self._scene = describe_scene(transport, {name: titles[name] for name in self._maps}, beside)
         self._sessions = 0
 
     async def asset(self, name: str) -> Response:
@@ -117,11 +130,12 @@ class _Handlers:
 
     async def tool(self, name: str, request: Request) -> Response:
         """Return the result of a tool for a light; it is given up once the page is gone."""
-        if name not in TOOLS:
-            raise InputError(f"there is no tool {name!r}: choose one of {', '.join(TOOLS)}.")
+        if name not in self._tools:
+            known = ", ".join(self._tools)
+            raise InputError(f"there is no tool {name!r}: choose one of {known}.")
         largest = max(self._maximum_light_bytes, self._maximum_picture_bytes)
-        steps = TOOLS[name](self._transport, await read_body(request, largest))
-        while (found := await self._tools[name].run(next_of, steps)) is None:
+        steps = self._tools[name](self._transport, await read_body(request, largest))
+        while (found := await self._queues[name].run(next_of, steps)) is None:
             if await request.is_disconnected():
                 return Response(status_code=CLIENT_CLOSED_REQUEST)
         return _bytes_response(found)
@@ -157,15 +171,27 @@ class _Handlers:
             self._sessions -= 1
 
 
-def application(transport: InteractiveTransport) -> FastAPI:
+def application(
+    transport: InteractiveTransport,
+    beside: Beside | None = None,
+    photo_maps: Mapping[str, Map] = MappingProxyType({}),
+) -> FastAPI:
     """Return the ASGI application of a transport's page.
+
+    Parameters
+    ----------
+    transport : InteractiveTransport
+    beside : Beside, optional
+        What is shown beside it.
+    photo_maps : mapping of str to Map, optional
+        Maps by photos, as `nearfar.viewer.held_out.photo_maps` makes them.
 
     Raises
     ------
     MissingFileError
         If the package was installed without the page.
     """
-    handlers = _Handlers(transport)
+    handlers = _Handlers(transport, beside, photo_maps)
     routes = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     routes.exception_handler(NearfarError)(_error_response)
     routes.add_middleware(with_security_headers)
@@ -194,6 +220,10 @@ def application(transport: InteractiveTransport) -> FastAPI:
 
 async def _error_response(_request: Request, error: Exception) -> Response:
     return JSONResponse({"fault": str(error)}, 503 if isinstance(error, BusyError) else 400)
+
+
+def _given(found: Map) -> Map:
+    return found
 
 
 def _bytes_response(content: bytes, media_type: str = "application/octet-stream") -> Response:

@@ -46,7 +46,7 @@ def read_page(page: str) -> dict[str, Asset]:
     Returns
     -------
     dict of str to Asset
-        By file name. The style sheet begins with the one of reports.
+        By file name. ``style.css`` begins with the style of reports.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def read_page(page: str) -> dict[str, Asset]:
         media_type = MEDIA_TYPES.get(file.name[file.name.rfind(".") :])
         if media_type is not None:
             text = file.read_text(encoding="utf-8")
-            text = STYLE + text if media_type == "text/css" else text
+            text = STYLE + text if file.name == "style.css" else text
             assets[file.name] = Asset(text.encode(), f"{media_type}; charset=utf-8")
     if "index.html" not in assets:
         raise MissingFileError(f"{folder} has no page: install nearfar again.")

@@ -201,9 +201,7 @@ class InteractiveTransport:
         ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
         """
         channel_light = self.for_channels(light.as_array())
-        # Free rows are in the place of far-range light.
-        slots = {**gains.of(("direct", "near", "far")), "free": gains.far}
-        given = {part: slots[part] for part in self.stored.parts}
+        given = gains.of_parts(self.stored.parts)
         analysed: AnalysedLight | None = None
         pictures = []
         for block in self.blocks():

@@ -55,6 +55,10 @@ class Gains(BaseModel):
         """Return the gains of some components, by name."""
         return {name: getattr(self, name) for name in names}
 
+    def of_parts(self, parts: Iterable[str]) -> dict[str, float]:
+        """Return the gains of a transport's parts; free rows take the place of far-range light."""
+        return {part: self.far if part == "free" else getattr(self, part) for part in parts}
+
 
 class Light(NamedTuple):
     """A light that a page sends, as the product of levels and a colour.

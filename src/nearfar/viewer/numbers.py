@@ -44,7 +44,7 @@ def numbers_at(
     bars = ErrorBars(pixel) if pixel.posterior is not None else None
     whole: Floats
     if header.split == "physical" and physical.is_prepared:
-        split = physical.pixel(header.y, header.x)
+        split = physical.pixels(np.array([header.y]), np.array([header.x]))
         parts = split.components(levels)._asdict()
         sigmas = PhysicalErrorBars(split).components(levels)._asdict() if bars else {}
     else:

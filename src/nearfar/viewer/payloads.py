@@ -1,6 +1,6 @@
 """The content of the viewer's responses, independent of HTTP."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,18 +10,31 @@ from nearfar.arrays import Floats
 from nearfar.errors import InputError
 from nearfar.files import from_srgb, full_scale_of
 from nearfar.files.codecs import encode_exr
-from nearfar.markup import MARK, SCALE
+from nearfar.markup import MARK
 from nearfar.release import version
-from nearfar.report.maps import TITLES, Map, map_named
+from nearfar.report.maps import Map, map_named
 from nearfar.transport.gains import why_unjudgeable
+from nearfar.viewer.beside import Beside
+from nearfar.viewer.colour_maps import describe_colour_maps
 from nearfar.viewer.decoding import decode_in_process
 from nearfar.viewer.interactive import InteractiveTransport, to_float16
 from nearfar.viewer.messages import WHITE_LEVEL, Gains, Light, pack
 from nearfar.viewer.transport_row import transport_row
 
 
-def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict[str, Any]:
-    """Return a transport's verdict and sizes, its plan and the maps there are, for JSON."""
+def describe_scene(
+    transport: InteractiveTransport, maps: Mapping[str, str], beside: Beside | None = None
+) -> dict[str, Any]:
+    """Return a transport's verdict and sizes, its plan and what there is of it, for JSON.
+
+    Parameters
+    ----------
+    transport : InteractiveTransport
+    maps : mapping of str to str
+        Titles of the maps there are, by name.
+    beside : Beside, optional
+        The second transport.
+    """
     stored, verdict = transport.stored, transport.stored.verdict
     plan = stored.provenance.get("plan")
     return {
@@ -44,8 +57,11 @@ def describe_scene(transport: InteractiveTransport, maps: Iterable[str]) -> dict
         "pitch": transport.coarse.pitch,
         "method": stored.provenance.get("method"),
         "plan": plan if isinstance(plan, dict) else None,
-        "maps": [{"name": name, "title": TITLES[name]} for name in maps],
-        "scale": SCALE.tolist(),
+        "maps": [{"name": name, "title": title} for name, title in maps.items()],
+        "has_error_bars": stored.has_error_bars,
+        "beside": beside
+        and {"name": beside.name, "remark": beside.remark, "is_apart": beside.is_apart},
+        "colour_maps": describe_colour_maps(),
         "mark": list(MARK),
     }
 

@@ -83,14 +83,19 @@ class PhysicalRelighting:
 
     def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
         """Relight every camera pixel that is displayed, in one step."""
-        assert self._displayed is not None
-        parts, stride = self._parts(self._displayed, light), self._transport.display_stride
+        parts, stride = self._parts(self.displayed, light), self._transport.display_stride
         yield packed_frame(parts, stride, exact=True, split="physical")
 
-    def pixel(self, y: int, x: int) -> PhysicalSplit:
-        """Return the split of one camera pixel."""
+    @property
+    def displayed(self) -> PhysicalSplit:
+        """The split of the camera pixels that are displayed."""
+        assert self._displayed is not None
+        return self._displayed
+
+    def pixels(self, rows: Integers, columns: Integers) -> PhysicalSplit:
+        """Return the split of the camera pixels in some rows and columns."""
         assert self._whole is not None
-        return _of_pixels(self._whole, np.array([y]), np.array([x]))
+        return _of_pixels(self._whole, rows, columns)
 
     def relight(self, light: Light, gains: Gains) -> Floats:
         """Relight every camera pixel with gains, as ``nearfar relight`` does."""

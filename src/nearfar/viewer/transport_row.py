@@ -80,9 +80,10 @@ def transport_row(transport: Transport, x: int) -> TransportRow:
         "floodlit": {
             part: float(row.sum()) for part, row in transport.named(Components(d, n, f)).items()
         },
-        **_bands(transport),
+        **bands_of(transport),
     }
-    return TransportRow(header, window, far, errors[0], errors[1], _spectrum(window + far))
+    spectrum = in_decibels(magnitude_of(window + far))
+    return TransportRow(header, window, far, errors[0], errors[1], spectrum)
 
 
 def _why_no_errors(transport: Transport, *, saturated: bool | None) -> str:
@@ -91,14 +92,19 @@ def _why_no_errors(transport: Transport, *, saturated: bool | None) -> str:
     return "they are unknown" if saturated else ""
 
 
-def _spectrum(row: Floats) -> Floats:
-    magnitude = np.abs(np.fft.fftshift(np.fft.fft2(row)))
+def magnitude_of(row: Floats) -> Floats:
+    """Return the magnitude of a row's Fourier transform, (Py, Px), DC in the middle."""
+    return np.abs(np.fft.fftshift(np.fft.fft2(row)))
+
+
+def in_decibels(magnitude: Floats) -> Floats:
+    """Return magnitudes in dB, 0 for the largest."""
     largest = max(float(magnitude.max()), float(np.finfo(np.float32).tiny))
     relative = np.maximum(magnitude / largest, RELATIVE_SPECTRUM_FLOOR)
     return np.asarray(20 * np.log10(relative), dtype=np.float32)
 
 
-def _bands(transport: Transport) -> dict[str, Any]:
+def bands_of(transport: Transport) -> dict[str, Any]:
     """Return k_far, k_near and the measured frequencies, in cycles per projector pixel."""
     far = band_edge(transport)
     posterior = transport.posterior

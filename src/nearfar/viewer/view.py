@@ -1,9 +1,12 @@
 """``nearfar view``: a transport under any light, in the browser."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
+from nearfar.report.maps import Map
 from nearfar.viewer.application import application
+from nearfar.viewer.beside import Beside
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.messages import maximum_light_bytes
 from nearfar.viewer.server import ListeningAddress, serve
@@ -14,6 +17,9 @@ def run_view(
     listening: ListeningAddress,
     on_start: Callable[[str], None],
     stop: threading.Event | None = None,
+    *,
+    beside: Beside | None = None,
+    photo_maps: Mapping[str, Map] = MappingProxyType({}),
 ) -> None:
     """Serve the page of a transport until an interrupt, or until `stop` is set.
 
@@ -25,6 +31,10 @@ def run_view(
         Called with the URL to open.
     stop : Event, optional
         Ends the server once it is set.
+    beside : Beside, optional
+        A second transport, under the same light.
+    photo_maps : mapping of str to Map, optional
+        Maps by photos, as `nearfar.viewer.held_out.photo_maps` makes them.
 
     Raises
     ------
@@ -33,7 +43,8 @@ def run_view(
     """
     stop = stop or threading.Event()
     largest = maximum_light_bytes(transport.projector)
-    with serve(application(transport), listening, maximum_message_bytes=largest) as url:
+    page = application(transport, beside, photo_maps)
+    with serve(page, listening, maximum_message_bytes=largest) as url:
         on_start(url)
         try:
             stop.wait()

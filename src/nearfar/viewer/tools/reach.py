@@ -4,7 +4,6 @@ Index convention: pictures are [y, x, colour].
 """
 
 from collections.abc import Generator, Iterable, Iterator
-from math import ceil, sqrt
 from typing import Annotated
 
 import numpy as np
@@ -12,12 +11,13 @@ from pydantic import Field
 
 from nearfar.applications.masks import ProbingMask
 from nearfar.applications.probe import probe
-from nearfar.arrays import Floats, blocks, middles
+from nearfar.arrays import Floats, blocks
 from nearfar.errors import InputError
 from nearfar.transport.model import Transport
-from nearfar.transport.rows import of_pixels, of_rows, thinned_blocks
+from nearfar.transport.rows import of_rows, thinned_blocks
 from nearfar.viewer.interactive import InteractiveTransport, to_float16
 from nearfar.viewer.messages import LightHeader, pack, unpack_levels
+from nearfar.viewer.tools.few_pixels import few_pixels
 
 # Entries of the transport that are masked in one step: some tenths of a second.
 STEP_ENTRIES = 2**24
@@ -120,12 +120,8 @@ def _require_places(transport: InteractiveTransport) -> None:
 
 def _coarse(transport: InteractiveTransport) -> Transport:
     """Return so few camera pixels that they are probed at once."""
-    coarse = transport.coarse
-    entries = coarse.projector.pixels * coarse.channels
-    pixels = max(COARSE_ENTRIES // entries, LEAST_PIXELS)
-    stride = ceil(sqrt(coarse.camera.pixels / pixels))
-    rows, columns = (middles(side, stride) for side in coarse.camera)
-    return of_pixels(coarse, rows, columns)
+    entries = transport.projector.pixels * transport.stored.channels
+    return few_pixels(transport, max(COARSE_ENTRIES // entries, LEAST_PIXELS))
 
 
 def _probed(

@@ -23,6 +23,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.rows import of_pixels
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.misfit import (
+    Fits,
     fit_photos,
     is_white_or_black,
     serves,
@@ -61,6 +62,9 @@ class MisfitMaps:
         Where any channel is saturated, or most of a cell.
     cell : int
         Camera pixels along the side of a cell of the map.
+    of_held_out : ndarray, shape (y, x), or None
+        Over check photos, the root mean square of what relit pictures are off by, noise included,
+        as a share of the photos' without black; NaN as `of_camera`. None without check photos.
     """
 
     of_frequencies: dict[Frequency, float]
@@ -68,6 +72,7 @@ class MisfitMaps:
     of_camera: Floats
     saturated: Booleans
     cell: int
+    of_held_out: Floats | None = None
 
 
 def measure_misfit(
@@ -107,10 +112,11 @@ def measure_misfit(
         # All of the lines are saturated.
         return None
     counted = ~is_white_or_black(plan) & ~serves(plan, "correspondence")
+    checks = serves(plan, "check")
     pitch = lines_apart(camera)
     cells = max(1, round(camera.width / pitch)) if pitch > 1 else None
     sums, values = np.zeros(len(plan.patterns)), 0
-    lines, marks = [], []
+    lines, marks, held_out = [], [], []
     values_of_row = len(plan.patterns) * transport.channels * photos.camera.width
     for rows in blocks(photos.camera.height, max(1, VALUES_AT_ONCE // values_of_row)):
         fits = fit_photos(photos, part(rows), rows.start)
@@ -119,16 +125,18 @@ def measure_misfit(
         known = np.asarray(np.isfinite(fits.variance).any(axis=0))
         values += int(known.sum())
         lines.append(_in_cells(share[counted].mean(axis=0), known, cells))
+        if checks.any():
+            held_out.append(_off_by(fits, known, cells, checks))
         marks.append(_most_in_cells(np.asarray(~known.all(axis=-1)), cells))
         progress("comparing photos", rows.stop / photos.camera.height)
     misfit = sums / max(values, 1)
-    checks = serves(plan, "check")
     return MisfitMaps(
         _of_frequencies(plan, misfit),
         float(misfit[checks].mean()) if checks.any() else None,
         np.concatenate(lines),
         np.concatenate(marks),
         pitch,
+        np.concatenate(held_out) if held_out else None,
     )
 
 
@@ -177,6 +185,19 @@ def _in_cells(share: Floats, known: Booleans, cells: int | None) -> Floats:
             for values in (total, count)
         )
     return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
+def _off_by(fits: Fits, known: Booleans, cells: int | None, checks: Booleans) -> Floats:
+    """Return how far relit pictures are off, as a share of the photos' light, over some photos."""
+    off, light = (
+        _in_cells(
+            np.where(known, (fits.photos[checks] - other) ** 2, 0.0).sum(axis=0), known, cells
+        )
+        for other in (fits.relit[checks], fits.black)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.sqrt(off / light)
+    return np.where(np.isfinite(share), share, np.nan)
 
 
 def _most_in_cells(marks: Booleans, cells: int | None) -> Booleans:

@@ -64,7 +64,7 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     require_instance(capture, Capture, "capture", "nearfar.open_capture")
     path = Path(path)
     stored = open_transport(path)
-    _require_origin(stored, capture)
+    require_origin(stored, capture)
     require_writable(path, path / METADATA)
     verdict = judge_reconstruction(stored, capture, progress or ignore_progress)
     with storage_faults(path):
@@ -72,8 +72,14 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     return verdict
 
 
-def _require_origin(stored: StoredTransport, capture: Capture) -> None:
-    """Refuse a capture that a transport was not reconstructed from."""
+def require_origin(stored: StoredTransport, capture: Capture) -> None:
+    """Refuse a capture that a transport was not reconstructed from.
+
+    Raises
+    ------
+    InputError
+        As `judge_transport`.
+    """
     if any(name not in stored.provenance for name in PROVENANCE):
         raise InputError(
             f"{stored.path} does not say how it was made, so that it cannot be judged: reconstruct "

@@ -1,6 +1,8 @@
 // The page's state in its address: only what differs from the initial state.
 
-import { ALL_ONE, CAMERA_LIGHTS, KINDS, RANGES, SPLITS, TABS, TOOLS } from './state.js';
+import { readRanges } from './ranges.js';
+import { readRegion } from './region-sides.js';
+import { ALL_ONE, ARRANGEMENTS, CAMERA_LIGHTS, ERROR_BARS, KINDS, RANGES, SPLITS, TABS, TOOLS } from './state.js';
 
 // Dropped pictures that take more than this are left out of the address.
 const MAXIMUM_PICTURE_CHARACTERS = 400000;
@@ -25,7 +27,7 @@ const LIMITS = { exposure: [-6, 12], gamma: [0.5, 3], wipe: [0, 100], reach: [0.
   ...Object.fromEntries(Object.keys(ALL_ONE).map(name => [name, [0, 4]])) };
 
 // Anyone may have written the address: values of the wrong type or range are left out.
-export function fromAddress(hash, initial) {
+export function fromAddress(hash, initial, camera) {
   let given = {};
   try { given = JSON.parse(decodeURIComponent(hash.slice(1))) || {}; } catch { return { ...initial }; }
   const state = { ...initial };
@@ -37,12 +39,15 @@ export function fromAddress(hash, initial) {
   }
   for (const [name, [low, high]] of Object.entries(LIMITS)) state[name] = Math.min(high, Math.max(low, state[name]));
   if (!COLOUR.test(state.colour)) state.colour = initial.colour;
-  for (const [name, known] of [['kind', KINDS], ['tool', TOOLS], ['range', RANGES], ['cameraLight', CAMERA_LIGHTS], ['tab', TABS]])
+  for (const [name, known] of [['kind', KINDS], ['tool', TOOLS], ['range', RANGES], ['cameraLight', CAMERA_LIGHTS], ['tab', TABS],
+    ['errorBars', ERROR_BARS], ['arrangement', ARRANGEMENTS]])
     if (!known.includes(state[name])) state[name] = initial[name];
   if (!Object.hasOwn(SPLITS, state.split)) state.split = initial.split;
   for (const name of ['pixel', 'column'])
     if (Array.isArray(given[name]) && given[name].length === 2 && given[name].every(Number.isInteger))
       state[name] = given[name];
+  state.difference = given.difference === true;
+  Object.assign(state, { ranges: readRanges(given.ranges), region: readRegion(given.region, camera) });
   if (Array.isArray(given.strokes)) state.strokes = given.strokes.filter(isStroke).slice(0, MAXIMUM_STROKES);
   if (Array.isArray(given.pictures))
     state.pictures = given.pictures.slice(0, MAXIMUM_PICTURES).map(url => typeof url === 'string' && PNG_URL.test(url) ? url : '');

@@ -72,7 +72,6 @@ export function showControls(state, { pictureCount, hasReference, isPlaying, spl
   zoomLight(state.zoom);
   set(get('colour'), 'value', state.colour);
   set(get('maps'), 'value', state.map);
-  for (const id of ['wiping', 'comparing']) set(get(id), 'hidden', !hasReference);
   set(get('difference'), 'ariaPressed', String(state.difference));
   set(get('forget'), 'hidden', !hasReference);
   set(document.documentElement.dataset, 'theme', theme(state));

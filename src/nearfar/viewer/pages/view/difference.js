@@ -1,6 +1,7 @@
 // The picture less what it is compared with: how far they are apart, and where, by sign.
 
 import { get, set } from './dom.js';
+import { drawBar, numberText, usualRange } from './false-colour.js';
 
 // More light than the reference is orange, less is blue, none is grey.
 const MORE = [255, 140, 40], NONE = [40, 40, 44], LESS = [70, 150, 255];
@@ -25,7 +26,7 @@ export function compare(picture, reference) {
   return { height, width, values, snr: noise > 0 ? 10 * Math.log10(signal / noise) : Infinity };
 }
 
-// The colours' full strength is at `range`.
+// The colours' full strength is at the range.
 export function drawDifference(canvas, { height, width, values }, range) {
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height);
@@ -37,11 +38,16 @@ export function drawDifference(canvas, { height, width, values }, range) {
   pen.putImageData(image, 0, 0);
 }
 
-// A tenth of what is white at an exposure.
-export const rangeAt = ({ exposure }) => 0.1 * 2 ** -exposure;
+// What was typed, or what one camera pixel in a hundred is beyond, in two digits; of equal pictures a tenth of what is white.
+export function rangeOf({ values }, { exposure, ranges }) {
+  if (ranges.difference?.high) return ranges.difference.high;
+  const { high } = usualRange(values.map(Math.abs), true);
+  return values.some(Boolean) ? Number(high.toPrecision(2)) : 0.1 * 2 ** -exposure;
+}
 
-export function describeDifference(compared, state) {
-  const apart = Number.isFinite(compared.snr) ? `SNR ${compared.snr.toFixed(1)} dB` : 'equal';
-  const range = rangeAt(state).toPrecision(2);
-  set(get('snr'), 'textContent', state.difference ? `${apart}; orange ${range} more than the reference, blue ${range} less` : apart);
+// isUnderWay: one of the two pictures is not there yet.
+export function describeDifference(compared, { difference, range }, isUnderWay) {
+  const apart = isUnderWay ? 'SNR follows' : Number.isFinite(compared.snr) ? `SNR ${compared.snr.toFixed(1)} dB` : 'equal';
+  set(get('snr'), 'textContent', difference ? `${apart}; orange ${numberText(range)} more than the reference, blue ${numberText(range)} less` : apart);
+  if (difference) drawBar(get('difference-figure'), [LESS, NONE, MORE], [-range, 0, range].map(numberText));
 }

@@ -1,23 +1,26 @@
 // One camera pixel (a row of the transport), or one projector pixel (a column), as plots.
 
 import { get, showingFaults } from './dom.js';
-import { crop, drawLog, drawSpectrum } from './plots.js';
-import { drawProfile } from './profile.js';
+import { drawSigned, negativeText } from './plots.js';
 import { requestMessage } from './protocol.js';
-import { hasPart } from './state.js';
+import { drawRowPlots } from './row-plots.js';
 
 export class Inspector {
   #scene;
   #store;
   #row = null;
+  #column = null;
   #request = null;
   #tabs;
+  #figures;
 
   // tabs() gives the inspector's tabs.
-  constructor({ scene, store, tabs }) {
+  constructor({ scene, store, tabs, figures }) {
     this.#tabs = tabs;
     this.#scene = scene;
     this.#store = store;
+    this.#figures = figures;
+    figures.add(() => { this.#drawRow(); this.#drawColumn(); });
   }
 
   // With the tab that is open, in place of the row's.
@@ -28,38 +31,35 @@ export class Inspector {
     this.#row = row;
     get('row').hidden = false;
     if (!tab && this.#store.state.tab !== 'numbers') this.#tabs().open('row');
-    this.drawRow();
+    this.#drawRow();
   });
 
   showColumn = showingFaults(async (y, x, tab = '') => {
     this.#store.update({ column: [y, x] });
-    const { header, arrays: [values] } = await requestMessage(`column?y=${y}&x=${x}`);
-    get('column-map').hidden = false;
+    this.#column = await requestMessage(`column?y=${y}&x=${x}`);
+    for (const id of ['column-map', 'column-range']) get(id).hidden = false;
     if (!tab) this.#tabs().offer('column');
     get('column').textContent = `row ${y}, column ${x}`;
-    const { negative } = drawLog(get('column-map'), values.data, values.shape, this.#scene.scale);
-    get('column-caption').textContent = 'photo units, log scale' + (header.stride > 1 ? `, one row and column in ${header.stride}` : '') + negativeText(negative);
+    this.#drawColumn();
   });
 
-  // Draws the newest row, again when the page's colours or its width change.
-  drawRow() {
+  #drawColumn() {
+    if (!this.#column) return;
+    const { header: { stride }, arrays: [{ data, shape }] } = this.#column, figures = this.#figures;
+    const negative = drawSigned(get('column-map'), data, shape, figures, 'column');
+    get('column-caption').textContent = 'photo units' + (stride > 1 ? `, one row and column in ${stride}` : '') + negativeText(negative, figures.colourMap);
+  }
+
+  #drawRow() {
+    get('row-ranges').hidden = !this.#row;
     if (!this.#row) return;
     const { header, arrays: [near, far, nearError, farError, spectrum] } = this.#row;
-    const { projector, scale } = this.#scene, [height, width] = projector;
     get('row').hidden = false;
     get('pixel').textContent = `row ${header.y}, column ${header.x}`;
     get('pixel-summary').textContent = summary(header);
-    const around = crop(near.data, projector, header.q || [height / 2, width / 2], Math.floor(header.window / 2) + 1);
-    drawLog(get('row-window'), around.values, around.shape, scale);
-    const { negative } = drawLog(get('row-far'), far.data, projector, scale);
-    get('row-negative').textContent = negativeText(negative);
-    placeCross(header.q, projector);
-    drawSpectrum(get('row-spectrum'), spectrum.data, projector, header, scale);
-    const first = header.line * width;
-    const line = (values, errors, colour) =>
-      ({ values: values.data.slice(first, first + width), errors: errors.data, colour });
-    const lines = [line(far, farError, '--far'), ...(hasPart(this.#scene, 'direct') ? [line(near, nearError, '--near')] : [])];
-    drawProfile(get('row-profile'), lines, header.q ? header.q[1] : null);
+    const [nearData, farData, nearErrors, farErrors, spectrumData] = [near, far, nearError, farError, spectrum].map(({ data }) => data);
+    drawRowPlots('row', { header, near: nearData, far: farData, nearError: nearErrors, farError: farErrors, spectrum: spectrumData },
+      { scene: this.#scene, figures: this.#figures });
   }
 
   // The row, or null if another one was asked for in the meantime.
@@ -77,16 +77,6 @@ export class Inspector {
 }
 
 const RANGES = { near: 'near-range', far: 'far-range' };
-
-// Of the sum of magnitudes.
-const negativeText = share => share >= 0.001 ? `; ${(100 * share).toFixed(share < 0.1 ? 1 : 0)} % of it negative, in red` : '';
-
-function placeCross(q, [height, width]) {
-  get('row-q').hidden = !q;
-  if (!q) return;
-  get('row-q').style.top = `${100 * (q[0] + 0.5) / height}%`;
-  get('row-q').style.left = `${100 * (q[1] + 0.5) / width}%`;
-}
 
 function summary({ q, floodlit, confidence, no_errors: noErrors, saturated }) {
   const parts = Object.keys(floodlit), total = parts.reduce((sum, name) => sum + floodlit[name], 0);

@@ -1,11 +1,14 @@
 // Puts the page together; each part gets what it needs here, and knows nothing of the others.
 
 import { createAddressWriter, fromAddress } from './address.js';
+import { Beside } from './beside.js';
 import { Compensation } from './compensation.js';
 import { Connection } from './connection.js';
 import { bindControls, describe, showControls } from './controls.js';
 import { get, nearestPixel, positionOn, showFault } from './dom.js';
 import { Dual } from './dual.js';
+import { ErrorBars } from './error-bars.js';
+import { Figures } from './figures.js';
 import { bindFiles, restorePictures } from './files.js';
 import { Inspector } from './inspector.js';
 import { bindKeyboard } from './keyboard.js';
@@ -17,6 +20,7 @@ import { Numbers } from './numbers.js';
 import { Playback } from './playback.js';
 import { request } from './protocol.js';
 import { Reach } from './reach.js';
+import { Region } from './region.js';
 import { bindSaving } from './saving.js';
 import { ScenePictures } from './scene-pictures.js';
 import { Splits } from './splits.js';
@@ -28,7 +32,7 @@ import { showVerdict } from './verdict.js';
 // The scene, and the state and the light that the address asks for.
 async function load() {
   const scene = await (await request('scene')).json();
-  const initial = initialState(scene), state = fromAddress(location.hash, initial);
+  const initial = initialState(scene), state = fromAddress(location.hash, initial, scene.camera);
   const light = new Light(scene.projector, scene.light_block);
   const missing = await restorePictures(state.pictures, light);
   state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
@@ -48,26 +52,28 @@ async function open() {
       scenePictures.draw(store.state);
     }
   });
-  const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store, tabs: () => tabs }), maps = new Maps({ scene, store });
-  const tabs = new Tabs({ store, onShown: () => inspector.drawRow() });
+  const figures = new Figures({ scene, store });
+  const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store, tabs: () => tabs, figures }), maps = new Maps({ scene, store, figures });
+  const tabs = new Tabs({ store, onShown: () => figures.draw() });
   const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
-  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); tools.lightChanged(); numbers.lightChanged(); } });
-  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits };
+  const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); for (const each of [tools, numbers, region, beside]) each.lightChanged(); } });
+  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits, figures, tabs };
   Object.assign(page, { dual: new Dual(page), compensation: new Compensation(page) });
-  const tools = page.tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation });
+  const tools = page.tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation, 'error-bars': new ErrorBars(page) });
   const numbers = page.numbers = new Numbers(page);
+  describe(scene);
+  const region = new Region(page), beside = page.beside = new Beside(page);
   function show(changes) {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
     splits.prepare();
     showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying, split });
     tools.show(store.state, changes);
-    tabs.show(store.state);
+    for (const each of [tabs, figures, region, beside]) each.show(store.state);
     numbers.refresh();
     writeAddress(store.state);
   }
 
-  describe(scene);
   showVerdict(scene);
   bind(page, show);
   lamps.bind(store);
@@ -80,6 +86,7 @@ async function open() {
   });
   if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
   inspect(state, { inspector, maps });
+  beside.compare();
 }
 
 const receiving = ({ store, lightCanvas, scenePictures, splits, numbers, tools }, show) => (header, parts, isNewest) => {
@@ -112,8 +119,8 @@ function inspect(state, { inspector, maps }) {
 const clicked = (event, size) => nearestPixel(positionOn(event, size), size);
 
 function bind(page, show) {
-  const { scene, store, inspector } = page;
-  bindControls({ ...page, onTheme: () => inspector.drawRow(), show });
+  const { scene, store, inspector, figures } = page;
+  bindControls({ ...page, onTheme: () => figures.draw(), show });
   bindPointer({ store, projector: scene.projector, onPixel: inspector.showColumn });
   bindFiles(page);
   bindSaving(page);
@@ -123,7 +130,7 @@ function bind(page, show) {
   get('picture').onclick = event =>
     store.state.tool === 'dual' ? inspector.showColumn(...clicked(event, scene.projector)) : inspector.showRow(...clicked(event, scene.camera));
   bindEdge(store);
-  addEventListener('resize', () => inspector.drawRow());
+  addEventListener('resize', () => figures.draw());
   addEventListener('hashchange', () => location.reload());
 }
 

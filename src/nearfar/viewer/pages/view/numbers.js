@@ -2,6 +2,7 @@
 
 import { BackgroundJob } from './background.js';
 import { get, nearestPixel, positionOn, set } from './dom.js';
+import { HeldOut } from './held-out.js';
 import { pack, request } from './protocol.js';
 import { titleOf } from './splits.js';
 import { SPLITS, hasPart } from './state.js';
@@ -10,7 +11,7 @@ const REST_MILLISECONDS = 150;
 const CHANNELS = ['red', 'green', 'blue'];
 
 const mean = values => values.reduce((sum, value) => sum + value, 0) / values.length;
-const digits = value => {
+export const valueText = value => {
   if (value === null) return 'unknown';
   return value === 0 ? '0' : Math.abs(value) < 0.001 ? value.toExponential(1) : value.toFixed(4);
 };
@@ -23,9 +24,11 @@ export class Numbers {
   // What the server told, and of what.
   #told = { key: '', numbers: null };
   #lights = 0;
+  #heldOut;
 
   constructor(page) {
     this.#page = page;
+    this.#heldOut = new HeldOut({ scene: page.scene, onRead: () => this.refresh() });
     const canvas = get('picture');
     canvas.onpointermove = event => this.#point(nearestPixel(positionOn(event, this.#grid), this.#grid));
     canvas.onpointerleave = () => this.#point(null);
@@ -68,11 +71,14 @@ export class Numbers {
     this.refresh();
   }
 
-  #showReadout([y, x], { shown, parts, split, isRelit }, told) {
+  #showReadout([y, x], { shown, parts, split, isRelit, textOf }, told) {
     const { scene } = this.#page;
-    const sigma = told?.sigma && isRelit ? ` ± ${digits(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
-    const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${digits(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
-    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${digits(mean(shown))}${sigma}`, ...apart].join(' · '));
+    const sigma = told?.sigma && isRelit ? ` ± ${valueText(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
+    const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${valueText(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
+    const { scenePictures } = this.#page, beside = !this.#isDual && isRelit && scenePictures.referenceAt([y, x]);
+    const heldOut = this.#isDual ? '' : this.#heldOut.at([y, x], scene.camera);
+    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${sigma}`, ...apart,
+      ...(beside ? [`${scenePictures.referenceName} ${valueText(mean(beside))}`] : []), ...(heldOut ? [`off at held-out photos ${heldOut}`] : [])].join(' · '));
   }
 
   #showTable([y, x], { parts, total, split }, told) {
@@ -82,17 +88,22 @@ export class Numbers {
     const rows = [['light', total, told?.sigma], ...names.map(name =>
       [titleOf(scene, name), parts[SPLITS[split].indexOf(name)], Object.values(told?.components || {})[names.indexOf(name)]?.sigma])];
     const head = ['', ...(colours === CHANNELS.length ? CHANNELS : ['light']), 'share'];
-    get('numbers').replaceChildren(line('th', head), ...rows.map(([title, values, sigma]) =>
-      line('td', [title, ...values.map((value, c) => digits(value) + (sigma ? `\n± ${digits(sigma[c] ?? null)}` : '')),
-        `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`])));
+    get('numbers').replaceChildren(tableLine('th', head), ...rows.map(([title, values, sigma]) =>
+      tableLine('td', [title, ...values.map((value, c) => valueText(value) + (sigma ? `\n± ${valueText(sigma[c] ?? null)}` : '')),
+        `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`])), ...this.#heldOutLine([y, x], colours));
     get('numbers').hidden = false;
+  }
+
+  #heldOutLine(place, colours) {
+    const text = this.#heldOut.at(place, this.#page.scene.camera);
+    return text ? [tableLine('td', ['off at held-out photos', ...Array(colours).fill(''), text])] : [];
   }
 
   #note(text) { if (text) set(get('numbers-note'), 'textContent', text); }
 }
 
-// A row of the table, whose first cell is its head.
-function line(kind, texts) {
+// A row of a table, whose first cell is its head.
+export function tableLine(kind, texts) {
   const row = document.createElement('tr');
   row.append(...texts.map((textContent, i) => Object.assign(document.createElement(i ? kind : 'th'), { textContent })));
   return row;

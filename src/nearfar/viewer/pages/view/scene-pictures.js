@@ -1,9 +1,12 @@
 // The scene under the light, its three parts, and the reference beside it.
 
-import { compare, describeDifference, drawDifference, rangeAt } from './difference.js';
-import { get, set } from './dom.js';
+import { showComparison } from './comparison.js';
+import { compare, describeDifference, drawDifference, rangeOf } from './difference.js';
+import { get } from './dom.js';
 import { FrameStatus } from './frame-status.js';
-import { drawPicture, exposureFor, fromFloat16, onePart, shrink, sumOfParts } from './picture.js';
+import { drawPicture, exposureFor, onePart, shrink, sumOfParts } from './picture.js';
+import { partsAt, valuesAt } from './picture-values.js';
+import { markPixel } from './stage-marks.js';
 import { SPLITS, gainsOf } from './state.js';
 
 const MAXIMUM_PIXELS_OF_A_PART = 65536;
@@ -60,11 +63,12 @@ export class ScenePictures {
     if (!this.#frame) return;
     const picture = this.#picture(state), [height, width] = this.#stage?.ofProjector ? [picture.height, picture.width] : this.#camera;
     this.#shape(width / height);
-    if (!this.#drawDifference(picture, state)) drawPicture(get('picture'), picture, this.#stage?.look || state);
+    if (this.#stage?.paint) this.#stage.paint(get('picture'));
+    else if (!this.#drawDifference(picture, state)) drawPicture(get('picture'), picture, this.#stage?.look || state);
     SPLITS[this.split].forEach((name, i) =>
       drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
     this.#drawReference(state);
-    this.#markPixel(state.pixel);
+    markPixel(this.#stage?.ofProjector ? null : state.pixel, this.#camera);
   }
 
   // Compares with the picture as it is, if it is exact; returns whether it is.
@@ -80,33 +84,38 @@ export class ScenePictures {
 
   removeReference() { this.compareWith(null, ''); }
 
+  // Whether a picture is what the scene is compared with.
+  isReference(picture) { return picture === this.#reference; }
+
+  // Whether what it is compared with stands beside it.
+  isPair(state) { return this.isCompared && state.arrangement === 'pair' && !state.difference; }
+
+  // What it is compared with, at a camera pixel, colour by colour; null if there is none.
+  referenceAt(place) {
+    return this.isCompared && this.#reference.isCurrent !== false ? valuesAt(this.#reference, place, this.#camera) : null;
+  }
+
   // Shows another picture in place of the relit scene, until the next one; the relit scene again for null.
-  // isFinal: whether nothing finer will follow; ofProjector: whether it is one of projector pixels; look: in place of the page's.
-  replace(picture, isFinal, state, { ofProjector = false, look = null } = {}) {
+  // isFinal: whether nothing finer will follow; ofProjector: whether it is one of projector pixels; look: in place of the page's;
+  // paint(canvas): draws what is no light; textOf(value): its values in words.
+  replace(picture, isFinal, state, { ofProjector = false, look = null, paint = null, textOf = null } = {}) {
     if (!picture && !this.#stage) return;
-    this.#stage = picture && { picture, ofProjector, look };
+    this.#stage = picture && { picture, ofProjector, look, paint, textOf };
     this.isStageFinal = isFinal;
     this.draw(state);
     this.#describeFrame();
   }
 
   // What is shown at a pixel [y, x] of a grid, and what the frame has there, colour by colour; null before there is one.
-  valuesAt([y, x], [height, width]) {
+  valuesAt(place, size) {
     if (!this.#frame) return null;
-    const { shape: [count, rows, columns, colours], data, scale } = this.#frame.parts, stage = this.#stage?.picture;
-    const pick = (values, h, w, c, first = 0) => {
-      const at = first + (Math.min(h - 1, Math.floor(y * h / height)) * w + Math.min(w - 1, Math.floor(x * w / width))) * c;
-      return Array.from(values.slice(at, at + c));
-    };
-    const size = rows * columns * colours;
-    const parts = Array.from({ length: count }, (_, i) => [...fromFloat16(pick(data, rows, columns, colours, i * size), scale)]);
-    const total = parts[0].map((_, c) => parts.reduce((sum, part) => sum + part[c], 0));
-    const shown = stage ? pick(stage.values, stage.height, stage.width, stage.colours) : total;
-    return { shown, parts, total, split: this.split, isRelit: !stage };
+    const parts = partsAt(this.#frame.parts, place, size), total = parts[0].map((_, c) => parts.reduce((sum, part) => sum + part[c], 0));
+    const stage = this.#stage?.picture, shown = stage ? valuesAt(stage, place, size) : total;
+    return { shown, parts, total, split: this.split, isRelit: !stage, textOf: this.#stage?.textOf };
   }
 
   // The exposure that suits the picture; null before there is one.
-  exposure(state) { return this.#frame && exposureFor(this.#picture(state)); }
+  exposure(state) { return this.#frame && exposureFor(this.#stage?.paint ? this.relit(state) : this.#picture(state)); }
 
   // The relit scene, whatever is shown in its place.
   relit(state) { return this.#frame && sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
@@ -118,31 +127,22 @@ export class ScenePictures {
     this.#aspect = aspect;
   }
 
-  get #isCompared() { return Boolean(this.#reference) && !this.#stage?.ofProjector; }
+  // Whether there is light of the camera's pixels on the stage, and something to compare it with.
+  get isCompared() { return Boolean(this.#reference) && !this.#stage?.ofProjector && !this.#stage?.paint; }
 
   // Tells how far the picture is from what it is compared with; draws the difference in its place and returns true if that
   // is wanted.
   #drawDifference(picture, state) {
-    if (!this.#isCompared) return false;
-    const compared = compare(picture, this.#reference);
-    describeDifference(compared, state);
-    if (state.difference) drawDifference(get('picture'), compared, rangeAt(state));
-    return state.difference;
+    if (!this.isCompared) return false;
+    const compared = compare(picture, this.#reference), isUnderWay = this.#reference.isCurrent !== undefined && !(this.#reference.isCurrent && this.isFinal);
+    const { difference } = state, range = difference ? rangeOf(compared, state) : 0;
+    describeDifference(compared, { difference, range }, isUnderWay);
+    if (difference) drawDifference(get('picture'), compared, range);
+    return difference;
   }
 
   #drawReference(state) {
     if (this.#reference) drawPicture(get('before'), this.#reference, state);
-    for (const id of ['before', 'edge']) set(get(id), 'hidden', !this.#isCompared || state.difference);
-    set(get('before').style, 'clipPath', `inset(0px ${100 - state.wipe}% 0px 0px)`);
-    set(get('edge').style, 'left', `calc(${state.wipe}% - 1px)`);
-  }
-
-  #markPixel(pixel) {
-    const [height, width] = this.#camera;
-    const isThere = pixel && !this.#stage?.ofProjector;
-    set(get('mark'), 'hidden', !isThere);
-    if (!isThere) return;
-    set(get('mark').style, 'left', 100 * (pixel[1] + 0.5) / width + '%');
-    set(get('mark').style, 'top', 100 * (pixel[0] + 0.5) / height + '%');
+    showComparison(state, { isCompared: this.isCompared, isPair: this.isPair(state), name: this.referenceName });
   }
 }

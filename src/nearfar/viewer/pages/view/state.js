@@ -10,14 +10,16 @@ export const hasPart = (scene, name) => scene.parts.includes(name) || name === '
   canSplitPhysically(scene) && SPLITS.physical.includes(name);
 export const canSplitPhysically = scene => scene.parts.includes('near');
 export const ALL_ONE = Object.freeze(Object.fromEntries(GAINS.map(name => [name, 1])));
-export const TOOLS = ['relit', 'reach', 'dual', 'compensation'];
-export const TABS = ['light', 'row', 'column', 'map', 'numbers'];
+export const TOOLS = ['relit', 'reach', 'dual', 'compensation', 'error-bars'];
+export const TABS = ['light', 'row', 'column', 'map', 'numbers', 'region'];
+export const ERROR_BARS = ['absolute', 'relative'];
+export const ARRANGEMENTS = ['wipe', 'pair'];
 export const RANGES = ['within', 'ring', 'beyond'];
 export const CAMERA_LIGHTS = ['spot', 'white'];
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
 
 // What a page opens with; the keys are those of the address.
-export function initialState({ projector: [height, width], camera: [rows, columns] }) {
+export function initialState({ projector: [height, width], camera: [rows, columns], beside }) {
   const side = Math.min(height, width);
   return Object.freeze({
     kind: 'spot', x: (width - 1) / 2, y: (height - 1) / 2, radius: Math.max(1, Math.round(side / 4)), soft: 0.5,
@@ -25,13 +27,15 @@ export function initialState({ projector: [height, width], camera: [rows, column
     shift: 0, brush: Math.max(0.5, Math.round(side / 16)), shown: 0, zoom: 1, colour: '#ffffff', strokes: [], pictures: [],
     ...ALL_ONE, split: 'model', solo: '', exposure: 0, gamma: 1, wipe: 50, difference: false, map: '', pixel: null,
     column: null, theme: '', tab: 'light', tool: 'relit', range: 'beyond', reach: 3, broad: 3,
+    colourMap: 'nearfar', ranges: {}, region: null, errorBars: 'absolute', arrangement: beside ? 'pair' : 'wipe',
     cameraLight: 'spot', cameraX: (columns - 1) / 2, cameraY: (rows - 1) / 2, cameraRadius: Math.max(1, Math.round(Math.min(rows, columns) / 8)),
   });
 }
 
 // Everything else changes the light.
 const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
-  'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius'];
+  'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius',
+  'colourMap', 'ranges', 'region', 'errorBars', 'arrangement'];
 
 export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));
 

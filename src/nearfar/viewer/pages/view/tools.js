@@ -13,11 +13,19 @@ export class Tools {
   constructor(page, tools) {
     this.#page = page;
     this.#tools = tools;
-    get('tools').hidden = !page.scene.parts.includes('direct');
-    for (const button of all('[data-tool]')) button.onclick = () => page.store.update({ tool: button.dataset.tool });
+    const known = [...all('[data-tool]')].filter(button => this.#canOpen(button.dataset.tool));
+    get('tools').hidden = known.length < 2;
+    for (const button of all('[data-tool]')) button.hidden = !known.includes(button);
+    for (const button of known) button.onclick = () => page.store.update({ tool: button.dataset.tool });
   }
 
   get #tool() { return this.#tools[this.#open]; }
+
+  // Lamps have no places on a projector, and estimates of some kinds no error bars.
+  #canOpen(tool) {
+    const { parts, has_error_bars: hasErrorBars } = this.#page.scene;
+    return tool === 'relit' || (tool === 'error-bars' ? hasErrorBars : parts.includes('direct'));
+  }
 
   lightChanged() { this.#tool?.lightChanged?.(); }
 
@@ -26,7 +34,7 @@ export class Tools {
 
   // The state has changed: opens the tool that it names.
   show(state, changes = {}) {
-    const tool = this.#page.scene.parts.includes('direct') ? state.tool : 'relit';
+    const tool = this.#canOpen(state.tool) ? state.tool : 'relit';
     if (tool !== this.#open) this.#choose(tool);
     else this.#tool?.changed?.(changes);
     for (const button of all('[data-tool]')) set(button, 'ariaPressed', String(button.dataset.tool === tool));
@@ -47,7 +55,7 @@ export class Tools {
   #label(state) {
     const { scenePictures } = this.#page, { split } = scenePictures;
     const label = this.#tool?.label(state) || this.#relitLabel(state, split);
-    if (!scenePictures.referenceName || this.#open === 'dual') return label;
+    if (!scenePictures.isCompared || scenePictures.isPair(state)) return label;
     return state.difference ? `${label} less ${scenePictures.referenceName}` : `${scenePictures.referenceName} | ${label}`;
   }
 

@@ -29,7 +29,7 @@ export class Inspector {
     get('row').hidden = false;
     if (!tab && this.#store.state.tab !== 'numbers') this.#tabs().open('row');
     this.drawRow();
-  });
+  }, 'row');
 
   showColumn = showingFaults(async (y, x, tab = '') => {
     this.#store.update({ column: [y, x] });
@@ -39,7 +39,14 @@ export class Inspector {
     get('column').textContent = `row ${y}, column ${x}`;
     const { negative } = drawLog(get('column-map'), values.data, values.shape, this.#scene.scale);
     get('column-caption').textContent = 'photo units, log scale' + (header.stride > 1 ? `, one row and column in ${header.stride}` : '') + negativeText(negative);
-  });
+  }, 'column');
+
+  // No camera pixel is chosen any more.
+  hideRow() {
+    this.#row = null;
+    get('row').hidden = true;
+    get('pixel').textContent = 'click the scene';
+  }
 
   // Draws the newest row, again when the page's colours or its width change.
   drawRow() {

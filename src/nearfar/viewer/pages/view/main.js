@@ -8,11 +8,13 @@ import { get, nearestPixel, positionOn, showFault } from './dom.js';
 import { Dual } from './dual.js';
 import { bindFiles, restorePictures } from './files.js';
 import { Inspector } from './inspector.js';
+import { bindKeeping } from './keeping.js';
 import { bindKeyboard } from './keyboard.js';
 import { LightCanvas, bindPointer } from './light-canvas.js';
 import { Lamps } from './lamps.js';
 import { Light } from './light.js';
 import { Maps } from './maps.js';
+import { meter } from './metering.js';
 import { Numbers } from './numbers.js';
 import { Playback } from './playback.js';
 import { request } from './protocol.js';
@@ -20,7 +22,7 @@ import { Reach } from './reach.js';
 import { bindSaving } from './saving.js';
 import { ScenePictures } from './scene-pictures.js';
 import { Splits } from './splits.js';
-import { Store, changesLight, initialState } from './state.js';
+import { Store, changesLight, initialState, limitsOf } from './state.js';
 import { Tabs } from './tabs.js';
 import { Tools } from './tools.js';
 import { showVerdict } from './verdict.js';
@@ -28,10 +30,10 @@ import { showVerdict } from './verdict.js';
 // The scene, and the state and the light that the address asks for.
 async function load() {
   const scene = await (await request('scene')).json();
-  const initial = initialState(scene), state = fromAddress(location.hash, initial);
+  const initial = initialState(scene), state = fromAddress(location.hash, initial, limitsOf(scene));
   const light = new Light(scene.projector, scene.light_block);
-  const missing = await restorePictures(state.pictures, light);
-  state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
+  const { pictures, missing } = await restorePictures(state.pictures, light), last = Math.max(0, pictures.length - 1);
+  Object.assign(state, { pictures, shown: Math.min(Math.max(0, Math.round(state.shown)), last) });
   return { scene, initial, state, light, missing };
 }
 
@@ -40,7 +42,6 @@ async function open() {
   const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera);
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
-      showFault('');
       scenePictures.lightChanged();
       lightCanvas.requestDraw();
     } else {
@@ -60,7 +61,8 @@ async function open() {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
     splits.prepare();
-    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying, split });
+    showControls(store.state, { hasReference, isPlaying, split });
+    page.showKept(store.state);
     tools.show(store.state, changes);
     tabs.show(store.state);
     numbers.refresh();
@@ -76,16 +78,17 @@ async function open() {
   const connection = new Connection({
     light: () => ({ sent: light.sent, colour: light.colour, split: splits.current }),
     onFrame: receiving(page, show),
-    onFault: showFault,
+    onFault: text => showFault(text, 'connection'),
   });
-  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
+  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`, 'address');
   inspect(state, { inspector, maps });
 }
 
-const receiving = ({ store, lightCanvas, scenePictures, splits, numbers, tools }, show) => (header, parts, isNewest) => {
-  const { split } = scenePictures;
+const receiving = (page, show) => (header, parts, isNewest) => {
+  const { store, lightCanvas, scenePictures, splits, numbers, tools } = page, { split } = scenePictures;
   scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state);
   tools.frameArrived();
+  meter(page);
   if (header.split === split) numbers.refresh(); else show();
   if (isNewest && header.split !== splits.current) splits.lost();
 };
@@ -118,6 +121,7 @@ function bind(page, show) {
   bindFiles(page);
   bindSaving(page);
   bindKeyboard(page);
+  page.showKept = bindKeeping(page, show);
   get('map').onclick = event => inspector.showRow(...clicked(event, scene.camera));
   // A dual view is one of projector pixels.
   get('picture').onclick = event =>

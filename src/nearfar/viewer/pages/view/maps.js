@@ -40,7 +40,7 @@ export class Maps {
     get('map-high').textContent = +header.high.toPrecision(3) + unit;
     get('map-caption').textContent = header.title + '; grey where there is none' +
       (anySaturated ? ', red where saturated' : '') + '. ' + header.reading;
-  });
+  }, 'map');
 
   #showValue(event) {
     if (!this.#map) return;

@@ -5,6 +5,7 @@ rests, exactly.
 """
 
 import asyncio
+import time
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -13,6 +14,7 @@ from nearfar.packages import needed
 from nearfar.viewer.interactive import Frame, InteractiveTransport, Relighting
 from nearfar.viewer.jobs import ExhaustedError, JobQueue, next_of
 from nearfar.viewer.messages import Light, Split, pack, unpack_light
+from nearfar.viewer.pace import Pace
 from nearfar.viewer.physical import PhysicalRelighting
 
 with needed(extra="viewer", what="a page in the browser"):
@@ -34,6 +36,8 @@ class _NewestLight:
     number: int = 0
     light: Light | None = None
     split: Split = "model"
+    took: float | None = None
+    level: int = 0
 
 
 async def run_session(
@@ -65,14 +69,19 @@ async def run_session(
     except WebSocketDisconnect:
         pass
     except NearfarError as error:
-        code = POLICY_VIOLATION if isinstance(error, InputError) else SERVER_ERROR
-        reason = str(error).encode()[:MAXIMUM_REASON_BYTES].decode(errors="ignore")
-        with suppress(RuntimeError, WebSocketDisconnect):
-            await socket.close(code, reason)
+        await close_for(error, socket)
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def close_for(error: NearfarError, socket: WebSocket) -> None:
+    """Close a page's socket, with the error's message as the reason."""
+    code = POLICY_VIOLATION if isinstance(error, InputError) else SERVER_ERROR
+    reason = str(error).encode()[:MAXIMUM_REASON_BYTES].decode(errors="ignore")
+    with suppress(RuntimeError, WebSocketDisconnect):
+        await socket.close(code, reason)
 
 
 async def _receive_lights(
@@ -86,6 +95,7 @@ async def _receive_lights(
         data = message.get("bytes") or b""
         header, light = unpack_light(data, transport.projector, transport.light_block)
         newest.number, newest.light, newest.split = header.number, light, header.split
+        newest.took, newest.level = header.took, header.level
         newest.arrived.set()
 
 
@@ -97,6 +107,7 @@ async def _send_frames(
     socket: WebSocket,
 ) -> None:
     """Send a coarse frame of each newest light, and an exact one once it rests."""
+    pace = Pace(transport.levels)
     while True:
         await newest.arrived.wait()
         newest.arrived.clear()
@@ -104,8 +115,13 @@ async def _send_frames(
         assert light is not None
         is_physical = newest.split == "physical" and physical.is_prepared
         relighting: Relighting = physical if is_physical else transport
-        frame = await jobs.run(relighting.relight_coarsely, light)
-        await socket.send_bytes(_pack_frame(number, frame))
+        began, level = time.perf_counter(), pace.level
+        took, is_of_this_level = newest.took, newest.level == level
+        frame = await jobs.run(relighting.relight_coarsely, light, level)
+        await socket.send_bytes(_pack_frame(number, frame, level))
+        if took is None or is_of_this_level:
+            # The server's own time is not yet all that the page waits for.
+            pace.took(max(took or 0.0, time.perf_counter() - began))
         # A page sends the light of blocks while it moves, and the whole light once it rests.
         if frame.exact or light.block > 1:
             continue
@@ -118,12 +134,12 @@ async def _send_frames(
             except ExhaustedError:
                 break
             if exact is not None:
-                await socket.send_bytes(_pack_frame(number, exact))
+                await socket.send_bytes(_pack_frame(number, exact, level))
 
 
-def _pack_frame(number: int, frame: Frame) -> bytes:
+def _pack_frame(number: int, frame: Frame, level: int) -> bytes:
     header = {name: getattr(frame, name) for name in ("exact", "stride", "scale", "split")}
-    return pack({"number": number, **header}, frame.parts)
+    return pack({"number": number, "level": level, **header}, frame.parts)
 
 
 async def _arrives_within(newest: _NewestLight, seconds: float) -> bool:

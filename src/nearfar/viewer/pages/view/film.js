@@ -37,7 +37,11 @@ export class Film {
       const { sent: { values, shape }, colour } = light;
       socket.send(pack({ number, shape, colour, split, gains }, values));
     };
-    socket.onopen = () => socket.send(JSON.stringify({ format, name, rate, count, exposure, gamma, channel: channel ? CHANNELS.indexOf(channel) - 1 : null }));
+    const header = JSON.stringify({ format, name: name.replaceAll(/[^\w.-]/g, '-'), rate, count, split, exposure, gamma, channel: channel ? CHANNELS.indexOf(channel) - 1 : null });
+    socket.onopen = () => {
+      socket.send(header);
+      send(0);
+    };
     socket.onmessage = ({ data }) => {
       if (typeof data === 'string') {
         const { done } = JSON.parse(data);

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from nearfar.errors import InputError, NearfarError
 from nearfar.packages import needed
+from nearfar.parallel import single_threaded_products
 from nearfar.viewer.interactive import Frame, InteractiveTransport, Relighting
 from nearfar.viewer.jobs import ExhaustedError, JobQueue, next_of
 from nearfar.viewer.messages import Light, Split, pack, unpack_light
@@ -117,7 +118,7 @@ async def _send_frames(
         relighting: Relighting = physical if is_physical else transport
         began, level = time.perf_counter(), pace.level
         took, is_of_this_level = newest.took, newest.level == level
-        frame = await jobs.run(relighting.relight_coarsely, light, level)
+        frame = await jobs.run(_relight_moving, relighting, light, level)
         await socket.send_bytes(_pack_frame(number, frame, level))
         if took is None or is_of_this_level:
             # The server's own time is not yet all that the page waits for.
@@ -135,6 +136,15 @@ async def _send_frames(
                 break
             if exact is not None:
                 await socket.send_bytes(_pack_frame(number, exact, level))
+
+
+def _relight_moving(relighting: Relighting, light: Light, level: int) -> Frame:
+    """Relight coarsely on one processor.
+
+    Where others are at work, threads of one product wait for one another longer than they compute.
+    """
+    with single_threaded_products():
+        return relighting.relight_coarsely(light, level)
 
 
 def _pack_frame(number: int, frame: Frame, level: int) -> bytes:

@@ -43,7 +43,8 @@ export function bindControls({ store, scenePictures, playback, onTheme, show }) 
     button.onclick = () => store.update({ solo: store.state.solo === button.dataset.solo ? '' : button.dataset.solo });
   for (const input of all('[data-of]')) input.oninput = () => store.update({ [input.dataset.of]: input.valueAsNumber });
   document.querySelector('[data-of=exposure]').oninput = event => store.update({ exposure: event.target.valueAsNumber, metering: 'fixed' });
-  get('metering').onclick = () => store.update({ metering: store.state.metering === 'auto' ? 'fixed' : 'auto' });
+  get('metering').onclick = () => store.update(store.state.metering === 'auto' ? { metering: 'fixed' }
+    : { metering: 'auto', exposure: scenePictures.exposure(store.state) ?? store.state.exposure });
   get('colour').oninput = () => store.update({ colour: get('colour').value });
   get('play').onclick = () => playback.toggle();
   get('clear').onclick = () => store.update({ strokes: [] });

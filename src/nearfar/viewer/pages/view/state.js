@@ -48,7 +48,7 @@ export function limitsOf({ projector, camera }) {
 }
 
 // Everything else changes the light.
-const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
+const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme',
   'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius',
   'viewZoom', 'viewX', 'viewY', 'channel', 'metering', 'keyframes', 'seconds', 'rate'];
 

@@ -31,23 +31,29 @@ const EXPLAINED = '[data-word], [data-solo], [data-split], [data-tool]';
 
 const wordOf = element => element.closest?.(EXPLAINED);
 
+const textOf = ({ word, solo, split, tool }) => WORDS[word || solo || split || tool] || '';
+
+// Above the word, or below it where there is no room.
+function place(tip, word) {
+  const box = word.getBoundingClientRect(), width = document.documentElement.clientWidth, above = box.top - tip.offsetHeight - GAP;
+  tip.style.left = `${Math.max(GAP, Math.min(box.left, width - tip.offsetWidth - GAP))}px`;
+  tip.style.top = `${above > GAP ? above : box.bottom + GAP}px`;
+}
+
 export function bindWords() {
   const tip = get('tip');
-  const explain = element => {
-    const { word, solo, split, tool } = element?.dataset || {}, text = WORDS[word || solo || split || tool];
-    tip.hidden = !text;
-    tip.textContent = text || '';
-    if (!text) return;
-    const box = element.getBoundingClientRect(), width = document.documentElement.clientWidth;
-    tip.style.left = `${Math.max(GAP, Math.min(box.left, width - tip.offsetWidth - GAP))}px`;
-    const above = box.top - tip.offsetHeight - GAP;
-    tip.style.top = `${above > GAP ? above : box.bottom + GAP}px`;
+  let explained = null;
+  const explain = word => {
+    explained = word;
+    tip.textContent = word ? textOf(word.dataset) : '';
+    tip.hidden = !tip.textContent;
+    if (!tip.hidden) place(tip, word);
   };
   for (const word of all('.word')) Object.assign(word, { tabIndex: 0 });
   for (const element of all(EXPLAINED)) element.setAttribute('aria-describedby', 'tip');
   addEventListener('pointerover', event => explain(event.pointerType === 'touch' ? null : wordOf(event.target)));
   addEventListener('focusin', event => explain(event.target.matches(':focus-visible') ? wordOf(event.target) : null));
   addEventListener('focusout', () => explain(null));
-  addEventListener('scroll', () => explain(null), { passive: true });
+  addEventListener('scroll', () => { if (explained) place(tip, explained); }, { passive: true, capture: true });
   addEventListener('keydown', event => { if (event.key === 'Escape') explain(null); });
 }

@@ -1,0 +1,109 @@
+"""The viewer's page in a real browser: what it says while files are read, and when they fail."""
+
+import numpy as np
+import pytest
+
+from nearfar.files.codecs import encode_npy, encode_png
+from tests.viewer.asking import PROJECTOR
+from tests.viewer.browsing import drop, seen, settled, slide
+from tests.waiting import wait_until
+
+pytestmark = pytest.mark.slow
+
+LINEAR = np.full(PROJECTOR, 0.25, np.float32)
+
+
+def _is_lit(page, level):
+    """Whether the light is of one level everywhere."""
+    return bool(np.all(seen(page, "light") == level))
+
+
+def test_a_file_that_is_read_is_named_until_it_is_there(open_page, address):
+    page = open_page(address)
+    drop(page, "#light", "quarter.npy", encode_npy(LINEAR), "")
+    page.wait_for_selector("#reading:has-text('reading quarter.npy')")
+    page.wait_for_selector("output:has-text('1 of 1')")
+    assert page.inner_text("#reading") == ""
+    # On the scene, too, and when it fails.
+    drop(page, "#stage", "torn.exr", b"no picture", "")
+    page.wait_for_selector("#reading:has-text('reading torn.exr')")
+    page.wait_for_selector("#fault:has-text('torn.exr')")
+    assert page.inner_text("#reading") == ""
+
+
+def test_a_fault_stays_until_its_own_file_goes_well_or_it_is_closed(open_page, address):
+    page = open_page(address)
+    picture = encode_png(np.full((*PROJECTOR, 3), 60, np.uint8))
+    drop(page, "#light", "torn.png", b"no picture")
+    page.wait_for_selector("#fault:has-text('torn.png is no picture')")
+    # Neither another file nor another light takes it away.
+    drop(page, "#light", "leaves.png", picture)
+    wait_until(lambda: _is_lit(page, 60))
+    page.click("[data-kind=sinusoid]")
+    page.click("#play")
+    before = seen(page, "light")
+    wait_until(lambda: not np.array_equal(seen(page, "light"), before))
+    page.click("#play")
+    settled(page)
+    assert "torn.png is no picture" in page.inner_text("#fault")
+    # Two faults are told side by side, and the page stays where it is.
+    top = page.locator("#stage").bounding_box()["y"]
+    drop(page, "#light", "x.exr", b"no picture", "")
+    page.wait_for_selector("#fault:has-text('x.exr')")
+    assert "torn.png" in page.inner_text("#fault")
+    assert page.locator("#stage").bounding_box()["y"] == top
+    drop(page, "#light", "torn.png", picture)
+    wait_until(lambda: "torn.png" not in page.inner_text("#fault"))
+    assert "x.exr" in page.inner_text("#fault")
+    page.keyboard.press("Escape")
+    assert page.inner_text("#fault") == ""
+    drop(page, "#light", "y.png", b"no picture")
+    page.wait_for_selector("#fault:has-text('y.png')")
+    page.focus("#fault button")
+    page.keyboard.press("Enter")
+    assert page.inner_text("#fault") == ""
+
+
+def test_of_several_files_those_that_are_pictures_are_taken(open_page, address):
+    page = open_page(address)
+    page.set_input_files(
+        "#pictures",
+        [
+            {"name": "torn.png", "mimeType": "image/png", "buffer": b"no picture"},
+            {
+                "name": "good.png",
+                "mimeType": "image/png",
+                "buffer": encode_png(np.full((*PROJECTOR, 3), 60, np.uint8)),
+            },
+        ],
+    )
+    page.wait_for_selector("output:has-text('1 of 1')")
+    wait_until(lambda: _is_lit(page, 60))
+    assert "torn.png" in page.inner_text("#fault")
+
+
+def test_keys_live_after_a_slider_and_a_button(open_page, address):
+    page = open_page(address)
+    page.locator("[data-of=radius]").click()
+    page.keyboard.press("f")
+    assert page.get_attribute("[data-solo=far]", "aria-pressed") == "true"
+    page.keyboard.press("5")
+    assert page.get_attribute("[data-kind=white]", "aria-pressed") == "true"
+    page.click("[data-kind=spot]")
+    page.keyboard.press("Space")
+    assert page.inner_text("#play") == "stop"
+    page.keyboard.press("Space")
+    assert page.inner_text("#play") == "play"
+
+
+def test_the_wipe_s_edge_is_dragged_where_the_scene_is_enlarged(open_page, address):
+    page = open_page(address, {"viewZoom": 2, "viewX": 0.25, "viewY": 0.25})
+    page.click("#keep")
+    slide(page, "wipe", 20)
+    box = page.locator("#edge").bounding_box()
+    scene = page.locator("#scene-view").bounding_box()
+    page.mouse.move(box["x"] + 1, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(scene["x"] + 0.8 * scene["width"], box["y"] + 60, steps=4)
+    page.mouse.up()
+    assert float(page.input_value("[data-of=wipe]")) == pytest.approx(40, abs=1)

@@ -1,11 +1,13 @@
 """The viewer's page in a real browser: what it says while files are read, and when they fail."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from nearfar.files.codecs import encode_npy, encode_png
 from tests.viewer.asking import PROJECTOR
-from tests.viewer.browsing import drop, seen, settled, slide
+from tests.viewer.browsing import contrast, drop, seen, settled, slide
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.slow
@@ -107,3 +109,38 @@ def test_the_wipe_s_edge_is_dragged_where_the_scene_is_enlarged(open_page, addre
     page.mouse.move(scene["x"] + 0.8 * scene["width"], box["y"] + 60, steps=4)
     page.mouse.up()
     assert float(page.input_value("[data-of=wipe]")) == pytest.approx(40, abs=1)
+
+
+def test_a_film_without_its_package_says_how_to_get_it(open_page, address, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    page = open_page(address, {"keyframes": [{"kind": "spot"}, {"kind": "white"}]})
+    page.click("#film-mp4")
+    page.wait_for_selector("#fault:has-text('nearfar[film]')")
+    assert not page.is_visible("#film-cancel")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 844, 1300, 1900])
+def test_what_is_kept_and_said_is_readable_by_day_and_night(open_page, address, scheme, width):
+    frames = [{"kind": "spot"}, {"kind": "sinusoid"}]
+    page = open_page(address, {"keyframes": frames}, color_scheme=scheme)
+    page.set_viewport_size({"width": width, "height": 390 if width == 844 else 900})
+    page.fill("#view-name", "a name that is longer than the place for it, by far")
+    page.press("#view-name", "Enter")
+    page.hover("[data-tool=compensation]")
+    assert contrast(page, "#tip") >= 4.5
+    drop(page, "#light", "x.exr", b"no picture", "")
+    page.wait_for_selector("#reading:has-text('x.exr')")
+    assert contrast(page, "#reading") >= 4.5
+    page.wait_for_selector("#fault:has-text('x.exr')")
+    fault = page.locator("#fault").bounding_box()
+    texts = "#fault span, #fault button, #keyframes .name, #film-length, #views button, .word"
+    for selector in f"{texts}, #view-zoom".split(", "):
+        assert contrast(page, selector) >= 4.5, selector
+    page.keyboard.press("Escape")
+    page.click("#copy-as")
+    for selector in ("#copying p", "#copying pre", "#copying h2"):
+        assert contrast(page, selector) >= 4.5, selector
+    for box in (fault, page.locator("#copying").bounding_box()):
+        assert 0 <= box["x"] <= box["x"] + box["width"] <= width
+    assert page.evaluate("document.documentElement.scrollWidth") <= width

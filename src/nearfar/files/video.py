@@ -76,8 +76,8 @@ def new_film(path: Path, rate: float) -> Iterator[AddPicture]:
             code = cv2.VideoWriter.fourcc(*CODEC)
             if not writer.open(str(path), cv2.CAP_FFMPEG, code, rate, (width, height)):
                 raise StorageError(
-                    f"this build of OpenCV cannot write {path.name} as VP9: install the package "
-                    f"opencv-python-headless."
+                    f"OpenCV cannot write {path.name} as VP9: choose a folder that can be written "
+                    f"to, or install opencv-python-headless."
                 )
         writer.write(np.ascontiguousarray(frame[..., ::-1]))
 

@@ -5,6 +5,7 @@ the server says how many are done, and the page sends the next light; at the end
 nothing is queued, and a page that is gone ends its film.
 """
 
+import asyncio
 import tempfile
 import zipfile
 from collections.abc import Awaitable, Callable, Iterator
@@ -25,12 +26,13 @@ from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.jobs import JobQueue
 from nearfar.viewer.live import close_for
 from nearfar.viewer.messages import WHITE_LEVEL, Gains, Light, Split, unpack_light
+from nearfar.viewer.uploads import UPLOAD_TIMEOUT_SECONDS
 
 with needed(extra="viewer", what="a page in the browser"):
     from starlette.websockets import WebSocket, WebSocketDisconnect
 
 MAXIMUM_PICTURES = 3600
-MAXIMUM_FILM_BYTES = 2**30
+MAXIMUM_FILM_BYTES = 2**29
 MAXIMUM_NAME_CHARACTERS = 120
 MAXIMUM_HEADER_CHARACTERS = 4096
 
@@ -161,7 +163,11 @@ async def run_film(
 
 async def _receive(socket: WebSocket, kind: str) -> Any:
     """Receive a message, text or bytes; None for one of the other kind."""
-    message = await socket.receive()
+    try:
+        async with asyncio.timeout(UPLOAD_TIMEOUT_SECONDS):
+            message = await socket.receive()
+    except TimeoutError:
+        raise InputError(f"no light came within {UPLOAD_TIMEOUT_SECONDS:g} s.") from None
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect
     return message.get(kind)

@@ -20,6 +20,8 @@ export class Connection {
   #times = new Map();
   #drawn = 0;
   #measured = { took: null, level: 0 };
+  // Seconds from the newest light that has been drawn to its frame.
+  #delay = 0;
   #retryDelay = FIRST_RETRY_MILLISECONDS;
   #light;
   #onFrame;
@@ -66,7 +68,7 @@ export class Connection {
     if (this.#retryDelay > FIRST_RETRY_MILLISECONDS) this.#onFault('');
     this.#retryDelay = FIRST_RETRY_MILLISECONDS;
     this.#send();
-    this.#onFrame(header, arrays[0], header.number === this.#sent && !this.#changed);
+    this.#onFrame({ ...header, delay: this.#delay }, arrays[0], header.number === this.#sent && !this.#changed);
     this.#measure(header);
   }
 
@@ -75,8 +77,9 @@ export class Connection {
     const sent = this.#times.get(number), now = performance.now();
     if (sent !== undefined) {
       this.#measured = { took: (now - Math.max(sent, this.#drawn)) / SECOND, level };
+      this.#delay = (now - sent) / SECOND;
       // For those who drive the page by a program.
-      document.body.dataset.delay = ((now - sent) / SECOND).toFixed(4);
+      document.body.dataset.delay = this.#delay.toFixed(4);
     }
     for (const older of this.#times.keys()) if (older <= number) this.#times.delete(older);
     this.#drawn = now;

@@ -15,10 +15,12 @@ export function describe(scene) {
   const [height, width] = scene.projector, [rows, columns] = scene.camera;
   get('name').textContent = scene.name;
   document.title = `${scene.name} · nearfar`;
-  get('about').textContent = `camera ${rows}x${columns}, ${scene.channels} channel${scene.channels > 1 ? 's' : ''}; ` +
-    (hasPart(scene, 'direct') ? `projector ${height}x${width}` : `${height * width} lamps`) + (scene.parts.includes('near') ? `; W = ${scene.window}` : '') +
-    (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') +
-    (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : '');
+  const window = Object.assign(document.createElement('span'), { className: 'word', textContent: 'W' });
+  window.dataset.word = 'W';
+  get('about').replaceChildren(`camera ${rows}x${columns}, ${scene.channels} channel${scene.channels > 1 ? 's' : ''}; ` +
+    (hasPart(scene, 'direct') ? `projector ${height}x${width}` : `${height * width} lamps`),
+  ...(scene.parts.includes('near') ? ['; ', window, ` = ${scene.window}`] : []),
+  (scene.pitch > 1 ? ` every ${scene.pitch} projector pixels` : '') + (scene.plan ? `; ${scene.plan.photos} photos, ${scene.method} estimate` : ''));
   get('parts').hidden = scene.parts.length === 1;
   if (isFree(scene)) {
     get('row-far-title').textContent = document.querySelector('.far-text').textContent = 'each lamp';

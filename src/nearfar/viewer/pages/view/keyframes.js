@@ -9,12 +9,14 @@ const button = (textContent, ariaLabel, onclick, disabled = false) => Object.ass
 
 export class Keyframes {
   #store;
+  #playback;
   // When it was started; 0 while it is stopped.
   #started = 0;
   #shown = null;
 
-  constructor({ store }) {
+  constructor({ store, playback }) {
     this.#store = store;
+    this.#playback = playback;
     get('add-keyframe').onclick = () => this.#set([...store.state.keyframes, pick(store.state, LIGHT_KEYS)]);
     get('play-keyframes').onclick = () => this.toggle();
   }
@@ -24,6 +26,7 @@ export class Keyframes {
   toggle() {
     const { state } = this.#store;
     if (!this.isPlaying && state.keyframes.length < 2) return;
+    if (!this.isPlaying && this.#playback.isPlaying) this.#playback.toggle();
     this.#started = this.isPlaying ? 0 : performance.now();
     // A cross-fade ends at the keyframe that it is nearer to.
     if (!this.isPlaying && state.blend) this.#store.update({ blend: null });
@@ -34,7 +37,10 @@ export class Keyframes {
   #run(started) {
     const step = now => {
       if (this.#started !== started) return;
-      const { state } = this.#store, time = Math.max(0, now - started) / 1000;
+      const { state } = this.#store;
+      // Something else plays, or nothing is left to play.
+      if (this.#playback.isPlaying || state.keyframes.length < 2) { this.toggle(); return; }
+      const time = Math.max(0, now - started) / 1000;
       this.#store.update(lightAt(state.keyframes, state.seconds, time));
       if (time >= secondsOf(state)) this.toggle(); else requestAnimationFrame(step);
     };

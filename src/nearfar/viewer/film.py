@@ -9,7 +9,7 @@ import asyncio
 import tempfile
 import zipfile
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
 
@@ -125,7 +125,7 @@ async def run_film(
 ) -> None:
     """Make one film for a page, until it is done or the page disconnects.
 
-    An error closes the socket, with the error's message as the reason.
+    An error's message is sent as a fault, and closes the socket.
 
     Parameters
     ----------
@@ -158,6 +158,9 @@ async def run_film(
     except WebSocketDisconnect:
         pass
     except NearfarError as error:
+        # The reason of a closed socket has room for a few words only.
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await socket.send_json({"fault": str(error)})
         await close_for(error, socket)
 
 

@@ -44,8 +44,11 @@ export class Film {
     };
     socket.onmessage = ({ data }) => {
       if (typeof data === 'string') {
-        const { done } = JSON.parse(data);
-        if (done < count) send(done); else this.#say('putting the film together');
+        const { done, fault } = JSON.parse(data);
+        if (fault) {
+          showFault(fault, 'film');
+          this.#end('');
+        } else if (done < count) send(done); else this.#say('putting the film together');
         return;
       }
       const [type, ending] = TYPES[format];

@@ -84,18 +84,20 @@ def test_of_several_files_those_that_are_pictures_are_taken(open_page, address):
     assert "torn.png" in page.inner_text("#fault")
 
 
-def test_keys_live_after_a_slider_and_a_button(open_page, address):
-    page = open_page(address)
-    page.locator("[data-of=radius]").click()
-    page.keyboard.press("f")
-    assert page.get_attribute("[data-solo=far]", "aria-pressed") == "true"
-    page.keyboard.press("5")
-    assert page.get_attribute("[data-kind=white]", "aria-pressed") == "true"
-    page.click("[data-kind=spot]")
-    page.keyboard.press("Space")
-    assert page.inner_text("#play") == "stop"
-    page.keyboard.press("Space")
-    assert page.inner_text("#play") == "play"
+def test_a_map_that_fails_leaves_nothing_behind(open_page, address):
+    page = open_page(address, {"tab": "map"})
+    refusal = {"status": 400, "json": {"fault": "there is no such map."}}
+    page.route("**/map/row", lambda route: route.fulfill(**refusal))
+    page.select_option("#maps", "error")
+    page.wait_for_selector("#map-caption:has-text('grey')")
+    page.select_option("#maps", "row")
+    page.wait_for_selector("#fault:has-text('no such map')")
+    assert page.inner_text("#map-caption") == ""
+    assert not page.is_visible("#map")
+    # Another one goes well, and the fault of the one before is over.
+    page.select_option("#maps", "error")
+    page.wait_for_selector("#map-caption:has-text('grey')")
+    assert page.inner_text("#fault") == ""
 
 
 def test_the_wipe_s_edge_is_dragged_where_the_scene_is_enlarged(open_page, address):

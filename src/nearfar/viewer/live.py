@@ -6,6 +6,7 @@ rests, exactly.
 
 import asyncio
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -129,9 +130,11 @@ async def _send_frames(
         if transport.light_block == 1 and await _arrives_within(newest, REST_SECONDS):
             continue
         steps = relighting.relight_exactly(light)
+        # Pictures are coarse where others are at work.
+        step = _next_on_one_processor if level else next_of
         while not newest.arrived.is_set():
             try:
-                exact = await jobs.run(next_of, steps)
+                exact = await jobs.run(step, steps)
             except ExhaustedError:
                 break
             if exact is not None:
@@ -145,6 +148,11 @@ def _relight_moving(relighting: Relighting, light: Light, level: int) -> Frame:
     """
     with single_threaded_products():
         return relighting.relight_coarsely(light, level)
+
+
+def _next_on_one_processor(steps: Iterator[Frame | None]) -> Frame | None:
+    with single_threaded_products():
+        return next_of(steps)
 
 
 def _pack_frame(number: int, frame: Frame, level: int) -> bytes:

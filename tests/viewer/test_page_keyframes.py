@@ -66,8 +66,7 @@ def test_lights_are_kept_put_in_order_and_played(open_page, address):
     settled(page)
     np.testing.assert_array_equal(seen(page, "light"), first)
     # They come back with the address, by the keyboard alone as well.
-    page.focus("#add-keyframe")
-    page.keyboard.press("Enter")
+    page.keyboard.press("k")
     names = _names(page)
     assert len(names) == 3
     wait_until(lambda: len(_of_the_address(page).get("keyframes", ())) == 3)

@@ -58,6 +58,7 @@ export function bindKeyboard({ scene, store, inspector, playback, scenePictures,
     const kind = all('[data-kind]')[Number(event.key) - 1], solo = SOLOS[event.key];
     if (kind) store.update({ kind: kind.dataset.kind });
     else if (solo !== undefined && (!solo || hasPart(scene, solo) && SPLITS[scenePictures.split].includes(solo))) store.update({ solo });
+    else if (event.key === 'k') get('add-keyframe').click();
     else if (SPLIT_KEYS[event.key]) splits.choose(SPLIT_KEYS[event.key]);
     else if (event.key === ' ' && !['BUTTON', 'SUMMARY'].includes(focused.tagName)) {
       event.preventDefault();

@@ -54,7 +54,7 @@ export class Keyframes {
     set(get('play-keyframes'), 'textContent', this.isPlaying ? 'stop' : 'play');
     set(get('play-keyframes'), 'ariaPressed', String(this.isPlaying));
     for (const id of ['play-keyframes', 'film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable);
-    set(get('film-length'), 'textContent', isPlayable ? `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s` : 'Keep two lights or more, and the page plays from one to the next.');
+    set(get('film-length'), 'textContent', isPlayable ? `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s` : 'Keep two lights or more as keyframes, and the page plays from one to the next.');
     if (this.#shown === keyframes) return;
     this.#shown = keyframes;
     get('keyframes').replaceChildren(...keyframes.map((frame, i) => this.#item(frame, i, keyframes)));

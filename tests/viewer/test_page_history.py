@@ -25,7 +25,9 @@ def _value(page, name):
 
 def _slide_by_hand(page, name, share):
     """Drag a slider's handle from the middle on."""
-    box = page.locator(f"[data-of={name}]").bounding_box()
+    slider = page.locator(f"[data-of={name}]")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
     y = box["y"] + box["height"] / 2
     page.mouse.move(box["x"] + box["width"] / 2, y)
     page.mouse.down()

@@ -148,7 +148,7 @@ def test_a_film_plays_in_a_browser_and_shows_the_pictures(open_page, address, tm
 def test_a_film_is_cancelled(open_page, address):
     page = open_page(address, {"keyframes": KEYFRAMES, "seconds": 20, "rate": 60})
     page.click("#film-pictures")
-    wait_until(lambda: page.inner_text("#film-status").startswith("picture 3 "))
+    wait_until(lambda: int((page.inner_text("#film-status") or "picture 0").split()[1]) > 2)
     page.click("#film-cancel")
     assert page.inner_text("#film-status") == ""
     assert page.inner_text("#fault") == ""

@@ -1,7 +1,7 @@
 """Films: pictures one after the other in an MP4 file, compressed as VP9.
 
-Chromium, Firefox, Safari from version 14 on and common players show VP9 in MP4. The codec belongs
-to the wheels of OpenCV; an encoder of H.264 does not, for its licence.
+Chromium, Firefox and common players show VP9 in MP4. OpenCV's wheels have an encoder of it, and
+none of H.264, for its licence.
 """
 
 from collections.abc import Iterator

@@ -22,7 +22,7 @@ from nearfar.errors import InputError, NearfarError
 from nearfar.files import developed, encode_png, to_srgb
 from nearfar.files.video import new_film
 from nearfar.packages import needed
-from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.interactive import GREY, InteractiveTransport
 from nearfar.viewer.jobs import JobQueue
 from nearfar.viewer.live import close_for
 from nearfar.viewer.messages import WHITE_LEVEL, Gains, Light, Split, unpack_light
@@ -112,8 +112,9 @@ def _picture(
 ) -> NDArray[np.uint8]:
     """Relight every camera pixel, and return the picture as the page shows it."""
     picture = relight(light, gains)
-    colours = transport.to_colours(picture.reshape(*picture.shape[:2], -1)).squeeze()
-    shown = developed(colours, exposure=film.exposure, gamma=film.gamma, channel=film.channel)
+    colours = transport.to_colours(picture.reshape(*picture.shape[:2], -1))
+    grey_or_rgb = colours[..., 0] if colours.shape[2] == GREY else colours
+    shown = developed(grey_or_rgb, exposure=film.exposure, gamma=film.gamma, channel=film.channel)
     return np.rint(255 * to_srgb(shown)).astype(np.uint8)
 
 

@@ -22,8 +22,10 @@ from nearfar.viewer.physical import PhysicalRelighting
 with needed(extra="viewer", what="a page in the browser"):
     from starlette.websockets import WebSocket, WebSocketDisconnect
 
-# A light that has not changed for so long is at rest.
+# A light that has not changed for so long is at rest; longer by what a page takes for a picture,
+# which sends the next light after it.
 REST_SECONDS = 0.12
+LONGEST_REST_SECONDS = 1.0
 # WebSocket close codes: what the page sent is wrong, or the server failed.
 POLICY_VIOLATION, SERVER_ERROR = 1008, 1011
 # The protocol allows a close reason of 123 bytes.
@@ -127,7 +129,8 @@ async def _send_frames(
         # A page sends the light of blocks while it moves, and the whole light once it rests.
         if frame.exact or light.block > 1:
             continue
-        if transport.light_block == 1 and await _arrives_within(newest, REST_SECONDS):
+        rest = min(REST_SECONDS + (took or 0.0), LONGEST_REST_SECONDS)
+        if transport.light_block == 1 and await _arrives_within(newest, rest):
             continue
         steps = relighting.relight_exactly(light)
         # Pictures are coarse where others are at work.

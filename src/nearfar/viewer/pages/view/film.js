@@ -7,6 +7,7 @@ import { pack } from './protocol.js';
 import { download, namedGains } from './saving.js';
 import { CHANNELS } from './state.js';
 
+const MAXIMUM_NAME_CHARACTERS = 120;
 const TYPES = { pictures: ['application/zip', 'zip'], mp4: ['video/mp4', 'mp4'] };
 
 export class Film {
@@ -37,7 +38,7 @@ export class Film {
       const { sent: { values, shape }, colour } = light;
       socket.send(pack({ number, shape, colour, split, gains }, values));
     };
-    const header = JSON.stringify({ format, name: name.replaceAll(/[^\w.-]/g, '-'), rate, count, split, exposure, gamma, channel: channel ? CHANNELS.indexOf(channel) - 1 : null });
+    const header = JSON.stringify({ format, name: name.slice(-MAXIMUM_NAME_CHARACTERS).replaceAll(/[^\w.-]/g, '-'), rate, count, split, exposure, gamma, channel: channel ? CHANNELS.indexOf(channel) - 1 : null });
     socket.onopen = () => {
       socket.send(header);
       send(0);

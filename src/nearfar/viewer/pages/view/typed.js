@@ -1,6 +1,6 @@
 // Sliders' values, which can be typed into as well.
 
-import { all, get } from './dom.js';
+import { all } from './dom.js';
 
 // What a slider counts from 0 and its text from 1.
 const FROM_ONE = ['shown'];
@@ -30,6 +30,8 @@ function bindOutput(output, show) {
   // A label would give the focus to its slider.
   output.onclick = event => event.preventDefault();
   output.onfocus = () => {
+    // Gains of the other split are called otherwise.
+    output.ariaLabel = `${nameOf(output, slider)}, typed`;
     before = output.textContent;
     getSelection().selectAllChildren(output);
   };
@@ -47,6 +49,4 @@ function bindOutput(output, show) {
 // show(): shows the controls again, as what was typed may be no number.
 export function bindTyped(show) {
   for (const output of all('.slider output')) bindOutput(output, show);
-  // Gains of the other split are called otherwise.
-  for (const id of ['part0', 'part1', 'part2']) get(id).parentElement.querySelector('output').title = 'type a gain';
 }

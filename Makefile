@@ -51,7 +51,7 @@ $(READY): requirements.lock pyproject.toml
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 		--no-annotate --custom-compile-command 'make lock' --quiet \
-		--extra dask --extra mitsuba --extra window --extra gphoto2 --extra raw --extra webcam \
+		--extra dask --extra mitsuba --extra window --extra gphoto2 --extra raw --extra webcam --extra film \
 		--extra viewer --group dev --group docs --group build pyproject.toml -o requirements.lock
 
 clean:

@@ -18,6 +18,7 @@ from nearfar.errors import (
 )
 from nearfar.files import (
     check_picture_ending,
+    developed,
     encode_png,
     from_srgb,
     full_scale_of,
@@ -261,3 +262,16 @@ def test_pictures_are_listed_in_natural_order(tmp_path: Path) -> None:
         list_pictures(tmp_path / "no")
     with pytest.raises(UnreadableFileError):
         list_pictures(tmp_path / "notes.txt")
+
+
+def test_a_picture_is_developed_as_it_is_to_look():
+    picture = np.random.default_rng(0).uniform(0, 2, (5, 7, 3)).astype(np.float32)
+    np.testing.assert_array_equal(developed(picture), picture)
+    np.testing.assert_allclose(developed(picture, exposure=-1.5), picture * 2**-1.5, rtol=1e-6)
+    # A gamma acts on what the screen gets.
+    shown = to_srgb(developed(picture, exposure=-1, gamma=2))
+    np.testing.assert_allclose(shown, to_srgb(picture / 2) ** 0.5, atol=1e-5)
+    np.testing.assert_array_equal(developed(picture, channel=1), picture[..., 1])
+    grey = picture[..., 0]
+    np.testing.assert_array_equal(developed(grey, channel=2), grey)
+    np.testing.assert_array_equal(developed(grey[..., None], channel=2), grey)

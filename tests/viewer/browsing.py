@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import time
 from collections.abc import Hashable
 from pathlib import Path
@@ -11,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 from playwright.sync_api import Browser, ConsoleMessage, Error, Page, ViewportSize
 
-from nearfar.files import to_srgb
+from nearfar.files import from_srgb, to_srgb
 from tests.viewer.asking import PROJECTOR
 from tests.waiting import LONGEST_WAIT
 
@@ -170,3 +171,22 @@ def drop(page, target, name, data, kind="image/png"):
           new DragEvent('drop', { dataTransfer: given, bubbles: true, cancelable: true })); }""",
         [target, name, base64.b64encode(data).decode(), kind],
     )
+
+
+def contrast(page, selector):
+    """Ratio of luminances of a text and what lies behind it, as WCAG has it."""
+    colours = page.evaluate(
+        """selector => { const at = document.querySelector(selector); let behind = at;
+        const back = () => getComputedStyle(behind).backgroundColor;
+        while (back() === 'rgba(0, 0, 0, 0)') behind = behind.parentElement;
+        return [getComputedStyle(at).color, back()]; }""",
+        selector,
+    )
+    light = [
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+        for r, g, b in (
+            from_srgb(np.array([int(v) for v in re.findall(r"\d+", colour)[:3]]) / np.float32(255))
+            for colour in colours
+        )
+    ]
+    return (max(light) + 0.05) / (min(light) + 0.05)

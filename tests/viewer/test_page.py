@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nearfar.files import from_srgb, read_light, to_srgb
+from nearfar.files import read_light, to_srgb
 from nearfar.files.codecs import decode_png, encode_png
 from nearfar.illumination.pictures import natural_picture
 from nearfar.transport.store import save_transport
@@ -16,7 +16,7 @@ from nearfar.transport.verdict import KeptVerdict, Reason
 from nearfar.viewer import interactive
 from nearfar.viewer.interactive import InteractiveTransport
 from tests.viewer.asking import CAMERA, PROJECTOR
-from tests.viewer.browsing import drag, drop, pictures, saved, seen, settled, slide, tone
+from tests.viewer.browsing import contrast, drag, drop, pictures, saved, seen, settled, slide, tone
 from tests.viewer.conftest import served_view
 from tests.waiting import LONGEST_WAIT
 
@@ -167,25 +167,6 @@ def test_dark_light_is_shown_in_all_its_steps(open_page, address, transport, gam
     column = transport.column(3, 7)
     expected = np.rint(255 * to_srgb(np.clip(32 * column, 0, 1)) ** (1 / gamma))
     assert np.abs(seen(page) - expected).max() <= 1
-
-
-def contrast(page, selector):
-    """Ratio of luminances of a text and what lies behind it, as WCAG has it."""
-    colours = page.evaluate(
-        """selector => { const at = document.querySelector(selector); let behind = at;
-        const back = () => getComputedStyle(behind).backgroundColor;
-        while (back() === 'rgba(0, 0, 0, 0)') behind = behind.parentElement;
-        return [getComputedStyle(at).color, back()]; }""",
-        selector,
-    )
-    light = [
-        0.2126 * r + 0.7152 * g + 0.0722 * b
-        for r, g, b in (
-            from_srgb(np.array([int(v) for v in re.findall(r"\d+", colour)[:3]]) / np.float32(255))
-            for colour in colours
-        )
-    ]
-    return (max(light) + 0.05) / (min(light) + 0.05)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -11,9 +11,8 @@ from nearfar.transport.store import save_transport
 from nearfar.viewer.beside import open_beside
 from nearfar.viewer.interactive import InteractiveTransport
 from tests.viewer.asking import CAMERA, PROJECTOR
-from tests.viewer.browsing import seen, settled, slide, tone
+from tests.viewer.browsing import contrast, seen, settled, slide, tone
 from tests.viewer.conftest import served_view
-from tests.viewer.test_page import contrast
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.slow
@@ -102,6 +101,37 @@ def test_numbers_and_clicks_are_those_of_the_first(open_page, two, transport, se
     wait_until(lambda: page.inner_text("#pixel") == "row 12, column 33")
     mark = _box(page, "#mark")
     assert mark["x"] + mark["width"] / 2 == pytest.approx(at[0], abs=2)
+
+
+def test_both_are_enlarged_and_moved_together(open_page, two):
+    page = open_page(two, {"kind": "white"})
+    _snr(page)
+    part = _box(page, "#second-part")
+    at = (part["x"] + 0.75 * part["width"], part["y"] + 0.25 * part["height"])
+    page.mouse.move(*at)
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -400)
+    page.keyboard.up("Control")
+    wait_until(lambda: page.inner_text("#view-zoom") == "4x")
+    first, second = _box(page, "#picture"), _box(page, "#before")
+    apart = part["x"] - _box(page, ".part >> nth=0")["x"]
+    assert second["width"] == pytest.approx(4 * part["width"], rel=0.01)
+    # The point below the pointer stays, and the same point of the first is above its own.
+    assert (at[0] - second["x"]) / second["width"] == pytest.approx(0.75, abs=0.01)
+    assert (second["x"] - first["x"], second["y"]) == pytest.approx((apart, first["y"]), abs=1)
+    # A drag that crosses into the other picture goes on as it began.
+    page.keyboard.down("Shift")
+    page.mouse.down()
+    page.mouse.move(at[0] - part["width"], at[1], steps=4)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    right_edge = _box(page, "#before")
+    assert right_edge["x"] + right_edge["width"] == pytest.approx(part["x"] + part["width"], abs=1)
+    assert _box(page, "#picture")["x"] == pytest.approx(right_edge["x"] - apart, abs=1)
+    # As an edge between the two, one lies on the other.
+    page.click("#arrangement")
+    first, second = _box(page, "#picture"), _box(page, "#before")
+    assert second == first
 
 
 def test_the_wipe_and_the_signed_difference_by_the_keyboard(open_page, two, transport, second):

@@ -11,8 +11,7 @@ from nearfar.markup import false_colour
 from nearfar.report.maps import maps_of
 from nearfar.viewer.colour_maps import COLOUR_MAPS
 from tests.viewer.asking import CAMERA, PROJECTOR
-from tests.viewer.browsing import pictures, seen, settled, slide
-from tests.viewer.test_page import contrast
+from tests.viewer.browsing import contrast, pictures, seen, settled, slide
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.slow
@@ -208,12 +207,14 @@ def test_the_error_bars_of_the_picture_are_a_map(open_page, address, transport):
     _type(page, "#error-bars-range", "high", "0.01")
     assert _close(seen(page), false_colour(sigma, 0, 0.01))
     assert _ticks(page, "#error-bars-figure") == ["0", "0.005", "0.01 photo units"]
+    page.locator("#picture").scroll_into_view_if_needed()
     box = page.locator("#picture").bounding_box()
     y, x = 12, 33
     page.mouse.move(
         box["x"] + (x + 0.5) / CAMERA.width * box["width"],
         box["y"] + (y + 0.5) / CAMERA.height * box["height"],
     )
+    wait_until(lambda: "± " in page.inner_text("#readout"))
     told = float(page.inner_text("#readout").split("± ")[1])
     assert told == pytest.approx(sigma[y, x], abs=1e-4)
     # Under another light, with other gains, and as a share of the light.

@@ -108,34 +108,37 @@ def test_a_slider_and_a_strip_choose_the_distance(open_page, address, transport)
     assert page.inner_text("#strip") == ""
 
 
+# How many requests to probe are under way, how many were at most, and the body of the newest.
+COUNTING = """
+    const ask = fetch;
+    window.probes = { count: 0, now: 0, most: 0 };
+    window.fetch = async (...given) => {
+      if (!String(given[0]).endsWith('tool/reach')) return ask(...given);
+      probes.count += 1;
+      probes.now += 1;
+      probes.most = Math.max(probes.most, probes.now);
+      probes.last = Array.from(new Uint8Array(await new Blob([given[1].body]).arrayBuffer()));
+      try { return await ask(...given); } finally { probes.now -= 1; }
+    };
+"""
+
+
 def test_a_moving_slider_leaves_no_backlog(open_page, address):
     """However often it moves, one request is under way, and the last of them is of its end."""
-    page = open_page(address, {"kind": "white", "tool": "reach"})
+    page = open_page(address, {"kind": "white", "tool": "reach"}, script=COUNTING)
     _staged(page)
-    asked, under_way, most = [], set(), [0]
-
-    def started(request):
-        if request.url.endswith("/tool/reach"):
-            under_way.add(request)
-            most[0] = max(most[0], len(under_way))
-            body = request.post_data_buffer
-            length = int.from_bytes(body[:4], "little")
-            asked.append(json.loads(body[4 : 4 + length]))
-
-    def ended(request):
-        under_way.discard(request)
-
-    page.on("request", started)
-    # A request that has finished is told of later, at times after the page has sent the next one.
-    page.on("response", lambda response: ended(response.request))
-    page.on("requestfailed", ended)
     for step in range(1, 61):
         slide(page, "reach", step / 4)
     _staged(page)
-    wait_until(lambda: asked and not asked[-1]["coarse"] and not under_way)
-    assert asked[-1]["inner"] == 15
-    assert most[0] == 1
-    assert len(asked) < 60
+
+    def last():
+        body = bytes(page.evaluate("probes.last"))
+        return json.loads(body[4 : 4 + int.from_bytes(body[:4], "little")])
+
+    wait_until(lambda: not page.evaluate("probes.now") and not last()["coarse"])
+    assert last()["inner"] == 15
+    assert page.evaluate("probes.most") == 1
+    assert page.evaluate("probes.count") < 60
 
 
 def test_what_nobody_waits_for_is_given_up(stored, monkeypatch):

@@ -406,14 +406,14 @@ def test_one_job_runs_at_a_time_even_if_its_page_is_gone(serve_it, lights, monke
     under, most, lock = 0, [], threading.Lock()
     relight_coarsely = InteractiveTransport.relight_coarsely
 
-    def counted(self, light):
+    def counted(self, *given):
         nonlocal under
         with lock:
             under += 1
             most.append(under)
         time.sleep(0.05)
         try:
-            return relight_coarsely(self, light)
+            return relight_coarsely(self, *given)
         finally:
             with lock:
                 under -= 1

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nearfar.cli.lights import Resize, Srgb, light_or_white, require_light, say_resized
+from nearfar.cli.looks import Channel, Exposure, Gamma, look_for
 from nearfar.cli.opening import open_reconstructed
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
 from nearfar.cli.saying import say
@@ -96,6 +97,9 @@ def probe(
     ] = None,
     srgb: Srgb = False,
     resize: Resize = False,
+    exposure: Exposure = 0.0,
+    gamma: Gamma = 1.0,
+    channel: Channel = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -111,13 +115,14 @@ def probe(
     require_light(light, srgb=srgb, resize=resize)
     chosen, files = _mask(within, ring, beyond, epipolar, mask)
     check_picture_ending(output)
+    look = look_for(output, exposure, gamma, channel)
     keep_input(output, transport, *files, *([light] if light else []))
     check_output(output, force=force)
     with progress_bar("probing", quiet=quiet):
         opened = open_reconstructed(transport)
         projected, given = light_or_white(opened, light, srgb=srgb, resize=resize)
         picture = probe_stored(opened, projected, chosen)
-        write_picture(output, picture, force=force)
+        write_picture(output, look.of(picture), force=force)
     if light is not None:
         say_resized(light, given, opened.projector, quiet=quiet)
     say(f"probed picture of {opened.camera} written to {output}", quiet=quiet)

@@ -8,6 +8,7 @@ import typer
 
 from nearfar.cli.gains import MODEL, PHYSICAL, gains_of
 from nearfar.cli.lights import Resize, Srgb, read_light_for, say_resized
+from nearfar.cli.looks import Channel, Exposure, Gamma, look_for
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
 from nearfar.cli.other_projectors import open_transports, others_of
 from nearfar.cli.saying import say
@@ -83,6 +84,9 @@ def relight(
             "the camera is saturated.",
         ),
     ] = False,
+    exposure: Exposure = 0.0,
+    gamma: Gamma = 1.0,
+    channel: Channel = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -103,6 +107,7 @@ def relight(
     paths = [transport, *(each.path for each in others)]
     lights = [light, *(each.beside for each in others)]
     check_picture_ending(output)
+    look = look_for(output, exposure, gamma, channel)
     keep_input(output, *paths, *lights)
     check_output(output, force=force)
     with progress_bar("relighting", quiet=quiet):
@@ -115,7 +120,7 @@ def relight(
             make(one, projected, gains) for one, (projected, _) in zip(opened, read, strict=True)
         ]
         picture = (added_deviations if error_bars else added_pictures)(pictures)
-        write_picture(output, picture, force=force, may_be_infinite=error_bars)
+        write_picture(output, look.of(picture), force=force, may_be_infinite=error_bars)
     for path, one, (_, given) in zip(lights, opened, read, strict=True):
         say_resized(path, given, one.projector, quiet=quiet)
     what = "standard deviation of the relit picture" if error_bars else "relit picture"

@@ -5,7 +5,7 @@ Stores are in `nearfar.files.stores`: Zarr is much of a command's start, and pla
 
 from nearfar.files.arrays import read_arrays, write_array
 from nearfar.files.codecs import encode_png
-from nearfar.files.colour import from_srgb, luminance, to_srgb
+from nearfar.files.colour import developed, from_srgb, luminance, to_srgb
 from nearfar.files.images import (
     check_picture_ending,
     full_scale_of,
@@ -36,6 +36,7 @@ __all__ = [
     "check_output",
     "check_picture_ending",
     "check_resumable",
+    "developed",
     "encode_png",
     "from_srgb",
     "full_scale_of",

@@ -22,6 +22,36 @@ def from_srgb(encoded: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
     return np.asarray(np.where(value <= 0.04045, value / 12.92, curve), dtype=np.float32)
 
 
+def developed(
+    picture: NDArray[np.floating[Any]],
+    *,
+    exposure: float = 0.0,
+    gamma: float = 1.0,
+    channel: int | None = None,
+) -> NDArray[np.float32]:
+    """Return a picture as the viewer shows it, in linear light, to be written as PNG.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (y, x) or (y, x, channels)
+        Linear light.
+    exposure : float
+        In stops: each doubles the light.
+    gamma : float
+        On top of the sRGB curve; above 1, dark parts are lifted, and light is clipped to [0, 1].
+    channel : int, optional
+        The only channel to be left, as grey; of a grey picture there is only one.
+
+    Returns
+    -------
+    ndarray, shape (y, x) or (y, x, channels), float32
+    """
+    light = np.asarray(picture, dtype=np.float32) * np.float32(2.0**exposure)
+    if channel is not None and light.ndim == 3:
+        light = light[..., min(channel, light.shape[2] - 1)]
+    return light if gamma == 1.0 else from_srgb(to_srgb(light) ** np.float32(1 / gamma))
+
+
 def luminance(rgb: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
     """Luminance of linear RGB light, shape (..., 3) to (...)."""
     return np.asarray(np.asarray(rgb, dtype=np.float32) @ _LUMINANCE, dtype=np.float32)

@@ -15,11 +15,13 @@ from nearfar.report.maps import TITLES, Map, maps_of
 from nearfar.viewer.assets import read_page, with_security_headers
 from nearfar.viewer.beside import Beside
 from nearfar.viewer.decoding import MAXIMUM_FILE_BYTES
+from nearfar.viewer.film import Relight, run_film
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.jobs import BusyError, JobQueue, next_of
 from nearfar.viewer.live import run_session
 from nearfar.viewer.messages import (
     WHITE_LEVEL,
+    Split,
     maximum_light_bytes,
     unpack_levels,
     unpack_light,
@@ -42,6 +44,7 @@ with needed(extra="viewer", what="a page in the browser"):
     from fastapi.responses import JSONResponse, Response
 
 MAXIMUM_SESSIONS = 8
+MAXIMUM_FILMS = 2
 # WebSocket close code for a session too many.
 TRY_AGAIN_LATER = 1013
 MAXIMUM_NAME_CHARACTERS = 255
@@ -76,7 +79,7 @@ class _Handlers:
         self._maximum_picture_bytes = maximum_light_bytes(transport.stored.camera)
         titles = {**TITLES, **{name: found.title for name, found in photo_maps.items()}}
         self._scene = describe_scene(transport, {name: titles[name] for name in self._maps}, beside)
-        self._sessions = 0
+        self._sessions = self._films = 0
 
     async def asset(self, name: str) -> Response:
         """Return a file of the page."""
@@ -117,9 +120,7 @@ class _Handlers:
         """Return every camera pixel under the light of the request, as OpenEXR."""
         body = await read_body(request, self._maximum_light_bytes)
         header, light = unpack_light(body, self._transport.projector)
-        if header.split == "physical":
-            await self._splitting.run(self._physical.prepare)
-        relight = (self._physical if header.split == "physical" else self._transport).relight
+        relight = await self._relight_by(header.split)
         arguments = self._transport, relight, light, header.gains
         exr = await self._whole_pictures.run(encode_relit_exr, *arguments)
         return _bytes_response(exr, "image/x-exr")
@@ -170,6 +171,25 @@ class _Handlers:
         finally:
             self._sessions -= 1
 
+    async def film(self, socket: WebSocket) -> None:
+        """Make a film, unless `MAXIMUM_FILMS` are made already."""
+        await socket.accept()
+        if self._films >= MAXIMUM_FILMS:
+            await socket.close(TRY_AGAIN_LATER, f"{MAXIMUM_FILMS} films are being made: wait.")
+            return
+        self._films += 1
+        try:
+            await run_film(self._transport, self._relight_by, self._whole_pictures, socket)
+        finally:
+            self._films -= 1
+
+    async def _relight_by(self, split: Split) -> Relight:
+        """Return what relights every camera pixel by a split, which is made if need be."""
+        if split == "physical":
+            await self._splitting.run(self._physical.prepare)
+            return self._physical.relight
+        return self._transport.relight
+
 
 def application(
     transport: InteractiveTransport,
@@ -215,6 +235,7 @@ def application(
     ):
         routes.post(path, response_model=None)(post)
     routes.websocket("/relight")(handlers.relight)
+    routes.websocket("/film")(handlers.film)
     return routes
 
 

@@ -8,7 +8,6 @@ components being direct, near and far. Frames have 1 colour or 3.
 """
 
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,6 @@ from nearfar.transport.model import Transport
 from nearfar.transport.rows import FACTORS, of_pixels, of_rows, stacked, thinned_blocks
 from nearfar.transport.stored import StoredTransport, open_transport
 from nearfar.viewer.messages import Gains, Light, Split
-from nearfar.viewer.pace import Pace
 
 # Factors of the coarse copy: relighting them takes some tens of milliseconds.
 MAXIMUM_COARSE_BYTES = 160 * 2**20
@@ -76,8 +74,8 @@ class Frame(NamedTuple):
 class Relighting(Protocol):
     """What relights a scene for a page, into the three components of a split."""
 
-    def relight_coarsely(self, light: Light) -> Frame:
-        """Relight as finely as the pictures before allow, while the light may move on."""
+    def relight_coarsely(self, light: Light, level: int = 0) -> Frame:
+        """Relight at a level of detail, while the light may move on; 0 is the finest."""
         ...
 
     def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
@@ -146,7 +144,6 @@ class InteractiveTransport:
         while len(self._moving) < PACES:
             finer = self._moving[-1]
             self._moving.append(of_pixels(finer, *(middles(side, 2) for side in finer.camera)))
-        self._pace = Pace(PACES)
 
     @property
     def projector(self) -> Size:
@@ -158,9 +155,13 @@ class InteractiveTransport:
         """Colours of a frame: 3 if the camera has as many channels, else 1."""
         return COLOUR if self.stored.channels >= COLOUR else GREY
 
-    def relight_coarsely(self, light: Light) -> Frame:
-        """Relight as finely as the pictures before allow, while the light may move on."""
-        began, level = time.perf_counter(), self._pace.level
+    @property
+    def levels(self) -> int:
+        """How many levels of detail there are while the light moves."""
+        return len(self._moving)
+
+    def relight_coarsely(self, light: Light, level: int = 0) -> Frame:
+        """Relight at a level of detail, while the light may move on; 0 is the finest."""
         is_whole = light.block == 1
         if is_whole and self.light_block > 1:
             means = block_means(light.levels, self.light_block)
@@ -169,9 +170,7 @@ class InteractiveTransport:
         parts = self._parts(transport, self._analysed(transport, light), light)
         stride = self.coarse_stride * 2**level
         exact = is_whole and self.light_block == 1 and stride == self.display_stride
-        frame = packed_frame(parts, stride, exact=exact)
-        self._pace.took(time.perf_counter() - began)
-        return frame
+        return packed_frame(parts, stride, exact=exact)
 
     def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
         """Relight every camera pixel that is displayed, block by block.

@@ -5,21 +5,27 @@ rests, exactly.
 """
 
 import asyncio
+import time
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 from nearfar.errors import InputError, NearfarError
 from nearfar.packages import needed
+from nearfar.parallel import single_threaded_products
 from nearfar.viewer.interactive import Frame, InteractiveTransport, Relighting
 from nearfar.viewer.jobs import ExhaustedError, JobQueue, next_of
 from nearfar.viewer.messages import Light, Split, pack, unpack_light
+from nearfar.viewer.pace import Pace
 from nearfar.viewer.physical import PhysicalRelighting
 
 with needed(extra="viewer", what="a page in the browser"):
     from starlette.websockets import WebSocket, WebSocketDisconnect
 
-# A light that has not changed for so long is at rest.
+# A light that has not changed for so long is at rest; longer by what a page takes for a picture,
+# which sends the next light after it.
 REST_SECONDS = 0.12
+LONGEST_REST_SECONDS = 1.0
 # WebSocket close codes: what the page sent is wrong, or the server failed.
 POLICY_VIOLATION, SERVER_ERROR = 1008, 1011
 # The protocol allows a close reason of 123 bytes.
@@ -34,6 +40,8 @@ class _NewestLight:
     number: int = 0
     light: Light | None = None
     split: Split = "model"
+    took: float | None = None
+    level: int = 0
 
 
 async def run_session(
@@ -65,14 +73,19 @@ async def run_session(
     except WebSocketDisconnect:
         pass
     except NearfarError as error:
-        code = POLICY_VIOLATION if isinstance(error, InputError) else SERVER_ERROR
-        reason = str(error).encode()[:MAXIMUM_REASON_BYTES].decode(errors="ignore")
-        with suppress(RuntimeError, WebSocketDisconnect):
-            await socket.close(code, reason)
+        await close_for(error, socket)
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def close_for(error: NearfarError, socket: WebSocket) -> None:
+    """Close a page's socket, with the error's message as the reason."""
+    code = POLICY_VIOLATION if isinstance(error, InputError) else SERVER_ERROR
+    reason = str(error).encode()[:MAXIMUM_REASON_BYTES].decode(errors="ignore")
+    with suppress(RuntimeError, WebSocketDisconnect):
+        await socket.close(code, reason)
 
 
 async def _receive_lights(
@@ -86,6 +99,7 @@ async def _receive_lights(
         data = message.get("bytes") or b""
         header, light = unpack_light(data, transport.projector, transport.light_block)
         newest.number, newest.light, newest.split = header.number, light, header.split
+        newest.took, newest.level = header.took, header.level
         newest.arrived.set()
 
 
@@ -97,6 +111,7 @@ async def _send_frames(
     socket: WebSocket,
 ) -> None:
     """Send a coarse frame of each newest light, and an exact one once it rests."""
+    pace = Pace(transport.levels)
     while True:
         await newest.arrived.wait()
         newest.arrived.clear()
@@ -104,26 +119,48 @@ async def _send_frames(
         assert light is not None
         is_physical = newest.split == "physical" and physical.is_prepared
         relighting: Relighting = physical if is_physical else transport
-        frame = await jobs.run(relighting.relight_coarsely, light)
-        await socket.send_bytes(_pack_frame(number, frame))
+        began, level = time.perf_counter(), pace.level
+        took, is_of_this_level = newest.took, newest.level == level
+        frame = await jobs.run(_relight_moving, relighting, light, level)
+        await socket.send_bytes(_pack_frame(number, frame, level))
+        if took is None or is_of_this_level:
+            # The server's own time is not yet all that the page waits for.
+            pace.took(max(took or 0.0, time.perf_counter() - began))
         # A page sends the light of blocks while it moves, and the whole light once it rests.
         if frame.exact or light.block > 1:
             continue
-        if transport.light_block == 1 and await _arrives_within(newest, REST_SECONDS):
+        rest = min(REST_SECONDS + (took or 0.0), LONGEST_REST_SECONDS)
+        if transport.light_block == 1 and await _arrives_within(newest, rest):
             continue
         steps = relighting.relight_exactly(light)
+        # Pictures are coarse where others are at work.
+        step = _next_on_one_processor if level else next_of
         while not newest.arrived.is_set():
             try:
-                exact = await jobs.run(next_of, steps)
+                exact = await jobs.run(step, steps)
             except ExhaustedError:
                 break
             if exact is not None:
-                await socket.send_bytes(_pack_frame(number, exact))
+                await socket.send_bytes(_pack_frame(number, exact, level))
 
 
-def _pack_frame(number: int, frame: Frame) -> bytes:
+def _relight_moving(relighting: Relighting, light: Light, level: int) -> Frame:
+    """Relight coarsely on one processor.
+
+    Where others are at work, threads of one product wait for one another longer than they compute.
+    """
+    with single_threaded_products():
+        return relighting.relight_coarsely(light, level)
+
+
+def _next_on_one_processor(steps: Iterator[Frame | None]) -> Frame | None:
+    with single_threaded_products():
+        return next_of(steps)
+
+
+def _pack_frame(number: int, frame: Frame, level: int) -> bytes:
     header = {name: getattr(frame, name) for name in ("exact", "stride", "scale", "split")}
-    return pack({"number": number, **header}, frame.parts)
+    return pack({"number": number, "level": level, **header}, frame.parts)
 
 
 async def _arrives_within(newest: _NewestLight, seconds: float) -> bool:

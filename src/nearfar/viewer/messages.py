@@ -105,6 +105,11 @@ class LightHeader(BaseModel):
         Linear red, green and blue, which the levels are multiplied by.
     split : {"model", "physical"}
         Which components the picture is taken apart into.
+    took : float or None
+        Seconds that the page's newest frame took from its light to the screen, without the wait
+        for those before it; None before there is one.
+    level : int
+        The level of detail that this frame had; see `nearfar.viewer.pace`.
     gains : Gains
         Used for pictures that are saved; pages apply the gains of live frames themselves.
     """
@@ -116,6 +121,8 @@ class LightHeader(BaseModel):
     block: int = Field(default=1, ge=1, le=2**16)
     colour: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
     split: Split = "model"
+    took: float | None = Field(default=None, ge=0, le=3600)
+    level: int = Field(default=0, ge=0, le=15)
     gains: Gains = Gains()
 
 

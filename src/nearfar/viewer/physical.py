@@ -3,7 +3,6 @@
 A split takes seconds or, for large scenes, minutes. It is made when the first page asks for it.
 """
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,9 +17,8 @@ from nearfar.estimate.physical.split import (
     split_physically,
 )
 from nearfar.transport.rows import of_pixels
-from nearfar.viewer.interactive import PACES, Frame, InteractiveTransport, packed_frame
+from nearfar.viewer.interactive import Frame, InteractiveTransport, packed_frame
 from nearfar.viewer.messages import Gains, Light
-from nearfar.viewer.pace import Pace
 
 
 class PhysicalRelighting:
@@ -38,7 +36,6 @@ class PhysicalRelighting:
         self._displayed: PhysicalSplit | None = None
         self._moving: list[PhysicalSplit] = []
         self._fault: InputError | None = None
-        self._pace = Pace(PACES)
 
     @property
     def is_prepared(self) -> bool:
@@ -63,7 +60,9 @@ class PhysicalRelighting:
                 raise
             displayed = self._transport.display_stride
             self._displayed = _every(self._whole, displayed)
-            strides = [self._transport.coarse_stride * 2**level for level in range(PACES)]
+            strides = [
+                self._transport.coarse_stride * 2**level for level in range(self._transport.levels)
+            ]
             # All of them at once: what relights looks whether there are any.
             self._moving = [
                 self._displayed if stride == displayed else _every(self._whole, stride)
@@ -71,15 +70,12 @@ class PhysicalRelighting:
             ]
         return len(self._whole.bodies)
 
-    def relight_coarsely(self, light: Light) -> Frame:
-        """Relight as finely as the pictures before allow, while the light may move on."""
-        began, level = time.perf_counter(), self._pace.level
+    def relight_coarsely(self, light: Light, level: int = 0) -> Frame:
+        """Relight at a level of detail, while the light may move on; 0 is the finest."""
         parts = self._parts(self._moving[level], light)
         stride = self._transport.coarse_stride * 2**level
         exact = light.block == 1 and stride == self._transport.display_stride
-        frame = packed_frame(parts, stride, exact=exact, split="physical")
-        self._pace.took(time.perf_counter() - began)
-        return frame
+        return packed_frame(parts, stride, exact=exact, split="physical")
 
     def relight_exactly(self, light: Light) -> Iterator[Frame | None]:
         """Relight every camera pixel that is displayed, in one step."""

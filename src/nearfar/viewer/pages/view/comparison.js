@@ -15,7 +15,7 @@ export function shareThePointer() {
 // isCompared: whether there is something to compare with; isPair: whether both are shown whole; name: of the second.
 export function showComparison({ difference, wipe, arrangement }, { isCompared, isPair, name }) {
   const before = get('before'), isWiped = isCompared && !difference && !isPair;
-  get('stage').classList.toggle('pair', isPair);
+  get('scene-view').classList.toggle('pair', isPair);
   set(before, 'hidden', !isCompared || difference);
   set(before.style, 'clipPath', isPair ? 'none' : `inset(0px ${100 - wipe}% 0px 0px)`);
   set(get('edge'), 'hidden', !isWiped);

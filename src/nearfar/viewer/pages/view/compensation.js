@@ -2,8 +2,8 @@
 
 import { BackgroundJob } from './background.js';
 import { WHITE_LEVEL } from './colour.js';
-import { get, set, showFault, showingFaults } from './dom.js';
-import { isLinear, readByServer } from './files.js';
+import { get, set } from './dom.js';
+import { isLinear, readByServer, showingFaultsOf } from './files.js';
 import { levelsOfPicture } from './light.js';
 import { exposureFor, pictureOf } from './picture.js';
 import { pack, requestMessage } from './protocol.js';
@@ -24,10 +24,10 @@ export class Compensation {
     this.#page = page;
     this.#job = new BackgroundJob(text => set(get('tool-status'), 'textContent',
       text === 'computing' ? 'Looking for the light. This takes as long as some hundred pictures.' : text));
-    get('wanted').onchange = showingFaults(async event => {
+    get('wanted').onchange = async event => {
       await this.want(event.target.files[0]);
       event.target.value = '';
-    });
+    };
   }
 
   close() {
@@ -44,9 +44,9 @@ export class Compensation {
   lightChanged() { this.#choose(''); }
 
   // Takes a file for what the scene is to look like.
-  async want(file) {
-    if (!file) return;
-    showFault('');
+  async want(file) { if (file) await showingFaultsOf(file, () => this.#want(file)); }
+
+  async #want(file) {
     const { scene: { camera: [height, width] } } = this.#page;
     const levels = await isLinear(file) ? (await readByServer('wanted', file)).arrays[0].data : await this.#levelsOf(file, width, height);
     this.#job.ask([signal => this.#find({ levels, height, width }, signal)]);
@@ -60,11 +60,11 @@ export class Compensation {
     const body = pack({ shape: [height, width, 3], colour: [1, 1, 1] }, levels);
     const { header, arrays: [found, expected, far] } = await requestMessage('tool/compensation', { method: 'POST', body, signal });
     const { store, light, scenePictures } = this.#page, { said } = header;
-    light.addLinear(found.data);
+    const pictures = [...store.state.pictures, light.addLinear(found.data)];
     const wanted = { height, width, colours: 3, values: Float32Array.from(levels, level => said.scale * level / WHITE_LEVEL) };
     const picture = pictureOf(expected, header.scale);
     scenePictures.compareWith(wanted, 'wanted');
-    store.update({ kind: 'picture', shown: light.pictureCount - 1, pictures: [...store.state.pictures, ''], wipe: 50, exposure: exposureFor(wanted) });
+    store.update({ kind: 'picture', shown: pictures.length - 1, pictures, wipe: 50, exposure: exposureFor(wanted) });
     const share = (100 * said.out_of_reach_share).toFixed(1);
     this.#strip.show([
       this.#item('wanted', '', wanted), this.#item('expected', errorOf(said), picture),

@@ -4,6 +4,7 @@ import { pack, unpack } from './protocol.js';
 
 // Lights without a frame yet: the server relights one while the page draws the frame of another.
 const MAXIMUM_LIGHTS_UNDER_WAY = 3;
+const SECOND = 1000;
 const FIRST_RETRY_MILLISECONDS = 500;
 const LAST_RETRY_MILLISECONDS = 8000;
 // Close codes of a light that the server refused or failed at: it is not sent again by itself.
@@ -15,6 +16,12 @@ export class Connection {
   #sent = 0;
   #received = 0;
   #changed = true;
+  // When lights were sent, by number; when the newest frame was drawn; and what the server is told of it.
+  #times = new Map();
+  #drawn = 0;
+  #measured = { took: null, level: 0 };
+  // Seconds from the newest light that has been drawn to its frame.
+  #delay = 0;
   #retryDelay = FIRST_RETRY_MILLISECONDS;
   #light;
   #onFrame;
@@ -52,7 +59,8 @@ export class Connection {
     this.#changed = false;
     this.#sent += 1;
     const { sent: { values, shape, block }, colour, split } = this.#light();
-    this.#socket.send(pack({ number: this.#sent, shape, block, colour, split }, values));
+    this.#times.set(this.#sent, performance.now());
+    this.#socket.send(pack({ number: this.#sent, shape, block, colour, split, ...this.#measured }, values));
   }
 
   #receive({ header, arrays }) {
@@ -60,6 +68,20 @@ export class Connection {
     if (this.#retryDelay > FIRST_RETRY_MILLISECONDS) this.#onFault('');
     this.#retryDelay = FIRST_RETRY_MILLISECONDS;
     this.#send();
-    this.#onFrame(header, arrays[0], header.number === this.#sent && !this.#changed);
+    this.#onFrame({ ...header, delay: this.#delay }, arrays[0], header.number === this.#sent && !this.#changed);
+    this.#measure(header);
+  }
+
+  // How long the frame took from its light to the screen; of a light at rest only the first frame tells.
+  #measure({ number, level }) {
+    const sent = this.#times.get(number), now = performance.now();
+    if (sent !== undefined) {
+      this.#measured = { took: (now - Math.max(sent, this.#drawn)) / SECOND, level };
+      this.#delay = (now - sent) / SECOND;
+      // For those who drive the page by a program.
+      document.body.dataset.delay = this.#delay.toFixed(4);
+    }
+    for (const older of this.#times.keys()) if (older <= number) this.#times.delete(older);
+    this.#drawn = now;
   }
 }

@@ -15,9 +15,27 @@ export function positionOn(event, [height, width]) {
 export const nearestPixel = ([y, x], [height, width]) =>
   [Math.min(height - 1, Math.max(0, Math.round(y))), Math.min(width - 1, Math.max(0, Math.round(x)))];
 
-export const showFault = text => set(get('fault'), 'textContent', text);
+// What went wrong, by where: a fault is shown until what it is of goes well, or until it is closed.
+const faults = new Map();
 
-// An asynchronous handler whose error is shown on the page.
-export const showingFaults = handler => async (...args) => {
-  try { await handler(...args); } catch (error) { showFault(error.message); }
+export function showFault(text, source = '') {
+  if (text) faults.set(source, text); else if (!faults.delete(source)) return;
+  showFaults();
+}
+
+export function closeFaults() {
+  faults.clear();
+  showFaults();
+}
+
+function showFaults() {
+  const lines = [...new Set(faults.values())].map(textContent => Object.assign(document.createElement('span'), { textContent }));
+  const button = Object.assign(document.createElement('button'), { textContent: 'close', onclick: closeFaults });
+  get('fault').replaceChildren(...lines, ...(lines.length ? [button] : []));
+}
+
+// An asynchronous handler whose error is shown on the page, until it is called again.
+export const showingFaults = (handler, source) => async (...args) => {
+  showFault('', source);
+  try { await handler(...args); } catch (error) { showFault(error.message, source); }
 };

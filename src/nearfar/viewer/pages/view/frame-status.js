@@ -8,12 +8,13 @@ export class FrameStatus {
   #times = [];
   #timer = 0;
 
-  arrived({ exact, stride }) {
+  // delay: seconds from the light before to its frame.
+  arrived({ exact, stride, delay }) {
     const now = performance.now();
     this.#times = this.#times.filter(time => time > now - SECOND);
     this.#times.push(now);
     const detail = (exact ? '' : 'while it moves: ') + (stride > 1 ? `one row and column in ${stride}` : 'every camera pixel');
-    this.#say(this.#times.length > 2 ? `${this.#times.length} pictures a second · ${detail}` : detail);
+    this.#say(this.#times.length > 2 ? `${this.#times.length} pictures a second, ${Math.round(SECOND * delay)} ms after the light · ${detail}` : detail);
     // A rate is one of lights that move: it is gone once nothing comes.
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => this.#say(detail), SECOND);

@@ -32,7 +32,7 @@ export class Inspector {
     get('row').hidden = false;
     if (!tab && this.#store.state.tab !== 'numbers') this.#tabs().open('row');
     this.#drawRow();
-  });
+  }, 'row');
 
   showColumn = showingFaults(async (y, x, tab = '') => {
     this.#store.update({ column: [y, x] });
@@ -41,7 +41,14 @@ export class Inspector {
     if (!tab) this.#tabs().offer('column');
     get('column').textContent = `row ${y}, column ${x}`;
     this.#drawColumn();
-  });
+  }, 'column');
+
+  // No camera pixel is chosen any more.
+  hideRow() {
+    this.#row = null;
+    for (const id of ['row', 'row-ranges']) get(id).hidden = true;
+    get('pixel').textContent = 'click the scene';
+  }
 
   #drawColumn() {
     if (!this.#column) return;

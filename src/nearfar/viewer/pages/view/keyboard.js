@@ -1,6 +1,7 @@
 // Keys: what they do depends on the element that has the focus.
 
 import { all, get, nearestPixel } from './dom.js';
+import { isTyping } from './history.js';
 import { SPLITS, hasPart } from './state.js';
 
 const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
@@ -24,7 +25,7 @@ function releaseFocus() {
 export function bindKeyboard({ scene, store, inspector, playback, scenePictures, splits, dual }) {
   releaseFocus();
   addEventListener('keydown', event => {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || isTyping() || document.querySelector('dialog[open]')) return;
     const focused = document.activeElement, arrow = ARROWS[event.key];
     if ((arrow || event.key === 'Enter') && focused === get('light')) onLight(event, arrow);
     else if ((arrow || event.key === 'Enter') && focused === get('picture')) onPicture(event, arrow);
@@ -57,6 +58,7 @@ export function bindKeyboard({ scene, store, inspector, playback, scenePictures,
     const kind = all('[data-kind]')[Number(event.key) - 1], solo = SOLOS[event.key];
     if (kind) store.update({ kind: kind.dataset.kind });
     else if (solo !== undefined && (!solo || hasPart(scene, solo) && SPLITS[scenePictures.split].includes(solo))) store.update({ solo });
+    else if (event.key === 'k') get('add-keyframe').click();
     else if (SPLIT_KEYS[event.key]) splits.choose(SPLIT_KEYS[event.key]);
     else if (event.key === ' ' && !['BUTTON', 'SUMMARY'].includes(focused.tagName)) {
       event.preventDefault();

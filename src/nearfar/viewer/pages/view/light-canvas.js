@@ -1,6 +1,6 @@
 // The light's own canvas: the light is drawn on it, and dragged or painted in it.
 
-import { get, nearestPixel, positionOn, showFault } from './dom.js';
+import { get, nearestPixel, positionOn } from './dom.js';
 import { drawLight } from './picture.js';
 
 const CLICK_DISTANCE = 4;
@@ -110,7 +110,6 @@ export function bindPointer({ store, projector, onPixel }) {
     canvas.setPointerCapture(event.pointerId);
     const position = positionOn(event, projector), { phase, shift } = store.state;
     press = { pointer: event.pointerId, client: [event.clientX, event.clientY], position, phase, shift };
-    showFault('');
     update(pressed(store.state, position.map(roundToQuarter)));
   };
   canvas.onpointermove = event => {

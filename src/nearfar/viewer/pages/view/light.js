@@ -24,8 +24,12 @@ export class Light {
     this.shown = this.sent = this.#whole;
   }
 
-  // Pictures that were dropped on the page.
-  get pictureCount() { return this.#pictures.length; }
+  // One of the same pictures, to draw on beside this one.
+  another() {
+    const light = new Light([this.height, this.width]);
+    light.#pictures = this.#pictures;
+    return light;
+  }
 
   // Draws every projector pixel.
   draw(state) { this.#drawOn(this.#whole, state); }
@@ -36,10 +40,25 @@ export class Light {
   #drawOn(levels, state) {
     this.sent = this.shown = levels;
     this.changed = null;
+    if (state.blend) { this.#drawBlend(levels, state); return; }
     if (state.kind === 'paint') { this.#drawPaint(state.strokes); return; }
     this.#painted = null;
-    if (state.kind === 'picture') this.#drawPicture(levels, state.shown);
+    if (state.kind === 'picture') this.#drawPicture(levels, state.pictures[state.shown]?.number);
     else this.#drawShape(levels, state);
+  }
+
+  // A share of one light and the rest of another.
+  #drawBlend(levels, { blend: { from, to, share }, pictures }) {
+    const whole = this.#whole, mixed = new Float32Array(3 * this.height * this.width);
+    for (const [light, weight] of [[from, 1 - share], [to, share]]) {
+      this.#drawOn(whole, { ...light, pictures, blend: null });
+      const { values, channels } = whole, tint = this.colour.map(value => weight * value);
+      for (let i = 0; i < mixed.length; i++) mixed[i] += tint[i % 3] * values[channels === 3 ? i : Math.floor(i / 3)];
+    }
+    whole.ofChannels(3).forEach((_, i, values) => { values[i] = Math.round(mixed[i]); });
+    if (levels !== whole) levels.average(whole, whole.everything);
+    Object.assign(this, { sent: levels, shown: levels, changed: null, colour: [1, 1, 1] });
+    this.#painted = null;
   }
 
   #drawShape(levels, state) {
@@ -77,9 +96,9 @@ export class Light {
     }
   }
 
-  #drawPicture(levels, index) {
+  #drawPicture(levels, number) {
     this.colour = [1, 1, 1];
-    const picture = this.#pictures[Math.min(Math.max(Math.round(index), 0), this.#pictures.length - 1)];
+    const picture = this.#pictures[number];
     this.#whole.ofChannels(3);
     if (!picture) levels.ofChannels(3).fill(0);
     else if (levels === this.#whole) this.#whole.values.set(picture.levels);
@@ -92,21 +111,22 @@ export class Light {
     return this.#blocks.values.slice();
   }
 
-  // Levels of a picture of the grid's size, in linear light.
-  addLinear(levels) { this.#addLevels(levels.slice()); }
+  // Levels of a picture of the grid's size, in linear light; like the others it returns { number, url }, no URL if the address
+  // cannot hold the picture.
+  addLinear(levels) { return this.#addLevels(levels.slice()); }
 
   // In place of a picture that the address does not hold.
-  addMissing() { this.#addLevels(new Uint16Array(3 * this.height * this.width)); }
+  addMissing() { return this.#addLevels(new Uint16Array(3 * this.height * this.width)); }
 
-  #addLevels(levels) { this.#pictures.push({ levels, inBlocks: null }); }
+  // Pictures stay when they are removed from the page, so that a removal can be undone.
+  #addLevels(levels, url = '') { return { number: this.#pictures.push({ levels, inBlocks: null }) - 1, url }; }
 
-  // An sRGB picture of any size, cropped to the grid; returns it as a data URL for the address.
+  // An sRGB picture of any size, cropped to the grid.
   async addPicture(source) {
     const { canvas, levels } = await levelsOfPicture(source, this.width, this.height);
-    this.#addLevels(levels);
     const blob = await canvas.convertToBlob({ type: 'image/png' });
-    return 'data:image/png;base64,' + btoa(Array.from(new Uint8Array(await blob.arrayBuffer()),
-      byte => String.fromCharCode(byte)).join(''));
+    return this.#addLevels(levels, 'data:image/png;base64,' + btoa(Array.from(new Uint8Array(await blob.arrayBuffer()),
+      byte => String.fromCharCode(byte)).join('')));
   }
 }
 

@@ -11,11 +11,13 @@ import { ErrorBars } from './error-bars.js';
 import { Figures } from './figures.js';
 import { bindFiles, restorePictures } from './files.js';
 import { Inspector } from './inspector.js';
+import { bindKeeping } from './keeping.js';
 import { bindKeyboard } from './keyboard.js';
 import { LightCanvas, bindPointer } from './light-canvas.js';
 import { Lamps } from './lamps.js';
 import { Light } from './light.js';
 import { Maps } from './maps.js';
+import { meter } from './metering.js';
 import { Numbers } from './numbers.js';
 import { Playback } from './playback.js';
 import { request } from './protocol.js';
@@ -32,10 +34,10 @@ import { showVerdict } from './verdict.js';
 // The scene, and the state and the light that the address asks for.
 async function load() {
   const scene = await (await request('scene')).json();
-  const initial = initialState(scene), state = fromAddress(location.hash, initial, scene.camera);
+  const initial = initialState(scene), state = fromAddress(location.hash, initial, scene);
   const light = new Light(scene.projector, scene.light_block);
-  const missing = await restorePictures(state.pictures, light);
-  state.shown = Math.min(Math.max(0, Math.round(state.shown)), Math.max(0, light.pictureCount - 1));
+  const { pictures, missing } = await restorePictures(state.pictures, light), last = Math.max(0, pictures.length - 1);
+  Object.assign(state, { pictures, shown: Math.min(Math.max(0, Math.round(state.shown)), last) });
   return { scene, initial, state, light, missing };
 }
 
@@ -44,7 +46,6 @@ async function open() {
   const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera);
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
-      showFault('');
       scenePictures.lightChanged();
       lightCanvas.requestDraw();
     } else {
@@ -67,7 +68,8 @@ async function open() {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
     splits.prepare();
-    showControls(store.state, { pictureCount: light.pictureCount, hasReference, isPlaying, split });
+    showControls(store.state, { hasReference, isPlaying, split });
+    page.showKept(store.state);
     tools.show(store.state, changes);
     for (const each of [tabs, figures, region, beside]) each.show(store.state);
     numbers.refresh();
@@ -82,17 +84,18 @@ async function open() {
   const connection = new Connection({
     light: () => ({ sent: light.sent, colour: light.colour, split: splits.current }),
     onFrame: receiving(page, show),
-    onFault: showFault,
+    onFault: text => showFault(text, 'connection'),
   });
-  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`);
+  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`, 'address');
   inspect(state, { inspector, maps });
   beside.compare();
 }
 
-const receiving = ({ store, lightCanvas, scenePictures, splits, numbers, tools }, show) => (header, parts, isNewest) => {
-  const { split } = scenePictures;
+const receiving = (page, show) => (header, parts, isNewest) => {
+  const { store, lightCanvas, scenePictures, splits, numbers, tools } = page, { split } = scenePictures;
   scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state);
   tools.frameArrived();
+  meter(page);
   if (header.split === split) numbers.refresh(); else show();
   if (isNewest && header.split !== splits.current) splits.lost();
 };
@@ -125,6 +128,7 @@ function bind(page, show) {
   bindFiles(page);
   bindSaving(page);
   bindKeyboard(page);
+  page.showKept = bindKeeping(page, show);
   get('map').onclick = event => inspector.showRow(...clicked(event, scene.camera));
   // A dual view is one of projector pixels.
   get('picture').onclick = event =>

@@ -38,7 +38,7 @@ export class Maps {
     this.#map = { ...values, ...header, name, saturated: saturated.data };
     for (const id of ['map', 'map-bar', 'map-range']) get(id).hidden = false;
     this.#draw();
-  });
+  }, 'map');
 
   #draw() {
     if (!this.#map) return;

@@ -1,6 +1,7 @@
 // Pictures { height, width, colours, values }: from the float16 parts of a frame to pixels of a canvas.
 
 import { WHITE_LEVEL } from './colour.js';
+import { CHANNELS } from './state.js';
 
 // The value of each float16 by its 16 bits; infinities are the largest finite values, NaN is 0.
 const FLOAT16_VALUES = Float32Array.from({ length: 65536 }, (_, bits) => {
@@ -64,13 +65,14 @@ export function shrink(picture, maximumPixels) {
   return { height, width, colours, values };
 }
 
-export function drawPicture(canvas, { height, width, colours, values }, { exposure, gamma }) {
+// In grey if the look is that of one channel.
+export function drawPicture(canvas, { height, width, colours, values }, { exposure, gamma, channel = '' }) {
   const tone = toneCurve(gamma), scale = 2 ** exposure;
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const pen = canvas.getContext('2d', { willReadFrequently: true }), image = pen.createImageData(width, height), out = image.data;
   const byteOf = v => tone[v <= 0 ? 0 : Math.min(TONE_STEPS, TONE_STEPS * Math.sqrt(v * scale) + 0.5 | 0)];
-  if (colours === 1)
-    for (let i = 0, j = 0; i < values.length; i++, j += 4) {
+  if (colours === 1 || channel)
+    for (let i = colours === 1 ? 0 : CHANNELS.indexOf(channel) - 1, j = 0; i < values.length; i += colours, j += 4) {
       out[j] = out[j + 1] = out[j + 2] = byteOf(values[i]); out[j + 3] = 255;
     }
   else

@@ -8,8 +8,8 @@ const DEGREES_OF_PHASE_A_SECOND = 120;
 const PIXELS_A_SECOND = 8;
 const SHIFTS_A_SECOND = 6;
 
-export const canPlay = (state, pictureCount) =>
-  !['white', 'paint'].includes(state.kind) && (state.kind !== 'picture' || pictureCount > 1);
+export const canPlay = state =>
+  !['white', 'paint'].includes(state.kind) && (state.kind !== 'picture' || state.pictures.length > 1);
 
 const POSITIONS = {
   spot: (t, _state, { height, width }) => {
@@ -41,7 +41,7 @@ export class Playback {
   get isPlaying() { return this.#started !== 0; }
 
   toggle() {
-    if (!this.isPlaying && !canPlay(this.#store.state, this.#light.pictureCount)) return;
+    if (!this.isPlaying && !canPlay(this.#store.state)) return;
     this.#started = this.isPlaying ? 0 : performance.now();
     get('play').ariaPressed = String(this.isPlaying);
     get('play').textContent = this.isPlaying ? 'stop' : 'play';
@@ -51,7 +51,7 @@ export class Playback {
   #run(started, firstPhase) {
     const step = now => {
       if (this.#started !== started) return;
-      const { state } = this.#store, { height, width, pictureCount } = this.#light;
+      const { state } = this.#store, { height, width } = this.#light, pictureCount = state.pictures.length;
       const changes = POSITIONS[state.kind]?.(Math.max(0, now - started) / 1000, state, { height, width, pictureCount, firstPhase });
       if (changes) this.#store.update(changes);
       requestAnimationFrame(step);

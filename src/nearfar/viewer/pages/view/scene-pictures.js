@@ -123,7 +123,7 @@ export class ScenePictures {
   #picture(state) { return this.#stage?.picture || this.relit(state); }
 
   #shape(aspect) {
-    if (this.#aspect !== aspect) get('stage').style.setProperty('--aspect', aspect);
+    if (this.#aspect !== aspect) get('scene-view').style.setProperty('--aspect', aspect);
     this.#aspect = aspect;
   }
 

@@ -16,6 +16,9 @@ export const ERROR_BARS = ['absolute', 'relative'];
 export const ARRANGEMENTS = ['wipe', 'pair'];
 export const RANGES = ['within', 'ring', 'beyond'];
 export const CAMERA_LIGHTS = ['spot', 'white'];
+export const CHANNELS = ['', 'red', 'green', 'blue'];
+// Whether exposure stays as it is, or follows the light.
+export const METERINGS = ['fixed', 'auto'];
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
 
 // What a page opens with; the keys are those of the address.
@@ -29,13 +32,32 @@ export function initialState({ projector: [height, width], camera: [rows, column
     column: null, theme: '', tab: 'light', tool: 'relit', range: 'beyond', reach: 3, broad: 3,
     colourMap: 'nearfar', ranges: {}, region: null, errorBars: 'absolute', arrangement: beside ? 'pair' : 'wipe',
     cameraLight: 'spot', cameraX: (columns - 1) / 2, cameraY: (rows - 1) / 2, cameraRadius: Math.max(1, Math.round(Math.min(rows, columns) / 8)),
+    viewZoom: 1, viewX: 0.5, viewY: 0.5, channel: '', metering: 'fixed', keyframes: [], seconds: 2, rate: 25, blend: null,
   });
 }
 
+const upTo = highest => [0, Math.max(1, highest)];
+
+// How far numbers go, [lowest, highest].
+export function limitsOf({ projector, camera }) {
+  const side = Math.max(...projector), lens = Math.max(...camera);
+  return {
+    exposure: [-6, 12], gamma: [0.5, 3], wipe: [0, 100], reach: [0.5, side], broad: [0.5, Math.ceil(side / 2)], soft: [0, 1],
+    angle: [0, 180], phase: [0, 360], x: [-side, 2 * side], y: [-side, 2 * side], cameraX: [-lens, 2 * lens], cameraY: [-lens, 2 * lens],
+    radius: [0.5, Math.max(1, side / 2)], width: [1, side], side: [1, Math.max(1, side / 2)], cycles: upTo(side / 2), shift: upTo(side),
+    brush: [0.5, Math.max(1, side / 4)], zoom: [1, Math.max(1, Math.ceil(side / 40))], cameraRadius: [0.5, Math.max(1, Math.ceil(Math.min(...camera) / 2))],
+    viewZoom: [1, 64], viewX: [0, 1], viewY: [0, 1], seconds: [0.1, 20], rate: [1, 60], ...Object.fromEntries(GAINS.map(name => [name, [0, 4]])),
+  };
+}
+
 // Everything else changes the light.
-const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme', 'pictures',
+const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme',
   'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius',
-  'colourMap', 'ranges', 'region', 'errorBars', 'arrangement'];
+  'colourMap', 'ranges', 'region', 'errorBars', 'arrangement', 'viewZoom', 'viewX', 'viewY', 'channel', 'metering', 'keyframes', 'seconds', 'rate'];
+
+// What a light is drawn by.
+export const LIGHT_KEYS = ['kind', 'x', 'y', 'radius', 'soft', 'angle', 'width', 'cycles', 'phase', 'side', 'shift', 'shown', 'colour', 'strokes'];
+export const pick = (state, names) => Object.fromEntries(names.map(name => [name, state[name]]));
 
 export const changesLight = changes => Object.keys(changes).some(name => !DISPLAY_ONLY.includes(name));
 
@@ -48,6 +70,7 @@ export const gainsOf = (state, split) => SPLITS[split].map(name => (soloOf(state
 export class Store {
   #state;
   #onChange;
+  #watch = () => {};
 
   // onChange(changes) is called after each change.
   constructor(state, onChange) {
@@ -57,8 +80,15 @@ export class Store {
 
   get state() { return this.#state; }
 
+  // watch(before, after) is called at each change, too.
+  watch(watch) { this.#watch = watch; }
+
   update(changes) {
-    this.#state = Object.freeze({ ...this.#state, ...changes });
-    this.#onChange(changes);
+    const before = this.#state;
+    // A light that is changed is no longer one between two keyframes.
+    const all = before.blend && changesLight(changes) ? { blend: null, ...changes } : changes;
+    this.#state = Object.freeze({ ...before, ...all });
+    this.#watch(before, this.#state);
+    this.#onChange(all);
   }
 }

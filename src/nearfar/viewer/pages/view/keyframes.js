@@ -1,0 +1,72 @@
+// Keyframes: lights that the page plays through, from one to the next.
+
+import { get, set } from './dom.js';
+import { lightName } from './file-names.js';
+import { lightAt, pictureCountOf, secondsOf } from './between-lights.js';
+import { LIGHT_KEYS, pick } from './state.js';
+
+const button = (textContent, ariaLabel, onclick, disabled = false) => Object.assign(document.createElement('button'), { textContent, ariaLabel, title: ariaLabel, onclick, disabled });
+
+export class Keyframes {
+  #store;
+  #playback;
+  // When it was started; 0 while it is stopped.
+  #started = 0;
+  #shown = null;
+
+  constructor({ store, playback }) {
+    this.#store = store;
+    this.#playback = playback;
+    get('add-keyframe').onclick = () => this.#set([...store.state.keyframes, pick(store.state, LIGHT_KEYS)]);
+    get('play-keyframes').onclick = () => this.toggle();
+  }
+
+  get isPlaying() { return this.#started !== 0; }
+
+  toggle() {
+    const { state } = this.#store;
+    if (!this.isPlaying && state.keyframes.length < 2) return;
+    if (!this.isPlaying && this.#playback.isPlaying) this.#playback.toggle();
+    this.#started = this.isPlaying ? 0 : performance.now();
+    // A cross-fade ends at the keyframe that it is nearer to.
+    if (!this.isPlaying && state.blend) this.#store.update({ blend: null });
+    if (this.isPlaying) this.#run(this.#started);
+    this.show(this.#store.state);
+  }
+
+  #run(started) {
+    const step = now => {
+      if (this.#started !== started) return;
+      const { state } = this.#store;
+      // Something else plays, or nothing is left to play.
+      if (this.#playback.isPlaying || state.keyframes.length < 2) { this.toggle(); return; }
+      const time = Math.max(0, now - started) / 1000;
+      this.#store.update(lightAt(state.keyframes, state.seconds, time));
+      if (time >= secondsOf(state)) this.toggle(); else requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
+  }
+
+  #set(keyframes) { this.#store.update({ keyframes }); }
+
+  show(state) {
+    const { keyframes } = state, isPlayable = keyframes.length > 1;
+    set(get('play-keyframes'), 'textContent', this.isPlaying ? 'stop' : 'play');
+    set(get('play-keyframes'), 'ariaPressed', String(this.isPlaying));
+    for (const id of ['play-keyframes', 'film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable);
+    set(get('film-length'), 'textContent', isPlayable ? `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s` : 'Keep two lights or more as keyframes, and the page plays from one to the next.');
+    if (this.#shown === keyframes) return;
+    this.#shown = keyframes;
+    get('keyframes').replaceChildren(...keyframes.map((frame, i) => this.#item(frame, i, keyframes)));
+  }
+
+  #item(frame, i, keyframes) {
+    const item = document.createElement('li'), at = `keyframe ${i + 1}`, last = keyframes.length - 1;
+    const exchange = (a, b) => () => this.#set(keyframes.map((other, n) => n === a ? keyframes[b] : n === b ? keyframes[a] : other));
+    const show = button(lightName(frame).replaceAll('-', ' '), `show ${at}, ${lightName(frame).replaceAll('-', ' ')}`, () => this.#store.update({ ...frame, blend: null }));
+    show.className = 'name';
+    item.append(show, button('↑', `${at} earlier`, exchange(i, i - 1), i === 0), button('↓', `${at} later`, exchange(i, i + 1), i === last),
+      button('✕', `remove ${at}`, () => this.#set(keyframes.filter((_, n) => n !== i))));
+    return item;
+  }
+}

@@ -27,7 +27,7 @@ AGREEMENT = 0.3
 LEAST_BEYOND = 0.03
 MOST_BEYOND = 0.6
 # Light on that side over light on the other.
-ONE_SIDED = 2.0
+ONE_SIDED = 1.2
 # Wider footprints are of several projector pixels.
 SINGLE_PIXEL = 1.2
 

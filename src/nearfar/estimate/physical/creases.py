@@ -11,7 +11,7 @@ Index convention: c runs over camera pixels.
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
-from nearfar.estimate.physical.elsewhere import Elsewhere
+from nearfar.estimate.physical.elsewhere import Elsewhere, sees_single_pixels
 from nearfar.estimate.physical.rows_about import REACH, rows_about_q
 from nearfar.estimate.physical.told import told_by_lines, told_by_planes
 from nearfar.transport.direct import direct_weights
@@ -28,8 +28,6 @@ LEAST_BEYOND = 0.03
 MOST_BEYOND = 0.6
 # Light on that side over light on the other.
 ONE_SIDED = 1.2
-# Wider footprints are of several projector pixels.
-SINGLE_PIXEL = 1.2
 
 
 def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
@@ -55,8 +53,7 @@ def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
     off = np.abs(transport.correspondence - told).max(axis=-1)
     # Comparisons with NaN are false: where no side tells anything.
     chosen = opaque & (off > OFF[0]) & (off < OFF[1]) & (disagreement < AGREEMENT * off)
-    if transport.footprint is not None:
-        chosen &= np.all(transport.footprint[..., :2] < SINGLE_PIXEL, axis=-1)
+    chosen &= sees_single_pixels(transport)
     pixels = np.flatnonzero(chosen)
     last = np.array(transport.projector) - 1
     places = np.clip(told.reshape(-1, 2)[pixels], 0, last)

@@ -9,6 +9,10 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.transport.direct import footprint, look_up
+from nearfar.transport.model import Transport
+
+# Wider footprints are of several projector pixels; light from elsewhere is of one.
+SINGLE_PIXEL = 1.2
 
 
 class Elsewhere(NamedTuple):
@@ -53,3 +57,10 @@ class Elsewhere(NamedTuple):
 def nowhere(channels: int) -> Elsewhere:
     """Return no direct light at all."""
     return Elsewhere(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty((0, channels)))
+
+
+def sees_single_pixels(transport: Transport) -> Booleans:
+    """Return whether direct light's footprint is of one projector pixel, shape (Cy, Cx)."""
+    if transport.footprint is None:
+        return np.ones(transport.camera, dtype=bool)
+    return np.asarray(np.all(transport.footprint[..., :2] < SINGLE_PIXEL, axis=-1))

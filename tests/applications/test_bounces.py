@@ -158,6 +158,7 @@ def test_the_first_bounce_of_a_split_is_direct_and_subsurface_light(measured):
     pixels = np.arange(10)
     wax = Translucent(
         pixels,
+        measured.correspondence.reshape(-1, 2)[:10],
         np.ones(SIZE),
         (source_at(1.0, 0.8),) * CHANNELS,
         np.zeros(10, int),

@@ -10,7 +10,7 @@ from nearfar.applications.editing import recoloured_under_surfaces, widened
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.estimate.physical import PhysicalSplit
-from nearfar.estimate.physical.creases import Settled
+from nearfar.estimate.physical.elsewhere import nowhere
 from nearfar.estimate.physical.kernels import kernel, source_at
 from nearfar.estimate.physical.split import Translucent
 from nearfar.estimate.physical.subsurface import near_functions_of
@@ -118,10 +118,15 @@ def test_light_under_a_surface_in_functions_of_near_light_is_its_kernel(pitch, s
     pixels = np.arange(144)
     source = source_at(depth, attenuation)
     body = Translucent(
-        pixels, np.ones(size), (source,), np.zeros(144, int), np.full((144, 1), 2.0), np.ones(144)
+        pixels,
+        transport.correspondence.reshape(-1, 2),
+        np.ones(size),
+        (source,),
+        np.zeros(144, int),
+        np.full((144, 1), 2.0),
+        np.ones(144),
     )
-    nowhere = Settled(np.array([], int), np.zeros((0, 2)), np.array([]))
-    split = PhysicalSplit(transport, transport.direct, (body,), nowhere)
+    split = PhysicalSplit(transport, transport.direct, (body,), nowhere(1))
     found = near_functions_of(split)
     # A camera pixel in the middle, whose window lies on the projector.
     pixel = 5 * 12 + 5

@@ -9,13 +9,9 @@ import numpy as np
 
 from nearfar.arrays import Floats, Integers, middles
 from nearfar.errors import InputError
-from nearfar.estimate.physical.creases import Settled
-from nearfar.estimate.physical.split import (
-    PhysicalComponents,
-    PhysicalSplit,
-    Translucent,
-    split_physically,
-)
+from nearfar.estimate.physical.elsewhere import Elsewhere
+from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, Translucent
+from nearfar.estimate.physical.splitting import split_physically
 from nearfar.transport.rows import of_pixels
 from nearfar.viewer.interactive import Frame, InteractiveTransport, packed_frame
 from nearfar.viewer.messages import Gains, Light
@@ -126,7 +122,7 @@ def _of_pixels(split: PhysicalSplit, rows: Integers, columns: Integers) -> Physi
         of_pixels(split.transport, rows, columns),
         split.direct[np.ix_(rows, columns)],
         tuple(_body_of(body, places.ravel()) for body in split.bodies),
-        _creases_of(split.creases, places.ravel()),
+        _elsewhere_of(split.elsewhere, places.ravel()),
     )
 
 
@@ -135,12 +131,13 @@ def _body_of(body: Translucent, places: Integers) -> Translucent:
     kept = places[body.pixels] >= 0
     return body._replace(
         pixels=places[body.pixels[kept]],
+        places=body.places[kept],
         slope=body.slope[kept],
         amplitude=body.amplitude[kept],
         explained=body.explained[kept],
     )
 
 
-def _creases_of(creases: Settled, places: Integers) -> Settled:
-    kept = places[creases.pixels] >= 0
-    return Settled(places[creases.pixels[kept]], creases.places[kept], creases.kept[kept])
+def _elsewhere_of(elsewhere: Elsewhere, places: Integers) -> Elsewhere:
+    kept = elsewhere.of(places[elsewhere.pixels] >= 0)
+    return kept._replace(pixels=places[kept.pixels])

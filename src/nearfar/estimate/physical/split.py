@@ -10,26 +10,19 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage, signal
+from scipy import signal
 
-from nearfar.arrays import Floats, Integers
-from nearfar.checks import as_number, require_instance
-from nearfar.errors import InputError
-from nearfar.estimate.physical.body import body_at, cell_side
-from nearfar.estimate.physical.creases import Settled, settled
-from nearfar.estimate.physical.kernels import enlarged, kernel
-from nearfar.estimate.physical.medium import SLOPES, is_even, media_of
-from nearfar.estimate.physical.responses import waves_of
-from nearfar.estimate.physical.translucent import SQUARE, translucent
+from nearfar.arrays import Floats, Integers, Size
+from nearfar.checks import as_number
+from nearfar.estimate.physical.elsewhere import Elsewhere
+from nearfar.estimate.physical.kernels import kernel
+from nearfar.estimate.physical.medium import SLOPES
 from nearfar.markup import card
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import Footprint, footprint, look_up
 from nearfar.transport.model import Transport
 from nearfar.transport.summary_card import floodlit_and_apart
 
-# Where kernels explain a lesser share of what direct light leaves, nothing is translucent: a whole
-# body, or camera pixels at its outline.
-LEAST_EXPLAINED = 0.8
 # Kernels end where the light is down by exp(-FADED), or at the size of the projector.
 FADED = 7.0
 
@@ -49,6 +42,8 @@ class Translucent(NamedTuple):
     ----------
     pixels : ndarray of int, shape (n,)
         Its camera pixels, flattened row by row.
+    places : ndarray, shape (n, 2)
+        Where on the projector each sees it: q, but at outlines where q lies on something else.
     coverage : ndarray, shape (Py, Px)
         Share of each projector pixel that lights it.
     sources : tuple of Dipole
@@ -62,11 +57,28 @@ class Translucent(NamedTuple):
     """
 
     pixels: Integers
+    places: Floats
     coverage: Floats
     sources: tuple[Dipole, ...]
     slope: Integers
     amplitude: Floats
     explained: Floats
+
+    def under(self, lights: Floats, projector: Size) -> Floats:
+        """Return subsurface light for unit amplitude, shape (n, channels).
+
+        Parameters
+        ----------
+        lights : ndarray, shape (1 or channels, P)
+            Flat, of each channel or of all.
+        projector : Size
+        """
+        where = footprint(self.places, projector)
+        found = np.empty((len(self.pixels), len(self.sources)))
+        for channel, source in enumerate(self.sources):
+            picture = lights[min(channel, len(lights) - 1)].reshape(projector)
+            found[:, channel] = _spread(source, self.slope, picture * self.coverage, where)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +89,11 @@ class PhysicalSplit:
     ----------
     transport : Transport
     direct : ndarray, shape (Cy, Cx, channels), float32
-        Direct light under white, less what subsurface light adds at q.
+        Direct light under white from q, less what subsurface light adds at q.
     bodies : tuple of Translucent
         Empty where nothing is translucent.
-    creases : Settled
-        Camera pixels whose direct light is that of another q.
+    elsewhere : Elsewhere
+        Direct light from other places than q.
 
     Examples
     --------
@@ -95,7 +107,7 @@ class PhysicalSplit:
     transport: Transport
     direct: Floats
     bodies: tuple[Translucent, ...]
-    creases: Settled
+    elsewhere: Elsewhere
 
     def components(self, light: Floats) -> PhysicalComponents:
         """Relight each component by itself.
@@ -119,23 +131,14 @@ class PhysicalSplit:
         flat = np.asarray(transport.lights(light), dtype=np.float64)
         subsurface = np.zeros((transport.camera.pixels, transport.channels))
         for body in self.bodies:
-            where = footprint(
-                transport.correspondence.reshape(-1, 2)[body.pixels], transport.projector
-            )
-            for channel, source in enumerate(body.sources):
-                picture = flat[min(channel, len(flat) - 1)].reshape(transport.projector)
-                spread = _spread(source, body.slope, picture * body.coverage, where)
-                subsurface[body.pixels, channel] = body.amplitude[:, channel] * spread
+            subsurface[body.pixels] = body.amplitude * body.under(flat, transport.projector)
         # A part of D is moved, of the same footprint.
         with np.errstate(divide="ignore", invalid="ignore"):
             kept = np.where(transport.direct != 0, self.direct / transport.direct, 0.0)
         direct = model.direct * transport.picture(kept)
-        elsewhere = footprint(self.creases.places, transport.projector)
-        at_creases = direct.reshape(-1, transport.channels)
-        for channel in range(transport.channels):
-            light = flat[min(channel, len(flat) - 1)]
-            own = self.direct.reshape(-1, transport.channels)[self.creases.pixels, channel]
-            at_creases[self.creases.pixels, channel] = own * look_up(light, elsewhere)
+        elsewhere = np.zeros_like(subsurface)
+        elsewhere[self.elsewhere.pixels] = self.elsewhere.under(flat, transport.projector)
+        direct = direct + transport.picture(elsewhere)
         under = transport.picture(subsurface)
         rest = model.direct + model.near + model.far - direct - under
         return PhysicalComponents(direct, under, rest)
@@ -197,55 +200,3 @@ def _spread(source: Dipole, slope: Integers, lit: Floats, where: Footprint) -> F
 def _radius(source: Dipole, longest: int) -> int:
     """Return the projector pixels after which a kernel ends."""
     return int(min(longest, np.ceil(source.virtual + FADED / source.attenuation)))
-
-
-def split_physically(transport: Transport) -> PhysicalSplit:
-    """Split a transport into direct light, subsurface light and inter-reflection.
-
-    The model's own split, which `Transport.components` gives, has light of creases in near-range
-    light, and some subsurface light in direct light.
-
-    Parameters
-    ----------
-    transport : Transport
-
-    Returns
-    -------
-    PhysicalSplit
-
-    Raises
-    ------
-    InputError
-        If it is not a transport, or one without near-range light.
-
-    Examples
-    --------
-    >>> split = nearfar.split_physically(transport)
-    >>> split.bodies  # nothing in this scene is translucent
-    ()
-    """
-    require_instance(transport, Transport, "transport", "nearfar.load_transport")
-    if "near" not in transport.parts:
-        raise InputError(
-            "the transport cannot be split physically: it has no near-range light. Estimate it "
-            "with near-range light, from patterns of a projector."
-        )
-    labels, count = ndimage.label(translucent(transport), SQUARE)
-    direct = transport.direct.reshape(-1, transport.channels).copy()
-    bodies, waves = [], waves_of(transport)
-    for number in range(1, count + 1):
-        body = body_at(transport, labels == number, waves)
-        media = media_of(body)
-        if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or is_even(media):
-            continue
-        kept = body.inner | (media.explained >= LEAST_EXPLAINED)
-        direct[body.pixels[kept]] = media.direct[kept]
-        found = media.slope[kept], media.amplitude[kept], media.explained[kept]
-        sources = tuple(enlarged(source, cell_side(transport)) for source in media.sources)
-        bodies.append(Translucent(body.pixels[kept], body.coverage, sources, *found))
-    opaque = transport.lit.copy()
-    for one in bodies:
-        opaque.ravel()[one.pixels] = False
-    creases = settled(transport, opaque)
-    direct[creases.pixels] *= creases.kept[:, None]
-    return PhysicalSplit(transport, direct.reshape(transport.direct.shape), tuple(bodies), creases)

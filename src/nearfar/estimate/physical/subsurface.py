@@ -30,7 +30,7 @@ def near_functions_of(split: PhysicalSplit, factor: float = 1.0) -> Floats:
     basis = transport.near_basis
     found = np.zeros((transport.camera.pixels, transport.channels, basis.count))
     for body in split.bodies:
-        where = footprint(transport.correspondence.reshape(-1, 2)[body.pixels], transport.projector)
+        where = footprint(body.places, transport.projector)
         for channel, source in enumerate(body.sources):
             light = _densities(transport, body, enlarged(source, factor), where)
             # A function's coefficient is its light under white: a density times its area.
@@ -57,6 +57,9 @@ def _densities(transport: Transport, body: Translucent, source: Dipole, where: F
             for corner in range(where.pixels.shape[1]):
                 y, x = np.divmod(where.pixels[some, corner], projector.width)
                 apart = places - np.stack([y, x], axis=-1)[:, None] + radius
-                total += where.weights[some, corner, None] * drawn[apart[..., 0], apart[..., 1]]
+                # An outline may see the body beyond the window.
+                known = np.all((apart >= 0) & (apart < len(drawn)), axis=-1)
+                down, across = np.moveaxis(np.where(known[..., None], apart, 0), -1, 0)
+                total += where.weights[some, corner, None] * drawn[down, across] * known
             found[some] = total * body.coverage[held[..., 0], held[..., 1]] * inside
     return found

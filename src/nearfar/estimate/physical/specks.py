@@ -1,0 +1,80 @@
+"""Direct light that missed its footprint, or that holds light of a neighbouring projector pixel.
+
+An estimate takes direct light to come through a footprint of one projector pixel. What comes
+through a wider one, or from a q that is off, is left next to q, and the camera pixel stands out
+from those around it in two ways: of all its light more is next to q, and more is inter-reflection.
+Inter-reflection over all light is smooth, as albedo cancels. What stands out in both ways is moved
+to direct light; where a camera pixel has too little of both, direct light gives it back.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats
+from nearfar.estimate.physical.around import neighbours
+from nearfar.estimate.physical.body import cell_side
+from nearfar.estimate.physical.rows_about import offsets, rows_about_q
+from nearfar.estimate.physical.split import PhysicalSplit
+from nearfar.transport.model import Transport
+
+# Distance of light that is next to q, in cells.
+NEXT_TO_Q = 2.3
+# A camera pixel stands out if it lies beyond all but one of the eight about it: a line of them,
+# such as a crease, does not.
+EXCEPTIONS = 1
+# In photo units: light under white by which others are divided.
+DARK = 1e-6
+
+
+def without_specks(split: PhysicalSplit) -> PhysicalSplit:
+    """Return a split whose opaque camera pixels do not stand out from those around them.
+
+    Parameters
+    ----------
+    split : PhysicalSplit
+
+    Returns
+    -------
+    PhysicalSplit
+    """
+    transport = split.transport
+    shape = transport.direct.shape
+    white = np.ones(transport.projector, dtype=np.float32)
+    parts = [np.reshape(part, shape) for part in split.components(white)]
+    total = np.maximum(np.asarray(sum(parts)), DARK)
+    chosen = transport.lit.copy()
+    for body in split.bodies:
+        chosen.ravel()[body.pixels] = False
+    chosen.ravel()[split.elsewhere.pixels] = False
+    # Camera pixels without direct light have nothing but inter-reflection: next to a shadow, others
+    # that are partly in it do not stand out.
+    excess = _standing_out(parts[2] / total)
+    excess_next_to_q = _standing_out(_light_next_to_q(transport) / total)
+    alike = chosen[..., None] & (excess * excess_next_to_q > 0)
+    least = np.minimum(np.abs(excess), np.abs(excess_next_to_q))
+    change = np.where(alike, np.sign(excess) * least * total, 0.0)
+    return replace(split, direct=split.direct + change.astype(np.float32))
+
+
+def _standing_out(share: Floats) -> Floats:
+    """Return by how much each camera pixel lies beyond those around it."""
+    ordered = np.sort(neighbours(share), axis=0)
+    return np.asarray(share - np.clip(share, ordered[EXCEPTIONS], ordered[-1 - EXCEPTIONS]))
+
+
+def _light_next_to_q(transport: Transport) -> Floats:
+    """Return near- and far-range light next to q under white, shape (Cy, Cx, channels).
+
+    NaN without direct light, and where the projector's border cuts it off.
+    """
+    step = cell_side(transport)
+    near: Booleans = np.hypot(*offsets().T) <= NEXT_TO_Q
+    margin = step * NEXT_TO_Q
+    last = np.array(transport.projector) - 1 - margin
+    q = transport.correspondence
+    whole = transport.lit & np.all((q >= margin) & (q <= last), axis=-1)
+    found = np.full((transport.camera.pixels, transport.channels), np.nan)
+    for pixels, entries in rows_about_q(transport, whole.ravel(), step):
+        found[pixels] = entries[..., near].sum(axis=-1)
+    return found.reshape(transport.direct.shape)

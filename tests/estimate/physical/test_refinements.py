@@ -1,0 +1,203 @@
+"""Outlines, specks and holes of a physical split, on synthetic transports that are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar import Size, Transport
+from nearfar.estimate.physical.elsewhere import Elsewhere, nowhere
+from nearfar.estimate.physical.holes import without_holes
+from nearfar.estimate.physical.kernels import source_at
+from nearfar.estimate.physical.outlines import with_outlines
+from nearfar.estimate.physical.specks import without_specks
+from nearfar.estimate.physical.split import PhysicalSplit, Translucent
+from nearfar.estimate.physical.told import told_by_lines, told_by_planes
+from nearfar.illumination.frequencies import DC
+from nearfar.illumination.pictures import random_pattern
+from nearfar.illumination.real_basis import real_basis
+
+CAMERA = Size(13, 13)
+PROJECTOR = Size(19, 48)
+WINDOW = 7
+WHITE = np.ones(PROJECTOR, np.float32)
+
+
+def places(*, gap=0, from_column=13):
+    """Return q, a projector pixel for each camera pixel, with a gap at a column of the camera."""
+    y, x = np.mgrid[: CAMERA.height, : CAMERA.width].astype(np.float32)
+    return np.stack([y + 3, x + 3 + gap * (x >= from_column)], axis=-1)
+
+
+def transport_of(direct, interreflection, q, near=None):
+    """Return a transport of one channel whose far-range light is even."""
+    basis = real_basis([DC], PROJECTOR)
+    shape = (*CAMERA, 1)
+    if near is None:
+        near = np.zeros((*shape, WINDOW, WINDOW))
+    blank = Transport(
+        projector=PROJECTOR,
+        correspondence=q.astype(np.float32),
+        direct=direct[..., None].astype(np.float32),
+        near=near.astype(np.float32),
+        far=np.ones((*shape, 1), np.float32),
+        far_basis=basis,
+        black=np.zeros(shape, np.float32),
+        noise=np.full(shape, 1e-3, np.float32),
+    )
+    unit = blank.components(WHITE).far.reshape(CAMERA)
+    return replace(blank, far=blank.far * (interreflection / unit)[..., None, None])
+
+
+def split_of(transport, *bodies):
+    return PhysicalSplit(transport, transport.direct, bodies, nowhere(1))
+
+
+OF_BODY = 0.6
+OUTLINE = 6
+D_BODY, S_BODY, I_BODY = 0.15, 0.35, 0.05
+D_WALL, I_WALL = 0.5, 0.1
+
+
+def wax_before_a_wall(gap):
+    """Return a split at whose outline, a column, camera pixels see wax and wall; q is the wall's.
+
+    Left of it is wax, right of it a wall whose places on the projector are a gap away.
+    """
+    x = np.tile(np.arange(CAMERA.width), (CAMERA.height, 1))
+    of_body = np.where(x < OUTLINE, 1.0, np.where(x == OUTLINE, OF_BODY, 0.0))
+    q = places(gap=gap, from_column=OUTLINE)
+    total = of_body * (D_BODY + S_BODY + I_BODY) + (1 - of_body) * (D_WALL + I_WALL)
+    direct = np.where(x < OUTLINE, D_BODY, (1 - of_body) * D_WALL)
+    transport = transport_of(direct, total - direct, q)
+    pixels = np.flatnonzero(x < OUTLINE)
+    count = len(pixels)
+    body = Translucent(
+        pixels,
+        q.reshape(-1, 2)[pixels],
+        WHITE,
+        (source_at(0.5, 2.5),),
+        np.zeros(count, int),
+        np.ones((count, 1)),
+        np.ones(count),
+    )
+    unit = body.under(WHITE.reshape(1, -1), PROJECTOR)
+    return split_of(transport, body._replace(amplitude=S_BODY / unit))
+
+
+def test_an_outline_that_sees_two_places_has_the_components_of_both():
+    before = wax_before_a_wall(gap=20)
+    split = with_outlines(before)
+    parts = [part[:, OUTLINE] for part in split.components(WHITE)]
+    expected = (
+        OF_BODY * D_BODY + (1 - OF_BODY) * D_WALL,
+        OF_BODY * S_BODY,
+        OF_BODY * I_BODY + (1 - OF_BODY) * I_WALL,
+    )
+    for part, value in zip(parts, expected, strict=True):
+        np.testing.assert_allclose(part, value, rtol=0.02)
+    light = random_pattern(PROJECTOR, 1)
+    np.testing.assert_allclose(
+        sum(split.components(light)), split.transport @ light, atol=1e-6, err_msg="the sum"
+    )
+    elsewhere = np.arange(CAMERA.width) != OUTLINE
+    for part, was in zip(split.components(light), before.components(light), strict=True):
+        np.testing.assert_allclose(part[:, elsewhere], was[:, elsewhere], atol=1e-6)
+
+
+def test_light_on_one_of_both_places_is_direct_light_of_that_one():
+    split = with_outlines(wax_before_a_wall(gap=20))
+    on_wall = WHITE * (np.arange(PROJECTOR.width) > 16)
+    for light, value in ((on_wall, (1 - OF_BODY) * D_WALL), (WHITE - on_wall, OF_BODY * D_BODY)):
+        direct = split.components(light).direct[:, OUTLINE]
+        np.testing.assert_allclose(direct, value, rtol=0.02)
+
+
+def test_an_outline_without_a_gap_stays_as_it_is():
+    split = wax_before_a_wall(gap=0)
+    found = with_outlines(split)
+    np.testing.assert_array_equal(found.direct, split.direct)
+    assert not len(found.elsewhere.pixels)
+    np.testing.assert_array_equal(found.bodies[0].pixels, split.bodies[0].pixels)
+
+
+LOST = 0.1
+MIDDLE = (6, 6)
+
+
+def opaque(next_to_q):
+    """Return a split with some light on four sides of q, (Cy, Cx), that direct light lacks."""
+    near = np.zeros((*CAMERA, 1, WINDOW, WINDOW))
+    middle = WINDOW // 2
+    for down, across in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        near[:, :, 0, middle + down, middle + across] = next_to_q / 4
+    direct = np.full(CAMERA, 0.5) - next_to_q
+    return split_of(transport_of(direct, np.full(CAMERA, 0.1), places(), near))
+
+
+def test_direct_light_that_one_camera_pixel_has_lost_next_to_q_is_given_back():
+    lost = np.zeros(CAMERA)
+    lost[MIDDLE] = LOST
+    split = without_specks(opaque(lost))
+    np.testing.assert_allclose(split.direct, 0.5, rtol=1e-3)
+    light = random_pattern(PROJECTOR, 1)
+    np.testing.assert_allclose(sum(split.components(light)), split.transport @ light, atol=1e-6)
+
+
+def test_a_line_of_camera_pixels_with_light_next_to_q_is_a_crease():
+    line = np.zeros(CAMERA)
+    line[MIDDLE[0]] = LOST
+    before = opaque(line)
+    np.testing.assert_allclose(without_specks(before).direct, before.direct, atol=1e-6)
+
+
+def test_a_camera_pixel_partly_in_shadow_keeps_its_direct_light():
+    """It stands out by inter-reflection, but not by light next to q."""
+    direct = np.full(CAMERA, 0.5)
+    direct[MIDDLE] = 0.2
+    before = split_of(transport_of(direct, np.full(CAMERA, 0.1), places()))
+    np.testing.assert_allclose(without_specks(before).direct, before.direct, rtol=0.01)
+
+
+@pytest.mark.parametrize("q_there", [(np.nan, np.nan), (3.0, 40.0)])
+@pytest.mark.parametrize("shadow", [False, True])
+def test_a_camera_pixel_as_bright_as_all_around_it_sees_the_place_in_their_middle(q_there, shadow):
+    q = places()
+    true = q[MIDDLE].copy()
+    q[MIDDLE] = q_there
+    direct, interreflection = np.full(CAMERA, 0.5), np.full(CAMERA, 0.1)
+    direct[MIDDLE] = 0.0
+    interreflection[MIDDLE] = 0.1 if shadow else 0.6
+    before = split_of(transport_of(direct, interreflection, q))
+    split = without_holes(before)
+    parts = [float(part[MIDDLE]) for part in split.components(WHITE)]
+    if shadow:
+        assert not len(split.elsewhere.pixels)
+        return
+    assert parts == pytest.approx([0.5, 0.0, 0.1], rel=1e-3)
+    np.testing.assert_allclose(split.elsewhere.places, [true], atol=1e-4)
+
+
+def test_planes_are_surer_than_lines_of_a_q_that_is_drawn_aside_among_noisy_ones():
+    drawn, column = 0.1, 6
+    rng = np.random.default_rng(5)
+    q = places() + rng.normal(0, 0.012, (*CAMERA, 2)).astype(np.float32)
+    q[:, column] += np.float32([0.0, drawn])
+    transport = transport_of(np.full(CAMERA, 0.5), np.full(CAMERA, 0.1), q)
+    inner = slice(3, -3)
+    surer = []
+    for tell in (told_by_lines, told_by_planes):
+        told, disagreement = (found[inner, column] for found in tell(transport))
+        assert np.abs(told - places()[inner, column]).max() < 0.5 * drawn
+        surer.append((disagreement < 0.2 * drawn).mean())
+    assert surer[1] > surer[0] + 0.3
+
+
+def test_of_two_places_of_a_camera_pixel_the_later_counts():
+    one = Elsewhere(np.array([1, 4]), np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[0.1], [0.2]]))
+    two = Elsewhere(np.array([4, 7]), np.array([[2.0, 3.0], [5.0, 5.0]]), np.array([[0.3], [0.4]]))
+    both = one.and_also(two)
+    assert sorted(both.pixels) == [1, 4, 7]
+    (index,) = np.flatnonzero(both.pixels == 4)
+    assert both.direct[index] == 0.3
+    assert tuple(both.places[index]) == (2.0, 3.0)

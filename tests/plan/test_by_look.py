@@ -60,7 +60,7 @@ def test_the_expectation_is_what_least_squares_leave_of_noise():
     shown = np.random.default_rng(0).random((4000, PROJECTOR.pixels))
     error = np.einsum("np,pq,nq->n", shown, covariance, shown).mean() / PROJECTOR.pixels
     found = 10 * np.log10(np.mean(shown.mean(axis=1) ** 2 + 1 / 12) / error)
-    references, _, codes = shares_of_photos(NEEDED, checked=False)
+    references, _, codes = shares_of_photos(PROJECTOR, NEEDED, checked=False)
     expected = expected_of_codes(PROJECTOR, codes, references, noise).random
     assert expected == pytest.approx(found, abs=0.5)
 

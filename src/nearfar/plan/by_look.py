@@ -91,5 +91,5 @@ def _expected_of_codes(projector: Size, photos: int, look: Look, checked: bool) 
     needed = photos_of_every_code(projector, checked=checked)
     if needed is None or photos < needed:
         return None
-    references, _, codes = shares_of_photos(photos, checked=checked)
+    references, _, codes = shares_of_photos(projector, photos, checked=checked)
     return expected_of_codes(projector, codes, references, look.noise)

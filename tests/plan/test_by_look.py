@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.illumination.frequencies import DC
 from nearfar.plan.by_look import plan_by_look
+from nearfar.plan.candidates import lowest_first
 from nearfar.plan.expect import expected_of_codes
 from nearfar.plan.lamps import photos_of_every_code, plan_lamps, shares_of_photos
 from nearfar.plan.look import LARGEST_FREE_SHARE, Look
-from nearfar.plan.patterns import LampCode
+from nearfar.plan.patterns import LampCode, Sinusoid
+from nearfar.plan.references import FEWEST
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.fitted import FREE, TYPICAL_SCENES
 from nearfar.priors.typical import TypicalScenes
@@ -60,7 +63,7 @@ def test_the_expectation_is_what_least_squares_leave_of_noise():
     shown = np.random.default_rng(0).random((4000, PROJECTOR.pixels))
     error = np.einsum("np,pq,nq->n", shown, covariance, shown).mean() / PROJECTOR.pixels
     found = 10 * np.log10(np.mean(shown.mean(axis=1) ** 2 + 1 / 12) / error)
-    references, _, codes = shares_of_photos(NEEDED, checked=False)
+    references, _, codes = shares_of_photos(PROJECTOR, NEEDED, checked=False)
     expected = expected_of_codes(PROJECTOR, codes, references, noise).random
     assert expected == pytest.approx(found, abs=0.5)
 
@@ -95,3 +98,32 @@ def test_codes_tell_a_projector_pixel_with_half_the_variance_of_sinusoids():
         for window in (None, 3)
     )
     assert 0.4 < codes / sinusoids < 0.6
+
+
+def test_light_with_outlines_is_planned_for_at_every_frequency_where_noise_allows():
+    outlined = PriorComponent(0.0, 64.0, FREE, far_power=1.5)
+    seen = TypicalScenes(((outlined, 0.01),), np.ones((1, 1)), np.ones(1))
+    projector, photos = Size(15, 15), 120
+    lowest = lowest_first(projector)
+
+    def shown(noise):
+        planned = Look(seen, noise, window=3, reach=None, wanted_window=3, free_share=0.0)
+        plan = plan_by_look(projector, photos, planned)
+        return [p.frequency for p in plan.patterns if isinstance(p, Sinusoid) and p.frequency != DC]
+
+    # As many of the lowest as there are photos for, and none twice.
+    with_little_noise = shown(0.0025)
+    assert set(with_little_noise) == set(lowest[: len(set(with_little_noise))])
+    assert len(with_little_noise) == 2 * len(set(with_little_noise))
+    # With much noise the photos are worth more where most of the light is.
+    assert len(set(shown(0.2))) < len(set(with_little_noise)) / 2
+
+
+def test_references_and_checks_leave_room_for_all_codes():
+    order = shares_of_photos(PROJECTOR, NEEDED, checked=True).codes
+    for photos in range(NEEDED, 2 * NEEDED):
+        shares = shares_of_photos(PROJECTOR, photos, checked=True)
+        assert 2 * shares.references + shares.checks + shares.codes == photos
+        assert shares.codes >= order
+        assert shares.references >= FEWEST
+        assert shares.checks >= 1

@@ -55,7 +55,7 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
             f"{projector.pixels} lamps are too many to tell one by one: plan for a grid of at most "
             f"{MOST_LAMPS}, or leave a range in the model."
         )
-    references, checks, codes = shares_of_photos(photos, checked=checked)
+    references, checks, codes = shares_of_photos(projector, photos, checked=checked)
     if codes < 1:
         raise PlanError(
             f"{photos} photos are too few for two whites, two blacks, a code and one to check by: "
@@ -88,12 +88,7 @@ def photos_of_every_code(projector: Size, *, checked: bool = True) -> int | None
     """
     if projector.pixels > MOST_LAMPS:
         return None
-    order = _order_from(projector.pixels)
-    return next(
-        photos
-        for photos in count(order)
-        if shares_of_photos(photos, checked=checked).codes >= order
-    )
+    return _order_from(projector.pixels) + 2 * FEWEST + int(checked)
 
 
 class SharesOfPhotos(NamedTuple):
@@ -104,10 +99,19 @@ class SharesOfPhotos(NamedTuple):
     codes: int
 
 
-def shares_of_photos(photos: int, *, checked: bool) -> SharesOfPhotos:
-    """Return how many of its photos a plan for lamps gives to white and black, checks and codes."""
+def shares_of_photos(projector: Size, photos: int, *, checked: bool) -> SharesOfPhotos:
+    """Return how many of its photos a plan for lamps gives to white and black, checks and codes.
+
+    References and check photos leave room for all codes as long as two whites, two blacks and one
+    check photo remain.
+    """
     references = max(FEWEST, round(photos / PHOTOS_TO_A_REFERENCE))
     checks = max(1, round(CHECKED_SHARE * photos)) if checked else 0
+    left = photos - _order_from(projector.pixels)
+    if 2 * FEWEST + int(checked) <= left < 2 * references + checks:
+        # References first: black's error is in every code.
+        references = min(references, (left - int(checked)) // 2)
+        checks = min(checks, left - 2 * references)
     return SharesOfPhotos(references, checks, photos - 2 * references - checks)
 
 

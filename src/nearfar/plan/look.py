@@ -62,6 +62,13 @@ class Look(NamedTuple):
         """Whether direct, near-range and far-range light describe the scene."""
         return self.free_share <= LARGEST_FREE_SHARE
 
+    @property
+    def has_outlines(self) -> bool:
+        """Whether much of the light is of components with a sharp outline on the projector."""
+        components, shares = self.typical.prior_components, self.typical.shares[0]
+        outlined = [component.far_power > 0 for component, _ in components]
+        return float(shares @ outlined) > LARGEST_FREE_SHARE
+
 
 def look_at(transport: "Transport") -> Look:
     """Return priors, noise and reach of near-range light of a first estimate.

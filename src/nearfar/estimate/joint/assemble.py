@@ -11,7 +11,7 @@ from nearfar.estimate.joint.batch import dc_index
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
 from nearfar.estimate.joint.shares import share_on_projector
-from nearfar.estimate.joint.spikes import away_from_q
+from nearfar.estimate.joint.spikes import around_q, away_from_q
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency, far_frequencies
 from nearfar.illumination.real_basis import real_basis
@@ -24,8 +24,6 @@ from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 
-# Side of the square of projector pixels about q that direct light can touch.
-FOOTPRINT_SIDE = 3
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
 
@@ -129,14 +127,14 @@ def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> Estimated
     negative = xp.clip(rows.amplitudes[..., 1], max=0.0) * problem.pixels.lit[:, None]
     amplitudes = xp.asarray(rows.amplitudes, copy=True)
     amplitudes[..., 1] -= negative
-    if window < FOOTPRINT_SIDE:
+    around = around_q(window)
+    if not len(around):
         return rows._replace(amplitudes=amplitudes)
     windows = xp.asarray(rows.near, copy=True)
     if problem.near_basis.pitch > 1:
         windows[..., window**2 // 2] += negative
         return rows._replace(amplitudes=amplitudes, near=windows)
     weights = direct_weights(problem.pixels.correspondence, problem.pixels.centres)[:, 0]
-    around = np.flatnonzero(~away_from_q(window**2))
     windows[..., beside(around, windows)] += negative[..., None] * weights[:, None]
     return rows._replace(amplitudes=amplitudes, near=windows)
 

@@ -4,7 +4,7 @@ from math import log
 
 from array_api_compat import device
 
-from nearfar.arrays import Booleans, Floats, namespace
+from nearfar.arrays import Booleans, Floats, Integers, namespace
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.evidence import (
     best_of,
@@ -14,6 +14,7 @@ from nearfar.estimate.joint.evidence import (
 )
 from nearfar.estimate.joint.pooled_choice import no_probabilities, put_probabilities
 from nearfar.estimate.joint.problem import ComponentChoice, Model
+from nearfar.estimate.joint.unmeasured import log_scores
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.fitted import LIT_COMPONENTS
 
@@ -60,8 +61,10 @@ def choose(
         of_mine = batch if len(mine) == len(left) else batch.only(mine)
         values = log_evidences(of_mine, candidates, evidence_of)
         component, scale, evidence = best_of(values, candidates)
-        if is_first:
+        if is_first and candidates is model.lit:
             put_probabilities(probability, mine, values, candidates, model)
+        elif is_first:
+            _put_unlit(probability, mine, of_mine, values, model)
         if is_first and candidates is model.lit:
             (doubted,) = xp.nonzero(is_doubtful(of_mine, model.centred))
             if len(doubted):
@@ -72,11 +75,24 @@ def choose(
                 none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
                 component[doubted] = xp.where(none, unlit, component[doubted])
                 scale[doubted] = xp.where(none, its_scale, scale[doubted])
-                dark = mine[doubted[none]]
-                put_probabilities(probability, dark, values[:, none], model.unlit, model)
+                (dark,) = xp.nonzero(none)
+                of_dark, its_values = dark_ones.only(dark), values[:, none]
+                _put_unlit(probability, mine[doubted[dark]], of_dark, its_values, model)
         given.prior_component[mine] = component
         given.prior_scale[mine] = xp.astype(scale, xp.float32)
     return given, probability
+
+
+def _put_unlit(
+    probability: Floats, selected: Integers, batch: PixelBatch, values: Floats, model: Model
+) -> None:
+    """Set the probabilities of camera pixels without direct light.
+
+    Where functions are of several projector pixels, error bars are those of the estimate's choice.
+    """
+    if model.centred.near_basis.pitch == 1:
+        values = log_scores(batch, model.unlit, model.multiplicity, model.stood_for)
+    put_probabilities(probability, selected, values, model.unlit, model)
 
 
 def is_doubtful(batch: PixelBatch, centred: CentredBasis) -> Booleans:

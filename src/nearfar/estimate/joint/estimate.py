@@ -10,17 +10,17 @@ from itertools import zip_longest
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Size, beside, fetch, namespace
+from nearfar.arrays import Floats, Size, beside, fetch, namespace
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.batch import AllPixels
 from nearfar.estimate.joint.chessboard import Part, every_choice, part_of_sweep
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
-from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.seen import box_centres
+from nearfar.estimate.joint.shifts import moved_q, with_unshifted_light
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measurements import Measurements
@@ -31,12 +31,6 @@ from nearfar.transport.model import Transport
 NO_CHOICES = Choices()
 # Sweeps: one by each camera pixel's own photos alone, the rest with its neighbours.
 SWEEPS = 3
-# Largest shift of q in one sweep, in projector pixels, and largest distance of q from its rounded
-# value.
-LARGEST_SHIFT = 0.25
-# The same where footprints are boxes, whose responses are not linear in q.
-LARGEST_SHIFT_AT_PITCH = 0.12
-LARGEST_FROM_CENTRE = 0.499
 # At a pitch over 1 each sweep but the last is two, of half of the camera pixels each.
 HALF_SWEEPS = 2 * SWEEPS - 1
 # Camera rows on either side of a row that its estimate depends on at a pitch over 1: neighbours in
@@ -171,7 +165,10 @@ def _sweep(
         if number == 0 and chosen.of_error_bars is not None:
             found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
         is_last = number >= sweeps - (2 if halves else 1)
+        before = problem
         problem = _with_new_q(problem, found, part, is_last=is_last)
+        if is_last and not halves:
+            found = with_unshifted_light(before, problem.pixels.correspondence, found)
         if halves and number < sweeps - 1:
             # Later sweeps hardly move q: new footprints after each of them change no light's SNR
             # by more than 0.01 dB.
@@ -268,34 +265,9 @@ def _with_new_q(
     """Return the problem with the q, and the direct light, that a sweep found."""
     pixels = problem.pixels
     lit = found.choices.sweeps[-1].prior_component < len(LIT_COMPONENTS)
-    moved = _moved(problem, found, lit, is_last=is_last)
+    moved = moved_q(problem, found, lit, is_last=is_last)
     if part is not None:
         kept = np.ones(len(lit), dtype=bool)
         kept[part.selected] = False
         lit[kept], moved[kept] = pixels.lit[kept], pixels.correspondence[kept]
     return problem._replace(pixels=pixels._replace(lit=lit, correspondence=moved))
-
-
-def _moved(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: bool) -> Floats:
-    """Shift q by its estimated error.
-
-    At most to where it would round to another pixel, unless windows are placed anew about it. It is
-    NaN where the photos turned out to show no direct light.
-    """
-    xp = namespace(rows.amplitudes)
-    amplitudes = xp.astype(rows.amplitudes, xp.float64)
-    direct = amplitudes[..., 1]
-    energy = xp.clip(xp.sum(direct**2, axis=1), min=float(np.finfo(np.float32).tiny))
-    shifts = amplitudes[..., 2:COMMON_AMPLITUDES]
-    off = xp.sum(shifts * direct[..., None], axis=1) / energy[:, None]
-    largest = LARGEST_SHIFT if problem.near_basis.pitch == 1 else LARGEST_SHIFT_AT_PITCH
-    within = xp.clip(off, -largest, largest)
-    off = xp.where((xp.sum(direct, axis=1) > 0)[:, None], within, 0.0)
-    pixels, centres = problem.pixels, xp.astype(problem.pixels.centres, xp.float64)
-    last = beside(np.array(problem.measurements.projector) - 1.0, amplitudes)
-    most = LARGEST_FROM_CENTRE if is_last or problem.near_basis.pitch == 1 else np.inf
-    lowest = xp.clip(centres - most, min=0.0)
-    highest = xp.minimum(centres + most, last)
-    moved: Floats = xp.maximum(xp.minimum(pixels.correspondence + off, highest), lowest)
-    seen: Floats = xp.where(lit[:, None], moved, xp.nan)
-    return seen

@@ -20,6 +20,7 @@ from nearfar.estimate.joint.batch import (
 )
 from nearfar.estimate.joint.evidence import PriorSet, prior_set
 from nearfar.estimate.joint.spikes import expected_spikes
+from nearfar.estimate.joint.unmeasured import responses_stood_for
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import DC, Frequency
 from nearfar.illumination.near_basis import NearBasis
@@ -109,6 +110,8 @@ class Model(NamedTuple):
         Of camera pixels with and without direct light.
     lit_differences : PriorSet
         Those of `lit` that sweeps after the first choose from.
+    stood_for : ndarray, shape (R,), float64
+        For how many responses each measured one stands, as `responses_stood_for` returns them.
     """
 
     centred: CentredBasis
@@ -116,6 +119,7 @@ class Model(NamedTuple):
     lit: PriorSet
     lit_differences: PriorSet
     unlit: PriorSet
+    stood_for: Floats
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -206,6 +210,7 @@ def build_model(
         lit,
         lit if is_fine else lit.only(LIT_DIFFERENCES_AT_PITCH),
         _prior_set(tuple(range(len(every), len(EVERY_COMPONENT))), *key, device),
+        responses_stood_for(centred.basis),
     )
 
 

@@ -19,6 +19,8 @@ from nearfar.estimate.joint.solve import PosteriorMean
 from nearfar.illumination.near_basis import NearBasis, window_offsets
 from nearfar.priors.responses import ResponsePrior
 
+# Side of the square of projector pixels about q that direct light can touch.
+FOOTPRINT_SIDE = 3
 # A second surface's footprint is up to four entries.
 MAXIMUM_SPIKES = 4
 # Least gain in log evidence of an accepted spike. It is larger than chance alone requires, because
@@ -65,6 +67,11 @@ def likeliest_spike(
 def away_from_q(entries: int) -> Booleans:
     """Return which of W^2 window entries are not next to q, (W^2,); all callers share the array."""
     return np.asarray(np.abs(window_offsets(round(np.sqrt(entries)))).max(axis=1) > 1)
+
+
+def around_q(window: int) -> Integers:
+    """Return the 9 window entries next to q, in the order of `FOOTPRINT_OFFSETS`; none if W < 3."""
+    return np.flatnonzero(~away_from_q(window**2)) if window >= FOOTPRINT_SIDE else np.arange(0)
 
 
 def expected_spikes(correspondence: Floats, near_basis: NearBasis) -> Booleans:

@@ -1,0 +1,383 @@
+"""One sweep of the joint estimate over half of the camera pixels, at a pitch over 1.
+
+What is expected of all of them is subtracted from their responses first. Of each run of camera
+pixels of a row one then chooses its prior component and scale by its own photos and is estimated,
+and after that those beside it, with the same choice where their responses fit it as well.
+
+Index convention: n runs over the camera pixels of the sweep, its places, in an order of its own;
+arrays are (n, channels, ...); r runs over real responses, j over functions.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.estimate.joint.batch import PixelBatch
+from nearfar.estimate.joint.chessboard import Part
+from nearfar.estimate.joint.choose import choose, is_doubtful
+from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses
+from nearfar.estimate.joint.footprint import footprint_weights, unit_responses
+from nearfar.estimate.joint.neighbour_loops import expect_each_by_pixel, expect_together_by_pixel
+from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
+from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem
+from nearfar.estimate.joint.shared_choice import chooser_of_each
+from nearfar.estimate.joint.solve import variance_ratio
+from nearfar.estimate.joint.solve_hats import leading_count, solve_hats
+from nearfar.estimate.joint.turn import left_of_responses, put_sums
+from nearfar.parallel import side_by_side
+from nearfar.priors.fitted import LIT_COMPONENTS
+
+# Camera pixels of a batch.
+BATCH_PIXELS = 2048
+# Log likelihood by which the responses of a camera pixel may fit a choice better or worse than
+# those of the camera pixel that made it.
+LARGEST_MISFIT = 20.0
+
+
+def sweep_half(
+    problem: Problem,
+    before: EstimatedRows | None,
+    report: Callable[[float], None],
+    chosen: ComponentChoice | None,
+    part: Part,
+) -> EstimatedRows:
+    """Estimate half of the camera pixels once.
+
+    Parameters
+    ----------
+    problem : Problem
+    before : EstimatedRows, optional
+        Of the sweep before, whose arrays are overwritten; None in the first.
+    report : callable
+        Called with the share done.
+    chosen : ComponentChoice, optional
+        Prior components and scales, if they are chosen already.
+    part : Part
+        Camera pixels to estimate.
+    """
+    order = _order(problem, part.selected)
+    if before is None:
+        rows = _empty_rows(problem)
+        left = _whole(problem, order)
+    else:
+        sweeps = (*before.choices.sweeps, before.choices.sweeps[-1].of(slice(None)))
+        rows = before._replace(choices=before.choices._replace(sweeps=sweeps))
+        left = _less_expected(problem, before, part._replace(selected=order))
+    sweep = _HalfSweep(
+        problem,
+        rows,
+        left,
+        order,
+        starts=before is None,
+        is_new=not part.known.all(),
+        misfit=np.zeros(len(order)),
+    )
+    sweep.run(chosen, report)
+    if before is None:
+        choices = rows.choices._replace(of_error_bars=rows.choices.sweeps[-1])
+        rows = rows._replace(choices=choices)
+    return rows
+
+
+class _Left(NamedTuple):
+    """What is expected of the camera pixels of a sweep, and what that leaves of their responses.
+
+    Attributes
+    ----------
+    near : ndarray, shape (n, channels, J)
+    far : ndarray, shape (n, channels, R)
+        As measured.
+    responses : ndarray, shape (n, channels, R)
+        Re-centred.
+    """
+
+    near: Floats
+    far: Floats
+    responses: Floats
+
+
+class _HalfSweep(NamedTuple):
+    """What a sweep estimates from, and what it fills."""
+
+    problem: Problem
+    rows: EstimatedRows
+    left: _Left
+    order: Integers  # camera pixel of each place
+    starts: bool
+    is_new: bool  # whether no sweep has estimated these camera pixels before
+    misfit: Floats  # of each place's responses, by its choice
+
+    def run(self, chosen: ComponentChoice | None, report: Callable[[float], None]) -> None:
+        """Choose for, and estimate, all camera pixels."""
+        everywhere = np.arange(len(self.order))
+        if chosen is not None:
+            for mine, given in zip(self.rows.choices.sweeps[-1], chosen, strict=True):
+                mine[self.order] = given[self.order]
+            changed = np.flatnonzero(self._chosen_lit() != self.problem.pixels.lit[self.order])
+            self._choose(changed)
+            if self.is_new and not self.starts:
+                batch = self._batch(everywhere, derivatives=False)
+                doubted = batch.lit & is_doubtful(batch, self.problem.model.centred)
+                self._forget(np.flatnonzero(doubted))
+            self._solve(everywhere)
+            report(1.0)
+            return
+        chooser = chooser_of_each(self.order, self.problem.measurements.camera)
+        is_chooser = chooser == everywhere
+        choosers, others = np.flatnonzero(is_chooser), np.flatnonzero(~is_chooser)
+        self._choose(choosers)
+        self._solve(choosers)
+        report(0.4)
+        alike = self._adopt(others, chooser[others])
+        unlike = np.setdiff1d(others, alike)
+        fits = self._solve(alike, like=chooser)
+        report(0.8)
+        own = np.sort(np.concatenate([unlike, alike[~fits]]))
+        self._choose(own)
+        self._solve(own)
+        report(1.0)
+
+    def _chosen_lit(self) -> Booleans:
+        component = self.rows.choices.sweeps[-1].prior_component[self.order]
+        return np.asarray(component < len(LIT_COMPONENTS))
+
+    def _adopt(self, places: Integers, chooser: Integers) -> Integers:
+        """Give places the choice of others, and return those that are lit as it says."""
+        for values in self.rows.choices.sweeps[-1]:
+            values[self.order[places]] = values[self.order[chooser]]
+        lit = self.problem.pixels.lit[self.order]
+        return np.asarray(places[self._chosen_lit()[places] == lit[places]])
+
+    def _choose(self, places: Integers) -> None:
+        """Choose prior components and scales by the photos of each place."""
+        side_by_side(
+            self._choose_some, [places[batch] for batch in blocks(len(places), BATCH_PIXELS)]
+        )
+
+    def _choose_some(self, places: Integers) -> None:
+        problem = self.problem
+        batch = self._batch(places, derivatives=False)
+        rest = places
+        if self.is_new and not self.starts:
+            doubted = batch.lit & is_doubtful(batch, problem.model.centred)
+            (alone,), (remaining,) = np.nonzero(doubted), np.nonzero(~doubted)
+            if len(alone):
+                self._forget(places[alone])
+                afresh = self._batch(places[alone], derivatives=False)
+                self._put_choice(places[alone], afresh, is_first=True)
+                rest, batch = places[remaining], batch.only(remaining)
+        if len(rest):
+            self._put_choice(rest, batch, is_first=self.starts)
+
+    def _put_choice(self, places: Integers, batch: PixelBatch, *, is_first: bool) -> None:
+        found, _ = choose(batch, self.problem.model, None, is_first=is_first)
+        for values, mine in zip(self.rows.choices.sweeps[-1], found, strict=True):
+            values[self.order[places]] = mine
+
+    def _forget(self, places: Integers) -> None:
+        """Expect nothing of places: they may have no direct light, unlike their neighbours."""
+        alone = _whole(self.problem, self.order[places])
+        for mine, found in zip(self.left, alone, strict=True):
+            mine[places] = found
+
+    def _solve(self, places: Integers, like: Integers | None = None) -> Booleans:
+        """Estimate places by their choices, and return which of them fit these.
+
+        Only those that fit as well as the places `like` are put into the rows; all if it is None.
+        """
+        choice = self.rows.choices.sweeps[-1].of(self.order[places])
+        fits = np.ones(len(places), dtype=bool)
+
+        def work(some: tuple[int, int, Integers]) -> None:
+            number, count, mine = some
+            fits[mine] = self._solve_alike(places[mine], number, count, like)
+
+        side_by_side(work, list(self._alike(choice, self.order[places])))
+        return fits
+
+    def _alike(
+        self, choice: ComponentChoice, selected: Integers
+    ) -> Iterator[tuple[int, int, Integers]]:
+        """Yield components, and those of chosen camera pixels that share eigenvectors of each."""
+        pixels = self.problem.pixels
+        signal = np.max(pixels.white[selected] / pixels.noise[selected], axis=1)
+        largest = (choice.prior_scale * signal) ** 2
+        for number in np.unique(choice.prior_component).tolist():
+            mine = np.flatnonzero(choice.prior_component == number)
+            counts = leading_count(self.problem.model.priors[number], largest[mine])
+            for count in np.unique(counts).tolist():
+                some = mine[counts == count]
+                for batch in blocks(len(some), BATCH_PIXELS):
+                    yield number, count, some[batch]
+
+    def _solve_alike(
+        self, places: Integers, number: int, count: int, like: Integers | None
+    ) -> Booleans:
+        rows, centred = self.rows, self.problem.model.centred
+        batch = self._batch(places, derivatives=True)
+        doubted = np.zeros(len(places), dtype=bool)
+        if like is not None and self.is_new:
+            doubted = batch.lit & is_doubtful(batch, centred)
+        seen = number < len(LIT_COMPONENTS)
+        if not seen:
+            batch.direct_weights[:] = 0.0
+        batch = batch._replace(lit=np.full(len(places), seen))
+        selected = self.order[places]
+        ratio = variance_ratio(batch, rows.choices.sweeps[-1].prior_scale[selected])
+        found = solve_hats(batch, self.problem.model.priors[number], ratio, count, centred)
+        self.misfit[places] = found.misfit
+        fits = ~doubted
+        if like is not None:
+            fits &= np.abs(found.misfit - self.misfit[like[places]]) < 2 * LARGEST_MISFIT
+            kept = np.flatnonzero(fits)
+            if len(kept) < len(fits):
+                places, selected, batch = places[kept], selected[kept], batch.only(kept)
+                found = type(found)._make(values[kept] for values in found)
+        rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
+        rows.near_noise[selected] = found.near_noise
+        # What is found is added to what was expected.
+        put_sums(
+            self.left.near,
+            self.left.far,
+            found.near,
+            found.far,
+            places,
+            selected,
+            batch.centres,
+            centred.basis.single_phases,
+            rows.near,
+            rows.far,
+        )
+        return fits
+
+    def _batch(self, places: Integers, *, derivatives: bool) -> PixelBatch:
+        """Return a batch of places; without derivatives by q, as for the choice of a component."""
+        problem, centred = self.problem, self.problem.model.centred
+        pixels, selected = problem.pixels, self.order[places]
+        q, centres, lit = (
+            pixels.correspondence[selected],
+            pixels.centres[selected],
+            pixels.lit[selected],
+        )
+        footprint, offset_noise = pixels.footprint[selected], pixels.offset_noise[selected]
+        nothing = np.zeros((len(places), 0), dtype=np.int64)
+        count = centred.basis.count
+        of_offset = np.empty((len(places), 0, count), dtype=np.float32)
+        if derivatives:
+            weights = footprint_weights(q, centres, footprint, centred)
+            if problem.has_offset_noise:
+                ones = np.ones((len(places), 1, count), dtype=np.float32)
+                of_offset = centred.recentre(ones, centres)
+        else:
+            middles = np.where(lit[:, None], q - centres, 0.0)
+            weights = unit_responses(middles, footprint, centred)[:, None]
+            weights[~lit] = 0.0
+        return PixelBatch(
+            centres=centres,
+            lit=lit,
+            inside=nothing.astype(bool),
+            responses=self.left.responses[places],
+            direct_weights=weights,
+            of_offset=of_offset,
+            spikes=nothing,
+            noise=pixels.noise[selected],
+            offset_noise=offset_noise,
+            white=pixels.white[selected],
+            spike_expected=nothing.astype(bool),
+        )
+
+
+def _order(problem: Problem, selected: Integers) -> Integers:
+    """Return camera pixels so that those whose functions are cut alike are next to each other."""
+    pixels, near_basis = problem.pixels, problem.near_basis
+    projector = problem.measurements.projector
+    cut = pixels.lit[selected] & is_cut(pixels.centres[selected], near_basis, projector)
+    at_border = selected[cut]
+    distances = border_distances(pixels.centres[at_border], near_basis, projector)
+    return np.concatenate([selected[~cut], at_border[np.lexsort(distances.T[::-1])]])
+
+
+def _empty_rows(problem: Problem) -> EstimatedRows:
+    """Return rows of zeros for the first sweep to fill."""
+    number, channels, count = problem.pixels.responses.shape
+
+    def zeros(*shape: int) -> Floats:
+        return np.zeros((number, channels, *shape), dtype=np.float32)
+
+    choice = ComponentChoice(np.zeros(number, dtype=np.int64), np.zeros(number, dtype=np.float32))
+    return EstimatedRows(
+        zeros(COMMON_AMPLITUDES),
+        zeros(problem.near_basis.count),
+        zeros(count),
+        zeros(),
+        Choices((choice,)),
+    )
+
+
+def _whole(problem: Problem, order: Integers) -> _Left:
+    """Return that nothing is expected of camera pixels."""
+    _, channels, count = problem.pixels.responses.shape
+    shape = (len(order), channels)
+    near = np.zeros((*shape, problem.near_basis.count), dtype=np.float32)
+    far = np.zeros((*shape, count), dtype=np.float32)
+    found = _Left(near, far, np.zeros_like(far))
+    _subtract(problem, order, found, whole=True)
+    return found
+
+
+def _less_expected(problem: Problem, rows: EstimatedRows, part: Part) -> _Left:
+    """Return what neighbours lead to expect of a part's camera pixels, and what that leaves."""
+    near, far = _expected(problem, rows, part)
+    found = _Left(near, far, np.empty_like(far))
+    _subtract(problem, part.selected, found, whole=False)
+    return found
+
+
+def _subtract(problem: Problem, order: Integers, left: _Left, *, whole: bool) -> None:
+    """Fill in what is left of responses."""
+    pixels, centred = problem.pixels, problem.model.centred
+
+    def work(batch: slice) -> None:
+        some = order[batch]
+        centres = pixels.centres[some]
+        if not whole:
+            left.responses[batch] = near_responses(left.near[batch], centres, centred)
+        left_of_responses(
+            pixels.responses,
+            some,
+            left.far[batch],
+            centres,
+            centred.basis.single_phases,
+            left.responses[batch],
+        )
+
+    side_by_side(work, blocks(len(order), BATCH_PIXELS))
+
+
+def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats, Floats]:
+    """Return n and f of a part's camera pixels as their neighbours lead to expect."""
+    pixels, measurements = problem.pixels, problem.measurements
+    shape = (*measurements.camera, measurements.channels)
+    white = pixels.white.reshape(shape)
+    tiny = float(np.finfo(np.float32).tiny) ** 0.5
+    variance = np.clip((measurements.noise.reshape(shape) / white) ** 2, min=tiny)
+    basis = problem.model.centred.basis
+    cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
+    far = expect_each_by_pixel(
+        rows.far.reshape((*shape, -1)),
+        white,
+        variance,
+        problem.model.multiplicity,
+        np.flatnonzero(cycles >= np.median(cycles)),
+        part,
+    )
+    near = expect_together_by_pixel(
+        rows.near.reshape((*shape, -1)),
+        white,
+        rows.near_noise.reshape(shape) / white**2,
+        pixels.lit.reshape(measurements.camera),
+        part,
+    )
+    return near, far

@@ -150,7 +150,8 @@ def test_the_mean_is_that_of_dense_algebra():
     scale = 2.0**-5 * NOISE / WHITE * 2**8
     ratio = variance_ratio(batch, np.full(len(WHOLE), scale))
     every = batch._replace(responses=batch.responses.copy())
-    found = solve_hats(every, prior, ratio, centred.basis.count, centred)
+    units = amplitude_responses(batch, centred)
+    found = solve_hats(every, units, prior, ratio, centred.basis.count, BASIS)
     for c, i in np.ndindex(len(WHOLE), 2):
         gain, near = _dense_gain(centred, batch, c, i, COMPONENT, scale, multiplicity)
         mean = gain @ batch.responses[c, i]
@@ -165,12 +166,12 @@ def test_what_faint_eigenvectors_tell_is_far_below_the_noise():
     batch = _batch(WHOLE, centred)
     multiplicity = np.linspace(1.0, 2.0, centred.basis.count).astype(np.float32)
     prior = response_prior(COMPONENT, centred, multiplicity)
-    scale = 0.3 * NOISE / WHITE
+    scale = 0.1 * NOISE / WHITE
     ratio = variance_ratio(batch, np.full(len(WHOLE), scale))
     count = int(leading_count(prior, ratio.max()))
     assert count < centred.basis.count
     every = batch._replace(responses=batch.responses.copy())
-    found = solve_hats(every, prior, ratio, count, centred)
+    found = solve_hats(every, amplitude_responses(batch, centred), prior, ratio, count, BASIS)
     for c, i in np.ndindex(len(WHOLE), 2):
         gain, near = _dense_gain(centred, batch, c, i, COMPONENT, scale, multiplicity)
         for part, mean in ((near, found.near), (slice(near.stop, None), found.far)):
@@ -206,7 +207,8 @@ def test_each_sweep_finds_more_of_the_light_that_the_border_cuts(component, cent
         ratio = variance_ratio(batch, np.full(number, share * scale))
         left = responses - near_responses(near, batch.centres, centred) - found_far
         count = int(leading_count(prior, ratio.max()))
-        found = solve_hats(batch._replace(responses=left), prior, ratio, count, centred)
+        units = amplitude_responses(batch, centred)
+        found = solve_hats(batch._replace(responses=left), units, prior, ratio, count, BASIS)
         near, found_far = near + found.near, found_far + found.far
         errors.append(np.sum((values @ (near[:, 0] - truth).T) ** 2))
     gain, at = _dense_gain(centred, batch, 0, 0, component, scale, multiplicity)

@@ -155,17 +155,25 @@ def _explained(
 
 
 @compiled
-def _with_derivatives(
-    middles: Floats, footprints: Floats, step: float, waves: Floats, sums: Floats
-) -> Floats:
+def _put_derivatives(
+    middles: Floats,
+    footprints: Floats,
+    step: float,
+    waves: Floats,
+    sums: Floats,
+    first: int,
+    found: Floats,
+) -> None:
     number, count = len(middles), waves.shape[3]
-    found = np.zeros((number, 3, count), dtype=np.float32)
     at = np.empty((2, 2, count), dtype=np.float32)
     steep, before = np.empty_like(at), np.empty((2, count), dtype=np.float32)
     slope = np.float32(0.5 / step)
     for n in range(number):
         slanted = footprints[n, 2] != 0.0 or footprints[n, 3] != 0.0
         share = np.float32(0.5 if slanted else 1.0)
+        whole, by_down, by_across = found[n, first], found[n, first + 1], found[n, first + 2]
+        for r in range(count):
+            whole[r], by_down[r], by_across[r] = 0.0, 0.0, 0.0
         for box in range(2 if slanted else 1):
             for axis in range(2):
                 skew = footprints[n, 2 + axis] * (2.0 * box - 1.0)
@@ -181,10 +189,9 @@ def _with_derivatives(
                 here = at[0, 0, r] * at[1, 0, r] + at[0, 1, r] * at[1, 1, r]
                 down = steep[0, 0, r] * at[1, 0, r] + steep[0, 1, r] * at[1, 1, r]
                 across = at[0, 0, r] * steep[1, 0, r] + at[0, 1, r] * steep[1, 1, r]
-                found[n, 0, r] += share * here
-                found[n, 1, r] += share * down
-                found[n, 2, r] += share * across
-    return found
+                whole[r] += share * here
+                by_down[r] += share * down
+                by_across[r] += share * across
 
 
 def of_boxes(middles: Floats, footprints: Floats, table: WaveTable) -> Floats:
@@ -222,14 +229,16 @@ def explained_by_boxes(
     return np.asarray(_explained(responses, roots, *both, table.waves, table.sums))
 
 
-def with_derivatives(middles: Floats, footprints: Floats, step: float, table: WaveTable) -> Floats:
-    """Return responses of unit direct light and their differences by q, (n, 3, R), float32.
+def put_with_derivatives(
+    middles: Floats, footprints: Floats, step: float, table: WaveTable, first: int, found: Floats
+) -> None:
+    """Write responses of unit direct light and their differences by q into an array (n, G, R).
 
-    The differences are over `step` to both sides; other parameters as in `of_boxes`.
+    They take three of its second axis from `first` on. The differences are over `step` to both
+    sides; other parameters as in `of_boxes`.
     """
-    return _with_derivatives(
-        _as_doubles(middles), _as_doubles(footprints), step, table.waves, table.sums
-    )
+    both = _as_doubles(middles), _as_doubles(footprints)
+    _put_derivatives(*both, step, table.waves, table.sums, first, found)
 
 
 def _as_doubles(values: Floats) -> Floats:

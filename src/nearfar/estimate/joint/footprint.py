@@ -18,8 +18,8 @@ from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.estimate.joint.box_waves import (
     explained_by_boxes,
     of_boxes,
+    put_with_derivatives,
     wave_table,
-    with_derivatives,
 )
 from nearfar.estimate.joint.seen import MEDIAN_SIDE, reach_of, seen_of_projector
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
@@ -69,12 +69,25 @@ def footprint_weights(
     """
     if centred.near_basis.pitch == 1:
         return direct_weights(correspondence, centres)
+    found = np.empty((len(centres), 3, centred.basis.count), dtype=np.float32)
+    put_footprint_weights(correspondence, centres, footprints, centred, 0, found)
+    return found
+
+
+def put_footprint_weights(
+    correspondence: Floats,
+    centres: NDArray[np.int64],
+    footprints: Floats,
+    centred: CentredBasis,
+    first: int,
+    found: Floats,
+) -> None:
+    """Write `footprint_weights` of hats into (n, G, R), from `first` of its second axis on."""
     lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
     middles = np.where(lit[:, None], correspondence - centres, 0.0)
     table = wave_table(centred, reach_of(footprints, STEP))
-    found = with_derivatives(middles, footprints, STEP, table)
-    found[~lit] = 0.0
-    return found
+    put_with_derivatives(middles, footprints, STEP, table, first, found)
+    found[~lit, first:] = 0.0
 
 
 def unit_responses(middles: Floats, footprints: Floats, centred: CentredBasis) -> Floats:

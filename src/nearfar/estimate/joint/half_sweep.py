@@ -18,14 +18,14 @@ from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.chessboard import Part
 from nearfar.estimate.joint.choose import choose, is_doubtful
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses
-from nearfar.estimate.joint.footprint import footprint_weights, unit_responses
+from nearfar.estimate.joint.footprint import put_footprint_weights, unit_responses
 from nearfar.estimate.joint.neighbour_loops import expect_each_by_pixel, expect_together_by_pixel
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem
 from nearfar.estimate.joint.shared_choice import chooser_of_each
 from nearfar.estimate.joint.solve import variance_ratio
 from nearfar.estimate.joint.solve_hats import leading_count, solve_hats
-from nearfar.estimate.joint.turn import left_of_responses, put_sums
+from nearfar.estimate.joint.turn import left_of_responses, put_ones, put_sums
 from nearfar.parallel import side_by_side
 from nearfar.priors.fitted import LIT_COMPONENTS
 
@@ -118,7 +118,7 @@ class _HalfSweep(NamedTuple):
             changed = np.flatnonzero(self._chosen_lit() != self.problem.pixels.lit[self.order])
             self._choose(changed)
             if self.is_new and not self.starts:
-                batch = self._batch(everywhere, derivatives=False)
+                batch = self._choosing(everywhere)
                 doubted = batch.lit & is_doubtful(batch, self.problem.model.centred)
                 self._forget(np.flatnonzero(doubted))
             self._solve(everywhere)
@@ -158,14 +158,14 @@ class _HalfSweep(NamedTuple):
 
     def _choose_some(self, places: Integers) -> None:
         problem = self.problem
-        batch = self._batch(places, derivatives=False)
+        batch = self._choosing(places)
         rest = places
         if self.is_new and not self.starts:
             doubted = batch.lit & is_doubtful(batch, problem.model.centred)
             (alone,), (remaining,) = np.nonzero(doubted), np.nonzero(~doubted)
             if len(alone):
                 self._forget(places[alone])
-                afresh = self._batch(places[alone], derivatives=False)
+                afresh = self._choosing(places[alone])
                 self._put_choice(places[alone], afresh, is_first=True)
                 rest, batch = places[remaining], batch.only(remaining)
         if len(rest):
@@ -216,7 +216,7 @@ class _HalfSweep(NamedTuple):
         self, places: Integers, number: int, count: int, like: Integers | None
     ) -> Booleans:
         rows, centred = self.rows, self.problem.model.centred
-        batch = self._batch(places, derivatives=True)
+        batch, units = self._with_units(places)
         doubted = np.zeros(len(places), dtype=bool)
         if like is not None and self.is_new:
             doubted = batch.lit & is_doubtful(batch, centred)
@@ -226,14 +226,15 @@ class _HalfSweep(NamedTuple):
         batch = batch._replace(lit=np.full(len(places), seen))
         selected = self.order[places]
         ratio = variance_ratio(batch, rows.choices.sweeps[-1].prior_scale[selected])
-        found = solve_hats(batch, self.problem.model.priors[number], ratio, count, centred)
+        prior, near_basis = self.problem.model.priors[number], self.problem.near_basis
+        found = solve_hats(batch, units, prior, ratio, count, near_basis)
         self.misfit[places] = found.misfit
         fits = ~doubted
         if like is not None:
             fits &= np.abs(found.misfit - self.misfit[like[places]]) < 2 * LARGEST_MISFIT
             kept = np.flatnonzero(fits)
             if len(kept) < len(fits):
-                places, selected, batch = places[kept], selected[kept], batch.only(kept)
+                places, selected = places[kept], selected[kept]
                 found = type(found)._make(values[kept] for values in found)
         rows.amplitudes[selected] = found.amplitudes[..., :COMMON_AMPLITUDES]
         rows.near_noise[selected] = found.near_noise
@@ -245,45 +246,53 @@ class _HalfSweep(NamedTuple):
             found.far,
             places,
             selected,
-            batch.centres,
+            self.problem.pixels.centres[selected],
             centred.basis.single_phases,
             rows.near,
             rows.far,
         )
         return fits
 
-    def _batch(self, places: Integers, *, derivatives: bool) -> PixelBatch:
-        """Return a batch of places; without derivatives by q, as for the choice of a component."""
-        problem, centred = self.problem, self.problem.model.centred
-        pixels, selected = problem.pixels, self.order[places]
+    def _choosing(self, places: Integers) -> PixelBatch:
+        """Return a batch of places, with the responses that a choice asks for."""
+        pixels, selected = self.problem.pixels, self.order[places]
         q, centres, lit = (
             pixels.correspondence[selected],
             pixels.centres[selected],
             pixels.lit[selected],
         )
-        footprint, offset_noise = pixels.footprint[selected], pixels.offset_noise[selected]
+        middles = np.where(lit[:, None], q - centres, 0.0)
+        centred = self.problem.model.centred
+        weights = unit_responses(middles, pixels.footprint[selected], centred)
+        weights[~lit] = 0.0
+        nothing = np.zeros((len(places), 0, centred.basis.count), dtype=np.float32)
+        return self._batch(places, weights[:, None], nothing)
+
+    def _with_units(self, places: Integers) -> tuple[PixelBatch, Floats]:
+        """Return a batch of places, and responses to unit amplitudes, which it has views of."""
+        problem, selected = self.problem, self.order[places]
+        pixels, centred = problem.pixels, problem.model.centred
+        centres, first = pixels.centres[selected], int(problem.has_offset_noise)
+        units = np.empty((len(places), first + 3, centred.basis.count), dtype=np.float32)
+        if first:
+            put_ones(centres, centred.basis.single_phases, units)
+        q, footprints = pixels.correspondence[selected], pixels.footprint[selected]
+        put_footprint_weights(q, centres, footprints, centred, first, units)
+        return self._batch(places, units[:, first:], units[:, :first]), units
+
+    def _batch(self, places: Integers, direct_weights: Floats, of_offset: Floats) -> PixelBatch:
+        pixels, selected = self.problem.pixels, self.order[places]
         nothing = np.zeros((len(places), 0), dtype=np.int64)
-        count = centred.basis.count
-        of_offset = np.empty((len(places), 0, count), dtype=np.float32)
-        if derivatives:
-            weights = footprint_weights(q, centres, footprint, centred)
-            if problem.has_offset_noise:
-                ones = np.ones((len(places), 1, count), dtype=np.float32)
-                of_offset = centred.recentre(ones, centres)
-        else:
-            middles = np.where(lit[:, None], q - centres, 0.0)
-            weights = unit_responses(middles, footprint, centred)[:, None]
-            weights[~lit] = 0.0
         return PixelBatch(
-            centres=centres,
-            lit=lit,
+            centres=pixels.centres[selected],
+            lit=pixels.lit[selected],
             inside=nothing.astype(bool),
             responses=self.left.responses[places],
-            direct_weights=weights,
+            direct_weights=direct_weights,
             of_offset=of_offset,
             spikes=nothing,
             noise=pixels.noise[selected],
-            offset_noise=offset_noise,
+            offset_noise=pixels.offset_noise[selected],
             white=pixels.white[selected],
             spike_expected=nothing.astype(bool),
         )

@@ -24,14 +24,14 @@ from nearfar.compiled import compiled
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.factors import solve_small
-from nearfar.illumination.centred_basis import CentredBasis
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.priors.responses import ResponsePrior
 
 # Least variance of an eigenvector's coordinate, as a share of the noise's: with 0.01 and 0.0001
 # no light's SNR differs by 0.01 dB.
 LEAST_VARIANCE = 0.01
 # Leading eigenvectors are counted in multiples of as many, so that camera pixels share a number.
-MULTIPLE = 16
+MULTIPLE = 32
 
 
 class Leading(NamedTuple):
@@ -102,7 +102,12 @@ class HatsMean(NamedTuple):
 
 
 def solve_hats(
-    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, count: int, centred: CentredBasis
+    batch: PixelBatch,
+    units: Floats,
+    prior: ResponsePrior,
+    ratio: Floats,
+    count: int,
+    near_basis: NearBasis,
 ) -> HatsMean:
     """Estimate camera pixels of one prior component.
 
@@ -110,19 +115,20 @@ def solve_hats(
     ----------
     batch : PixelBatch
         Its responses are overwritten.
+    units : ndarray, shape (n, G, R), float32
+        Responses to unit amplitudes, as `nuisance.amplitude_responses` gives them.
     prior : ResponsePrior
     ratio : ndarray, shape (n, channels)
         Variance ratios (s / sigma)^2.
     count : int
         Number of leading eigenvectors, as `leading_count` says for the largest ratio.
-    centred : CentredBasis
+    near_basis : NearBasis
     """
     number, channels, responses = batch.responses.shape
-    functions = centred.near_basis.count
+    functions = near_basis.count
     leading = _leading(prior, count)
     y = product_by_row(batch.responses, leading.eigenvectors)
-    units = nuisance.amplitude_responses(batch, centred)
-    precision = nuisance.prior_precision(batch, centred.near_basis)
+    precision = nuisance.prior_precision(batch, near_basis)
     noise_variance = batch.noise.ravel() ** 2
     amplitudes, misfit = fit_leading(
         batch.responses.reshape(-1, responses),

@@ -61,6 +61,32 @@ def left_of_responses(
 
 
 @compiled
+def put_ones(
+    centres: NDArray[np.int64], phases: tuple[Complexes, Complexes], found: Floats
+) -> None:
+    """Write re-centred responses that are all 1 into the first of an array's second axis.
+
+    Parameters
+    ----------
+    centres : ndarray of int, shape (n, 2)
+    phases : tuple of ndarray
+        As in `left_of_responses`.
+    found : ndarray, shape (n, G, R), float32
+    """
+    down, across = phases
+    number = down.shape[1]
+    pairs = found.shape[2] - number
+    for n in range(len(centres)):
+        of_y, of_x, ones = down[centres[n, 0]], across[centres[n, 1]], found[n, 0]
+        for k in range(pairs):
+            c = of_y[k].real * of_x[k].real - of_y[k].imag * of_x[k].imag
+            s = of_y[k].real * of_x[k].imag + of_y[k].imag * of_x[k].real
+            ones[2 * k], ones[2 * k + 1] = c + s, c - s
+        for k in range(pairs, number):
+            ones[pairs + k] = of_y[k].real * of_x[k].real
+
+
+@compiled
 def put_sums(
     expected_near: Floats,
     expected_far: Floats,

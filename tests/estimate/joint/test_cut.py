@@ -161,7 +161,7 @@ def test_the_mean_is_that_of_dense_algebra():
         np.testing.assert_allclose(found.far[c, i], far, rtol=0, atol=2e-3 * np.abs(far).max())
 
 
-def test_what_faint_eigenvectors_tell_is_far_below_the_noise():
+def test_what_faint_eigenvectors_tell_is_far_below_what_is_not_known():
     centred = _centred()
     batch = _batch(WHOLE, centred)
     multiplicity = np.linspace(1.0, 2.0, centred.basis.count).astype(np.float32)
@@ -169,16 +169,20 @@ def test_what_faint_eigenvectors_tell_is_far_below_the_noise():
     scale = 0.1 * NOISE / WHITE
     ratio = variance_ratio(batch, np.full(len(WHOLE), scale))
     count = int(leading_count(prior, ratio.max()))
-    assert count < centred.basis.count
-    every = batch._replace(responses=batch.responses.copy())
+    assert count < 0.7 * centred.basis.count
+    noisy = batch._replace(responses=NOISE * batch.responses)
+    every = noisy._replace(responses=noisy.responses.copy())
     found = solve_hats(every, amplitude_responses(batch, centred), prior, ratio, count, BASIS)
     for c, i in np.ndindex(len(WHOLE), 2):
         gain, near = _dense_gain(centred, batch, c, i, COMPONENT, scale, multiplicity)
-        for part, mean in ((near, found.near), (slice(near.stop, None), found.far)):
-            # The responses that were drawn have a standard deviation of 1.
-            noise = np.sqrt(np.sum(gain[part] ** 2 / multiplicity))
-            off = np.linalg.norm(mean[c, i] - (gain @ batch.responses[c, i])[part])
-            assert off < 0.05 * noise
+        mean = gain @ noisy.responses[c, i]
+        variances = np.trace(prior.covariance), prior.far_variance.sum()
+        for part, one, variance in (
+            (near, found.near[c, i], variances[0]),
+            (slice(near.stop, None), found.far[c, i], variances[1]),
+        ):
+            before = scale * WHITE * np.sqrt(variance)
+            assert np.linalg.norm(one - mean[part]) < 0.05 * before
 
 
 @pytest.mark.parametrize(

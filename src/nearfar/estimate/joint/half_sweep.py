@@ -111,30 +111,31 @@ class _HalfSweep(NamedTuple):
 
     def run(self, chosen: ComponentChoice | None, report: Callable[[float], None]) -> None:
         """Choose for, and estimate, all camera pixels."""
-        everywhere = np.arange(len(self.order))
+        # Row by row: rounding hangs on where a camera pixel stands in a product, which is then the
+        # same in a tile that begins with the same row.
+        everywhere = np.argsort(self.order)
         if chosen is not None:
             for mine, given in zip(self.rows.choices.sweeps[-1], chosen, strict=True):
                 mine[self.order] = given[self.order]
-            changed = np.flatnonzero(self._chosen_lit() != self.problem.pixels.lit[self.order])
-            self._choose(changed)
+            is_changed = self._chosen_lit() != self.problem.pixels.lit[self.order]
+            self._choose(everywhere[is_changed[everywhere]])
             if self.is_new and not self.starts:
                 batch = self._choosing(everywhere)
                 doubted = batch.lit & is_doubtful(batch, self.problem.model.centred)
-                self._forget(np.flatnonzero(doubted))
+                self._forget(everywhere[doubted])
             self._solve(everywhere)
             report(1.0)
             return
         chooser = chooser_of_each(self.order, self.problem.measurements.camera)
-        is_chooser = chooser == everywhere
-        choosers, others = np.flatnonzero(is_chooser), np.flatnonzero(~is_chooser)
+        is_chooser = (chooser == np.arange(len(chooser)))[everywhere]
+        choosers, others = everywhere[is_chooser], everywhere[~is_chooser]
         self._choose(choosers)
         self._solve(choosers)
         report(0.4)
         alike = self._adopt(others, chooser[others])
-        unlike = np.setdiff1d(others, alike)
-        fits = self._solve(alike, like=chooser)
+        fits = alike[self._solve(alike, like=chooser)]
         report(0.8)
-        own = np.sort(np.concatenate([unlike, alike[~fits]]))
+        own = others[~np.isin(others, fits)]
         self._choose(own)
         self._solve(own)
         report(1.0)
@@ -308,6 +309,21 @@ def _order(problem: Problem, selected: Integers) -> Integers:
     return np.concatenate([selected[~cut], at_border[np.lexsort(distances.T[::-1])]])
 
 
+def _batches(problem: Problem, order: Integers) -> list[slice]:
+    """Return batches of ordered camera pixels; those whose functions are cut alike are in one."""
+    pixels, near_basis = problem.pixels, problem.near_basis
+    distances = border_distances(pixels.centres[order], near_basis, problem.measurements.projector)
+    changes = np.any(distances[1:] != distances[:-1], axis=1)
+    whole = np.flatnonzero(np.all(distances == near_basis.reach, axis=1))
+    found, start = [], 0
+    ends = np.concatenate([whole[BATCH_PIXELS::BATCH_PIXELS], 1 + np.flatnonzero(changes)])
+    for end in [*np.unique(ends).tolist(), len(order)]:
+        if end - start >= BATCH_PIXELS or end == len(order):
+            found.append(slice(start, end))
+            start = end
+    return found
+
+
 def _empty_rows(problem: Problem) -> EstimatedRows:
     """Return rows of zeros for the first sweep to fill."""
     number, channels, count = problem.pixels.responses.shape
@@ -362,7 +378,7 @@ def _subtract(problem: Problem, order: Integers, left: _Left, *, whole: bool) ->
             left.responses[batch],
         )
 
-    side_by_side(work, blocks(len(order), BATCH_PIXELS))
+    side_by_side(work, _batches(problem, order))
 
 
 def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats, Floats]:

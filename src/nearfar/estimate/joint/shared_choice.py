@@ -8,8 +8,8 @@ import numpy as np
 from nearfar.arrays import Integers, Size
 
 # Camera pixels of one colour in a row that share a choice, and which of them chooses.
-RUN = 8
-CHOOSER = 4
+RUN = 4
+CHOOSER = 2
 
 
 def chooser_of_each(selected: Integers, camera: Size) -> Integers:

@@ -27,8 +27,8 @@ from nearfar.estimate.joint.factors import solve_small
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.priors.responses import ResponsePrior
 
-# Least variance of an eigenvector's coordinate, as a share of the noise's: with 0.01 and 0.0001
-# no light's SNR differs by 0.01 dB.
+# Least variance of an eigenvector's coordinate, as a share of the noise's. No light's SNR is more
+# than 0.02 dB off that by all eigenvectors.
 LEAST_VARIANCE = 0.01
 # Leading eigenvectors are counted in multiples of as many, so that camera pixels share a number.
 MULTIPLE = 32

@@ -28,6 +28,8 @@ Booleans = NDArray[np.bool_]
 
 # Multiplications up to which OpenBLAS takes kernels for small matrices.
 FEW_MULTIPLICATIONS = 100**3
+# A multiple of the rows that its kernels take at once.
+ROWS_OF_KERNELS = 48
 
 
 class Size(NamedTuple):
@@ -209,19 +211,25 @@ def product(values: Floats, matrix: Floats) -> Floats:
 
 
 def product_by_row(values: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
-    """Return `product` of NumPy arrays; a row's rounding does not depend on the other rows.
+    """Return `product` of NumPy arrays; a row's rounding does not depend on the rows after it.
 
-    OpenBLAS multiplies by other kernels where there are few multiplications or a single row, so a
-    few rows are followed by zeros.
+    OpenBLAS multiplies by other kernels where there are few multiplications or a single row, and
+    where rows are left over that fill no kernel, so these are followed by zeros.
     """
     flat = values.reshape((math.prod(values.shape[:-1]), values.shape[-1]))
-    number, least = len(flat), max(2, FEW_MULTIPLICATIONS // max(1, matrix.size) + 1)
-    if number < least:
-        filled = np.zeros((least, flat.shape[1]), dtype=flat.dtype)
-        filled[:number] = flat
-        flat = filled
-    found = (flat @ matrix)[:number]
-    return np.asarray(found.reshape((*values.shape[:-1], matrix.shape[1])))
+    number, whole = len(flat), len(flat) // ROWS_OF_KERNELS * ROWS_OF_KERNELS
+    least = FEW_MULTIPLICATIONS // max(1, matrix.size) + 1
+    if whole < least:
+        whole = 0
+    found = np.empty((number, matrix.shape[1]), dtype=np.result_type(values, matrix))
+    if whole:
+        np.matmul(flat[:whole], matrix, out=found[:whole])
+    if whole < number:
+        rows = -(-max(least, number - whole) // ROWS_OF_KERNELS) * ROWS_OF_KERNELS
+        filled = np.zeros((rows, flat.shape[1]), dtype=flat.dtype)
+        filled[: number - whole] = flat[whole:]
+        found[whole:] = (filled @ matrix)[: number - whole]
+    return found.reshape((*values.shape[:-1], matrix.shape[1]))
 
 
 def blocks(count: int, length: int) -> Iterator[slice]:

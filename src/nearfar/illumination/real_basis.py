@@ -133,7 +133,7 @@ class RealBasis:
 
     def _shift_phases(self, responses: Floats, centres: NDArray[np.int64], sign: int) -> Floats:
         xp = namespace(responses)
-        down, across = (beside(phases, responses) for phases in self._single_phases)
+        down, across = (beside(phases, responses) for phases in self.single_phases)
         phase = down[centres[:, 0]] * across[centres[:, 1]]
         real, imaginary = xp.real(phase)[:, None], xp.imag(phase)[:, None]
         shifted: Floats = xp.empty_like(responses)
@@ -191,7 +191,8 @@ class RealBasis:
         return down, across
 
     @cached_property
-    def _single_phases(self) -> tuple[Complexes, Complexes]:
+    def single_phases(self) -> tuple[Complexes, Complexes]:
+        """exp(j 2 pi k y) and exp(j 2 pi k x), (Py, K) and (Px, K), in single precision."""
         down, across = self._phases
         return down.astype(np.complex64), across.astype(np.complex64)
 
@@ -214,7 +215,7 @@ class RealBasis:
     def _overlaps_by_axes(self, light: Floats) -> Floats:
         """Return the light's overlap with each pattern, (..., P) to (..., M), an axis at a time."""
         flat = light.reshape(-1, *self.projector)
-        down, across = self._single_phases
+        down, across = self.single_phases
         (columns, of_column) = np.unique(self.cycles[:, 1], return_inverse=True)
         first = np.unique(of_column, return_index=True)[1]
         found = np.empty((len(flat), self.count))
@@ -232,7 +233,7 @@ class RealBasis:
     def _sum_by_axes(self, weighted: Floats) -> Floats:
         """Return sums of patterns, (..., M) to (..., P), an axis at a time."""
         flat = weighted.reshape(-1, self.count)
-        down, across = self._single_phases
+        down, across = self.single_phases
         found = np.empty((len(flat), *self.projector), dtype=np.float32)
         for one, picture in zip(flat, found, strict=True):
             both = np.zeros(len(self.frequencies), dtype=np.complex64)

@@ -3,7 +3,6 @@
 Index convention: r runs over real responses, w over window entries.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -23,14 +22,6 @@ LAST_SHARP = (CORRELATION_LENGTH - LENGTH_AT_Q) / LENGTH_GROWTH
 # Floor of far-range light's spectral density, as a share of that at DC: sharp shadows have light
 # at every frequency.
 SPECTRAL_DENSITY_FLOOR = 1e-6
-# Near-range light of a smaller standard deviation, as a share of that at q, does not show whether
-# the border cuts it: with 0.2 no light's SNR changes by more than 0.01 dB, with 0.4 by 0.03 dB.
-FAINT_DEVIATION = 0.2
-# The same of differences from neighbours, which are much smaller: every light of cornell-aside at
-# 512x512 and the corner at 256x256 is within 0.1 dB of that with 0.2.
-FAINT_DIFFERENCE = 0.6
-# Cells about q in which a component with spread has direct light of its own.
-CELLS_OF_SPREAD = 2
 
 
 def spectral_density(cycles: Floats, prior_component: PriorComponent) -> Floats:
@@ -137,21 +128,6 @@ def covariance_of_coefficients(
     independent[around] += prior_component.direct_spread**2
     covariance[np.arange(coarse), np.arange(coarse)] += independent
     return np.asarray(covariance)
-
-
-def reach_of_near(
-    prior_component: PriorComponent, near_basis: NearBasis, faint: float = FAINT_DEVIATION
-) -> int:
-    """Return the projector pixels from q beyond which the border need not cut functions.
-
-    Beyond it, near-range light has less than the share `faint` of its standard deviation at q. At
-    most the functions' own reach. Components that fade soon need fewer windows cut by the border,
-    each of which takes several times as long as a whole one.
-    """
-    cells = -math.log(faint) * prior_component.near_reach
-    if prior_component.direct_spread:
-        cells = max(cells, CELLS_OF_SPREAD)
-    return min(near_basis.reach, math.ceil(cells * near_basis.pitch))
 
 
 def _correlation_lengths(distance: Floats) -> Floats:

@@ -24,7 +24,6 @@ from nearfar.priors.covariance import (
     covariance_of_coefficients,
     far_variance,
     near_covariance_factors,
-    reach_of_near,
 )
 
 # Variance ratios (s / sigma)^2, prior scale s over noise sigma, for which tables are made: from
@@ -85,8 +84,6 @@ class ResponsePrior(Eigenbasis):
         C.
     far_variance : ndarray, shape (R,), float64
         S.
-    reach : int
-        Projector pixels from q beyond which the border need not cut functions.
     """
 
     to_near: Floats
@@ -98,7 +95,6 @@ class ResponsePrior(Eigenbasis):
     factors: NearCovariance
     covariance: Floats
     far_variance: Floats
-    reach: int
 
     @property
     def _multiplied(self) -> tuple[str, ...]:
@@ -161,5 +157,4 @@ def response_prior(
         factors=near_covariance_factors(prior_component, centred.near_basis.window, projector),
         covariance=covariance,
         far_variance=variance,
-        reach=reach_of_near(prior_component, centred.near_basis),
     )

@@ -8,19 +8,18 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.estimate.joint.batch import AllPixels, gather, offset_noise, white_scale
-from nearfar.estimate.joint.clipped import rounded_ratio
 from nearfar.estimate.joint.cut import (
     border_distances,
     cut_responses,
     is_cut,
     near_responses,
-    solve_cut,
 )
 from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.seen import box_centres, seen_of_projector
 from nearfar.estimate.joint.shares import share_on_projector
-from nearfar.estimate.joint.solve import solve_whole, variance_ratio
+from nearfar.estimate.joint.solve import variance_ratio
+from nearfar.estimate.joint.solve_hats import leading_count, solve_hats
 from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives, wrap
 from nearfar.illumination.near_basis import NearBasis
@@ -90,6 +89,7 @@ def _by_hand(centred, centre):
 
 # Even distances from the border, to which distances are rounded at a pitch of four.
 CORNERS = np.array([[0, 0], [69, 2], [4, 40], [35, 87], [8, 81], [35, 45], [0, 89]])
+WHOLE = np.array([[35, 45], [33, 40]])
 
 
 def test_a_cut_function_answers_by_what_is_left_of_it():
@@ -121,84 +121,106 @@ def test_distances_are_rounded_by_a_fifth_at_most_and_never_past_the_reach():
     assert whole[exact == BASIS.reach][:20].all()
 
 
-def test_the_mean_is_that_of_dense_algebra():
-    centred = _centred()
-    batch = _batch(CORNERS, centred)
-    multiplicity = np.linspace(1.0, 2.0, centred.basis.count).astype(np.float32)
-    prior = response_prior(COMPONENT, centred, multiplicity)
-    scale = np.full(len(CORNERS), 2.0**-5 * NOISE / WHITE * 2**8)
-    ratio = variance_ratio(batch, scale)
-    found = solve_cut(batch, prior, ratio, centred)
-    covariance = covariance_of_coefficients(COMPONENT, BASIS, PROJECTOR)
+def _dense_gain(centred, batch, c, i, component, scale, multiplicity):
+    """From responses to the means of amplitudes, functions and f, by dense algebra."""
     amplitudes = amplitude_responses(batch, centred).astype(np.float64)
     precision = prior_precision(batch, BASIS)
-    for c, centre in enumerate(CORNERS):
-        squared = (scale[c] * WHITE) ** 2
-        responses = np.concatenate(
-            [amplitudes[c].T, _by_hand(centred, centre), np.eye(centred.basis.count)], axis=1
-        )
-        count, each = amplitudes.shape[1], BASIS.count
-        for i in range(2):
-            before = np.zeros((responses.shape[1],) * 2)
-            before[:count, :count] = np.diag(1 / precision[c, i])
-            before[count : count + each, count : count + each] = squared * covariance
-            before[count + each :, count + each :] = squared * np.diag(
-                far_variance(centred.basis, COMPONENT)
-            )
-            noise = np.diag(NOISE**2 / multiplicity.astype(float))
-            seen = responses @ before @ responses.T + noise
-            mean = before @ responses.T @ np.linalg.solve(seen, batch.responses[c, i])
-            size = np.abs(mean[count : count + each]).max()
-            np.testing.assert_allclose(
-                found.near[c, i], mean[count : count + each], rtol=0, atol=2e-3 * size
-            )
-            np.testing.assert_allclose(
-                found.far[c, i],
-                mean[count + each :],
-                rtol=0,
-                atol=2e-3 * np.abs(mean[count + each :]).max(),
-            )
+    squared = (scale * WHITE) ** 2
+    count, each = amplitudes.shape[1], BASIS.count
+    responses = np.concatenate(
+        [amplitudes[c].T, _by_hand(centred, batch.centres[c]), np.eye(centred.basis.count)], axis=1
+    )
+    before = np.zeros((responses.shape[1],) * 2)
+    before[:count, :count] = np.diag(1 / precision[c, i])
+    near = slice(count, count + each)
+    before[near, near] = squared * covariance_of_coefficients(component, BASIS, PROJECTOR)
+    before[count + each :, count + each :] = squared * np.diag(
+        far_variance(centred.basis, component)
+    )
+    noise = np.diag(NOISE**2 / multiplicity.astype(float))
+    seen = responses @ before @ responses.T + noise
+    return before @ responses.T @ np.linalg.inv(seen), near
 
 
-def test_whole_and_cut_agree_where_nothing_is_cut():
+def test_the_mean_is_that_of_dense_algebra():
     centred = _centred()
-    batch = _batch(np.array([[35, 45], [33, 40]]), centred)
-    prior = response_prior(COMPONENT, centred, np.ones(centred.basis.count, dtype=np.float32))
-    ratio = variance_ratio(batch, np.full(2, 0.016))
-    by_whole, by_cut = (solve(batch, prior, ratio, centred) for solve in (solve_whole, solve_cut))
-    for name in ("amplitudes", "near", "far"):
-        one, other = getattr(by_whole, name), getattr(by_cut, name)
-        np.testing.assert_allclose(one, other, rtol=0, atol=2e-3 * np.abs(one).max())
+    batch = _batch(WHOLE, centred)
+    multiplicity = np.linspace(1.0, 2.0, centred.basis.count).astype(np.float32)
+    prior = response_prior(COMPONENT, centred, multiplicity)
+    scale = 2.0**-5 * NOISE / WHITE * 2**8
+    ratio = variance_ratio(batch, np.full(len(WHOLE), scale))
+    every = batch._replace(responses=batch.responses.copy())
+    units = amplitude_responses(batch, centred)
+    found = solve_hats(every, units, prior, ratio, centred.basis.count, BASIS)
+    for c, i in np.ndindex(len(WHOLE), 2):
+        gain, near = _dense_gain(centred, batch, c, i, COMPONENT, scale, multiplicity)
+        mean = gain @ batch.responses[c, i]
+        size = np.abs(mean[near]).max()
+        np.testing.assert_allclose(found.near[c, i], mean[near], rtol=0, atol=2e-3 * size)
+        far = mean[near.stop :]
+        np.testing.assert_allclose(found.far[c, i], far, rtol=0, atol=2e-3 * np.abs(far).max())
 
 
-def test_light_that_fades_before_the_border_is_found_as_well_without_a_cut():
-    component = PriorComponent(1.3, 1.0, 3.0)
+def test_what_faint_eigenvectors_tell_is_far_below_what_is_not_known():
     centred = _centred()
-    prior = response_prior(component, centred, np.ones(centred.basis.count, dtype=np.float32))
-    at_border = np.array([[69 - prior.reach, 45], [40, prior.reach], [35, 45 - prior.reach]])
-    assert prior.reach < BASIS.reach
-    assert is_cut(at_border[:2], BASIS, PROJECTOR).all()
-    assert not is_cut(at_border, BASIS, PROJECTOR, prior.reach).any()
-    centre = np.array([69 - prior.reach, prior.reach])
-    draw, number, scale = np.random.default_rng(2), 300, 0.01
+    batch = _batch(WHOLE, centred)
+    multiplicity = np.linspace(1.0, 2.0, centred.basis.count).astype(np.float32)
+    prior = response_prior(COMPONENT, centred, multiplicity)
+    scale = 0.1 * NOISE / WHITE
+    ratio = variance_ratio(batch, np.full(len(WHOLE), scale))
+    count = int(leading_count(prior, ratio.max()))
+    assert count < 0.7 * centred.basis.count
+    noisy = batch._replace(responses=NOISE * batch.responses)
+    every = noisy._replace(responses=noisy.responses.copy())
+    found = solve_hats(every, amplitude_responses(batch, centred), prior, ratio, count, BASIS)
+    for c, i in np.ndindex(len(WHOLE), 2):
+        gain, near = _dense_gain(centred, batch, c, i, COMPONENT, scale, multiplicity)
+        mean = gain @ noisy.responses[c, i]
+        variances = np.trace(prior.covariance), prior.far_variance.sum()
+        for part, one, variance in (
+            (near, found.near[c, i], variances[0]),
+            (slice(near.stop, None), found.far[c, i], variances[1]),
+        ):
+            before = scale * WHITE * np.sqrt(variance)
+            assert np.linalg.norm(one - mean[part]) < 0.05 * before
+
+
+@pytest.mark.parametrize(
+    "component", [PriorComponent(1.3, 1.0, 3.0), PriorComponent(6.0, 1.0, 3.0, roughness=1.0)]
+)
+@pytest.mark.parametrize("centre", [[69, 45], [66, 4], [0, 0]])
+def test_each_sweep_finds_more_of_the_light_that_the_border_cuts(component, centre):
+    centred = _centred()
+    multiplicity = np.ones(centred.basis.count, dtype=np.float32)
+    prior = response_prior(component, centred, multiplicity)
+    draw, number, scale = np.random.default_rng(2), 200, 0.01
     size = scale * WHITE
     truth = size * draw.multivariate_normal(np.zeros(BASIS.count), prior.covariance, number)
     far = size * np.sqrt(prior.far_variance) * draw.normal(size=(number, centred.basis.count))
     noise = NOISE * draw.normal(size=far.shape)
     batch = _batch(np.tile(centre, (number, 1)), centred)
     direct = 0.3 * centred.of_direct(batch.direct_weights[:, 0])
-    responses = truth @ _by_hand(centred, centre).T + far + direct + noise
-    batch = batch._replace(responses=np.repeat(responses[:, None], 2, axis=1).astype(np.float32))
-    ratio = rounded_ratio(variance_ratio(batch, np.full(number, scale)))
+    responses = truth @ _by_hand(centred, np.array(centre)).T + far + direct + noise
+    responses = np.repeat(responses[:, None], 2, axis=1).astype(np.float32)
     places = np.stack(np.meshgrid(*map(np.arange, PROJECTOR), indexing="ij"), axis=-1)
-    values = BASIS.values_at(places.reshape(-1, 2) - centre)
-    by_cut = solve_cut(batch, replace(prior, reach=BASIS.reach), ratio, centred)
-    by_whole = solve_whole(batch, prior, ratio, centred)
-    cut, whole = (
-        np.sum((values @ (found.near[:, 0] - truth).T) ** 2) for found in (by_cut, by_whole)
-    )
-    assert cut < 0.5 * np.sum((values @ truth.T) ** 2)
-    assert whole < 1.01 * cut
+    values = BASIS.values_at(places.reshape(-1, 2) - np.array(centre))
+    near, found_far = np.zeros((number, 2, BASIS.count), np.float32), np.zeros_like(responses)
+    errors = []
+    # Later sweeps estimate small differences.
+    for share in (1.0, 0.25, 0.25):
+        ratio = variance_ratio(batch, np.full(number, share * scale))
+        left = responses - near_responses(near, batch.centres, centred) - found_far
+        count = int(leading_count(prior, ratio.max()))
+        units = amplitude_responses(batch, centred)
+        found = solve_hats(batch._replace(responses=left), units, prior, ratio, count, BASIS)
+        near, found_far = near + found.near, found_far + found.far
+        errors.append(np.sum((values @ (near[:, 0] - truth).T) ** 2))
+    gain, at = _dense_gain(centred, batch, 0, 0, component, scale, multiplicity)
+    exact = np.sum((values @ (responses[:, 0] @ gain[at].T - truth).T) ** 2)
+    assert exact < 0.5 * np.sum((values @ truth.T) ** 2)
+    assert errors[0] > errors[1] > errors[2]
+    # The least that any estimate from these responses leaves is that of exact cuts.
+    assert exact < errors[2] < 1.3 * exact
 
 
 HIGH = [

@@ -67,7 +67,7 @@ def _wave_table(centred: CentredBasis, reach: int) -> WaveTable:
 
 
 @compiled
-def _mean_wave(middle: float, width: float, waves: Floats, sums: Floats, found: Floats) -> None:
+def mean_wave(middle: float, width: float, waves: Floats, sums: Floats, found: Floats) -> None:
     """Write the mean of both parts of waves (2, P, R) over a box along an axis to (2, R)."""
     reach = waves.shape[1] // 2
     low, high = middle - 0.5 * width, middle + 0.5 * width
@@ -100,14 +100,14 @@ def _of_boxes(middles: Floats, footprints: Floats, waves: Floats, sums: Floats) 
     for n in range(number):
         height, width = max(footprints[n, 0], LEAST_WIDTH), max(footprints[n, 1], LEAST_WIDTH)
         skew_down, skew_across = footprints[n, 2], footprints[n, 3]
-        _mean_wave(middles[n, 0] - skew_down, height, waves[0], sums[0], down)
-        _mean_wave(middles[n, 1] - skew_across, width, waves[1], sums[1], across)
+        mean_wave(middles[n, 0] - skew_down, height, waves[0], sums[0], down)
+        mean_wave(middles[n, 1] - skew_across, width, waves[1], sums[1], across)
         for r in range(count):
             found[n, r] = down[0, r] * across[0, r] + down[1, r] * across[1, r]
         # Both boxes of an upright footprint are the same.
         if skew_down != 0.0 or skew_across != 0.0:
-            _mean_wave(middles[n, 0] + skew_down, height, waves[0], sums[0], down)
-            _mean_wave(middles[n, 1] + skew_across, width, waves[1], sums[1], across)
+            mean_wave(middles[n, 0] + skew_down, height, waves[0], sums[0], down)
+            mean_wave(middles[n, 1] + skew_across, width, waves[1], sums[1], across)
             for r in range(count):
                 other = down[0, r] * across[0, r] + down[1, r] * across[1, r]
                 found[n, r] = half * (found[n, r] + other)
@@ -115,25 +115,73 @@ def _of_boxes(middles: Floats, footprints: Floats, waves: Floats, sums: Floats) 
 
 
 @compiled
-def _with_derivatives(
-    middles: Floats, footprints: Floats, step: float, waves: Floats, sums: Floats
+def _explained(
+    responses: Floats,
+    roots: Floats,
+    middles: Floats,
+    footprints: Floats,
+    waves: Floats,
+    sums: Floats,
 ) -> Floats:
+    number, channels, count = responses.shape
+    found = np.empty(number)
+    down, across = np.empty((2, count), np.float32), np.empty((2, count), np.float32)
+    direct, half = np.empty(count, np.float32), np.float32(0.5)
+    for n in range(number):
+        height, width = max(footprints[n, 0], LEAST_WIDTH), max(footprints[n, 1], LEAST_WIDTH)
+        skew_down, skew_across = footprints[n, 2], footprints[n, 3]
+        mean_wave(middles[n, 0] - skew_down, height, waves[0], sums[0], down)
+        mean_wave(middles[n, 1] - skew_across, width, waves[1], sums[1], across)
+        for r in range(count):
+            direct[r] = down[0, r] * across[0, r] + down[1, r] * across[1, r]
+        if skew_down != 0.0 or skew_across != 0.0:
+            mean_wave(middles[n, 0] + skew_down, height, waves[0], sums[0], down)
+            mean_wave(middles[n, 1] + skew_across, width, waves[1], sums[1], across)
+            for r in range(count):
+                other = down[0, r] * across[0, r] + down[1, r] * across[1, r]
+                direct[r] = half * (direct[r] + other)
+        squared = np.float32(0.0)
+        for r in range(count):
+            direct[r] *= roots[r]
+            squared += direct[r] * direct[r]
+        total = 0.0
+        for channel in range(channels):
+            along = np.float32(0.0)
+            for r in range(count):
+                along += responses[n, channel, r] * direct[r]
+            total += np.float64(max(along, np.float32(0.0))) ** 2
+        found[n] = total / max(squared, np.float32(1e-12))
+    return found
+
+
+@compiled
+def _put_derivatives(
+    middles: Floats,
+    footprints: Floats,
+    step: float,
+    waves: Floats,
+    sums: Floats,
+    first: int,
+    found: Floats,
+) -> None:
     number, count = len(middles), waves.shape[3]
-    found = np.zeros((number, 3, count), dtype=np.float32)
     at = np.empty((2, 2, count), dtype=np.float32)
     steep, before = np.empty_like(at), np.empty((2, count), dtype=np.float32)
     slope = np.float32(0.5 / step)
     for n in range(number):
         slanted = footprints[n, 2] != 0.0 or footprints[n, 3] != 0.0
         share = np.float32(0.5 if slanted else 1.0)
+        whole, by_down, by_across = found[n, first], found[n, first + 1], found[n, first + 2]
+        for r in range(count):
+            whole[r], by_down[r], by_across[r] = 0.0, 0.0, 0.0
         for box in range(2 if slanted else 1):
             for axis in range(2):
                 skew = footprints[n, 2 + axis] * (2.0 * box - 1.0)
                 side = max(footprints[n, axis], LEAST_WIDTH)
                 middle = middles[n, axis] + skew
-                _mean_wave(middle, side, waves[axis], sums[axis], at[axis])
-                _mean_wave(middle + step, side, waves[axis], sums[axis], steep[axis])
-                _mean_wave(middle - step, side, waves[axis], sums[axis], before)
+                mean_wave(middle, side, waves[axis], sums[axis], at[axis])
+                mean_wave(middle + step, side, waves[axis], sums[axis], steep[axis])
+                mean_wave(middle - step, side, waves[axis], sums[axis], before)
                 for part in range(2):
                     for r in range(count):
                         steep[axis, part, r] = (steep[axis, part, r] - before[part, r]) * slope
@@ -141,10 +189,9 @@ def _with_derivatives(
                 here = at[0, 0, r] * at[1, 0, r] + at[0, 1, r] * at[1, 1, r]
                 down = steep[0, 0, r] * at[1, 0, r] + steep[0, 1, r] * at[1, 1, r]
                 across = at[0, 0, r] * steep[1, 0, r] + at[0, 1, r] * steep[1, 1, r]
-                found[n, 0, r] += share * here
-                found[n, 1, r] += share * down
-                found[n, 2, r] += share * across
-    return found
+                whole[r] += share * here
+                by_down[r] += share * down
+                by_across[r] += share * across
 
 
 def of_boxes(middles: Floats, footprints: Floats, table: WaveTable) -> Floats:
@@ -162,14 +209,36 @@ def of_boxes(middles: Floats, footprints: Floats, table: WaveTable) -> Floats:
     return _of_boxes(_as_doubles(middles), _as_doubles(footprints), table.waves, table.sums)
 
 
-def with_derivatives(middles: Floats, footprints: Floats, step: float, table: WaveTable) -> Floats:
-    """Return responses of unit direct light and their differences by q, (n, 3, R), float32.
+def explained_by_boxes(
+    responses: Floats, roots: Floats, middles: Floats, footprints: Floats, table: WaveTable
+) -> Floats:
+    """Return how much of the power of responses direct light of footprints explains, (n,), float64.
 
-    The differences are over `step` to both sides; other parameters as in `of_boxes`.
+    It is not negative.
+
+    Parameters
+    ----------
+    responses : ndarray, shape (n, channels, R), float32
+        Measured, in units of their noise.
+    roots : ndarray, shape (R,), float32
+        One measurement's noise in units of each response's.
+    middles, footprints, table
+        As in `of_boxes`.
     """
-    return _with_derivatives(
-        _as_doubles(middles), _as_doubles(footprints), step, table.waves, table.sums
-    )
+    both = _as_doubles(middles), _as_doubles(footprints)
+    return np.asarray(_explained(responses, roots, *both, table.waves, table.sums))
+
+
+def put_with_derivatives(
+    middles: Floats, footprints: Floats, step: float, table: WaveTable, first: int, found: Floats
+) -> None:
+    """Write responses of unit direct light and their differences by q into an array (n, G, R).
+
+    They take three of its second axis from `first` on. The differences are over `step` to both
+    sides; other parameters as in `of_boxes`.
+    """
+    both = _as_doubles(middles), _as_doubles(footprints)
+    _put_derivatives(*both, step, table.waves, table.sums, first, found)
 
 
 def _as_doubles(values: Floats) -> Floats:

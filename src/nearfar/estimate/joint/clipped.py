@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Integers, Size, beside, fetch, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.cut import is_cut
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis, reachable
@@ -35,8 +34,6 @@ from nearfar.transport import near
 
 def is_clipped(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
     """Return whether the border cuts into the window about each rounded q, shape (C,)."""
-    if near_basis.pitch > 1:
-        return is_cut(centres, near_basis, projector)
     xp = namespace(centres)
     never_inside = beside(~reachable(near_basis.window, projector), centres)
     inside = near.inside(centres, near_basis.window, projector)

@@ -1,16 +1,9 @@
-"""The posterior mean where the projector's border cuts hats of several projector pixels.
+"""Responses of near-range light where the projector's border cuts hats of several projector pixels.
 
-What is cut off a hat sends no light, so its responses depend on how far q is from the border. With
-C the hats' covariance at unit prior scale, B their responses as the border cuts them, S the
-variance of f and m how often each response was measured, responses have the covariance
+What is cut off a hat sends no light, so its responses depend on how far q is from the border.
+Camera pixels share responses where their distances from the border are nearly the same.
 
-    sigma^2 K,  K = ratio (B C B^T + S) + 1 / m,  ratio = (s / sigma)^2
-
-Camera pixels share B C B^T + S where their distances from the border are nearly the same and so
-is the prior component, and a factor of K where the ratio is the same as well.
-
-Index convention: arrays are (n, channels, ...); r runs over real responses, w over functions, g
-over y and the amplitudes of `nuisance`.
+Index convention: arrays are (n, channels, ...); r runs over real responses, j over functions.
 """
 
 from collections.abc import Iterator
@@ -22,38 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, Size, product_by_row
-from nearfar.estimate.joint import nuisance
-from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.cut_solve import solve_alike
-from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.near_basis import NearBasis
-from nearfar.priors.responses import ResponsePrior
 
 
-def is_cut(
-    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size, within: int | None = None
-) -> Booleans:
-    """Return whether the border cuts functions about each rounded q, shape (C,).
-
-    `within` is that of `border_distances`.
-    """
-    distances = border_distances(centres, near_basis, projector, within)
+def is_cut(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
+    """Return whether the border cuts functions about each rounded q, shape (C,)."""
+    distances = border_distances(centres, near_basis, projector)
     return np.asarray((distances < near_basis.reach).any(axis=1))
 
 
 def border_distances(
-    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size, within: int | None = None
+    centres: NDArray[np.int64], near_basis: NearBasis, projector: Size
 ) -> NDArray[np.int64]:
     """Return projector pixels from the rounded q to each border, at most the reach, (C, 4).
 
     Above, below, to the left and to the right, each rounded to one of those that `_rounded` lists.
-    Distances of at least `within` count as the reach.
     """
     last = np.array(projector) - 1 - centres
     distances = np.stack([centres[:, 0], last[:, 0], centres[:, 1], last[:, 1]], axis=1)
-    found = _rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)]
-    return found if within is None else np.where(distances < within, found, near_basis.reach)
+    return np.asarray(_rounded(near_basis.reach)[np.minimum(distances, near_basis.reach)])
 
 
 @lru_cache(maxsize=16)
@@ -70,15 +51,12 @@ def _rounded(reach: int) -> NDArray[np.int64]:
 
 
 def cut_alike(
-    centres: NDArray[np.int64], centred: CentredBasis, within: int | None = None
+    centres: NDArray[np.int64], centred: CentredBasis
 ) -> Iterator[tuple[Integers, tuple[int, int, int, int]]]:
-    """Yield camera pixels whose functions are cut alike, and their distances from the border.
-
-    `within` is that of `border_distances`.
-    """
+    """Yield camera pixels whose functions are cut alike, and their distances from the border."""
     if not len(centres):
         return
-    distances = border_distances(centres, centred.near_basis, centred.basis.projector, within)
+    distances = border_distances(centres, centred.near_basis, centred.basis.projector)
     # Each four distances as one number.
     code = distances @ (centred.near_basis.reach + 1) ** np.arange(4)
     order = np.argsort(code, kind="stable")
@@ -94,8 +72,12 @@ def _starts(ordered: Integers | Floats) -> Integers:
     return np.concatenate([[0], changes, [len(ordered)]])
 
 
-# Those of the same batch, whose camera pixels' components follow each other.
-@lru_cache(maxsize=64)
+# Those of most cuts, for all sweeps and tiles.
+@lru_cache(maxsize=512)
+def _transposed(centred: CentredBasis, distances: tuple[int, int, int, int]) -> Floats:
+    return np.ascontiguousarray(cut_responses(centred, distances).T, dtype=np.float32)
+
+
 def cut_responses(centred: CentredBasis, distances: tuple[int, int, int, int]) -> Floats:
     """Return the responses of functions to the patterns, re-centred, as the border cuts them.
 
@@ -169,51 +151,5 @@ def near_responses(
     found = np.empty(shape, dtype=np.result_type(coefficients, centred.on_window))
     found[whole] = product_by_row(coefficients[whole], centred.on_window.T)
     for part, distances in cut_alike(centres[cut], centred):
-        responses = cut_responses(centred, distances).T.astype(np.float32)
-        found[cut[part]] = product_by_row(coefficients[cut[part]], responses)
+        found[cut[part]] = product_by_row(coefficients[cut[part]], _transposed(centred, distances))
     return found
-
-
-def solve_cut(
-    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, centred: CentredBasis
-) -> PosteriorMean:
-    """Estimate camera pixels of one prior component and rounded ratios; see `solve_whole`."""
-    number, channels, count = batch.responses.shape
-    per_amplitude = nuisance.amplitude_responses(batch, centred)
-    precision = nuisance.prior_precision(batch, centred.near_basis)
-    noise_variance = 1.0 / np.sum(prior.eigenvectors.astype(np.float64) ** 2, axis=1)
-    amplitudes = np.empty(precision.shape)
-    near = np.empty((number, channels, centred.near_basis.count), dtype=np.float32)
-    far = np.empty((number, channels, count), dtype=np.float32)
-    for part, at in cut_alike(batch.centres, centred, prior.reach):
-        patterns = cut_responses(centred, at)
-        # Hats beyond the border answer nothing.
-        inside = np.flatnonzero(patterns.any(axis=0))
-        to_near = patterns[:, inside] @ prior.covariance[inside]
-        covariance = to_near[:, inside] @ patterns[:, inside].T
-        covariance[np.diag_indices(count)] += prior.far_variance
-        pixel, channel = np.divmod(np.argsort(ratio[part], axis=None, kind="stable"), channels)
-        of = part[pixel], channel
-        ratios = ratio[of]
-        starts = _starts(ratios)
-        found, rest, is_definite = solve_alike(
-            covariance,
-            noise_variance,
-            ratios[starts[:-1]],
-            starts,
-            batch.responses[of],
-            per_amplitude[of[0]],
-            precision[of] * batch.noise[of].astype(np.float64)[:, None] ** 2,
-        )
-        if not is_definite:
-            raise np.linalg.LinAlgError("the covariance of responses is not positive definite")
-        amplitudes[of] = found
-        near[of] = product_by_row(rest, to_near)
-        far[of] = rest * prior.far_variance
-    return PosteriorMean(
-        amplitudes=nuisance.in_full(amplitudes, batch),
-        near=near,
-        far=far,
-        near_noise=near_noise(batch, prior, ratio),
-        score=np.zeros((number, channels, 0), dtype=np.float32),
-    )

@@ -17,8 +17,10 @@ from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.batch import AllPixels
 from nearfar.estimate.joint.chessboard import Part, every_choice, part_of_sweep
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
+from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
+from nearfar.estimate.joint.quantisation import subtract_quantisation
 from nearfar.estimate.joint.seen import box_centres
 from nearfar.estimate.joint.shifts import moved_q, with_unshifted_light
 from nearfar.estimate.joint.sweep import sweep_once
@@ -161,7 +163,10 @@ def _sweep(
 
         mine = choice and choice.of(_pixels(problem, held))
         part = part_of_sweep(problem, number) if halves else None
-        found = sweep_once(problem, found, report, mine, part)
+        if part is None:
+            found = sweep_once(problem, found, report, mine)
+        else:
+            found = sweep_half(problem, found, report, mine, part)
         if number == 0 and chosen.of_error_bars is not None:
             found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
         is_last = number >= sweeps - (2 if halves else 1)
@@ -172,7 +177,9 @@ def _sweep(
         if halves and number < sweeps - 1:
             # Later sweeps hardly move q: new footprints after each of them change no light's SNR
             # by more than 0.01 dB.
-            problem = _with_new_footprints(problem) if number == 1 else problem
+            if number == 1:
+                problem = _with_new_footprints(problem)
+                subtract_quantisation(problem, found)
             problem = _about_new_q(problem)
     assert found is not None
     if halves:

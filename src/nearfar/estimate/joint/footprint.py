@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
-from nearfar.estimate.joint.box_waves import of_boxes, wave_table, with_derivatives
+from nearfar.estimate.joint.box_waves import (
+    explained_by_boxes,
+    of_boxes,
+    put_with_derivatives,
+    wave_table,
+)
 from nearfar.estimate.joint.seen import MEDIAN_SIDE, reach_of, seen_of_projector
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.near_basis import NearBasis
@@ -64,12 +69,25 @@ def footprint_weights(
     """
     if centred.near_basis.pitch == 1:
         return direct_weights(correspondence, centres)
+    found = np.empty((len(centres), 3, centred.basis.count), dtype=np.float32)
+    put_footprint_weights(correspondence, centres, footprints, centred, 0, found)
+    return found
+
+
+def put_footprint_weights(
+    correspondence: Floats,
+    centres: NDArray[np.int64],
+    footprints: Floats,
+    centred: CentredBasis,
+    first: int,
+    found: Floats,
+) -> None:
+    """Write `footprint_weights` of hats into (n, G, R), from `first` of its second axis on."""
     lit: Booleans = np.asarray(np.isfinite(correspondence).all(axis=1))
     middles = np.where(lit[:, None], correspondence - centres, 0.0)
     table = wave_table(centred, reach_of(footprints, STEP))
-    found = with_derivatives(middles, footprints, STEP, table)
-    found[~lit] = 0.0
-    return found
+    put_with_derivatives(middles, footprints, STEP, table, first, found)
+    found[~lit, first:] = 0.0
 
 
 def unit_responses(middles: Floats, footprints: Floats, centred: CentredBasis) -> Floats:
@@ -107,16 +125,18 @@ def footprint_boxes(
     centres = near.centre(correspondence, measurements.projector)
     explained = np.zeros((number, len(blurs)), dtype=np.float32)
 
-    def work(batch: slice) -> None:
-        responses = high.at(batch, centres[batch])
-        offsets = np.where(lit[batch, None], q[batch] - centres[batch], 0.0)
-        for place, blur in enumerate(blurs):
-            explained[batch, place] = high.explained(
-                responses, offsets, _blurred(seen[batch], blur)
-            )
+    # Every other camera pixel votes, as on a chessboard: tiles begin at even rows.
+    is_even = np.indices(camera).sum(axis=0).ravel() % 2 == 0
+    voters = np.flatnonzero(lit & is_even)
 
-    side_by_side(work, blocks(number, BATCH_PIXELS))
-    explained *= lit[:, None]
+    def work(batch: slice) -> None:
+        some = voters[batch]
+        responses = high.at(some, centres[some])
+        offsets = q[some] - centres[some]
+        for place, blur in enumerate(blurs):
+            explained[some, place] = high.explained(responses, offsets, _blurred(seen[some], blur))
+
+    side_by_side(work, blocks(len(voters), BATCH_PIXELS))
     voted = ndimage.uniform_filter(
         explained.reshape(*camera, -1), (VOTERS, VOTERS, 0), mode="nearest"
     ).reshape(number, -1)
@@ -141,12 +161,18 @@ class HighResponses:
     indices: NDArray[np.int64]
     centred: CentredBasis
 
+    @property
+    def roots(self) -> Floats:
+        """One measurement's noise in units of each response's, (R,), float32."""
+        roots = np.sqrt(self.measurements.multiplicity[self.indices])
+        return np.asarray(roots.astype(np.float32))
+
     def at(self, selected: slice | Integers, centres: NDArray[np.int64]) -> Floats:
         """Return re-centred responses over the noise, (n, channels, R), of some camera pixels."""
         noise = np.maximum(self.measurements.noise[selected], 1e-6)[..., None]
         responses = self.measurements.responses[selected][..., self.indices]
-        weights = np.sqrt(self.measurements.multiplicity[self.indices])
-        return self.centred.recentre(responses, centres) * (weights / noise).astype(np.float32)
+        recentred = self.centred.recentre(responses, centres)
+        return recentred * (self.roots / noise).astype(np.float32)
 
     def explained(self, responses: Floats, middles: Floats, footprints: Floats) -> Floats:
         """Return how much of the power of responses direct light of footprints explains, (n,).
@@ -159,11 +185,8 @@ class HighResponses:
             Middles of the footprints, from the rounded q.
         footprints : ndarray, shape (n, 4)
         """
-        direct = unit_responses(middles, footprints, self.centred)
-        direct = direct * np.sqrt(self.measurements.multiplicity[self.indices])
-        along = np.maximum(np.einsum("nir,nr->ni", responses, direct), 0.0)
-        squared = np.maximum(np.einsum("nr,nr->n", direct, direct), 1e-12)
-        return np.asarray(np.sum(along**2, axis=1) / squared)
+        table = wave_table(self.centred, reach_of(footprints))
+        return explained_by_boxes(responses, self.roots, middles, footprints, table)
 
 
 def high_responses(measurements: Measurements, near_basis: NearBasis) -> HighResponses | None:

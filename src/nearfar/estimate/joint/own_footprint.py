@@ -8,8 +8,11 @@ for that explain most of the camera pixel's own responses.
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.estimate.joint.box_waves import WaveTable, wave_table
 from nearfar.estimate.joint.footprint import BATCH_PIXELS, HighResponses, high_responses
+from nearfar.estimate.joint.footprint_search import best_shapes, descend
+from nearfar.estimate.joint.seen import reach_of
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
@@ -34,11 +37,11 @@ SHAPES = np.array(
         [0.5, 0.5, 0.3, -0.3],
     ]
 )
-# Directions of the search: along each of q's and the footprint's four numbers.
-DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
-ALONG_Q = DIRECTIONS[[0, 1, 6, 7]]
 # Times that each step is tried in each direction.
 ROUNDS = 2
+# Sides and middles of boxes grow by at most as many times a side and a projector pixel: all steps
+# together come to 0.86 of half of that, and the sides that they are shares of to 1.6 times theirs.
+MOST_GROWTH = 2.0
 # Camera pixels that are searched at once.
 SEARCHED_PIXELS = 1024
 # Sides of a box are no narrower, in projector pixels; and q moves by at most as much.
@@ -89,15 +92,15 @@ def own_footprints(
     def search_in(batch: slice) -> None:
         selected = doubted[batch]
         responses = high.at(selected, centres[selected])
-        middles = q[selected] - centres[selected]
-        start = np.concatenate([middles, footprints[selected]], axis=1)
-        search = _Search(high, start)
+        numbers = np.concatenate(
+            [q[selected] - centres[selected], footprints[selected]], axis=1, dtype=np.float64
+        )
+        search, by_q = _Search(high, numbers.copy()), before[selected]
         # What another q explains needs no other footprint.
-        numbers, by_q = search.descend(responses, start, before[selected], ALONG_Q)
+        search.move(responses, numbers, by_q)
         shaped = np.flatnonzero(power[selected] - by_q > LEAST_MISFIT * count)
-        search = _Search(high, start[shaped])
-        own, best = search.start(responses[shaped], numbers[shaped], by_q[shaped])
-        own, best = search.descend(responses[shaped], own, best, DIRECTIONS)
+        own, best = numbers[shaped], by_q[shaped]
+        search.only(shaped).reshape(responses[shaped], own, best)
         accepted = best - by_q[shaped] > 2 * LEAST_GAIN
         numbers[shaped[accepted]], by_q[shaped[accepted]] = own[accepted], best[accepted]
         accepted = by_q - before[selected] > 2 * LEAST_GAIN
@@ -120,7 +123,7 @@ class _Search:
     """
 
     def __init__(self, high: HighResponses, before: Floats) -> None:
-        self._high = high
+        self._high, self._before = high, before
         self._lowest, self._highest = np.full_like(before, -np.inf), np.full_like(before, np.inf)
         self._lowest[:, :2], self._highest[:, :2] = (
             before[:, :2] - FARTHEST,
@@ -128,29 +131,29 @@ class _Search:
         )
         self._lowest[:, 2:4] = np.minimum(NARROWEST, before[:, 2:4])
 
-    def start(self, responses: Floats, numbers: Floats, best: Floats) -> tuple[Floats, Floats]:
-        """Return the best of the shapes that the search starts from, and what it explains."""
-        sides = np.tile(numbers[:, 2:4], 2)
-        for shape in SHAPES:
-            tried = np.concatenate([numbers[:, :2], sides * shape], axis=1)
-            numbers, best = self._better(responses, numbers, best, tried)
-        return numbers, best
+    def only(self, selected: Integers) -> "_Search":
+        """Return the search for some of the camera pixels."""
+        return _Search(self._high, self._before[selected])
 
-    def descend(
-        self, responses: Floats, numbers: Floats, best: Floats, directions: Floats
-    ) -> tuple[Floats, Floats]:
-        """Return the best numbers that falling steps lead to, and what they explain."""
-        for step in STEPS:
-            for along in [*directions] * ROUNDS:
-                size = 0.5 * (1.0 + numbers[:, 2:4].mean(axis=1, keepdims=True))
-                tried = numbers + step * size * along
-                numbers, best = self._better(responses, numbers, best, tried)
-        return numbers, best
+    def move(self, responses: Floats, numbers: Floats, best: Floats) -> None:
+        """Overwrite q, and what it explains, by the best that falling steps lead to."""
+        self._descend(responses, numbers, best, 2)
 
-    def _better(
-        self, responses: Floats, numbers: Floats, best: Floats, tried: Floats
-    ) -> tuple[Floats, Floats]:
-        tried = np.clip(tried, self._lowest, self._highest)
-        explained = self._high.explained(responses, tried[:, :2], tried[:, 2:])
-        better = explained > best
-        return np.where(better[:, None], tried, numbers), np.where(better, explained, best)
+    def reshape(self, responses: Floats, numbers: Floats, best: Floats) -> None:
+        """Overwrite all numbers by the best that falling steps lead to from the best shape."""
+        table = self._table(numbers)
+        bounds = self._lowest, self._highest
+        best_shapes(responses, self._high.roots, SHAPES, *bounds, *table, numbers, best)
+        self._descend(responses, numbers, best, 6)
+
+    def _descend(self, responses: Floats, numbers: Floats, best: Floats, coordinates: int) -> None:
+        table = self._table(numbers)
+        bounds = self._lowest, self._highest
+        steps = np.repeat(STEPS, ROUNDS)
+        descend(responses, self._high.roots, steps, coordinates, *bounds, *table, numbers, best)
+
+    def _table(self, numbers: Floats) -> WaveTable:
+        """Return waves over all pixels that a search from these numbers may touch."""
+        side = float(numbers[:, 2:4].max(initial=0.0))
+        margin = FARTHEST + MOST_GROWTH * (1.0 + side)
+        return wave_table(self._high.centred, reach_of(numbers[:, 2:], margin))

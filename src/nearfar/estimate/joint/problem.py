@@ -27,7 +27,6 @@ from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
-from nearfar.priors.covariance import FAINT_DIFFERENCE, reach_of_near
 from nearfar.priors.fitted import (
     LIT_AT_PITCH,
     LIT_COMPONENTS,
@@ -132,15 +131,6 @@ class Model(NamedTuple):
         sets = (self.lit, self.unlit)
         return {n: one for each in sets for n, one in zip(each.numbers, each.priors, strict=True)}
 
-    @property
-    def difference_priors(self) -> dict[int, ResponsePrior]:
-        """The same for differences from neighbours, which borders cut less far away."""
-        found, near_basis = self.priors, self.centred.near_basis
-        for n in self.lit_differences.numbers:
-            reach = reach_of_near(EVERY_COMPONENT[n], near_basis, FAINT_DIFFERENCE)
-            found[n] = replace(found[n], reach=reach)
-        return found
-
 
 class Problem(NamedTuple):
     """Measurements, priors and camera pixels that all sweeps share.
@@ -153,7 +143,8 @@ class Problem(NamedTuple):
     near_basis : NearBasis
     quantisation_error : ndarray, shape (P or 0, R), float32
         That of the measurements in the order of the centred basis: a row for each projector pixel,
-        so that a camera pixel reads contiguous memory.
+        so that a camera pixel reads contiguous memory. Empty where functions are of several
+        projector pixels.
     """
 
     measurements: Measurements
@@ -161,6 +152,11 @@ class Problem(NamedTuple):
     pixels: AllPixels
     near_basis: NearBasis
     quantisation_error: Floats
+
+    @property
+    def has_offset_noise(self) -> bool:
+        """Whether the references have noise at any camera pixel."""
+        return bool(np.any(self.pixels.offset_noise > 0))
 
 
 def build_model(
@@ -260,7 +256,8 @@ def lay_out(
     )
     move = mover(device)
     pixels = AllPixels._make(map(move, pixels))
-    errors = _a_row_each(measurements.quantisation_error, model.centred.response_indices)
+    errors = measurements.quantisation_error[:, : None if near_basis.pitch == 1 else 0]
+    errors = _a_row_each(errors, model.centred.response_indices)
     return Problem(measurements, model, pixels, near_basis, move(errors))
 
 

@@ -4,7 +4,6 @@ Index convention: c runs over camera pixels, row by row.
 """
 
 import numpy as np
-from scipy import ndimage
 
 from nearfar.arrays import Floats, blocks
 from nearfar.parallel import side_by_side
@@ -12,6 +11,12 @@ from nearfar.transport.boxes import halves
 
 # q moves from one camera pixel to the next by the median over a square of this side.
 MEDIAN_SIDE = 3
+# Exchanges of two of nine values, the smaller to the first, after which the fifth is the median
+# (Devillard, "Fast median search: an ANSI C implementation", 1998).
+EXCHANGES = (
+    *((1, 2), (4, 5), (7, 8), (0, 1), (3, 4), (6, 7), (1, 2), (4, 5), (7, 8), (0, 3)),
+    *((5, 8), (4, 7), (3, 6), (1, 4), (2, 5), (4, 7), (4, 2), (6, 4), (4, 2)),
+)
 # A farther move, in projector pixels, leads to another surface.
 LARGEST_MOVE = 24.0
 # Moves to both sides stay on one surface if the larger is at most as many times the smaller, plus
@@ -67,10 +72,25 @@ def _moves(correspondence: Floats, axis: int) -> Floats:
     alike = most <= LARGEST_RATIO * least + LARGEST_DIFFERENCE
     smaller = np.where((lengths[0] <= lengths[1])[..., None], after, before)
     known = np.nan_to_num(np.where(alike[..., None], (after + before) / 2, smaller), nan=0.0)
-    parts = [
-        ndimage.median_filter(known[..., part], MEDIAN_SIDE, mode="nearest") for part in (0, 1)
-    ]
+    parts = [_median(known[..., part]) for part in (0, 1)]
     return np.stack(parts, axis=-1).reshape(-1, 2)
+
+
+def _median(values: Floats) -> Floats:
+    """Return the median of 3 x 3 values, those at the border repeated beyond it."""
+    padded = np.pad(values, 1, mode="edge")
+    height, width = values.shape
+    nine = [
+        padded[down : down + height, across : across + width].copy()
+        for down in range(MEDIAN_SIDE)
+        for across in range(MEDIAN_SIDE)
+    ]
+    larger = np.empty_like(nine[0])
+    for one, other in EXCHANGES:
+        np.maximum(nine[one], nine[other], out=larger)
+        np.minimum(nine[one], nine[other], out=nine[one])
+        nine[other], larger = larger, nine[other]
+    return nine[4]
 
 
 def box_centres(correspondence: Floats) -> Floats:

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from array_api_compat import is_numpy_array
 
-from nearfar.arrays import Floats, beside, namespace, product, product_by_row
+from nearfar.arrays import Floats, beside, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.fit import fit_diagonal
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
 
@@ -81,8 +80,6 @@ def solve_whole(
     ratio : ndarray, shape (n, channels)
         (s / sigma)^2.
     """
-    if centred.near_basis.pitch > 1:
-        return _of_several_pixels(batch, prior, ratio, centred)
     xp = namespace(batch.responses)
     noise = xp.astype(batch.noise[..., None], xp.float32) ** 2
     prior_variance = xp.astype(ratio[..., None], xp.float32) * noise
@@ -111,34 +108,4 @@ def solve_whole(
         far=product(y, prior.to_far),
         near_noise=near_noise(batch, prior, ratio),
         score=score,
-    )
-
-
-def _of_several_pixels(
-    batch: PixelBatch, prior: ResponsePrior, ratio: Floats, centred: CentredBasis
-) -> PosteriorMean:
-    """Return the posterior mean where functions are of several projector pixels.
-
-    Spikes are looked for among single projector pixels alone.
-    """
-    number, channels, count = batch.responses.shape
-    y = product_by_row(batch.responses, prior.eigenvectors)
-    amplitude_responses = nuisance.amplitude_responses(batch, centred)
-    noise_variance = batch.noise.ravel() ** 2
-    precision = nuisance.prior_precision(batch, centred.near_basis)
-    amplitudes = fit_diagonal(
-        y.reshape(-1, count),
-        product_by_row(amplitude_responses, prior.eigenvectors),
-        np.repeat(np.arange(number), channels),
-        prior.eigenvalues,
-        noise_variance,
-        ratio.ravel().astype(np.float32) * noise_variance,
-        np.ascontiguousarray(precision.reshape(number * channels, -1)),
-    )
-    return PosteriorMean(
-        amplitudes=nuisance.in_full(amplitudes.reshape(precision.shape), batch),
-        near=product_by_row(y, prior.to_near),
-        far=product_by_row(y, prior.to_far),
-        near_noise=near_noise(batch, prior, ratio),
-        score=y[..., :0],
     )

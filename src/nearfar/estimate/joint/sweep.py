@@ -7,24 +7,17 @@ Index convention: arrays are (C, channels, ...); r runs over real responses, w o
 """
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from array_api_compat import device
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Integers, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Floats, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
-from nearfar.estimate.joint.chessboard import Part
-from nearfar.estimate.joint.choose import choose, is_doubtful
+from nearfar.estimate.joint.choose import choose
 from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
-from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses, solve_cut
-from nearfar.estimate.joint.neighbour_loops import (
-    expect_each_by_pixel,
-    expect_together_by_pixel,
-)
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.pooled_choice import no_probabilities, pooled_choice
@@ -50,8 +43,6 @@ from nearfar.transport.direct import footprint, look_up_each
 
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
-# The same where functions are of several projector pixels, whose batches fall into more groups.
-BATCH_PIXELS_AT_PITCH = 4096
 
 
 def sweep_once(
@@ -59,9 +50,8 @@ def sweep_once(
     before: EstimatedRows | None,
     report: Callable[[float], None],
     chosen: ComponentChoice | None = None,
-    part: Part | None = None,
 ) -> EstimatedRows:
-    """Estimate camera pixels once.
+    """Estimate camera pixels once, where functions are of single projector pixels.
 
     Parameters
     ----------
@@ -72,12 +62,9 @@ def sweep_once(
         Called with the share done.
     chosen : ComponentChoice, optional
         Prior components and scales, if they are chosen already.
-    part : Part, optional
-        Camera pixels to estimate; by default all.
     """
-    rows = _empty_rows(problem) if before is None else _from_neighbours(problem, before, part)
-    # Half of the camera pixels do not tell what neighbours say.
-    pools = before is None and chosen is None and part is None
+    rows = _empty_rows(problem) if before is None else _from_neighbours(problem, before)
+    pools = before is None and chosen is None
     probability = no_probabilities(
         len(problem.pixels.responses) if pools else 0, problem.model, problem.pixels.white
     )
@@ -88,16 +75,13 @@ def sweep_once(
         chosen,
         probability,
         problem.model.priors,
-        problem.model.difference_priors,
     )
-    # In the second sweep over half of the camera pixels, these are estimated for the first time.
-    is_new = part is not None and not part.known.all()
-    estimate = sweep.estimate_new if is_new else partial(sweep.estimate, starts=before is None)
-    done, parts = [0], list(_parts(problem, part))
+    done, parts = [0], list(_parts(problem))
     count = sum(len(selected) for selected, _ in parts)
 
     def work(some: tuple[NDArray[np.int64], bool]) -> None:
-        estimate(beside(some[0], problem.pixels.responses), clips=some[1])
+        selected = beside(some[0], problem.pixels.responses)
+        sweep.estimate(selected, clips=some[1], starts=before is None)
         done[0] += len(some[0])
         report(done[0] / count)
 
@@ -118,39 +102,16 @@ class _Sweep(NamedTuple):
     of_quantisation: Callable[[NDArray[np.int64]], Floats]
     chosen: ComponentChoice | None
     probability: Floats  # of components and scales, or of no camera pixels
-    by_themselves: dict[int, ResponsePrior]
-    of_differences: dict[int, ResponsePrior]
+    priors: dict[int, ResponsePrior]
 
     def estimate(self, selected: NDArray[np.int64], *, clips: bool, starts: bool) -> None:
         """Estimate some camera pixels by their own photos alone, or from what is expected."""
-        self._solve(selected, self._gathered(selected, starts=starts), clips=clips, starts=starts)
-
-    def estimate_new(self, selected: NDArray[np.int64], *, clips: bool) -> None:
-        """Estimate camera pixels from what is expected that no sweep has estimated before.
-
-        Where there may be no direct light, what neighbours lead to expect has no say.
-        """
-        batch = self._gathered(selected, starts=False)
-        doubted = batch.lit & is_doubtful(batch, self.problem.model.centred)
-        (alone,), (rest,) = np.nonzero(doubted), np.nonzero(~doubted)
-        if len(alone):
-            afresh = selected[alone]
-            self.rows.near[afresh], self.rows.far[afresh] = 0.0, 0.0
-            self.estimate(afresh, clips=clips, starts=True)
-        if len(rest):
-            self._solve(selected[rest], batch.only(rest), clips=clips, starts=False)
-
-    def _gathered(self, selected: NDArray[np.int64], *, starts: bool) -> PixelBatch:
-        problem = self.problem
-        known = None if starts else _explained(problem, self.rows, self.of_quantisation, selected)
-        projector = problem.measurements.projector
-        return gather(problem.pixels, selected, problem.model.centred, projector, known)
-
-    def _solve(
-        self, selected: NDArray[np.int64], batch: PixelBatch, *, clips: bool, starts: bool
-    ) -> None:
-        """Choose prior components, and estimate camera pixels whose windows are whole or not."""
         model, rows = self.problem.model, self.rows
+        centred, projector = model.centred, self.problem.measurements.projector
+        known = None
+        if not starts:
+            known = _explained(self.problem, rows, self.of_quantisation, selected)
+        batch = gather(self.problem.pixels, selected, centred, projector, known)
         given = self.chosen and self.chosen.of(selected)
         (component, scale), probability = choose(batch, model, given, is_first=starts)
         choice = rows.choices.sweeps[-1]
@@ -160,51 +121,20 @@ class _Sweep(NamedTuple):
         seen = component < len(LIT_COMPONENTS)
         batch.direct_weights[~seen] = 0.0
         batch = batch._replace(lit=seen)
-        centred = model.centred
-        priors = self.by_themselves if starts else self.of_differences
-        solve_lit = {False: solve_whole, True: solve_clipped}
-        if centred.near_basis.pitch > 1:
-            solve_lit[True] = solve_cut
-        for place, alike, cut in _alike(batch, component, centred, priors, clips=clips):
+        xp = namespace(component)
+        for place in np.unique(fetch(component)).tolist():
+            (alike,) = xp.nonzero(component == place)
             some, of_some = batch.only(alike), selected[alike]
             ratio = variance_ratio(some, scale[alike])
-            ratio = rounded_ratio(ratio) if cut else ratio
-            found = _with_spikes(some, priors[place], ratio, solve_lit[cut], centred)
+            is_clipped_too = clips and place < len(LIT_COMPONENTS)
+            ratio = rounded_ratio(ratio) if is_clipped_too else ratio
+            solve = solve_clipped if is_clipped_too else solve_whole
+            found = _with_spikes(some, self.priors[place], ratio, solve, centred)
             rows.amplitudes[of_some] = found.amplitudes[..., :COMMON_AMPLITUDES]
             # What is found is added to what was expected.
             add_rows(rows.near, of_some, found.near)
             add_rows(rows.far, of_some, centred.uncentre(found.far, some.centres))
             rows.near_noise[of_some] = found.near_noise
-
-
-def _alike(
-    batch: PixelBatch,
-    component: Integers,
-    centred: CentredBasis,
-    priors: dict[int, ResponsePrior],
-    *,
-    clips: bool,
-) -> Iterator[tuple[int, NDArray[np.int64], bool]]:
-    """Yield each prior component, its camera pixels, and whether the border cuts their windows.
-
-    A component that fades soon does not reach every border that is in reach of the functions.
-    """
-    xp = namespace(component)
-    for place in np.unique(fetch(component)).tolist():
-        (alike,) = xp.nonzero(component == place)
-        cut = clips and place < len(LIT_COMPONENTS)
-        if not cut or centred.near_basis.pitch == 1:
-            yield place, alike, cut
-            continue
-        at_border = is_cut(
-            batch.centres[alike],
-            centred.near_basis,
-            centred.basis.projector,
-            priors[place].reach,
-        )
-        for is_one, some in ((False, alike[~at_border]), (True, alike[at_border])):
-            if len(some):
-                yield place, some, is_one
 
 
 def _explained(
@@ -216,10 +146,7 @@ def _explained(
     """Return the expected responses, plus those of direct light to the quantisation error."""
     centred = problem.model.centred
     centres = problem.pixels.centres[selected]
-    if centred.near_basis.pitch == 1:
-        responses = product(expected.near[selected], centred.on_window.T)
-    else:
-        responses = near_responses(expected.near[selected], centres, centred)
+    responses = product(expected.near[selected], centred.on_window.T)
     responses = centred.uncentre(responses, centres)
     responses += expected.far[selected]
     direct = expected.amplitudes[selected, :, 1, None]
@@ -244,26 +171,19 @@ def _empty_rows(problem: Problem) -> EstimatedRows:
     )
 
 
-def _parts(problem: Problem, part: Part | None) -> Iterator[tuple[NDArray[np.int64], bool]]:
+def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
     """Yield batches of camera pixels, and whether the border clips their windows.
 
     Windows clipped alike are next to each other.
     """
-    selects = np.ones(len(problem.pixels.lit), dtype=bool)
-    if part is not None:
-        selects[:] = False
-        selects[part.selected] = True
     pixels, near_basis = problem.pixels, problem.near_basis
     projector = problem.measurements.projector
     clipped = fetch(pixels.lit & is_clipped(pixels.centres, near_basis, projector))
-    (selected,) = np.nonzero(selects & clipped)
+    (selected,) = np.nonzero(clipped)
     places = fetch(pixels.centres)[selected]
-    if near_basis.pitch > 1:
-        places = border_distances(places, near_basis, projector)
     ordered = selected[np.lexsort(places.T[::-1])]
-    length = BATCH_PIXELS if near_basis.pitch == 1 else BATCH_PIXELS_AT_PITCH
-    for some, clips in ((np.flatnonzero(selects & ~clipped), False), (ordered, True)):
-        for batch in blocks(len(some), length):
+    for some, clips in ((np.flatnonzero(~clipped), False), (ordered, True)):
+        for batch in blocks(len(some), BATCH_PIXELS):
             yield some[batch], clips
 
 
@@ -289,9 +209,7 @@ def _with_spikes(
     xp, here = namespace(mean.near), device(mean.near)
     number = xp.arange(len(ratio), device=here)
     found = mean
-    # A function of several projector pixels is no spike.
-    has_spikes = centred.near_basis.pitch == 1 and bool(xp.any(batch.lit))
-    for _ in range(MAXIMUM_SPIKES if has_spikes else 0):
+    for _ in range(MAXIMUM_SPIKES if bool(xp.any(batch.lit)) else 0):
         entry, gain = likeliest_spike(batch, prior, ratio, found)
         (accepted,) = xp.nonzero(gain > LEAST_GAIN)
         if not len(accepted):
@@ -310,28 +228,15 @@ def _with_spikes(
     return mean
 
 
-def _from_neighbours(problem: Problem, before: EstimatedRows, part: Part | None) -> EstimatedRows:
+def _from_neighbours(problem: Problem, before: EstimatedRows) -> EstimatedRows:
     """Return the rows that a later sweep starts from: those expected from neighbours."""
-    windows, far = _expected(problem, before, part)
+    windows, far = _expected(problem, before)
     sweeps = (*before.choices.sweeps, before.choices.sweeps[-1].of(slice(None)))
-    rows = before._replace(choices=before.choices._replace(sweeps=sweeps))
-    if part is None:
-        return rows._replace(near=windows, far=far)
-
-    def put(some: slice) -> None:
-        rows.near[part.selected[some]], rows.far[part.selected[some]] = windows[some], far[some]
-
-    side_by_side(put, blocks(len(part.selected), BATCH_PIXELS))
-    if not part.known.all():
-        pixels, shape = problem.pixels, (*problem.measurements.camera, -1)
-        direct = np.ascontiguousarray(rows.amplitudes[..., 1]).reshape((*shape, 1))
-        white, lit = pixels.white.reshape(shape), pixels.lit.reshape(shape[:2])
-        expected = expect_together_by_pixel(direct, white, np.ones_like(white), lit, part)
-        rows.amplitudes[part.selected, :, 1] = expected[..., 0]
-    return rows
+    choices = before.choices._replace(sweeps=sweeps)
+    return before._replace(choices=choices, near=windows, far=far)
 
 
-def _expected(problem: Problem, rows: EstimatedRows, part: Part | None) -> tuple[Floats, Floats]:
+def _expected(problem: Problem, rows: EstimatedRows) -> tuple[Floats, Floats]:
     """Return n and f of camera pixels as their neighbours lead to expect."""
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
@@ -342,26 +247,20 @@ def _expected(problem: Problem, rows: EstimatedRows, part: Part | None) -> tuple
     variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    each: Callable[..., Floats] = expect_each
-    together: Callable[..., Floats] = expect_together
-    if part is not None:
-        each = partial(expect_each_by_pixel, part=part)
-        together = partial(expect_together_by_pixel, part=part)
-    far = each(
+    far = expect_each(
         rows.far.reshape((*shape, -1)),
         white,
         variance,
         problem.model.multiplicity,
         beside(np.flatnonzero(cycles >= np.median(cycles)), white),
     )
-    windows = together(
+    windows = expect_together(
         rows.near.reshape((*shape, -1)),
         white,
         rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(camera),
     )
     windows = windows.reshape((-1, *rows.near.shape[1:]))
-    if problem.near_basis.pitch == 1:
-        inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
-        windows *= inside[:, None]
+    inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
+    windows *= inside[:, None]
     return windows, far.reshape((-1, *rows.far.shape[1:]))

@@ -147,6 +147,17 @@ def test_a_film_plays_in_a_browser_and_shows_the_pictures(open_page, address, tm
     assert seconds == pytest.approx(1, abs=0.05)
 
 
+def test_films_are_of_the_relit_scene_alone(open_page, address):
+    page = open_page(address, {"keyframes": KEYFRAMES, "tool": "reach"})
+    for button in ("#film-pictures", "#film-mp4"):
+        assert page.is_disabled(button)
+    assert "choose relit" in page.inner_text("#film-length")
+    assert not page.is_disabled("#play-keyframes")
+    page.click("[data-tool=relit]")
+    wait_until(lambda: not page.is_disabled("#film-mp4"))
+    assert "relit" not in page.inner_text("#film-length")
+
+
 def test_a_film_is_cancelled(open_page, address):
     page = open_page(address, {"keyframes": KEYFRAMES, "seconds": 20, "rate": 60})
     page.click("#film-pictures")

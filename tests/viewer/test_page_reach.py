@@ -1,6 +1,7 @@
 """The viewer's page in a real browser: light by how far from q it comes."""
 
 import json
+import re
 import socket
 import threading
 import time
@@ -106,6 +107,20 @@ def test_a_slider_and_a_strip_choose_the_distance(open_page, address, transport)
     np.testing.assert_array_equal(seen(page), relit)
     assert page.inner_text("#stage-label") == "relit"
     assert page.inner_text("#strip") == ""
+
+
+def test_the_line_below_follows_the_distance(open_page, address, transport):
+    page = open_page(address, {"kind": "white", "tool": "reach", "reach": 2, "pixel": [12, 20]})
+    whole = transport @ WHITE
+    for distance in (2, 5):
+        slide(page, "reach", distance)
+        _staged(page)
+        far = _masked(transport, WHITE, lambda r, d=distance: r >= d)[12, 20].mean()
+        share = 100 * far / whole[12, 20].mean()
+        told = f"{share:.1f} % of its light, {whole[12, 20].mean():.4f}"
+        wait_until(lambda t=told: t in page.inner_text("#readout"))
+        found = float(re.search(r"column 20: ([\d.e-]+)", page.inner_text("#readout"))[1])
+        assert found == pytest.approx(far, abs=1e-4)
 
 
 # How many requests to probe are under way, how many were at most, and the body of the newest.

@@ -54,7 +54,7 @@ export class Film {
       }
       const [type, ending] = TYPES[format];
       download(new Blob([data], { type }), `${name}.${ending}`);
-      this.#end(`${count} pictures saved`);
+      this.#end(format === 'mp4' ? `film of ${count} pictures saved` : `${count} pictures saved`);
     };
     socket.onclose = ({ reason }) => {
       if (this.#socket !== socket) return;

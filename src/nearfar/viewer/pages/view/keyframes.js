@@ -7,6 +7,12 @@ import { LIGHT_KEYS, pick } from './state.js';
 
 const button = (textContent, ariaLabel, onclick, disabled = false) => Object.assign(document.createElement('button'), { textContent, ariaLabel, title: ariaLabel, onclick, disabled });
 
+function filmText(state) {
+  if (state.keyframes.length < 2) return 'Keep two lights or more as keyframes, and the page plays from one to the next.';
+  const length = `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s`;
+  return state.tool === 'relit' ? length : `${length}. Films are of the relit scene: choose relit to save one.`;
+}
+
 export class Keyframes {
   #store;
   #playback;
@@ -53,8 +59,9 @@ export class Keyframes {
     const { keyframes } = state, isPlayable = keyframes.length > 1;
     set(get('play-keyframes'), 'textContent', this.isPlaying ? 'stop' : 'play');
     set(get('play-keyframes'), 'ariaPressed', String(this.isPlaying));
-    for (const id of ['play-keyframes', 'film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable);
-    set(get('film-length'), 'textContent', isPlayable ? `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s` : 'Keep two lights or more as keyframes, and the page plays from one to the next.');
+    set(get('play-keyframes'), 'disabled', !isPlayable);
+    for (const id of ['film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable || state.tool !== 'relit');
+    set(get('film-length'), 'textContent', filmText(state));
     if (this.#shown === keyframes) return;
     this.#shown = keyframes;
     get('keyframes').replaceChildren(...keyframes.map((frame, i) => this.#item(frame, i, keyframes)));

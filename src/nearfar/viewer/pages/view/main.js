@@ -43,7 +43,7 @@ async function load() {
 
 async function open() {
   const { scene, initial, state, light, missing } = await load();
-  const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera);
+  const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera, () => page.numbers?.refresh());
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
       scenePictures.lightChanged();

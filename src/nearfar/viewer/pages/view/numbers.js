@@ -71,13 +71,14 @@ export class Numbers {
     this.refresh();
   }
 
-  #showReadout([y, x], { shown, parts, split, isRelit, textOf }, told) {
-    const { scene } = this.#page;
+  #showReadout([y, x], { shown, parts, total, split, isRelit, textOf }, told) {
+    const { scene, store: { state } } = this.#page;
     const sigma = told?.sigma && isRelit ? ` ± ${valueText(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
     const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${valueText(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
     const { scenePictures } = this.#page, beside = !this.#isDual && isRelit && scenePictures.referenceAt([y, x]);
     const heldOut = this.#isDual ? '' : this.#heldOut.at([y, x], scene.camera);
-    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${sigma}`, ...apart,
+    const share = state.tool === 'reach' && !isRelit ? [`${(100 * mean(shown) / (mean(total) || 1)).toFixed(1)} % of its light, ${valueText(mean(total))}`] : [];
+    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${sigma}`, ...share, ...apart,
       ...(beside ? [`${scenePictures.referenceName} ${valueText(mean(beside))}`] : []), ...(heldOut ? [`off at held-out photos ${heldOut}`] : [])].join(' · '));
   }
 

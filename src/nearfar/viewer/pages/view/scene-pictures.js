@@ -21,9 +21,10 @@ export class ScenePictures {
   #frameCount = 0;
   #aspect = 0;
 
-  constructor(camera) {
+  // onReplaced() is called once another picture is shown in place of the relit scene.
+  constructor(camera, onReplaced) {
     this.#camera = camera;
-    Object.assign(this, { isStageFinal: false, referenceName: '' });
+    Object.assign(this, { isStageFinal: false, referenceName: '', onReplaced });
   }
 
   get hasReference() { return this.#reference !== null; }
@@ -104,6 +105,7 @@ export class ScenePictures {
     this.isStageFinal = isFinal;
     this.draw(state);
     this.#describeFrame();
+    this.onReplaced();
   }
 
   // What is shown at a pixel [y, x] of a grid, and what the frame has there, colour by colour; null before there is one.

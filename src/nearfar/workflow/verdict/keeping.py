@@ -91,7 +91,7 @@ def require_origin(stored: StoredTransport, capture: Capture) -> None:
         of = "somebody else's patterns" if stored.parts == USUAL_PARTS else "lamps"
         raise InputError(
             f"{stored.path} is of {of}, and was judged by held-out photos when it was "
-            f"reconstructed: its verdict is kept with it, so leave out --capture."
+            f"reconstructed: its verdict is kept with it, so give the transport without a capture."
         )
     of_transport: dict[str, Any] = {
         "projector": stored.projector,

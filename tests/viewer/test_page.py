@@ -68,8 +68,8 @@ def test_a_dropped_picture_comes_back(open_page, address):
         (KeptVerdict("good", (), 41.0, 42.0), "Good. Relit pictures are off by 0.89 %", "nothing"),
         (
             KeptVerdict("wrong", (Reason("order", "<b>photo 3</b> is rotated."),), 9.0),
-            "Wrong. Relit pictures are off by 35 %",
-            "<b>photo 3</b> is rotated.",
+            "Wrong. <b>photo 3</b> is rotated. Relit pictures are off by 35 %",
+            "Do not rely on it",
         ),
         (
             KeptVerdict("doubtful", (Reason("unchecked", "nothing was checked."),)),

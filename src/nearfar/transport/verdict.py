@@ -14,6 +14,8 @@ NOT_JUDGED = (
     "not judged: nothing is known of how far it can be trusted. Give the capture that it was "
     "reconstructed from as `capture` to judge it."
 )
+# Lights that the estimate never saw, where they are patterns that were left out of it.
+PATTERNS_SHOWN = "patterns like those shown"
 # What is beyond these in a file is no result of ours.
 LARGEST_DECIBELS = 1000.0
 LARGEST_RATIO = sys.float_info.max
@@ -103,9 +105,12 @@ class KeptVerdict:
             widened = f"; error bars are made {self.widening:.2g} times as wide, to hold"
         least = "at least " if self.is_least else ""
         held_out = ", ".join([f"{least}{in_words(self.held_out_snr)}", *beside])
+        # Patterns of two levels hardly show a bend of the response.
+        is_hidden = "not-linear" in self.causes and self.checked_by == PATTERNS_SHOWN
+        others = " Lights of other levels may be off by far more." if is_hidden else ""
         return (
             f"Relit {self.checked_by} are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % "
-            f"(held-out SNR_b {held_out}){widened}."
+            f"(held-out SNR_b {held_out}){widened}.{others}"
         )
 
     @property

@@ -1,6 +1,7 @@
 """A stored transport is judged by its capture, and keeps the verdict."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.store import load_transport, save_transport
 from nearfar.transport.store_writing import write_verdict
 from nearfar.transport.stored import open_transport
-from nearfar.transport.verdict import KeptVerdict
+from nearfar.transport.verdict import PATTERNS_SHOWN, KeptVerdict, Reason
 from nearfar.workflow.acquire import acquire
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.verdict.keeping import judge_transport
@@ -121,3 +122,11 @@ def test_gains_that_cancel_leave_a_transport_to_judge(made, stored, tmp_path):
         [light.pair.difference for light in each.held_out.lights] for each in (same, verdict)
     )
     assert mine == theirs
+
+
+def test_what_two_levels_hide_is_said():
+    bent = (Reason("not-linear", "projector or camera is not linear."),)
+    shown = KeptVerdict("doubtful", bent, 35.0, checked_by=PATTERNS_SHOWN)
+    assert shown.summary.endswith("Lights of other levels may be off by far more.")
+    for told in (replace(shown, checked_by="pictures"), replace(shown, reasons=())):
+        assert "levels" not in told.summary

@@ -6,12 +6,10 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.transport.model import Transport
+from nearfar.transport.verdict import PATTERNS_SHOWN
 from nearfar.workflow.verdict.bars import bars_of, mean_square
 from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 from nearfar.workflow.verdict.weighed_photos import compare_weighed
-
-# What the lights are, in words.
-CALLED = "patterns like those shown"
 
 
 def compare_with_photos(
@@ -54,4 +52,4 @@ def compare_with_photos(
         if bars is not None:
             expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
         lights.append(HeldOutLight(description, False, compared, expected, unmeasured))
-    return HeldOut(tuple(lights), called=CALLED)
+    return HeldOut(tuple(lights), called=PATTERNS_SHOWN)

@@ -11,7 +11,13 @@ from nearfar.estimate.free_rows.design import Design, design_of
 from nearfar.estimate.free_rows.error_bars import variance_in_noise
 from nearfar.estimate.free_rows.estimate import FreeRows, estimate_free_rows, posterior_of
 from nearfar.transport.posterior import FreePosterior
-from nearfar.transport.verdict import LARGEST_WIDENING, Grade, KeptVerdict, Reason
+from nearfar.transport.verdict import (
+    LARGEST_WIDENING,
+    PATTERNS_SHOWN,
+    Grade,
+    KeptVerdict,
+    Reason,
+)
 from nearfar.workflow.verdict.checked import CheckedLight, Judged
 from nearfar.workflow.verdict.verdict import DOUBTFUL_DECIBELS, WRONG_DECIBELS
 from nearfar.workflow.verdict.widening import SPREAD, SURE_DEVIATIONS
@@ -81,7 +87,7 @@ def judge_free_rows(
     found = KeptVerdict(
         "good",
         held_out_snr=snr,
-        checked_by="lights of the check photos" if len(checks) else "patterns like those shown",
+        checked_by="lights of the check photos" if len(checks) else PATTERNS_SHOWN,
         is_least=measured < hidden,
     )
     posterior = posterior_of(design, rows.ratio)

@@ -15,9 +15,9 @@ const NOT_JUDGED = {
 
 export function showVerdict({ verdict, unjudgeable }) {
   const box = get('verdict'), { grade, summary, reasons } = verdict ?? { grade: 'not judged', reasons: [] };
-  // What was not checked has no summary, but always a reason.
+  // The most probable cause leads: how far lights like those shown are off may say less than it.
   get('grade').textContent = `${grade[0].toUpperCase()}${grade.slice(1)}.`;
-  get('off-by').textContent = verdict ? summary || reasons[0] || '' : NOT_JUDGED.summary;
+  get('off-by').textContent = verdict ? [reasons[0], summary].filter(Boolean).join(' ') : NOT_JUDGED.summary;
   get('meaning').textContent = verdict ? MEANINGS[grade] : unjudgeable ? `It ${unjudgeable}` : NOT_JUDGED.meaning;
   get('reasons').replaceChildren(...reasons.map(reason => {
     const item = document.createElement('li');

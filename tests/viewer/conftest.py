@@ -60,7 +60,7 @@ def transport(stored: Path) -> Transport:
 def served_view(
     transport: InteractiveTransport, listening: ListeningAddress = ANYWHERE, **shown: Any
 ) -> Iterator[str]:
-    """Serve a page, with what is shown beside the transport; gives its address."""
+    """Serve the page of a transport, and of a second one if given; yield its address."""
     ended, addresses = threading.Event(), []
     there = threading.Event()
 

@@ -62,7 +62,7 @@ def test_a_dense_truth_comes_at_the_first_ones_exposure(first, transport, lights
     assert (len(parts), beside.is_apart) == (1, False)
     expected = exposure.factor * (truth @ lights["random"])
     np.testing.assert_allclose(parts[0], expected, rtol=1e-3, atol=1e-4)
-    # Without what its rig recorded, the exposure is fitted, and that is said.
+    # The exposure is fitted where the rig recorded none, and the page says so.
     provenance = {**transport.provenance, "rig": {"name": "a real one"}}
     save_transport(replace(transport, provenance=provenance), tmp_path / "real.zarr")
     real = InteractiveTransport(tmp_path / "real.zarr")

@@ -184,7 +184,7 @@ class _Handlers:
             self._films -= 1
 
     async def _relight_by(self, split: Split) -> Relight:
-        """Return what relights every camera pixel by a split, which is made if need be."""
+        """Return the function that relights every camera pixel; make the physical split first."""
         if split == "physical":
             await self._splitting.run(self._physical.prepare)
             return self._physical.relight

@@ -9,6 +9,7 @@ arrays are (n, channels, ...); r runs over real responses, j over functions.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -348,37 +349,35 @@ def _whole(problem: Problem, order: Integers) -> _Left:
     near = np.zeros((*shape, problem.near_basis.count), dtype=np.float32)
     far = np.zeros((*shape, count), dtype=np.float32)
     found = _Left(near, far, np.zeros_like(far))
-    _subtract(problem, order, found, whole=True)
+    side_by_side(partial(_put_residuals, problem, order, found), _batches(problem, order))
     return found
 
 
 def _less_expected(problem: Problem, rows: EstimatedRows, part: Part) -> _Left:
-    """Return what neighbours lead to expect of a part's camera pixels, and what that leaves."""
+    """Return the expectation of a part's camera pixels from their neighbours, and the residuals."""
     near, far = _expected(problem, rows, part)
     found = _Left(near, far, np.empty_like(far))
-    _subtract(problem, part.selected, found, whole=False)
+
+    def work(batch: slice) -> None:
+        centres = problem.pixels.centres[part.selected[batch]]
+        found.responses[batch] = near_responses(near[batch], centres, problem.model.centred)
+        _put_residuals(problem, part.selected, found, batch)
+
+    side_by_side(work, _batches(problem, part.selected))
     return found
 
 
-def _subtract(problem: Problem, order: Integers, left: _Left, *, whole: bool) -> None:
-    """Fill in what is left of responses."""
-    pixels, centred = problem.pixels, problem.model.centred
-
-    def work(batch: slice) -> None:
-        some = order[batch]
-        centres = pixels.centres[some]
-        if not whole:
-            left.responses[batch] = near_responses(left.near[batch], centres, centred)
-        left_of_responses(
-            pixels.responses,
-            some,
-            left.far[batch],
-            centres,
-            centred.basis.single_phases,
-            left.responses[batch],
-        )
-
-    side_by_side(work, _batches(problem, order))
+def _put_residuals(problem: Problem, order: Integers, left: _Left, batch: slice) -> None:
+    """Replace the expected near-range responses of a batch by the residuals of its responses."""
+    pixels, some = problem.pixels, order[batch]
+    left_of_responses(
+        pixels.responses,
+        some,
+        left.far[batch],
+        pixels.centres[some],
+        problem.model.centred.basis.single_phases,
+        left.responses[batch],
+    )
 
 
 def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats, Floats]:

@@ -162,7 +162,7 @@ def _flat(picture: Floats, part: Transport) -> Floats:
 
 
 def _without_rows(part: Transport) -> Transport:
-    """Return what is small of some camera pixels' transport: a region may be the whole camera."""
+    """Return a part of a transport without its rows, which are as large as the region."""
     empty = np.zeros((*part.camera, part.channels, 0), dtype=np.float32)
     return replace(part, near=empty[..., None], far=empty, posterior=None, footprint=None)
 

@@ -239,6 +239,27 @@ def test_a_scheduler_that_is_lost_costs_what_was_not_written(
     assert _files(tmp_path / "t.zarr") == local
 
 
+def test_a_scheduler_that_dies_as_a_result_is_asked_for_is_no_fault_of_the_disk(
+    copied, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("nearfar.workflow.reconstruction.cluster.CONNECTION_SECONDS", 2)
+    capture, memory = copied("joint")
+    with _cluster(2) as address:
+        with distributed.Client(address, set_as_default=False) as client:
+            host = client.run_on_scheduler(os.getpid)
+
+        def as_completed_and_lost(tasks, **options):
+            for task in distributed.as_completed(tasks, **options):
+                os.kill(host, signal.SIGKILL)
+                yield task
+
+        monkeypatch.setattr(
+            "nearfar.workflow.reconstruction.cluster.as_completed", as_completed_and_lost
+        )
+        with pytest.raises(ClusterError, match="was lost in the middle"):
+            _reconstruct(capture, tmp_path / "t.zarr", scheduler=address, memory=memory)
+
+
 def test_a_fault_on_a_worker_is_told_here_and_leaves_nothing(cluster, copied, tmp_path):
     capture, memory = copied("paper")
     chunk = tmp_path / "c.zarr" / "photos" / "c.9.0.0.0"

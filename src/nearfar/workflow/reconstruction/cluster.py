@@ -33,6 +33,7 @@ from nearfar.workflow.reconstruction.summary import Summary
 try:
     from dask import config
     from distributed import Client, KilledWorker, as_completed
+    from distributed.comm import CommClosedError
 except ImportError as error:
     raise MissingPackageError(
         f"a scheduler needs Dask, which is not installed ({error}): install it by "
@@ -83,7 +84,7 @@ class DaskExecutor:
         assert isinstance(store, TileWriter), "workers write into a folder that all see"
         source, scheduler = work.capture.path.resolve(), self._scheduler
         store = replace(store, folder=store.folder.resolve())
-        with _connected(scheduler) as client:
+        with _connected(scheduler) as client, _lost_scheduler(scheduler):
             _require_workers(client, scheduler, source, store.folder, work.options.memory)
             run, marker = secrets.token_hex(8), store.folder / RUN_MARKER
             marker.write_text(run)
@@ -102,11 +103,6 @@ class DaskExecutor:
                     f"a tile was lost with its worker again and again, "
                     f"{error.last_worker} last: look at the workers' logs, and if memory ran out "
                     f"give less `memory`."
-                ) from error
-            except CancelledError as error:
-                raise ClusterError(
-                    f"the scheduler at {scheduler} was lost in the middle of the work: see that it "
-                    f"and its workers run, and reconstruct again."
                 ) from error
             finally:
                 # Tiles that are being reconstructed run to their end, but write nothing more.
@@ -160,6 +156,22 @@ def _connected(scheduler: str) -> Iterator[Client]:
             ) from error
         with client:
             yield client
+
+
+@contextmanager
+def _lost_scheduler(scheduler: str) -> Iterator[None]:
+    """Say that the scheduler was lost, however Dask tells it.
+
+    Tasks are cancelled where Dask notices first, and connections break off where we ask first. The
+    latter are OSError, and must not be taken for faults of the disk.
+    """
+    try:
+        yield
+    except (CancelledError, CommClosedError) as error:
+        raise ClusterError(
+            f"the scheduler at {scheduler} was lost in the middle of the work: see that it "
+            f"and its workers run, and reconstruct again."
+        ) from error
 
 
 class _Access(NamedTuple):

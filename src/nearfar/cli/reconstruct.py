@@ -196,8 +196,9 @@ def _of_plan(
             force=outputs.force,
             progress=progress,
         )
-        verdict = judge_transport(outputs.transport, capture, progress=progress)
     say_reconstructed(summary, capture, outputs.transport, quiet=outputs.quiet)
+    with progress_bar("judging", quiet=outputs.quiet) as progress:
+        verdict = judge_transport(outputs.transport, capture, progress=progress)
     if outputs.report is not None:
         outputs.write_report(_page_of_plan(capture, verdict, outputs, given=given is not None))
     outputs.tell(verdict.kept)

@@ -1,5 +1,6 @@
 """A stored transport is judged by its capture, and keeps the verdict."""
 
+import re
 import shutil
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import open_capture
-from nearfar.errors import InputError, MissingFileError
+from nearfar.errors import InputError, KeptInterrupt, MissingFileError
 from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -93,6 +94,30 @@ def test_what_cannot_be_judged_gets_a_sentence(made, stored, tmp_path):
     change_attributes(stored, provenance={})
     with pytest.raises(InputError, match="does not say how it was made"):
         judge_transport(stored, capture)
+
+
+def test_a_judgement_that_is_interrupted_leaves_a_whole_transport(made, stored):
+    def interrupt(_what, _share):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeptInterrupt, match=r"interrupted; .*t\.zarr is whole, and was not judged"):
+        judge_transport(stored, open_capture(made / "capture.zarr"), progress=interrupt)
+    assert load_transport(stored).verdict is None
+
+
+def test_a_check_photo_that_cannot_be_read_leaves_a_whole_transport(made, tmp_path):
+    # The estimate reads no check photo, and so does not meet the damage.
+    capture = shutil.copytree(made / "capture.zarr", tmp_path / "c.zarr")
+    purposes = [pattern.purpose for pattern in open_capture(capture).plan.patterns]
+    check = purposes.index("check")
+    chunk = capture / "photos" / f"c.{check}.0.0.0"
+    chunk.write_bytes(chunk.read_bytes()[:-9])
+    output = tmp_path / "t.zarr"
+    told = run_nearfar("reconstruct", capture, output)
+    assert told.status == 1
+    assert f"written to {output}" in told.out
+    assert re.search(r"c\.zarr is damaged.*t\.zarr is whole, and was not judged", told.err)
+    assert load_transport(output).verdict is None
 
 
 def test_what_gains_changed_is_not_judged_by_the_photos(made, tmp_path):

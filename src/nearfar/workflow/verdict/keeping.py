@@ -7,7 +7,7 @@ from typing import Any
 from nearfar.arrays import AnyPath
 from nearfar.capture import Capture
 from nearfar.checks import require_instance
-from nearfar.errors import InputError
+from nearfar.errors import InputError, KeptInterrupt, NearfarError
 from nearfar.files.kinds import METADATA
 from nearfar.files.output import require_writable, storage_faults
 from nearfar.progress import Report, ignore_progress
@@ -52,6 +52,9 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
         If the transport or the capture is not there, or damaged.
     StorageError
         If the verdict cannot be written.
+    KeptInterrupt
+        If it was interrupted. The message says, as those of all faults of the photos do, that the
+        transport is whole.
 
     Examples
     --------
@@ -66,9 +69,15 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     stored = open_transport(path)
     require_origin(stored, capture)
     require_writable(path, path / METADATA)
-    verdict = judge_reconstruction(stored, capture, progress or ignore_progress)
-    with storage_faults(path):
-        write_verdict(path, verdict.kept)
+    unjudged = f"{path} is whole, and was not judged"
+    try:
+        verdict = judge_reconstruction(stored, capture, progress or ignore_progress)
+        with storage_faults(path):
+            write_verdict(path, verdict.kept)
+    except KeyboardInterrupt as error:
+        raise KeptInterrupt(f"interrupted; {unjudged}.") from error
+    except NearfarError as error:
+        raise type(error)(f"{str(error).removesuffix('.')}; {unjudged}.") from error
     return verdict
 
 

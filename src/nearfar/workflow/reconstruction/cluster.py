@@ -33,7 +33,7 @@ from nearfar.workflow.reconstruction.summary import Summary
 try:
     from dask import config
     from distributed import Client, KilledWorker, as_completed
-    from distributed.comm import CommClosedError
+    from distributed.comm.core import CommClosedError
 except ImportError as error:
     raise MissingPackageError(
         f"a scheduler needs Dask, which is not installed ({error}): install it by "

@@ -89,7 +89,7 @@ def test_the_page_leads_with_the_verdict(open_page, transport, tmp_path, verdict
         page.keyboard.press("Space")
         page.wait_for_selector("#meaning", state="visible")
         assert follows in page.inner_text("#verdict")
-        assert page.inner_text("#play") == "play"
+        assert page.inner_text("#play") == "animate"
 
 
 def test_what_gains_changed_cannot_be_judged(open_page, transport, tmp_path):

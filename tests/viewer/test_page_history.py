@@ -108,7 +108,7 @@ def test_keys_of_a_text_field_are_its_own(open_page, address):
     page.keyboard.press("Control+z")
     assert page.get_attribute("[data-kind=white]", "aria-pressed") == "true"
     assert page.get_attribute("[data-solo=near]", "aria-pressed") == "false"
-    assert page.inner_text("#play") == "play"
+    assert page.inner_text("#play") == "animate"
 
 
 def test_a_dropped_picture_is_removed_and_comes_back(open_page, address):

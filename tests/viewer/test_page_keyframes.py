@@ -36,12 +36,25 @@ def _names(page):
     return page.locator("#keyframes .name").all_inner_texts()
 
 
+@pytest.mark.parametrize(("width", "height"), [(1300, 900), (1900, 1000)])
+def test_keyframes_are_seen_without_scrolling(open_page, address, width, height):
+    page = open_page(address, {"keyframes": KEYFRAMES})
+    page.set_viewport_size({"width": width, "height": height})
+    page.click("#tab-keyframes")
+    for id_ in ("#keyframes .name >> nth=2", "#play-keyframes"):
+        box = page.locator(id_).bounding_box()
+        assert box["y"] > 0
+        assert box["y"] + box["height"] <= height
+
+
 def test_lights_are_kept_put_in_order_and_played(open_page, address):
     page = open_page(address)
     assert page.is_disabled("#play-keyframes")
     for kind in ("spot", "white", "stripe"):
         page.click(f"[data-kind={kind}]")
         page.click("#add-keyframe")
+    # The light stays in view, and the keyframes' tab tells that there is something new.
+    page.click("#tab-keyframes.news")
     spot, white, stripe = _names(page)
     assert (white, stripe.split()[0]) == ("white", "stripe")
     assert page.is_disabled("[aria-label='keyframe 1 earlier']")
@@ -59,7 +72,7 @@ def test_lights_are_kept_put_in_order_and_played(open_page, address):
     settled(page)
     first = seen(page, "light")
     page.click("#play-keyframes")
-    wait_until(lambda: page.inner_text("#play-keyframes") == "play")
+    wait_until(lambda: page.inner_text("#play-keyframes") == "play keyframes")
     settled(page)
     assert (seen(page, "light") == 255).all()
     page.keyboard.press("Control+z")
@@ -78,7 +91,7 @@ def test_lights_are_kept_put_in_order_and_played(open_page, address):
 def test_a_film_of_pictures_is_what_relight_makes_of_its_lights(
     open_page, address, stored, transport, tmp_path
 ):
-    page = open_page(address, {**FILM, "near": 2, "exposure": 1})
+    page = open_page(address, {**FILM, "near": 2, "exposure": 1, "tab": "keyframes"})
     assert page.inner_text("#film-length") == "5 pictures, 0.8 s"
     path = saved(page, "#film-pictures", tmp_path)
     assert path.name == "a-scene-3-keyframes.zip"
@@ -106,6 +119,7 @@ def test_a_film_of_pictures_is_what_relight_makes_of_its_lights(
     # The command that the page gives makes the same pictures: a moving and a fading one.
     for path in (paths[0], paths[2], paths[4]):
         path.unlink()
+    page.click("[data-tab=light]")
     page.click("#copy-as")
     (tmp_path / "a scene.zarr").symlink_to(stored)
     loop = page.inner_text("#as-loop").replace("nearfar relight", '"$0" -m nearfar relight')
@@ -115,9 +129,28 @@ def test_a_film_of_pictures_is_what_relight_makes_of_its_lights(
         assert np.abs(picture.astype(int) - again).max() <= 1
 
 
+def test_exposure_follows_the_light_in_a_film(open_page, address, transport, tmp_path):
+    page = open_page(address, {**FILM, "metering": "auto", "tab": "keyframes"})
+    assert page.inner_text("#film-length").endswith("exposure follows the light")
+    # What the page shows of each light at rest is what the film has of it.
+    shown = []
+    for number in range(3):
+        page.click(f"#keyframes .name >> nth={number}")
+        settled(page)
+        shown.append(seen(page).astype(int))
+    with zipfile.ZipFile(saved(page, "#film-pictures", tmp_path)) as archive:
+        of_film = [decode_png(archive.read(name)) for name in archive.namelist()[::2]]
+    for one, other in zip(shown, of_film[::2], strict=True):
+        assert np.percentile(other, 99.5) > 240
+        assert np.abs(one - other).max() <= 1
+    page.click("[data-tab=light]")
+    page.click("#copy-as")
+    assert page.is_visible("#loop-note")
+
+
 def test_a_film_plays_in_a_browser_and_shows_the_pictures(open_page, address, tmp_path):
     cv2 = pytest.importorskip("cv2")
-    page = open_page(address, FILM)
+    page = open_page(address, {**FILM, "tab": "keyframes"})
     pictures = saved(page, "#film-pictures", tmp_path)
     film = saved(page, "#film-mp4", tmp_path)
     assert film.name == "a-scene-3-keyframes.mp4"
@@ -148,7 +181,7 @@ def test_a_film_plays_in_a_browser_and_shows_the_pictures(open_page, address, tm
 
 
 def test_films_are_of_the_relit_scene_alone(open_page, address):
-    page = open_page(address, {"keyframes": KEYFRAMES, "tool": "reach"})
+    page = open_page(address, {"keyframes": KEYFRAMES, "tool": "reach", "tab": "keyframes"})
     for button in ("#film-pictures", "#film-mp4"):
         assert page.is_disabled(button)
     assert "choose relit" in page.inner_text("#film-length")
@@ -159,7 +192,9 @@ def test_films_are_of_the_relit_scene_alone(open_page, address):
 
 
 def test_a_film_is_cancelled(open_page, address):
-    page = open_page(address, {"keyframes": KEYFRAMES, "seconds": 20, "rate": 60})
+    page = open_page(
+        address, {"keyframes": KEYFRAMES, "seconds": 20, "rate": 60, "tab": "keyframes"}
+    )
     page.click("#film-pictures")
     wait_until(lambda: int((page.inner_text("#film-status") or "picture 0").split()[1]) > 2)
     page.click("#film-cancel")

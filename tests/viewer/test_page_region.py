@@ -7,6 +7,8 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
+from nearfar.applications.masks import ProbingMask
+from nearfar.applications.probe import probe
 from nearfar.capture import open_capture
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.transport.stored import open_transport
@@ -102,6 +104,47 @@ def test_a_region_is_dragged_on_the_scene(open_page, address, transport):
     page.keyboard.press("7")
     settled(page)
     wait_until(lambda: _table(page)["light"][0] < 0.05)
+
+
+def test_a_finger_drags_a_region_only_when_it_is_told_to(open_page, address):
+    page = open_page(address, {"kind": "white", "tab": "region"}, has_touch=True)
+    touch = page.context.new_cdp_session(page)
+
+    def drag_by_finger(start, end):
+        for kind, place in (("touchStart", start), ("touchMove", end), ("touchEnd", None)):
+            points = [dict(zip("xy", _at(page, *place), strict=True))] if place else []
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    drag_by_finger((6, 10), (12, 24))
+    assert not page.is_visible("#region-mark")
+    page.tap("#region-drag")
+    drag_by_finger((6, 10), (12, 24))
+    _ready(page, REGION)
+    assert page.is_visible("#region-mark")
+    # Once: after it, a finger scrolls again.
+    assert page.get_attribute("#region-drag", "aria-pressed") == "false"
+
+
+def test_a_mouse_alone_is_not_asked_for_a_finger(open_page, address):
+    page = open_page(address, {"tab": "region"})
+    assert not page.is_visible("#region-drag")
+
+
+def test_light_of_a_region_by_distance_is_what_probing_makes(open_page, address, transport):
+    mask = ProbingMask.beyond(4.0)
+    light = np.broadcast_to(WHITE[..., None], (*PROJECTOR, 3))
+    total = transport.relight(light)[REGION].mean()
+    expected = probe(transport, light, mask)[REGION].mean()
+    state = {"kind": "white", "tool": "reach", "range": "beyond", "reach": 4, "tab": "region"}
+    page = open_page(address, {**state, "region": [6, 10, 13, 25]})
+    line = "#region-by-distance:has-text('light from 4 px or more away')"
+    text = page.locator(line).inner_text()
+    found, share = map(float, re.search(r": ([\d.]+), ([\d.]+) %", text).groups())
+    assert found == pytest.approx(expected, rel=0.01, abs=6e-5)
+    assert share == pytest.approx(100 * expected / total, rel=0.01, abs=0.06)
+    # It is of the light by distance alone.
+    page.click("[data-tool=relit]")
+    wait_until(lambda: page.inner_text("#region-by-distance") == "")
 
 
 def test_a_region_is_typed_by_the_keyboard_alone(open_page, address, transport):

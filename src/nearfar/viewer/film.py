@@ -26,6 +26,7 @@ from nearfar.viewer.interactive import GREY, InteractiveTransport
 from nearfar.viewer.jobs import JobQueue
 from nearfar.viewer.live import close_for
 from nearfar.viewer.messages import WHITE_LEVEL, Gains, Light, Split, unpack_light
+from nearfar.viewer.metering import exposure_for
 from nearfar.viewer.uploads import UPLOAD_TIMEOUT_SECONDS
 
 with needed(extra="viewer", what="a page in the browser"):
@@ -54,7 +55,11 @@ class FilmHeader(BaseModel):
         How many pictures there will be.
     split : {"model", "physical"}
         Which components the gains of the lights are of.
-    exposure, gamma : float
+    metering : {"fixed", "auto"}
+        Whether all pictures have one exposure, or each the one that suits it.
+    exposure : float
+        That of all pictures, in stops; not heeded where each has its own.
+    gamma : float
     channel : int or None
         The only colour that is shown, in grey.
     """
@@ -66,6 +71,7 @@ class FilmHeader(BaseModel):
     rate: Annotated[float, Field(ge=1.0, le=60.0)]
     count: int = Field(ge=1, le=MAXIMUM_PICTURES)
     split: Split = "model"
+    metering: Literal["fixed", "auto"] = "fixed"
     exposure: float = Field(default=0.0, ge=-6.0, le=12.0)
     gamma: float = Field(default=1.0, ge=0.5, le=3.0)
     channel: Literal[0, 1, 2] | None = None
@@ -114,7 +120,8 @@ def _picture(
     picture = relight(light, gains)
     colours = transport.to_colours(picture.reshape(*picture.shape[:2], -1))
     grey_or_rgb = colours[..., 0] if colours.shape[2] == GREY else colours
-    shown = developed(grey_or_rgb, exposure=film.exposure, gamma=film.gamma, channel=film.channel)
+    exposure = exposure_for(colours) if film.metering == "auto" else film.exposure
+    shown = developed(grey_or_rgb, exposure=exposure, gamma=film.gamma, channel=film.channel)
     return np.rint(255 * to_srgb(shown)).astype(np.uint8)
 
 

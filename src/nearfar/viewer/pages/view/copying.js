@@ -23,6 +23,7 @@ export function bindCopying(page) {
     get('as-python').textContent = pythonOf(shown);
     get('as-loop').textContent = loopOf(shown);
     get('of-keyframes').hidden = page.store.state.keyframes.length < 2;
+    get('loop-note').hidden = page.store.state.metering !== 'auto';
     get('copied').textContent = '';
     get('light-file').textContent = shown.light;
     get('transport-file').textContent = shown.transport;

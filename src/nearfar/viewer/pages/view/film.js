@@ -27,7 +27,7 @@ export class Film {
     if (this.#socket) return;
     showFault('', 'film');
     const { store: { state }, scenePictures: { split }, scene } = this.#page, light = this.#page.light.another(), count = pictureCountOf(state);
-    const { exposure, gamma, rate, seconds, keyframes, pictures, channel } = state, gains = namedGains(state, split);
+    const { exposure, metering, gamma, rate, seconds, keyframes, pictures, channel } = state, gains = namedGains(state, split);
     const url = new URL('film', location.href);
     Object.assign(url, { protocol: url.protocol.replace('http', 'ws'), hash: '' });
     const socket = this.#socket = new WebSocket(url), name = `${sceneName(scene)}-${keyframes.length}-keyframes`;
@@ -38,7 +38,7 @@ export class Film {
       const { sent: { values, shape }, colour } = light;
       socket.send(pack({ number, shape, colour, split, gains }, values));
     };
-    const header = JSON.stringify({ format, name: name.slice(-MAXIMUM_NAME_CHARACTERS).replaceAll(/[^\w.-]/g, '-'), rate, count, split, exposure, gamma, channel: channel ? CHANNELS.indexOf(channel) - 1 : null });
+    const header = JSON.stringify({ format, name: name.slice(-MAXIMUM_NAME_CHARACTERS).replaceAll(/[^\w.-]/g, '-'), rate, count, split, metering, exposure, gamma, channel: channel ? CHANNELS.indexOf(channel) - 1 : null });
     socket.onopen = () => {
       socket.send(header);
       send(0);

@@ -22,3 +22,8 @@ export class FrameStatus {
 
   #say(text) { set(get('frame-status'), 'textContent', text); }
 }
+
+// For those who drive the page by a program; stage: whether what is shown in place of the relit scene is final, null for nothing.
+export function describeFrame({ exact, split, isNewest }, count, stage) {
+  document.body.dataset.frame = JSON.stringify({ count, exact, newest: isNewest, split, stage });
+}

@@ -8,8 +8,8 @@ import { LIGHT_KEYS, pick } from './state.js';
 const button = (textContent, ariaLabel, onclick, disabled = false) => Object.assign(document.createElement('button'), { textContent, ariaLabel, title: ariaLabel, onclick, disabled });
 
 function filmText(state) {
-  if (state.keyframes.length < 2) return 'Keep two lights or more as keyframes, and the page plays from one to the next.';
-  const length = `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s`;
+  if (state.keyframes.length < 2) return 'Keep two lights or more, by “keep as keyframe” below the light. The page goes from one to the next.';
+  const length = `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s` + (state.metering === 'auto' ? ', exposure follows the light' : '');
   return state.tool === 'relit' ? length : `${length}. Films are of the relit scene: choose relit to save one.`;
 }
 
@@ -20,10 +20,13 @@ export class Keyframes {
   #started = 0;
   #shown = null;
 
-  constructor({ store, playback }) {
+  constructor({ store, playback, tabs }) {
     this.#store = store;
     this.#playback = playback;
-    get('add-keyframe').onclick = () => this.#set([...store.state.keyframes, pick(store.state, LIGHT_KEYS)]);
+    get('add-keyframe').onclick = () => {
+      this.#set([...store.state.keyframes, pick(store.state, LIGHT_KEYS)]);
+      tabs.offer('keyframes');
+    };
     get('play-keyframes').onclick = () => this.toggle();
   }
 
@@ -57,7 +60,7 @@ export class Keyframes {
 
   show(state) {
     const { keyframes } = state, isPlayable = keyframes.length > 1;
-    set(get('play-keyframes'), 'textContent', this.isPlaying ? 'stop' : 'play');
+    set(get('play-keyframes'), 'textContent', this.isPlaying ? 'stop' : 'play keyframes');
     set(get('play-keyframes'), 'ariaPressed', String(this.isPlaying));
     set(get('play-keyframes'), 'disabled', !isPlayable);
     for (const id of ['film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable || state.tool !== 'relit');

@@ -43,7 +43,7 @@ async function load() {
 
 async function open() {
   const { scene, initial, state, light, missing } = await load();
-  const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera, () => page.numbers?.refresh());
+  const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera, () => [page.numbers, page.region].forEach(each => each?.refresh()));
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
       scenePictures.lightChanged();
@@ -63,7 +63,7 @@ async function open() {
   const tools = page.tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation, 'error-bars': new ErrorBars(page) });
   const numbers = page.numbers = new Numbers(page);
   describe(scene);
-  const region = new Region(page), beside = page.beside = new Beside(page);
+  const region = page.region = new Region(page), beside = page.beside = new Beside(page);
   function show(changes) {
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
@@ -92,9 +92,10 @@ async function open() {
 }
 
 const receiving = (page, show) => (header, parts, isNewest) => {
-  const { store, lightCanvas, scenePictures, splits, numbers, tools } = page, { split } = scenePictures;
+  const { store, lightCanvas, scenePictures, splits, numbers, tools, region } = page, { split } = scenePictures;
   scenePictures.receive(header, parts, isNewest && !lightCanvas.isPending, store.state);
   tools.frameArrived();
+  region.refresh();
   meter(page);
   if (header.split === split) numbers.refresh(); else show();
   if (isNewest && header.split !== splits.current) splits.lost();

@@ -1,4 +1,4 @@
-// Playing: what each kind of light does over time.
+// Animation: what each kind of light does over time.
 
 import { get } from './dom.js';
 
@@ -44,7 +44,7 @@ export class Playback {
     if (!this.isPlaying && !canPlay(this.#store.state)) return;
     this.#started = this.isPlaying ? 0 : performance.now();
     get('play').ariaPressed = String(this.isPlaying);
-    get('play').textContent = this.isPlaying ? 'stop' : 'play';
+    get('play').textContent = this.isPlaying ? 'stop' : 'animate';
     if (this.isPlaying) this.#run(this.#started, this.#store.state.phase);
   }
 

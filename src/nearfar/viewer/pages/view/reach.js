@@ -10,6 +10,11 @@ const MAXIMUM_EDGES = 6;
 const KEYS = ['range', 'reach', 'broad'];
 const px = value => `${+value.toFixed(1)} px`;
 
+export function distanceText({ range, reach, broad }) {
+  if (range === 'within') return `light from less than ${px(reach)} away`;
+  return range === 'beyond' ? `light from ${px(reach)} or more away` : `light from ${px(reach)} to ${px(reach + broad)} away`;
+}
+
 // Where rings end: 1, 2, 4 and so on, up to half of the projector.
 function edgesOf([height, width]) {
   const most = Math.max(2, Math.max(height, width) / 2), factor = Math.max(2, most ** (1 / MAXIMUM_EDGES));
@@ -50,10 +55,7 @@ export class Reach {
 
   changed(changes) { if (KEYS.some(name => name in changes)) this.#ask(); }
 
-  label({ range, reach, broad }) {
-    if (range === 'within') return `light from less than ${px(reach)} away`;
-    return range === 'beyond' ? `light from ${px(reach)} or more away` : `light from ${px(reach)} to ${px(reach + broad)} away`;
-  }
+  label(state) { return distanceText(state); }
 
   show(state) {
     for (const button of all('[data-range]')) set(button, 'ariaPressed', String(button.dataset.range === state.range));

@@ -1,7 +1,8 @@
 // The table of a region: means and standard deviations, channel by channel.
 
-import { get } from './dom.js';
+import { get, set } from './dom.js';
 import { tableLine, valueText } from './numbers.js';
+import { meanIn } from './picture-values.js';
 import { titleOf } from './splits.js';
 
 const CHANNELS = ['red', 'green', 'blue'];
@@ -23,4 +24,11 @@ export function showRegionNumbers({ pixels, without_direct: without, saturated, 
   get('region-note').textContent = `${pixels} camera pixel${pixels > 1 ? 's' : ''}` +
     (without ? `, ${without} without direct light` : '') + (saturated ? `, ${saturated} saturated` : '') + '. ' +
     'Spread, ± and noise are standard deviations.';
+}
+
+// Of the light from the chosen distances, over a region; pictures are that light and all light, or null.
+export function showByDistance(pictures, region, camera, title) {
+  const [shown, total] = pictures ? pictures.map(picture => mean(meanIn(picture, region, camera))) : [];
+  const text = pictures && `${title}: ${valueText(shown)}, ${(100 * shown / (total || 1)).toFixed(1)} % of the region's light`;
+  set(get('region-by-distance'), 'textContent', text || '');
 }

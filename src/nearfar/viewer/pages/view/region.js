@@ -4,7 +4,8 @@ import { BackgroundJob } from './background.js';
 import { get, nearestPixel, set } from './dom.js';
 import { pack, requestMessage } from './protocol.js';
 import { between, bindRegionDrag, readRegion } from './region-sides.js';
-import { showRegionNumbers } from './region-numbers.js';
+import { distanceText } from './reach.js';
+import { showByDistance, showRegionNumbers } from './region-numbers.js';
 import { drawRowPlots } from './row-plots.js';
 import { markRegion } from './stage-marks.js';
 import { isFree } from './state.js';
@@ -38,7 +39,14 @@ export class Region {
     this.show(this.#page.store.state);
   }
 
+  // The picture by distance may be new.
+  refresh() {
+    const { store: { state }, scenePictures, scene } = this.#page, isByDistance = state.region && state.tool === 'reach';
+    showByDistance(isByDistance ? scenePictures.shownAndTotal : null, state.region, scene.camera, distanceText(state));
+  }
+
   show({ region, tab, tool }) {
+    this.refresh();
     markRegion(tool === 'dual' ? null : region, this.#page.scene.camera);
     const { split } = this.#page.scenePictures, key = region ? [region, this.#lights, split].join() : '';
     set(get('region-none'), 'hidden', !region);

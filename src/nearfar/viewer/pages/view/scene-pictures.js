@@ -3,7 +3,7 @@
 import { showComparison } from './comparison.js';
 import { compare, describeDifference, drawDifference, rangeOf } from './difference.js';
 import { get } from './dom.js';
-import { FrameStatus } from './frame-status.js';
+import { FrameStatus, describeFrame } from './frame-status.js';
 import { drawPicture, exposureFor, onePart, shrink, sumOfParts } from './picture.js';
 import { partsAt, valuesAt } from './picture-values.js';
 import { markPixel } from './stage-marks.js';
@@ -32,10 +32,9 @@ export class ScenePictures {
   // The split of the newest frame.
   get split() { return this.#frame?.split || 'model'; }
 
-  // Whether the picture is exact.
   get isExact() { return Boolean(this.#frame?.exact); }
 
-  // Whether it is, and of the newest light; or whether the picture in its place is.
+  // Whether the picture is exact, and of the newest light; or whether the picture in its place is.
   get isFinal() { return this.#stage ? this.isStageFinal : this.isExact && this.#frame.isNewest; }
 
   // The light has changed: the picture is of an older one.
@@ -53,12 +52,7 @@ export class ScenePictures {
     this.#describeFrame();
   }
 
-  // For those who drive the page by a program.
-  #describeFrame() {
-    if (!this.#frame) return;
-    const { exact, split, isNewest } = this.#frame;
-    document.body.dataset.frame = JSON.stringify({ count: this.#frameCount, exact, newest: isNewest, split, stage: this.#stage ? this.isStageFinal : null });
-  }
+  #describeFrame() { if (this.#frame) describeFrame(this.#frame, this.#frameCount, this.#stage ? this.isStageFinal : null); }
 
   draw(state) {
     if (!this.#frame) return;
@@ -127,6 +121,12 @@ export class ScenePictures {
   #shape(aspect) {
     if (this.#aspect !== aspect) get('scene-view').style.setProperty('--aspect', aspect);
     this.#aspect = aspect;
+  }
+
+  // What is shown in place of the relit scene, and all light; null before both are exact, and where it is no light of camera pixels.
+  get shownAndTotal() {
+    const isExact = this.#stage && !this.#stage.ofProjector && !this.#stage.paint && this.isFinal && this.#frame.isNewest;
+    return isExact ? [this.#stage.picture, sumOfParts(this.#frame.parts, [1, 1, 1])] : null;
   }
 
   // Whether there is light of the camera's pixels on the stage, and something to compare it with.

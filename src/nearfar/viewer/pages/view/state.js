@@ -11,7 +11,7 @@ export const hasPart = (scene, name) => scene.parts.includes(name) || name === '
 export const canSplitPhysically = scene => scene.parts.includes('near');
 export const ALL_ONE = Object.freeze(Object.fromEntries(GAINS.map(name => [name, 1])));
 export const TOOLS = ['relit', 'reach', 'dual', 'compensation', 'error-bars'];
-export const TABS = ['light', 'row', 'column', 'map', 'numbers', 'region'];
+export const TABS = ['light', 'row', 'column', 'map', 'numbers', 'region', 'keyframes'];
 export const ERROR_BARS = ['absolute', 'relative'];
 export const ARRANGEMENTS = ['wipe', 'pair'];
 export const RANGES = ['within', 'ring', 'beyond'];

@@ -83,14 +83,6 @@ def test_a_simulated_rig_is_a_context_and_works_without(tmp_path):
         np.testing.assert_array_equal(list(old.shoot(white)), photos)
 
 
-def test_a_simulated_rig_is_not_calibrated(tmp_path):
-    simulated = tmp_path / "simulated.toml"
-    simulated.write_text('[scene]\nname = "corner"\n')
-    ran = run_nearfar("calibrate", simulated)
-    assert ran.status == 1
-    assert "is a simulated rig" in ran.err
-
-
 def test_without_a_display_commands_say_so(tmp_path, monkeypatch):
     monkeypatch.setenv("DISPLAY", "")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

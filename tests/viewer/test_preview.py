@@ -7,6 +7,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from contextlib import contextmanager
 
 import imagecodecs
 import numpy as np
@@ -14,7 +15,9 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.errors import InputError
+from nearfar.rigs.opening import open_rig_to_preview
 from nearfar.rigs.real.rig import RealRig
+from nearfar.rigs.tables import read_rig_table
 from nearfar.viewer.photo_statistics import (
     HISTOGRAM_BINS,
     SATURATED_COLOUR,
@@ -23,7 +26,6 @@ from nearfar.viewer.photo_statistics import (
 )
 from nearfar.viewer.preview import run_preview
 from tests.absent import said_without
-from tests.cli.conftest import run_nearfar
 from tests.rigs.displays import need
 from tests.rigs.table import TableCamera, TableScreen
 from tests.waiting import LONGEST_WAIT
@@ -84,6 +86,13 @@ def served():
     transport = np.full((size.pixels, projector.pixels), 0.6 / projector.pixels)
     camera = TableCamera(screen, transport, size, projector)
     rig = RealRig(screen, camera, projector, scale=1, exposure=0.1)
+    with _previewed(rig) as (ask, until):
+        yield camera, ask, until
+
+
+@contextmanager
+def _previewed(rig):
+    """Run a preview; yield a way to ask it, and one to wait until its state is some way."""
     addresses, faults = [], []
 
     def run():
@@ -116,7 +125,7 @@ def served():
         assert thread.is_alive()
         time.sleep(0.01)
     ask.address = addresses[0]
-    yield camera, ask, until
+    yield ask, until
     if thread.is_alive():
         ask("/settings", {"stop": True})
         thread.join(timeout=LONGEST_WAIT)
@@ -229,9 +238,18 @@ def test_without_its_packages_there_is_a_sentence():
     assert "pip install 'nearfar[viewer]'" in said_without("uvicorn", program)
 
 
-def test_a_simulated_rig_is_refused(tmp_path):
-    rig = tmp_path / "rig.toml"
-    rig.write_text('[scene]\nname = "corner"\n')
-    ran = run_nearfar("preview", rig)
-    assert ran.status == 1
-    assert "is a simulated rig" in ran.err
+def test_a_simulated_rig_is_shown(tmp_path):
+    np.save(tmp_path / "T.npy", np.full((6, 7, 8, 9), 0.01, np.float32))
+    path = tmp_path / "rig.toml"
+    path.write_text('[scene]\ntransport = "T.npy"\n[camera]\nambient = 0.0\n')
+    with _previewed(open_rig_to_preview(path, read_rig_table(path))) as (ask, until):
+        white = until(lambda state: state.get("pattern") == "white")
+        assert white["camera"] == "the simulated camera of T.npy"
+        assert white["monitor"].startswith("0: simulated, 8x9")
+        assert white["size"] == "6x7"
+        assert 0.5 < white["brightest"] < 1
+        ask("/settings", {"pattern": "black"})
+        black = until(lambda state: state["pattern"] == "black")
+        assert black["mean"] < white["mean"] / 5
+        ask("/settings", {"pattern": "white", "exposure": 1.5})
+        until(lambda state: state["exposure"] == 1.5 and state["brightest"] == 1.0)

@@ -8,7 +8,6 @@ import typer
 from nearfar.arrays import Size
 from nearfar.cli.options import Force, Quiet, ScenesCamera, ScenesProjector, size
 from nearfar.cli.saying import say, warn
-from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 # A board of 7 by 10 squares, as it is often printed, in metres.
@@ -66,6 +65,7 @@ def calibrate(
     """Measure how a rig turns numbers into light, and back; or where its devices stand.
 
     The calibration and its plots are kept in a folder beside the rig, which acquire reads.
+    A simulated RIG.toml is calibrated as a real one, to be tried without hardware.
     With --geometry, STEREO.yml is written, which depth reads. It asks for pose after pose of the
     board, and keeps their photos in a folder beside STEREO.yml.
 
@@ -119,20 +119,15 @@ def _calibrate_light(rig: Path, *, force: bool, quiet: bool) -> None:
     )
     from nearfar.rigs.calibration import calibration_folder
     from nearfar.rigs.opening import open_rig_to_calibrate
-    from nearfar.rigs.tables import RealTable, read_rig_table
+    from nearfar.rigs.tables import read_rig_table
     from nearfar.workflow.calibrate import calibrate as measure
 
     table = read_rig_table(rig)
-    if not isinstance(table, RealTable):
-        raise InputError(
-            f"{rig} is a simulated rig, whose response is what projector.gamma says: name the "
-            f"RIG.toml of a real one."
-        )
     folder = calibration_folder(rig)
     check_output(folder, force=force, replaceable=is_calibration)
     with (
         progress_bar("opening the rig", quiet=quiet) as report,
-        open_rig_to_calibrate(rig, table, on_alarm=warn) as opened,
+        open_rig_to_calibrate(rig, table, on_alarm=warn, progress=report) as opened,
     ):
         found = measure(opened, report)
     write_calibration(folder, found, force=force)

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 from nearfar.cli.options import Browser, Port, Quiet, RigFile
 from nearfar.cli.saying import say
-from nearfar.errors import InputError
+from nearfar.progress import progress_bar
 
 
 def preview(
@@ -15,19 +15,17 @@ def preview(
 ) -> None:
     """Show what the camera sees, live: picture, histogram, focus and saturation.
 
+    A simulated RIG.toml shows its scene, to be tried without hardware.
+
     Example: nearfar preview rig.toml
     """
     import webbrowser
 
     from nearfar.rigs.opening import open_rig_to_preview
-    from nearfar.rigs.tables import RealTable, read_rig_table
+    from nearfar.rigs.tables import read_rig_table
     from nearfar.viewer.preview import run_preview
 
     table = read_rig_table(rig)
-    if not isinstance(table, RealTable):
-        raise InputError(
-            f"{rig} is a simulated rig, which needs no focus: name the RIG.toml of a real one."
-        )
 
     def started(address: str) -> None:
         say(f"preview at {address}, Esc on the projector or Ctrl-C here ends it")
@@ -35,6 +33,8 @@ def preview(
             webbrowser.open(address)
 
     # Esc on the projector and Ctrl-C are how a preview ends.
-    with open_rig_to_preview(rig, table) as opened, suppress(KeyboardInterrupt):
+    with progress_bar("opening the rig", quiet=quiet) as report:
+        shown = open_rig_to_preview(rig, table, progress=report)
+    with shown as opened, suppress(KeyboardInterrupt):
         run_preview(opened, port, started)
     say("preview ended", quiet=quiet)

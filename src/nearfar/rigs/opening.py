@@ -1,6 +1,7 @@
 """Open a rig by its name or file, simulated or real."""
 
 import os
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,7 +14,8 @@ from nearfar.rigs.calibration import calibration_folder, read_calibration
 from nearfar.rigs.cameras.base import Camera
 from nearfar.rigs.real.rig import RealRig
 from nearfar.rigs.screens import Window
-from nearfar.rigs.simulated.opening import open_simulated_rig
+from nearfar.rigs.simulated.devices import UNIT_SECONDS, SceneCamera, SimulatedScreen
+from nearfar.rigs.simulated.opening import open_simulated_rig, projector_of
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.rigs.tables import RealTable, SceneTable, SimulatedTable, read_rig_table
 from nearfar.scenes import SCENES
@@ -92,7 +94,11 @@ def open_rig(
     else:
         table = SimulatedTable(scene=SceneTable(transport=path.name))
     if isinstance(table, SimulatedTable):
-        return open_simulated_rig(table, path.parent, projector, progress=progress)
+        is_file = name not in SCENES and path.suffix.lower() == ".toml"
+        calibration = read_calibration(calibration_folder(path)) if is_file else None
+        return open_simulated_rig(
+            table, path.parent, projector, calibration=calibration, progress=progress
+        )
     return open_real_rig(
         path, table, projector, exposure=exposure, on_alarm=on_alarm, on_start=on_start
     )
@@ -196,14 +202,25 @@ def open_real_rig(
 
 
 def open_rig_to_calibrate(
-    path: Path, table: RealTable, *, on_alarm: Callable[[str], None] | None = None
+    path: Path,
+    table: RealTable | SimulatedTable,
+    *,
+    on_alarm: Callable[[str], None] | None = None,
+    progress: Report | None = None,
 ) -> RealRig:
-    """Open a real rig without its calibration, one pattern pixel for each of the projector's.
+    """Open a rig without its calibration, one pattern pixel for each of the projector's.
+
+    A simulated one has a screen and a camera of its own, and takes no time; `progress` is called
+    while its scene is computed.
 
     Raises
     ------
     MissingPackageError, DeviceError, InputError
+    MissingFileError, UnreadableFileError
+        If a simulated rig's scene is not there, or damaged.
     """
+    if isinstance(table, SimulatedTable):
+        return _simulated_devices(path, table, lambda _seconds: None, on_alarm, progress)
     # Single frames: averages have another noise, and a bracket needs the black level, which is
     # still to be found.
     single = table.camera.model_copy(update={"average": 1, "bracket": (1.0,)})
@@ -214,13 +231,20 @@ def open_rig_to_calibrate(
     return _open_devices(path, table.model_copy(update={"camera": single}), set_up)
 
 
-def open_rig_to_preview(path: Path, table: RealTable) -> RealRig:
-    """Open a real rig as `open_rig_to_calibrate`, whatever its camera sees: it is not aimed yet.
+def open_rig_to_preview(
+    path: Path, table: RealTable | SimulatedTable, *, progress: Report | None = None
+) -> RealRig:
+    """Open a rig as `open_rig_to_calibrate`, whatever its camera sees: it is not aimed yet.
+
+    A simulated one takes the time that a real projector would.
 
     Raises
     ------
-    MissingPackageError, DeviceError, InputError
+    MissingPackageError, DeviceError, InputError, MissingFileError, UnreadableFileError
+        As `open_rig_to_calibrate`.
     """
+    if isinstance(table, SimulatedTable):
+        return _simulated_devices(path, table, time.sleep, None, progress)
 
     def set_up(screen: Window, camera: Camera) -> RealRig:
         exposure = exposure_of(table)
@@ -230,6 +254,27 @@ def open_rig_to_preview(path: Path, table: RealTable) -> RealRig:
         return _uncalibrated(screen, camera, table, exposure, None)
 
     return _open_devices(path, table, set_up)
+
+
+def _simulated_devices(
+    path: Path,
+    table: SimulatedTable,
+    pause: Callable[[float], object],
+    on_alarm: Callable[[str], None] | None,
+    progress: Report | None,
+) -> RealRig:
+    """Return a simulated rig's screen and camera as a real rig, exposed as the simulated one."""
+    folder = path.parent
+    rig = open_simulated_rig(table, folder, projector_of(table, folder), progress=progress)
+    screen = SimulatedScreen(rig.projector, pause)
+    return RealRig(
+        screen,
+        SceneCamera(rig, screen),
+        rig.projector,
+        scale=1,
+        exposure=UNIT_SECONDS,
+        on_alarm=on_alarm,
+    )
 
 
 def _uncalibrated(

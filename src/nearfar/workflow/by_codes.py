@@ -103,8 +103,9 @@ class FoundCorrespondence:
                 Reason(
                     "not-linear",
                     f"projector or camera is not linear: the photos follow the patterns' levels "
-                    f"raised to {self.exponent:.2f}. q allows for that, a transport does not: set "
-                    f"the gamma of both to 1, or calibrate.",
+                    f"raised to {self.exponent:.2f}, and the devices' own power is as far from 1 "
+                    f"or farther, as global light hides a part of it. q allows for that, a "
+                    f"transport does not: set the gamma of both to 1, or calibrate.",
                 )
             )
         return found

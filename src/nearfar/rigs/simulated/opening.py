@@ -7,8 +7,10 @@ from nearfar.arrays import Size, parse_size
 from nearfar.errors import InputError
 from nearfar.files import kind_of_store
 from nearfar.progress import Report
+from nearfar.rigs.calibration import Calibration
 from nearfar.rigs.simulated.rig import SimulatedRig, World, brightest
 from nearfar.rigs.tables import SimulatedTable
+from nearfar.scenes import sizes
 from nearfar.scenes.cache import cached_known
 from nearfar.scenes.mitsuba.loading import load_scene
 from nearfar.scenes.mitsuba.photos import RenderedWorld
@@ -26,7 +28,12 @@ WHITE_LEVELS_OF_PHOTO_UNITS = (0.1, 0.95)
 
 
 def open_simulated_rig(
-    table: SimulatedTable, folder: Path, projector: Size, *, progress: Report | None = None
+    table: SimulatedTable,
+    folder: Path,
+    projector: Size,
+    *,
+    calibration: Calibration | None = None,
+    progress: Report | None = None,
 ) -> SimulatedRig:
     """Open a simulated rig.
 
@@ -37,6 +44,8 @@ def open_simulated_rig(
         What paths in the table are relative to.
     projector : Size
         Pattern grid.
+    calibration : Calibration, optional
+        By which patterns are drawn; without one the projector is taken as linear.
     progress : callable, optional
         Called with what is computed of a scene, and the share of it that is done.
 
@@ -76,7 +85,24 @@ def open_simulated_rig(
         seed=table.seed,
         details=rendered.describe() if rendered else {},
         notes=rendered.notes if rendered else (),
+        calibration=calibration,
     )
+
+
+def projector_of(table: SimulatedTable, folder: Path) -> Size:
+    """Return the pattern grid of a simulated rig where no plan says it: its scene's own.
+
+    Raises
+    ------
+    MissingFileError, UnreadableFileError, MissingPackageError
+        As `open_simulated_rig`.
+    """
+    scene = table.scene
+    if scene.name is not None:
+        return sizes(scene.name)[0]
+    if scene.mitsuba is not None:
+        return load_scene(folder / scene.mitsuba).projector
+    return load_world(folder / str(scene.transport), None, None).projector
 
 
 def load_world(

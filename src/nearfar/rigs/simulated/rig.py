@@ -1,6 +1,6 @@
 """A simulated rig: photo = sensor(noise(T l)) on a transport that is known."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Protocol, Self
@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size
 from nearfar.errors import InputError
+from nearfar.illumination.frames import fit_frame
 from nearfar.rigs.base import Photo
+from nearfar.rigs.calibration import Calibration
+from nearfar.rigs.linear import PRIMARY_COUNT, LinearProjector
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 
@@ -50,6 +53,9 @@ class SimulatedRig:
         What else a capture should remember of how the world was made, as JSON.
     notes : tuple of str
         What a user should know of the world, a sentence each.
+    calibration : Calibration, optional
+        By which patterns are drawn, so that light is linear in their levels; without one the
+        projector is taken as linear.
     """
 
     world: World
@@ -60,6 +66,7 @@ class SimulatedRig:
     seed: int
     details: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    calibration: Calibration | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -86,6 +93,7 @@ class SimulatedRig:
             "camera": self.sensor.model_dump(),
             "transport_exposure": self.exposure,
             "seed": self.seed,
+            **({"calibration": self.calibration.made} if self.calibration else {}),
             **self.details,
         }
 
@@ -101,7 +109,7 @@ class SimulatedRig:
     def shoot(self, patterns: Iterable[NDArray[np.uint8]], first: int = 0) -> Iterator[Photo]:
         """Yield a photo for each pattern, in order; `first` is the number of the first."""
         number = first
-        for batch in _batches(patterns, PATTERNS_AT_ONCE, first):
+        for batch in _batches(map(self._drawing(), patterns), PATTERNS_AT_ONCE, first):
             # Dark lights fill the batch up to the first: the last digit of a picture depends on how
             # many are computed at once, and photos must not depend on where a capture was resumed.
             before = number % PATTERNS_AT_ONCE
@@ -114,6 +122,16 @@ class SimulatedRig:
                 generator = np.random.default_rng([self.seed, number])
                 yield self.sensor.photograph(self.exposure * picture, generator, number)
                 number += 1
+
+    def _drawing(self) -> Callable[[NDArray[np.uint8]], NDArray[np.uint8]]:
+        """Return what turns a pattern into the levels that the projector is sent."""
+        if self.calibration is None:
+            return lambda pattern: pattern
+        # The primaries of a simulated projector have one response.
+        response = self.calibration.response_table().mean(axis=1, keepdims=True)
+        layout = fit_frame(self.projector, 1, None)
+        draw = LinearProjector(np.repeat(response, PRIMARY_COUNT, axis=1), layout).draw
+        return lambda pattern: draw(pattern) if pattern.ndim == 3 else draw(pattern)[..., 0]
 
 
 def _batches(

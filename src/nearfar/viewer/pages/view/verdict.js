@@ -13,12 +13,15 @@ const NOT_JUDGED = {
   meaning: 'Judge it by the capture that it was reconstructed from: nearfar info TRANSPORT.zarr --capture CAPTURE.zarr',
 };
 
+const FIRST_THINGS_FIRST = 'The most probable cause is the first. Mend it first: the others may follow from it.';
+
 export function showVerdict({ verdict, unjudgeable }) {
   const box = get('verdict'), { grade, summary, reasons } = verdict ?? { grade: 'not judged', reasons: [] };
   // The most probable cause leads: how far lights like those shown are off may say less than it.
   get('grade').textContent = `${grade[0].toUpperCase()}${grade.slice(1)}.`;
   get('off-by').textContent = verdict ? [reasons[0], summary].filter(Boolean).join(' ') : NOT_JUDGED.summary;
-  get('meaning').textContent = verdict ? MEANINGS[grade] : unjudgeable ? `It ${unjudgeable}` : NOT_JUDGED.meaning;
+  const meaning = [MEANINGS[grade], ...(reasons.length > 1 ? [FIRST_THINGS_FIRST] : [])].join(' ');
+  get('meaning').textContent = verdict ? meaning : unjudgeable ? `It ${unjudgeable}` : NOT_JUDGED.meaning;
   get('reasons').replaceChildren(...reasons.map(reason => {
     const item = document.createElement('li');
     item.textContent = reason;

@@ -17,7 +17,11 @@ export const between = ([y, x], [v, u]) => [Math.min(y, v), Math.min(x, u), Math
 // The next drag of a finger on the scene makes a region, in place of scrolling the page.
 function bindFinger() {
   get('region-drag').hidden = !matchMedia('(any-pointer: coarse)').matches;
-  get('region-drag').onclick = () => setDragging(get('region-drag').ariaPressed !== 'true');
+  get('region-drag').onclick = () => {
+    setDragging(get('region-drag').ariaPressed !== 'true');
+    // On a phone the inspector is a sheet before the scene.
+    if (get('close-sheet').checkVisibility()) get('close-sheet').click();
+  };
 }
 
 function setDragging(isDragging) {

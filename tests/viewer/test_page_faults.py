@@ -115,7 +115,8 @@ def test_the_wipe_s_edge_is_dragged_where_the_scene_is_enlarged(open_page, addre
 
 def test_a_film_without_its_package_says_how_to_get_it(open_page, address, monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
-    page = open_page(address, {"keyframes": [{"kind": "spot"}, {"kind": "white"}]})
+    frames = [{"kind": "spot"}, {"kind": "white"}]
+    page = open_page(address, {"keyframes": frames, "tab": "keyframes"})
     page.click("#film-mp4")
     page.wait_for_selector("#fault:has-text('nearfar[film]')")
     assert not page.is_visible("#film-cancel")

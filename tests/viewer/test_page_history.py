@@ -124,9 +124,11 @@ def test_a_dropped_picture_is_removed_and_comes_back(open_page, address):
     assert (seen(page, "light") == 120).all()
     assert page.inner_text("[data-for=picture] output") == "1 of 1"
     # The keyframe of the other one follows it.
+    page.click("#tab-keyframes")
     page.click("#keyframes .name")
     settled(page)
     assert (seen(page, "light") == 120).all()
+    page.click("[data-tab=light]")
     page.click("#remove-picture")
     settled(page)
     assert page.is_disabled("#remove-picture")

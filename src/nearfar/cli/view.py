@@ -32,7 +32,7 @@ def view(
         Path | None,
         typer.Option(
             help="Photos that it was reconstructed from: shows where it is off at those that no "
-            "estimate used.",
+            "estimate used, and compares the scene with each of them.",
             metavar="CAPTURE.zarr",
         ),
     ] = None,
@@ -67,6 +67,7 @@ def view(
     from nearfar.viewer.beside import open_beside
     from nearfar.viewer.held_out import photo_maps
     from nearfar.viewer.interactive import InteractiveTransport
+    from nearfar.viewer.photo_series import PhotoSeries
     from nearfar.viewer.server import ListeningAddress
     from nearfar.viewer.view import run_view
 
@@ -74,6 +75,7 @@ def view(
     require_reconstructed(transport)
     second: Beside | None = None
     maps: Mapping[str, Map] = {}
+    series: PhotoSeries | None = None
     with progress_bar("reading", quiet=quiet) as report:
         interactive = InteractiveTransport(
             transport, memory=available, progress=lambda share: report("reading", share)
@@ -86,7 +88,9 @@ def view(
                 progress=lambda share: report(f"reading {beside}", share),
             )
         if capture is not None:
-            maps = photo_maps(interactive.stored, open_capture(capture), report)
+            opened = open_capture(capture)
+            maps = photo_maps(interactive.stored, opened, report)
+            series = PhotoSeries(interactive, opened)
 
     _tell_of_memory(interactive.stored.nbytes, available, quiet=quiet)
 
@@ -98,7 +102,9 @@ def view(
     # Ctrl-C is how it ends.
     with suppress(KeyboardInterrupt):
         listening = ListeningAddress(host, port)
-        run_view(interactive, listening, on_start, beside=second, photo_maps=maps)
+        run_view(
+            interactive, listening, on_start, beside=second, photo_maps=maps, photo_series=series
+        )
     say("view ended", quiet=quiet)
 
 

@@ -35,6 +35,7 @@ from nearfar.viewer.payloads import (
     pack_map,
     pack_row,
 )
+from nearfar.viewer.photo_series import PhotoSeries
 from nearfar.viewer.physical import PhysicalRelighting
 from nearfar.viewer.tools import tools_of
 from nearfar.viewer.uploads import read_body
@@ -60,7 +61,9 @@ class _Handlers:
         transport: InteractiveTransport,
         beside: Beside | None,
         photo_maps: Mapping[str, Map],
+        photo_series: PhotoSeries | None,
     ) -> None:
+        self._photo_series = photo_series
         self._transport, self._physical = transport, PhysicalRelighting(transport)
         # A light moves on while pixels are inspected, both while a map or an exact picture is
         # computed, and all of them while a file is decoded.
@@ -78,7 +81,9 @@ class _Handlers:
         self._maximum_light_bytes = maximum_light_bytes(transport.projector)
         self._maximum_picture_bytes = maximum_light_bytes(transport.stored.camera)
         titles = {**TITLES, **{name: found.title for name, found in photo_maps.items()}}
-        self._scene = describe_scene(transport, {name: titles[name] for name in self._maps}, beside)
+        named = {name: titles[name] for name in self._maps}
+        photos = [] if photo_series is None else photo_series.describe()
+        self._scene = {**describe_scene(transport, named, beside), "photos": photos}
         self._sessions = self._films = 0
 
     async def asset(self, name: str) -> Response:
@@ -115,6 +120,12 @@ class _Handlers:
         if name not in self._packed_maps:
             self._packed_maps[name] = await self._whole_pictures.run(pack_map, self._maps, name)
         return _bytes_response(self._packed_maps[name])
+
+    async def photo(self, number: int) -> Response:
+        """Return a photo of the capture and its light."""
+        if self._photo_series is None:
+            raise InputError("there are no photos here: give their capture to view.")
+        return _bytes_response(await self._whole_pictures.run(self._photo_series.photo, number))
 
     async def picture(self, request: Request) -> Response:
         """Return every camera pixel under the light of the request, as OpenEXR."""
@@ -195,6 +206,7 @@ def application(
     transport: InteractiveTransport,
     beside: Beside | None = None,
     photo_maps: Mapping[str, Map] = MappingProxyType({}),
+    photo_series: PhotoSeries | None = None,
 ) -> FastAPI:
     """Return the ASGI application of a transport's page.
 
@@ -205,13 +217,15 @@ def application(
         What is shown beside it.
     photo_maps : mapping of str to Map, optional
         Maps by photos, as `nearfar.viewer.held_out.photo_maps` makes them.
+    photo_series : PhotoSeries, optional
+        Photos to compare the scene with, each under its light.
 
     Raises
     ------
     MissingFileError
         If the package was installed without the page.
     """
-    handlers = _Handlers(transport, beside, photo_maps)
+    handlers = _Handlers(transport, beside, photo_maps, photo_series)
     routes = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     routes.exception_handler(NearfarError)(_error_response)
     routes.add_middleware(with_security_headers)
@@ -221,6 +235,7 @@ def application(
         ("/row", handlers.row),
         ("/column", handlers.column),
         ("/map/{name}", handlers.map),
+        ("/photo/{number}", handlers.photo),
         ("/{name}", handlers.asset),
     ):
         routes.get(path, response_model=None)(get)

@@ -9,6 +9,7 @@ from nearfar.viewer.application import application
 from nearfar.viewer.beside import Beside
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.messages import maximum_light_bytes
+from nearfar.viewer.photo_series import PhotoSeries
 from nearfar.viewer.server import ListeningAddress, serve
 
 
@@ -20,6 +21,7 @@ def run_view(
     *,
     beside: Beside | None = None,
     photo_maps: Mapping[str, Map] = MappingProxyType({}),
+    photo_series: PhotoSeries | None = None,
 ) -> None:
     """Serve the page of a transport until an interrupt, or until `stop` is set.
 
@@ -35,6 +37,8 @@ def run_view(
         A second transport, under the same light.
     photo_maps : mapping of str to Map, optional
         Maps by photos, as `nearfar.viewer.held_out.photo_maps` makes them.
+    photo_series : PhotoSeries, optional
+        Photos to compare the scene with, each under its light.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def run_view(
     """
     stop = stop or threading.Event()
     largest = maximum_light_bytes(transport.projector)
-    page = application(transport, beside, photo_maps)
+    page = application(transport, beside, photo_maps, photo_series)
     with serve(page, listening, maximum_message_bytes=largest) as url:
         on_start(url)
         try:

@@ -1,5 +1,6 @@
 // The page's state in its address: only what differs from the initial state.
 
+import { PHOTO_URL } from './photo-series.js';
 import { readRanges } from './ranges.js';
 import { readRegion } from './region-sides.js';
 import { ARRANGEMENTS, CAMERA_LIGHTS, CHANNELS, ERROR_BARS, KINDS, LIGHT_KEYS, METERINGS, RANGES, SPLITS, TABS, TOOLS, limitsOf, pick } from './state.js';
@@ -62,7 +63,7 @@ export function stateOf(given, initial, scene) {
   if (Array.isArray(given.keyframes))
     state.keyframes = given.keyframes.slice(0, MAXIMUM_KEYFRAMES).map(frame => pick(stateOf({ ...frame, keyframes: [] }, initial, scene), LIGHT_KEYS));
   if (Array.isArray(given.pictures))
-    state.pictures = given.pictures.slice(0, MAXIMUM_PICTURES).map(url => typeof url === 'string' && PNG_URL.test(url) ? url : '');
+    state.pictures = given.pictures.slice(0, MAXIMUM_PICTURES).map(url => typeof url === 'string' && (PNG_URL.test(url) || PHOTO_URL.test(url)) ? url : '');
   return state;
 }
 

@@ -2,6 +2,7 @@
 
 import { get, set, showFault } from './dom.js';
 import { fromFloat16 } from './picture.js';
+import { PHOTO_URL } from './photo-series.js';
 import { requestMessage } from './protocol.js';
 
 // Offsets in a PNG file.
@@ -47,12 +48,18 @@ export async function showingFaultsOf(file, work) {
 // The page's policy forbids fetching data: URLs, so they are decoded here.
 const blobOf = url => new Blob([Uint8Array.from(atob(url.split(',')[1]), c => c.charCodeAt(0))], { type: 'image/png' });
 
+// The light of a photo of the capture.
+async function lightOfPhoto(url, light) {
+  const { arrays: [levels] } = await requestMessage(`photo/${PHOTO_URL.exec(url)[1]}`);
+  return light.addLinear(levels.data, url);
+}
+
 // Adds the pictures that the address holds; returns them, and how many of them it does not.
 export async function restorePictures(urls, light) {
   const pictures = [];
   let missing = 0;
   for (const url of urls)
-    try { pictures.push(await light.addPicture(blobOf(url))); } catch {
+    try { pictures.push(await (PHOTO_URL.test(url) ? lightOfPhoto(url, light) : light.addPicture(blobOf(url)))); } catch {
       pictures.push(light.addMissing());
       missing += 1;
     }

@@ -113,7 +113,7 @@ export class Light {
 
   // Levels of a picture of the grid's size, in linear light; like the others it returns { number, url }, no URL if the address
   // cannot hold the picture.
-  addLinear(levels) { return this.#addLevels(levels.slice()); }
+  addLinear(levels, url = '') { return this.#addLevels(levels.slice(), url); }
 
   // In place of a picture that the address does not hold.
   addMissing() { return this.#addLevels(new Uint16Array(3 * this.height * this.width)); }

@@ -19,6 +19,7 @@ import { Light } from './light.js';
 import { Maps } from './maps.js';
 import { meter } from './metering.js';
 import { Numbers } from './numbers.js';
+import { PhotoSeries } from './photo-series.js';
 import { Playback } from './playback.js';
 import { request } from './protocol.js';
 import { Reach } from './reach.js';
@@ -63,8 +64,9 @@ async function open() {
   const tools = page.tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation, 'error-bars': new ErrorBars(page) });
   const numbers = page.numbers = new Numbers(page);
   describe(scene);
-  const region = page.region = new Region(page), beside = page.beside = new Beside(page);
+  const region = page.region = new Region(page), beside = page.beside = new Beside(page), photoSeries = new PhotoSeries(page);
   function show(changes) {
+    photoSeries.show(store.state); // What the scene is compared with comes before what is said of it.
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
     splits.show(split);
     splits.prepare();

@@ -17,7 +17,7 @@ function commit(output, onEnd) {
   // A slider keeps to its ends and steps.
   if (Number.isFinite(number) && String(number) !== slider.value) {
     slider.value = number;
-    slider.dispatchEvent(new Event('input'));
+    for (const name of ['input', 'change']) slider.dispatchEvent(new Event(name));
   }
   onEnd();
 }

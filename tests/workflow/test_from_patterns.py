@@ -6,8 +6,10 @@ import pytest
 import nearfar
 from nearfar import natural_picture, snr
 from nearfar.arrays import Size
+from nearfar.capture import import_photos, open_capture, read_shown
 from nearfar.errors import InputError, PlanError
-from nearfar.workflow.from_patterns import reconstruct_from_patterns
+from nearfar.transport.verdict import KeptVerdict, Reason
+from nearfar.workflow.from_patterns import _with_faults, reconstruct_from_patterns
 from tests.cli.conftest import check_done, check_sentence, run_nearfar
 from tests.shown import (
     captured,
@@ -15,9 +17,11 @@ from tests.shown import (
     fringes,
     gray_code,
     hadamard,
+    photograph,
     random_binary,
     white_and_black,
     with_inverses,
+    write_pictures,
 )
 
 SIZE = Size(8, 16)
@@ -150,6 +154,36 @@ def test_photos_of_other_scenes_are_wrong(world, tmp_path):
     taken = [*shuffled, *white_and_black(SIZE)]
     transport = reconstruct_from_patterns(captured(world, taken, tmp_path, shown=pictures))
     assert transport.verdict.grade != "good"
+
+
+def test_what_may_follow_from_a_fault_is_no_cause_beside_it(world, tmp_path):
+    pictures = SETS["Gray code and fringes"]()
+    patterns = write_pictures(tmp_path / "patterns", pictures)
+    linear = [photo / 16383 for photo in photograph(world, pictures)]
+    encoded = [(16383 * photo ** (1 / 2.2)).astype(np.uint16) for photo in linear]
+    taken = write_pictures(tmp_path / "photos", encoded)
+    paths = [taken / f"p{number}.png" for number in range(len(pictures))]
+    shown = read_shown(patterns)
+    import_photos(shown.plan, paths, tmp_path / "c.zarr", full_scale=16383, shown=shown)
+    verdict = reconstruct_from_patterns(open_capture(tmp_path / "c.zarr")).verdict
+    assert verdict.grade != "good"
+    assert verdict.causes == ("not-linear",)
+    assert "a power of about 0." in verdict.reasons[0].sentence
+
+
+@pytest.mark.parametrize("cause", ["too-few-photos", "noise", "model", "unknown"])
+def test_a_consequence_is_told_with_the_first_fault(cause):
+    found = KeptVerdict("doubtful", (Reason(cause, "x."), Reason("unchecked", "y.")))
+    faults = [Reason("not-linear", "the response is bent."), Reason("lamp", "it flickers.")]
+    verdict = _with_faults(found, faults)
+    assert verdict.causes == ("not-linear", "lamp", "unchecked")
+    first, second, _ = verdict.sentences
+    assert first.startswith("The response is bent. That ")
+    assert first.endswith("may follow from it.")
+    assert second == "It flickers."
+    assert _with_faults(found, []) == found
+    # Alone it is a cause.
+    assert _with_faults(KeptVerdict("good"), [Reason(cause, "x.")]).causes == (cause,)
 
 
 def test_what_cannot_be_estimated_is_refused(world, tmp_path):

@@ -233,7 +233,8 @@ class NotLinear:
     Attributes
     ----------
     encoding : str
-        The response that explains it best, such as "sRGB"; empty if none does.
+        The response that explains it best, such as "sRGB"; empty if none does. A gamma is that of
+        the display: values are light to the power 1/gamma.
     """
 
     encoding: str

@@ -39,6 +39,11 @@ LEAST_LIT = 0.05
 # Steps of the photos' numbers that direct light makes at least.
 LEAST_STEPS = 2.0
 AXES = ("rows", "columns")
+# What powers of the patterns' levels mean, projector and camera together.
+POWERS = (
+    "1 is linear; a projector of gamma 2.2 alone makes 2.2, photos encoded by a gamma of 2.2 alone "
+    "1/2.2 = 0.45"
+)
 # Camera pixels by which a power is fitted; it counts where it leaves less than this share of what
 # linear levels leave unexplained, and differs from 1 by more than these octaves.
 FITTED_PIXELS = 4096
@@ -102,10 +107,9 @@ class FoundCorrespondence:
             found.append(
                 Reason(
                     "not-linear",
-                    f"projector or camera is not linear: the photos follow the patterns' levels "
-                    f"raised to {self.exponent:.2f}, and the devices' own power is as far from 1 "
-                    f"or farther, as global light hides a part of it. q allows for that, a "
-                    f"transport does not: set the gamma of both to 1, or calibrate.",
+                    f"projector or camera is not linear: the photos' values follow the patterns' "
+                    f"levels to a power of about {self.exponent:.2f} ({POWERS}). q allows for "
+                    f"that, a transport does not: set the gamma of both to 1, or calibrate.",
                 )
             )
         return found

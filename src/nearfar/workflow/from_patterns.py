@@ -46,6 +46,13 @@ PATCHES_ALONG = 3
 PATCH_SIDE = 10
 # Arrays of a camera pixel that are held at once, over those of its transport.
 COPIES = 3
+# By their causes, reasons that may be mere consequences of another fault of the photos.
+CONSEQUENCES = {
+    "unknown": "photos of inverse patterns do not sum to one white",
+    "too-few-photos": "too little seems to be measured",
+    "noise": "the photos seem noisy",
+    "model": "the scene seems to have light that the model cannot represent",
+}
 
 
 class _Data(NamedTuple):
@@ -198,13 +205,26 @@ def _read(capture: Capture, places: Floats) -> _Data:
 
 
 def _with_faults(verdict: KeptVerdict, faults: Sequence[Reason]) -> KeptVerdict:
-    """Return a verdict with faults of the photos, which held-out ones share, as first reasons."""
+    """Return a verdict with faults of the photos, which held-out ones share, as first reasons.
+
+    What may be no more than a consequence of them is no cause beside them, and is told with the
+    first.
+    """
     if not faults:
         return verdict
+    first, *rest = faults
     named = {fault.cause for fault in faults}
-    others = (reason for reason in verdict.reasons if reason.cause not in named)
+    others = [*rest, *(reason for reason in verdict.reasons if reason.cause not in named)]
+    for reason in others:
+        if (seen := CONSEQUENCES.get(reason.cause)) is not None:
+            first = first._replace(sentence=f"{first.sentence} That {seen} may follow from it.")
+    causes = (reason for reason in others if reason.cause not in CONSEQUENCES)
     is_wrong = verdict.grade == "wrong" or "order" in named
-    return replace(verdict, grade="wrong" if is_wrong else "doubtful", reasons=(*faults, *others))
+    return replace(
+        verdict,
+        grade="wrong" if is_wrong else "doubtful",
+        reasons=(first, *causes),
+    )
 
 
 def _judge(capture: Capture, data: _Data, progress: Report) -> Judged:

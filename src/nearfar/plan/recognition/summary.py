@@ -122,7 +122,7 @@ def _of_fringes(recognised: Recognised, contents: Sequence[Content]) -> str:
     else:
         named = f"period {_listed(periods)} pixels"
     powers = [each.exponent for each in fringes if each.exponent != 1.0]
-    power = f", sinusoids once raised to {sum(powers) / len(powers):.2f}" if powers else ""
+    power = f", sinusoids in levels to the power {sum(powers) / len(powers):.2f}" if powers else ""
     return f"{step}{where}, {named}{power}"
 
 

@@ -68,7 +68,9 @@ FLICKER_SHARE = 0.2
 # excess of their sums is left.
 DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
     "sRGB": lambda values: from_srgb(np.clip(values, 0.0, 1.0)),
-    "a gamma of 2.2": lambda values: np.maximum(values, 0.0) ** 2.2,
+    "a gamma of 2.2 (values are light to the power 1/2.2 = 0.45)": lambda values: (
+        np.maximum(values, 0.0) ** 2.2
+    ),
 }
 NAMED_SHARE = 0.2
 # Share of camera pixels at which all photos of black read the lowest level.

@@ -15,6 +15,8 @@ demo: $(READY)
 
 # One thread for BLAS: as many processes as processors share the work as it is.
 test: export OPENBLAS_NUM_THREADS := 1
+# Each process would compile all modules anew where it keeps none of them.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
 

@@ -14,9 +14,9 @@ import nearfar
 
 TIMED = """
 import sys, time
-started = time.perf_counter()
+started = time.process_time()
 import nearfar
-seconds = time.perf_counter() - started
+seconds = time.process_time() - started
 heavy = {"scipy", "numba", "zarr", "trimesh", "embreex", "imagecodecs", "OpenEXR"}
 heavy &= set(sys.modules)
 sys.exit(f"slow: {seconds} s, {heavy}" if heavy or seconds > 0.5 else 0)

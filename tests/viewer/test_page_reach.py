@@ -204,7 +204,7 @@ def test_the_server_stops_once_nobody_waits(stored, monkeypatch):
         if len(steps) == 2:
             second.set()
         if len(steps) > 2:
-            time.sleep(0.05)
+            time.sleep(0.25)
         return probe(*given)
 
     monkeypatch.setattr(reach, "STEP_ENTRIES", 1)
@@ -222,5 +222,5 @@ def test_the_server_stops_once_nobody_waits(stored, monkeypatch):
         before = -1
         while before != len(steps):
             before = len(steps)
-            time.sleep(0.5)
+            time.sleep(1)
     assert len(steps) < CAMERA.height / 2

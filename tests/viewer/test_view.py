@@ -433,10 +433,14 @@ def test_too_many_requests_at_once_are_refused(serve_it, monkeypatch):
     from nearfar.viewer import jobs, payloads
 
     monkeypatch.setattr(jobs, "MAXIMUM_JOBS", 2)
-    row_of = payloads.transport_row
-    monkeypatch.setattr(
-        payloads, "transport_row", lambda *given: [time.sleep(0.5), row_of(*given)][1]
-    )
+    row_of, refused_one = payloads.transport_row, threading.Event()
+
+    def held(*given):
+        # Until another one is refused, on the busiest machine too.
+        assert refused_one.wait(LONGEST_WAIT)
+        return row_of(*given)
+
+    monkeypatch.setattr(payloads, "transport_row", held)
     address = serve_it()
 
     def row(_):
@@ -444,6 +448,7 @@ def test_too_many_requests_at_once_are_refused(serve_it, monkeypatch):
             return 200 if ask(address, "/row?y=1&x=1") else 0
         except urllib.error.HTTPError as error:
             error.close()
+            refused_one.set()
             return error.code
 
     with ThreadPoolExecutor(8) as pool:

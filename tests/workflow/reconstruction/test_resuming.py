@@ -2,6 +2,7 @@
 
 import random
 import shutil
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -263,39 +264,56 @@ def test_a_folder_that_holds_something_else_is_not_gone_on_with(
     assert list(tmp_path.iterdir()) == [folder]
 
 
+def _length(log):
+    """Bytes of a log; 0 where it is not there, or no more."""
+    try:
+        return log.stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
 @pytest.mark.slow(minutes=1.5)
-def test_kill_9_at_twenty_moments_costs_nothing(tall_capture, tall_whole, tmp_path):
+def test_kill_9_at_twenty_moments_costs_nothing(
+    tall_capture, tall_whole, tmp_path, tmp_path_factory
+):
     generator = random.Random(0)
     path = tmp_path / "t.zarr"
     log = Path(f"{path}.unfinished") / LOG_NAME
     memory = f"{_memory(tall_capture) / 1e6}MB"
     command = ("reconstruct", tall_capture.path, path, "--memory", memory, "-q")
+    undisturbed = _judged(tall_whole, tall_capture, tmp_path_factory.mktemp("judged"))
     kills = 0
-    while kills < 20:
+    # On a busy machine it may end before it is killed; the next one is begun anew.
+    for _ in range(60):
         resume = ["--resume"] if log.parent.exists() else []
         process = start(run_command, *command, *resume)
         # From its first reading on, to a tile or so.
         while not log.parent.exists() and process.exitcode is None:
             time.sleep(0.001)
-        before = log.stat().st_size if log.exists() else 0
-        while process.exitcode is None and (log.stat().st_size if log.exists() else 0) == before:
+        before = _length(log)
+        while process.exitcode is None and _length(log) == before:
             if kills % 4 == 0 and generator.random() < 0.02:
                 break
             time.sleep(0.01)
         time.sleep(generator.uniform(0, 0.02))
-        finished = process.exitcode
         process.kill()
         process.join()
-        kills += 1
-        if finished is not None:
-            assert finished == 0
+        assert process.exitcode in {0, -signal.SIGKILL}
+        kills += process.exitcode != 0
+        if kills == 20:
             break
-    if not path.exists():
-        resume = ["--resume"] if log.parent.exists() else []
-        check_done(run_nearfar(*command, *resume))
-    assert kills == 20, "it ended before it was killed twenty times: give it more tiles"
+        if path.exists():
+            # Killed while it was judged, it has no verdict.
+            if process.exitcode == 0:
+                _check_same(undisturbed, path)
+            shutil.rmtree(path)
+    assert kills == 20
+    if path.exists():
+        shutil.rmtree(path)
+    resume = ["--resume"] if log.parent.exists() else []
+    check_done(run_nearfar(*command, *resume))
     assert list(tmp_path.iterdir()) == [path]
-    _check_same(_judged(tall_whole, tall_capture, tmp_path), path)
+    _check_same(undisturbed, path)
 
 
 def test_by_the_command_line_with_a_torn_log(capture, whole, memory, tmp_path):

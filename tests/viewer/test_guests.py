@@ -18,7 +18,7 @@ from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.server import ListeningAddress
 from tests.viewer.asking import PROJECTOR, ask, message, refused, relit, socket_of
 from tests.viewer.conftest import served_view
-from tests.waiting import LONGEST_WAIT
+from tests.waiting import LONGEST_WAIT, wait_until
 
 
 @pytest.mark.parametrize(
@@ -63,24 +63,36 @@ def test_messages_that_are_too_large_are_refused(address, lights):
     relit(address, lights["spot"])
 
 
+def _is_refused(socket):
+    try:
+        socket.recv(timeout=0.01)
+    except websockets.exceptions.ConnectionClosed as gone:
+        assert gone.rcvd.code == 1013
+        assert "close one of them" in gone.rcvd.reason
+        return True
+    except TimeoutError:
+        return False
+    return False
+
+
 def test_hundreds_of_sockets_are_refused_and_the_first_go_on(serve_it, lights):
     address = serve_it()
     with ExitStack() as stack:
         first = stack.enter_context(socket_of(address))
         first.send(message(lights["spot"]))
         first.recv(timeout=LONGEST_WAIT)
-        closed = 0
+        others = []
         for _ in range(300):
             socket = stack.enter_context(socket_of(address))
-            try:
-                socket.recv(timeout=0.01)
-            except websockets.exceptions.ConnectionClosed as gone:
-                assert gone.rcvd.code == 1013
-                assert "close one of them" in gone.rcvd.reason
-                closed += 1
-            except TimeoutError:
-                pass
-        assert closed >= 300 - 2 * application.MAXIMUM_SESSIONS
+            if not _is_refused(socket):
+                others.append(socket)
+
+        def most_are_refused():
+            # On a busy machine a refusal comes late.
+            others[:] = [socket for socket in others if not _is_refused(socket)]
+            return len(others) <= 2 * application.MAXIMUM_SESSIONS
+
+        wait_until(most_are_refused)
         first.send(message(lights["random"]))
         first.recv(timeout=LONGEST_WAIT)
     # Those that went made room.

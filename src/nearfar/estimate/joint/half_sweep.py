@@ -73,6 +73,7 @@ def sweep_half(
         order,
         starts=before is None,
         is_new=not part.known.all(),
+        has_offset=problem.has_offset_noise,
         misfit=np.zeros(len(order)),
     )
     sweep.run(chosen, report)
@@ -108,6 +109,7 @@ class _HalfSweep(NamedTuple):
     order: Integers  # camera pixel of each place
     starts: bool
     is_new: bool  # whether no sweep has estimated these camera pixels before
+    has_offset: bool  # whether the references have noise
     misfit: Floats  # of each place's responses, by its choice
 
     def run(self, chosen: ComponentChoice | None, report: Callable[[float], None]) -> None:
@@ -274,7 +276,7 @@ class _HalfSweep(NamedTuple):
         """Return a batch of places, and responses to unit amplitudes, which it has views of."""
         problem, selected = self.problem, self.order[places]
         pixels, centred = problem.pixels, problem.model.centred
-        centres, first = pixels.centres[selected], int(problem.has_offset_noise)
+        centres, first = pixels.centres[selected], int(self.has_offset)
         units = np.empty((len(places), first + 3, centred.basis.count), dtype=np.float32)
         if first:
             put_ones(centres, centred.basis.single_phases, units)

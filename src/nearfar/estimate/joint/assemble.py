@@ -103,7 +103,7 @@ def _far_range(rest: Floats, far: Floats, kept: Integers) -> Floats:
 
     def work(batch: slice) -> None:
         found[batch, :, 0] = rest[batch]
-        found[batch, :, 1:] = far[batch][..., kept]
+        found[batch, :, 1:] = xp.take(far[batch], kept, axis=2)
 
     side_by_side(work, blocks(len(far), BATCH_PIXELS))
     return found

@@ -118,20 +118,25 @@ def put_mean_waves(
 
 @compiled
 def _put_direct(
-    middles: Floats, footprints: Floats, n: int, waves: Floats, sums: Floats, found: Floats
+    middle: tuple[float, float],
+    sides: tuple[float, float],
+    skew: tuple[float, float],
+    waves: Floats,
+    sums: Floats,
+    found: Floats,
 ) -> None:
     """Write responses of one footprint to (R,)."""
-    height, width = max(footprints[n, 0], LEAST_WIDTH), max(footprints[n, 1], LEAST_WIDTH)
+    height, width = max(sides[0], LEAST_WIDTH), max(sides[1], LEAST_WIDTH)
     reach = waves.shape[2] // 2
     # Both boxes of an upright footprint are the same.
-    slanted = footprints[n, 2] != 0.0 or footprints[n, 3] != 0.0
+    slanted = skew[0] != 0.0 or skew[1] != 0.0
     share = np.float32(0.5 if slanted else 1.0)
     for r in range(len(found)):
         found[r] = 0.0
     for box in range(2 if slanted else 1):
         sign = 2.0 * box - 1.0
-        down = ends_of_box(middles[n, 0] + sign * footprints[n, 2], height, reach)
-        across = ends_of_box(middles[n, 1] + sign * footprints[n, 3], width, reach)
+        down = ends_of_box(middle[0] + sign * skew[0], height, reach)
+        across = ends_of_box(middle[1] + sign * skew[1], width, reach)
         for r in range(len(found)):
             y_cosine = _mean_wave(down, 0, 0, r, waves, sums)
             y_sine = _mean_wave(down, 0, 1, r, waves, sums)
@@ -144,12 +149,32 @@ def _put_direct(
 def _of_boxes(middles: Floats, footprints: Floats, waves: Floats, sums: Floats) -> Floats:
     number, count = len(middles), waves.shape[3]
     found = np.empty((number, count), dtype=np.float32)
-    direct = np.empty(count, np.float32)
+    direct = np.empty(count, dtype=np.float32)
     for n in range(number):
-        _put_direct(middles, footprints, n, waves, sums, direct)
+        middle, sides = (middles[n, 0], middles[n, 1]), (footprints[n, 0], footprints[n, 1])
+        skew = (footprints[n, 2], footprints[n, 3])
+        _put_direct(middle, sides, skew, waves, sums, direct)
         for r in range(count):
             found[n, r] = direct[r]
     return found
+
+
+@compiled
+def power_along(responses: Floats, n: int, roots: Floats, direct: Floats) -> float:
+    """Return how much of the power of responses[n], (channels, R), direct light explains.
+
+    Its responses, (R,), are overwritten.
+    """
+    squared, total = np.float32(0.0), 0.0
+    for r in range(len(roots)):
+        direct[r] *= roots[r]
+        squared += direct[r] * direct[r]
+    for channel in range(responses.shape[1]):
+        along = np.float32(0.0)
+        for r in range(len(roots)):
+            along += responses[n, channel, r] * direct[r]
+        total += np.float64(max(along, np.float32(0.0))) ** 2
+    return float(total / max(squared, np.float32(1e-12)))
 
 
 @compiled
@@ -158,25 +183,19 @@ def _explained(
     roots: Floats,
     middles: Floats,
     footprints: Floats,
+    blurs: Floats,
     waves: Floats,
     sums: Floats,
 ) -> Floats:
-    number, channels, count = responses.shape
-    found = np.empty(number)
-    direct = np.empty(count, np.float32)
-    for n in range(number):
-        _put_direct(middles, footprints, n, waves, sums, direct)
-        squared = np.float32(0.0)
-        for r in range(count):
-            direct[r] *= roots[r]
-            squared += direct[r] * direct[r]
-        total = 0.0
-        for channel in range(channels):
-            along = np.float32(0.0)
-            for r in range(count):
-                along += responses[n, channel, r] * direct[r]
-            total += np.float64(max(along, np.float32(0.0))) ** 2
-        found[n] = total / max(squared, np.float32(1e-12))
+    found = np.empty((len(responses), len(blurs)))
+    direct = np.empty(waves.shape[3], dtype=np.float32)
+    for n in range(len(responses)):
+        middle, skew = (middles[n, 0], middles[n, 1]), (footprints[n, 2], footprints[n, 3])
+        for place in range(len(blurs)):
+            height = np.hypot(footprints[n, 0], blurs[place])
+            width = np.hypot(footprints[n, 1], blurs[place])
+            _put_direct(middle, (height, width), skew, waves, sums, direct)
+            found[n, place] = power_along(responses, n, roots, direct)
     return found
 
 
@@ -256,11 +275,16 @@ def of_boxes(middles: Floats, footprints: Floats, table: WaveTable) -> Floats:
 
 
 def explained_by_boxes(
-    responses: Floats, roots: Floats, middles: Floats, footprints: Floats, table: WaveTable
+    responses: Floats,
+    roots: Floats,
+    middles: Floats,
+    footprints: Floats,
+    blurs: Floats,
+    table: WaveTable,
 ) -> Floats:
-    """Return how much of the power of responses direct light of footprints explains, (n,), float64.
+    """Return how much of the power of responses direct light of footprints explains, (n, S).
 
-    It is not negative.
+    It is not negative; float64.
 
     Parameters
     ----------
@@ -270,9 +294,11 @@ def explained_by_boxes(
         One measurement's noise in units of each response's.
     middles, footprints, table
         As in `of_boxes`.
+    blurs : ndarray, shape (S,), float64
+        Widths of boxes that the footprints are blurred by.
     """
     both = _as_doubles(middles), _as_doubles(footprints)
-    return np.asarray(_explained(responses, roots, *both, table.waves, table.sums))
+    return np.asarray(_explained(responses, roots, *both, blurs, table.waves, table.sums))
 
 
 def put_with_derivatives(

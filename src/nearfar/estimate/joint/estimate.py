@@ -162,6 +162,11 @@ def _sweep(
             progress((number + share) / sweeps)
 
         mine = choice and choice.of(_pixels(problem, held))
+        is_last = number >= sweeps - (2 if halves else 1)
+        if halves and number == sweeps - 1 >= 4 and mine is None:
+            # Of what is left by then, another choice hardly finds more.
+            assert found is not None
+            mine = found.choices.sweeps[-2].of(slice(None))
         part = part_of_sweep(problem, number) if halves else None
         if part is None:
             found = sweep_once(problem, found, report, mine)
@@ -169,7 +174,6 @@ def _sweep(
             found = sweep_half(problem, found, report, mine, part)
         if number == 0 and chosen.of_error_bars is not None:
             found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
-        is_last = number >= sweeps - (2 if halves else 1)
         before = problem
         problem = _with_new_q(problem, found, part, is_last=is_last)
         if is_last and not halves:

@@ -10,7 +10,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.compiled import compiled
-from nearfar.estimate.joint.box_waves import put_mean_waves
+from nearfar.estimate.joint.box_waves import power_along, put_mean_waves
 from nearfar.transport.boxes import LEAST_WIDTH
 
 
@@ -45,25 +45,16 @@ def _power(
     Their mean waves are at the places `down` and `across`, and the next ones; `direct`, (R,), is
     overwritten.
     """
-    squared, total = np.float32(0.0), 0.0
     share = np.float32(0.5 if slanted else 1.0)
     for r in range(len(roots)):
         one = means[down, 0, r] * means[across, 0, r] + means[down, 1, r] * means[across, 1, r]
-        direct[r] = one
+        direct[r] = share * one
     if slanted:
         down, across = down + 1, across + 1
         for r in range(len(roots)):
             other = means[down, 0, r] * means[across, 0, r]
-            direct[r] += other + means[down, 1, r] * means[across, 1, r]
-    for r in range(len(roots)):
-        direct[r] *= share * roots[r]
-        squared += direct[r] * direct[r]
-    for channel in range(responses.shape[1]):
-        along = np.float32(0.0)
-        for r in range(len(roots)):
-            along += responses[n, channel, r] * direct[r]
-        total += np.float64(max(along, np.float32(0.0))) ** 2
-    return float(total / max(squared, np.float32(1e-12)))
+            direct[r] += share * (other + means[down, 1, r] * means[across, 1, r])
+    return float(power_along(responses, n, roots, direct))
 
 
 @compiled

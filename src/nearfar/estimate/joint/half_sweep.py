@@ -20,7 +20,11 @@ from nearfar.estimate.joint.chessboard import Part
 from nearfar.estimate.joint.choose import choose, is_doubtful
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses
 from nearfar.estimate.joint.footprint import put_footprint_weights, unit_responses
-from nearfar.estimate.joint.neighbour_loops import expect_each_by_pixel, expect_together_by_pixel
+from nearfar.estimate.joint.neighbour_loops import (
+    Expectation,
+    expect_each_by_pixel,
+    expect_together_by_pixel,
+)
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem
 from nearfar.estimate.joint.shared_choice import chooser_of_each
@@ -357,11 +361,18 @@ def _whole(problem: Problem, order: Integers) -> _Left:
 
 def _less_expected(problem: Problem, rows: EstimatedRows, part: Part) -> _Left:
     """Return the expectation of a part's camera pixels from their neighbours, and the residuals."""
-    near, far = _expected(problem, rows, part)
+    near, far = (
+        np.empty((len(part.selected), *values.shape[1:]), dtype=np.float32)
+        for values in (rows.near, rows.far)
+    )
     found = _Left(near, far, np.empty_like(far))
+    put_near, put_far = _expectations(problem, rows, part.known)
 
     def work(batch: slice) -> None:
-        centres = problem.pixels.centres[part.selected[batch]]
+        some = part.selected[batch]
+        put_near(some, near[batch])
+        put_far(some, far[batch])
+        centres = problem.pixels.centres[some]
         found.responses[batch] = near_responses(near[batch], centres, problem.model.centred)
         _put_residuals(problem, part.selected, found, batch)
 
@@ -382,8 +393,10 @@ def _put_residuals(problem: Problem, order: Integers, left: _Left, batch: slice)
     )
 
 
-def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats, Floats]:
-    """Return n and f of a part's camera pixels as their neighbours lead to expect."""
+def _expectations(
+    problem: Problem, rows: EstimatedRows, known: Booleans
+) -> tuple[Expectation, Expectation]:
+    """Return filters that write n and f of camera pixels as their neighbours lead to expect."""
     pixels, measurements = problem.pixels, problem.measurements
     shape = (*measurements.camera, measurements.channels)
     white = pixels.white.reshape(shape)
@@ -391,19 +404,19 @@ def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats
     variance = np.clip((measurements.noise.reshape(shape) / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    far = expect_each_by_pixel(
+    of_far = expect_each_by_pixel(
         rows.far.reshape((*shape, -1)),
         white,
         variance,
         problem.model.multiplicity,
         np.flatnonzero(cycles >= np.median(cycles)),
-        part,
+        known,
     )
-    near = expect_together_by_pixel(
+    of_near = expect_together_by_pixel(
         rows.near.reshape((*shape, -1)),
         white,
         rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(measurements.camera),
-        part,
+        known,
     )
-    return near, far
+    return of_near, of_far

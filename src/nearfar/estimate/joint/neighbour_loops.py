@@ -3,16 +3,17 @@
 Index convention: arrays are (Cy, Cx, channels, j), j over coefficients.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.compiled import compiled
-from nearfar.estimate.joint.chessboard import Part
 from nearfar.estimate.joint.neighbours import DEVIATION_FLOOR, DIVISOR_FLOOR, HIGHEST_FACTOR
-from nearfar.parallel import side_by_side
 
-# Camera pixels on which one thread works.
-PIXELS = 4096
+# Writes what is expected of camera pixels (n,), their indices, to (n, channels, J).
+Expectation = Callable[[Integers, Floats], None]
 
 
 def expect_each_by_pixel(
@@ -21,61 +22,31 @@ def expect_each_by_pixel(
     variance: Floats,
     multiplicity: Floats,
     highest: Integers,
-    part: Part,
-) -> Floats:
-    """Filter each coefficient with a gain of its own; see `neighbours.expect_each`.
+    known: Booleans,
+) -> Expectation:
+    """Return a filter of each coefficient with a gain of its own; see `neighbours.expect_each`.
 
-    Returns
-    -------
-    ndarray, shape (n, channels, J)
-        Of the part's camera pixels. Where one is not known itself, the mean of its neighbours is
-        expected.
+    Where a camera pixel is not known itself, the mean of its neighbours is expected.
     """
-    selected, known = part
-    found = np.empty((len(selected), *values.shape[2:]), dtype=values.dtype)
     weight = (known[..., None] / variance).astype(values.dtype)
     by_noise = 1.0 + 1.0 / np.sqrt(len(highest))
     of_highest = np.zeros(values.shape[3], dtype=values.dtype)
     of_highest[highest] = multiplicity[highest] / len(highest)
-
-    def work(some: slice) -> None:
-        _expect_each(
-            values,
-            white,
-            variance,
-            weight,
-            multiplicity,
-            of_highest,
-            by_noise,
-            selected[some],
-            found[some],
-        )
-
-    side_by_side(work, blocks(len(selected), PIXELS))
-    return found
+    return partial(
+        _expect_each, values, white, variance, weight, multiplicity, of_highest, by_noise
+    )
 
 
 def expect_together_by_pixel(
-    values: Floats, white: Floats, variance: Floats, lit: Booleans, part: Part
-) -> Floats:
-    """Filter coefficients with one gain for all of them; see `neighbours.expect_together`.
+    values: Floats, white: Floats, variance: Floats, lit: Booleans, known: Booleans
+) -> Expectation:
+    """Return a filter of coefficients with one gain for all; see `neighbours.expect_together`.
 
-    Returns
-    -------
-    ndarray, shape (n, channels, J)
-        Of the part's camera pixels. Where one is not known itself, the mean of its neighbours is
-        expected.
+    Where a camera pixel is not known itself, the mean of its neighbours is expected.
     """
-    selected, known = part
-    found = np.empty((len(selected), *values.shape[2:]), dtype=values.dtype)
     has_say = (lit & known)[..., None]
     weight = (has_say / np.maximum(variance, DEVIATION_FLOOR**2)).astype(values.dtype)
-
-    def work(some: slice) -> None:
-        _expect_together(values, white, variance, weight, lit, selected[some], found[some])
-
-    side_by_side(work, blocks(len(selected), PIXELS))
-    return found
+    return partial(_expect_together, values, white, variance, weight, lit)
 
 
 # Loops read whole arrays by index: a slice of an array takes longer to make than a row to add up.

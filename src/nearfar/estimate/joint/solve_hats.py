@@ -32,6 +32,8 @@ from nearfar.priors.responses import ResponsePrior
 LEAST_VARIANCE = 0.01
 # Leading eigenvectors are counted in multiples of as many, so that camera pixels share a number.
 MULTIPLE = 32
+# Sums are over a multiple of as many numbers: those that a processor adds up at once.
+LANES = 16
 
 
 class Leading(NamedTuple):
@@ -198,8 +200,10 @@ def fit_leading(
     right, misfit = np.empty(number), np.empty(len(responses))
     # The responses and their leading coordinates, one after the other: units, and what is measured.
     # Sums of what the leading eigenvectors leave are small differences of large numbers.
-    both = np.empty((number + 1, count + leading))
-    weighted, weight = np.empty((number, count + leading)), np.empty(count + leading)
+    # Zeros fill the last vector instructions.
+    whole = -(-(count + leading) // LANES) * LANES
+    both, weighted = np.zeros((number + 1, whole)), np.zeros((number, whole))
+    weight = np.zeros(whole)
     for m in range(len(responses)):
         n, precise = pixel[m], 1.0 / np.float64(noise_variance[m])
         for r in range(count):
@@ -214,15 +218,15 @@ def fit_leading(
                 both[g, r] = units[n, g, r]
             for i in range(leading):
                 both[g, count + i] = of_units[n, g, i]
-            for r in range(count + leading):
+            for r in range(whole):
                 weighted[g, r] = weight[r] * both[g, r]
             total = 0.0
-            for r in range(count + leading):
+            for r in range(whole):
                 total += weighted[g, r] * both[number, r]
             right[g] = total
             for h in range(g + 1):
                 total = 0.0
-                for r in range(count + leading):
+                for r in range(whole):
                     total += weighted[g, r] * both[h, r]
                 normal[g, h] = total
             normal[g, g] += precision[m, g]

@@ -29,7 +29,7 @@ BATCH_PIXELS = 2048
 
 
 def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
-    """Return the transport, which takes over the rows' arrays where functions are of several pixels.
+    """Return the transport, which at a pitch over 1 takes over the arrays of the rows.
 
     f is kept at the measured frequencies of the far band, and at those others that lie on the DFT
     grid of the projector: there light is held that no window holds. Its DC is white less d and n.

@@ -15,7 +15,12 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.batch import AllPixels
-from nearfar.estimate.joint.chessboard import Part, every_choice, part_of_sweep
+from nearfar.estimate.joint.chessboard import (
+    CHOOSING_SWEEPS,
+    Part,
+    every_choice,
+    part_of_sweep,
+)
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
 from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
@@ -163,10 +168,10 @@ def _sweep(
 
         mine = choice and choice.of(_pixels(problem, held))
         is_last = number >= sweeps - (2 if halves else 1)
-        if halves and number == sweeps - 1 >= 4 and mine is None:
-            # Of what is left by then, another choice hardly finds more.
+        if halves and number >= CHOOSING_SWEEPS and mine is None:
             assert found is not None
-            mine = found.choices.sweeps[-2].of(slice(None))
+            # The sweep before the last was of the same colour.
+            mine = found.choices.sweeps[-2]
         part = part_of_sweep(problem, number) if halves else None
         if part is None:
             found = sweep_once(problem, found, report, mine)

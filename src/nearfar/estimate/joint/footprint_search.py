@@ -138,7 +138,12 @@ def descend(
         held[0], held[1], free = 0, 2, 4
         _put_both(mine, 0, waves, sums, means, 0)
         _put_both(mine, 1, waves, sums, means, 2)
+        has_moved = True
         for s in range(len(steps)):
+            # A step that has led nowhere leads nowhere again.
+            if s > 0 and steps[s] == steps[s - 1] and not has_moved:
+                continue
+            has_moved = False
             for way in range(2 * coordinates):
                 i = way % coordinates
                 sign = 1.0 if way < coordinates else -1.0
@@ -156,7 +161,7 @@ def descend(
                 slanted = tried[4] != 0.0 or tried[5] != 0.0
                 explained = _power(responses, n, roots, means, down, across, slanted, direct)
                 if explained > best[n]:
-                    best[n], mine[i] = explained, tried[i]
+                    best[n], mine[i], has_moved = explained, tried[i], True
                     held[axis], free = free, held[axis]
         for j in range(6):
             numbers[n, j] = mine[j]

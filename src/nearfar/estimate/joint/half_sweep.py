@@ -77,6 +77,7 @@ def sweep_half(
         order,
         starts=before is None,
         is_new=not part.known.all(),
+        moves_q=part.moves_q,
         has_offset=problem.has_offset_noise,
         misfit=np.zeros(len(order)),
     )
@@ -113,6 +114,7 @@ class _HalfSweep(NamedTuple):
     order: Integers  # camera pixel of each place
     starts: bool
     is_new: bool  # whether no sweep has estimated these camera pixels before
+    moves_q: bool  # whether shifts of q are estimated
     has_offset: bool  # whether the references have noise
     misfit: Floats  # of each place's responses, by its choice
 
@@ -263,17 +265,8 @@ class _HalfSweep(NamedTuple):
 
     def _choosing(self, places: Integers) -> PixelBatch:
         """Return a batch of places, with the responses that a choice asks for."""
-        pixels, selected = self.problem.pixels, self.order[places]
-        q, centres, lit = (
-            pixels.correspondence[selected],
-            pixels.centres[selected],
-            pixels.lit[selected],
-        )
-        middles = np.where(lit[:, None], q - centres, 0.0)
-        centred = self.problem.model.centred
-        weights = unit_responses(middles, pixels.footprint[selected], centred)
-        weights[~lit] = 0.0
-        nothing = np.zeros((len(places), 0, centred.basis.count), dtype=np.float32)
+        weights = _unit_direct(self.problem, self.order[places])
+        nothing = np.zeros((len(places), 0, weights.shape[1]), dtype=np.float32)
         return self._batch(places, weights[:, None], nothing)
 
     def _with_units(self, places: Integers) -> tuple[PixelBatch, Floats]:
@@ -281,11 +274,15 @@ class _HalfSweep(NamedTuple):
         problem, selected = self.problem, self.order[places]
         pixels, centred = problem.pixels, problem.model.centred
         centres, first = pixels.centres[selected], int(self.has_offset)
-        units = np.empty((len(places), first + 3, centred.basis.count), dtype=np.float32)
+        of_direct = 3 if self.moves_q else 1
+        units = np.empty((len(places), first + of_direct, centred.basis.count), dtype=np.float32)
         if first:
             put_ones(centres, centred.basis.single_phases, units)
         q, footprints = pixels.correspondence[selected], pixels.footprint[selected]
-        put_footprint_weights(q, centres, footprints, centred, first, units)
+        if self.moves_q:
+            put_footprint_weights(q, centres, footprints, centred, first, units)
+        else:
+            units[:, first] = _unit_direct(problem, selected)
         return self._batch(places, units[:, first:], units[:, :first]), units
 
     def _batch(self, places: Integers, direct_weights: Floats, of_offset: Floats) -> PixelBatch:
@@ -304,6 +301,16 @@ class _HalfSweep(NamedTuple):
             white=pixels.white[selected],
             spike_expected=nothing.astype(bool),
         )
+
+
+def _unit_direct(problem: Problem, selected: Integers) -> Floats:
+    """Return responses of unit direct light of camera pixels, (n, R); 0 where there is none."""
+    pixels, lit = problem.pixels, problem.pixels.lit[selected]
+    offsets = pixels.correspondence[selected] - pixels.centres[selected]
+    middles = np.where(lit[:, None], offsets, 0.0)
+    found = unit_responses(middles, pixels.footprint[selected], problem.model.centred)
+    found[~lit] = 0.0
+    return found
 
 
 def _order(problem: Problem, selected: Integers) -> Integers:

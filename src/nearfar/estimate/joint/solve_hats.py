@@ -158,6 +158,26 @@ def solve_hats(
 
 
 @compiled
+def _put_normal(
+    both: Floats, weight: Floats, weighted: Floats, normal: Floats, right: Floats
+) -> None:
+    """Write weighted sums of products of units (G, whole), and of them and the measured row."""
+    number, whole = weighted.shape
+    for g in range(number):
+        for r in range(whole):
+            weighted[g, r] = weight[r] * both[g, r]
+        total = 0.0
+        for r in range(whole):
+            total += weighted[g, r] * both[number, r]
+        right[g] = total
+        for h in range(g + 1):
+            total = 0.0
+            for r in range(whole):
+                total += weighted[g, r] * both[h, r]
+            normal[g, h] = total
+
+
+@compiled
 def fit_leading(
     responses: Floats,
     y: Floats,
@@ -218,17 +238,8 @@ def fit_leading(
                 both[g, r] = units[n, g, r]
             for i in range(leading):
                 both[g, count + i] = of_units[n, g, i]
-            for r in range(whole):
-                weighted[g, r] = weight[r] * both[g, r]
-            total = 0.0
-            for r in range(whole):
-                total += weighted[g, r] * both[number, r]
-            right[g] = total
-            for h in range(g + 1):
-                total = 0.0
-                for r in range(whole):
-                    total += weighted[g, r] * both[h, r]
-                normal[g, h] = total
+        _put_normal(both, weight, weighted, normal, right)
+        for g in range(number):
             normal[g, g] += precision[m, g]
         solve_small(normal, right)
         for g in range(number):

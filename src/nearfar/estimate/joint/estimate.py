@@ -15,12 +15,7 @@ from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.batch import AllPixels
-from nearfar.estimate.joint.chessboard import (
-    CHOOSING_SWEEPS,
-    Part,
-    every_choice,
-    part_of_sweep,
-)
+from nearfar.estimate.joint.chessboard import Part, every_choice, part_of_sweep
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
 from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
@@ -167,11 +162,6 @@ def _sweep(
             progress((number + share) / sweeps)
 
         mine = choice and choice.of(_pixels(problem, held))
-        is_last = number >= sweeps - (2 if halves else 1)
-        if halves and number >= CHOOSING_SWEEPS and mine is None:
-            assert found is not None
-            # The sweep before the last was of the same colour.
-            mine = found.choices.sweeps[-2]
         part = part_of_sweep(problem, number) if halves else None
         if part is None:
             found = sweep_once(problem, found, report, mine)
@@ -179,6 +169,7 @@ def _sweep(
             found = sweep_half(problem, found, report, mine, part)
         if number == 0 and chosen.of_error_bars is not None:
             found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
+        is_last = number >= sweeps - (2 if halves else 1)
         before = problem
         problem = _with_new_q(problem, found, part, is_last=is_last)
         if is_last and not halves:

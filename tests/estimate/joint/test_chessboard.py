@@ -1,9 +1,11 @@
 """Sweeps over every other camera pixel."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint.chessboard import every_choice
+from nearfar.estimate.joint.chessboard import every_choice, part_of_sweep
 from nearfar.estimate.joint.problem import ComponentChoice
 from nearfar.priors.fitted import LIT_AT_PITCH, LIT_COMPONENTS
 
@@ -36,3 +38,16 @@ def test_a_camera_pixel_that_is_lit_like_none_beside_it_has_a_component_of_its_k
     found = every_choice(dark, is_even, lit, camera)
     assert found.prior_component.tolist() == [UNLIT, LIT_AT_PITCH[0], UNLIT, LIT_AT_PITCH[0]]
     assert found.prior_scale.tolist() == [0.5, 0.5, 0.25, 0.25]
+
+
+def test_each_colour_of_a_chessboard_is_shifted_twice():
+    camera = Size(4, 5)
+    is_even = np.indices(camera).sum(axis=0).ravel() % 2 == 0
+    problem = SimpleNamespace(
+        pixels=SimpleNamespace(is_even=is_even), measurements=SimpleNamespace(camera=camera)
+    )
+    shifts = np.zeros(camera.pixels, dtype=np.int64)
+    for number in range(5):
+        part = part_of_sweep(problem, number)
+        shifts[part.selected] += part.moves_q
+    assert shifts.tolist() == [2] * camera.pixels

@@ -5,6 +5,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.estimate.joint.estimate import choose_components
+from nearfar.estimate.joint.problem import lay_out
 from nearfar.estimate.joint.shared_choice import RUN, chooser_of_each
 from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
@@ -95,3 +96,11 @@ def test_a_camera_pixel_whose_responses_do_not_fit_chooses_for_itself():
     assert chosen.min() > 4 * found[rest].max()
     # The others share what one of each run chose.
     assert np.mean(found[rest] == np.median(found[rest])) > 0.3
+
+
+def test_responses_of_a_camera_pixel_are_side_by_side():
+    q, measurements = _measured(np.full(CAMERA, 0.1))
+    problem = lay_out(measurements, q, BASIS, "cpu")
+    found, order = problem.pixels.responses, problem.model.centred.response_indices
+    assert found.flags.c_contiguous
+    np.testing.assert_array_equal(found, measurements.responses[..., order])

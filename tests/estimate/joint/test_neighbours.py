@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from nearfar.estimate.joint import neighbour_loops, neighbours
-from nearfar.estimate.joint.chessboard import Part
 
 BY_ARRAYS = (neighbours.expect_each, neighbours.expect_together)
 
 
 def _of_every_pixel(expect):
     def found(values, *more):
-        shape = values.shape[:2]
-        every = Part(np.arange(np.prod(shape)), np.ones(shape, dtype=bool))
-        return expect(values, *more, every).reshape(values.shape)
+        shape, expected = values.shape[:2], np.empty_like(values)
+        put = expect(values, *more, np.ones(shape, dtype=bool))
+        put(np.arange(np.prod(shape)), expected.reshape(-1, *values.shape[2:]))
+        return expected
 
     return found
 
@@ -87,13 +87,16 @@ def test_a_camera_pixel_that_is_not_known_is_the_mean_of_its_neighbours():
     values, white = generator.normal(size=(6, 7, 1, 5)), 1.0 + generator.random((6, 7, 1))
     known = np.indices((6, 7)).sum(axis=0) % 2 == 0
     values[~known] = 1e6
-    part, variance = Part(np.flatnonzero(~known), known), np.full((6, 7, 1), 0.01)
-    each = neighbour_loops.expect_each_by_pixel(
-        values, white, variance, np.ones(5), np.array([3, 4]), part
-    )
+    selected, variance = np.flatnonzero(~known), np.full((6, 7, 1), 0.01)
+    each, together = (np.empty((len(selected), 1, 5)) for _ in range(2))
+    neighbour_loops.expect_each_by_pixel(
+        values, white, variance, np.ones(5), np.array([3, 4]), known
+    )(selected, each)
     every = np.ones((6, 7), dtype=bool)
-    together = neighbour_loops.expect_together_by_pixel(values, white, variance, every, part)
-    y, x = np.unravel_index(part.selected, known.shape)
+    neighbour_loops.expect_together_by_pixel(values, white, variance, every, known)(
+        selected, together
+    )
+    y, x = np.unravel_index(selected, known.shape)
     inner = (y > 0) & (y < 5) & (x > 0) & (x < 6)
     shares = values / white[..., None]
     mean = (shares[y[inner] - 1, x[inner]] + shares[y[inner] + 1, x[inner]]) / 4

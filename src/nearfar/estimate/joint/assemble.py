@@ -29,7 +29,7 @@ BATCH_PIXELS = 2048
 
 
 def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
-    """Return the transport.
+    """Return the transport, which at a pitch over 1 takes over the arrays of the rows.
 
     f is kept at the measured frequencies of the far band, and at those others that lie on the DFT
     grid of the projector: there light is held that no window holds. Its DC is white less d and n.
@@ -103,7 +103,7 @@ def _far_range(rest: Floats, far: Floats, kept: Integers) -> Floats:
 
     def work(batch: slice) -> None:
         found[batch, :, 0] = rest[batch]
-        found[batch, :, 1:] = far[batch][..., kept]
+        found[batch, :, 1:] = xp.take(far[batch], kept, axis=2)
 
     side_by_side(work, blocks(len(far), BATCH_PIXELS))
     return found
@@ -116,9 +116,15 @@ def _under_white(problem: Problem, direct: Floats, coefficients: Floats) -> Floa
         whole: Floats = direct + xp.sum(coefficients, axis=-1)
         return whole
     projector = problem.measurements.projector
-    shares = share_on_projector(pixels.centres, near_basis.offsets, near_basis.pitches, projector)
+    found = np.asarray(coefficients.sum(axis=-1))
+    # Hats about other q lie on the projector.
+    from_border = np.minimum(pixels.centres, np.array(projector) - 1 - pixels.centres)
+    (cut,) = np.nonzero(from_border.min(axis=1) < near_basis.reach)
+    hats = near_basis.offsets, near_basis.pitches
+    shares = share_on_projector(pixels.centres[cut], *hats, projector)
+    found[cut] = np.einsum("cij,cj->ci", coefficients[cut], shares)
     of_direct = share_of_boxes(pixels.correspondence, pixels.footprint, projector)
-    return np.asarray(direct * of_direct[:, None] + np.einsum("cij,cj->ci", coefficients, shares))
+    return np.asarray(direct * of_direct[:, None] + found)
 
 
 def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
@@ -130,10 +136,10 @@ def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> Estimated
     around = around_q(window)
     if not len(around):
         return rows._replace(amplitudes=amplitudes)
-    windows = xp.asarray(rows.near, copy=True)
     if problem.near_basis.pitch > 1:
-        windows[..., window**2 // 2] += negative
-        return rows._replace(amplitudes=amplitudes, near=windows)
+        rows.near[..., window**2 // 2] += negative
+        return rows._replace(amplitudes=amplitudes)
+    windows = xp.asarray(rows.near, copy=True)
     weights = direct_weights(problem.pixels.correspondence, problem.pixels.centres)[:, 0]
     windows[..., beside(around, windows)] += negative[..., None] * weights[:, None]
     return rows._replace(amplitudes=amplitudes, near=windows)

@@ -132,9 +132,7 @@ def footprint_boxes(
     def work(batch: slice) -> None:
         some = voters[batch]
         responses = high.at(some, centres[some])
-        offsets = q[some] - centres[some]
-        for place, blur in enumerate(blurs):
-            explained[some, place] = high.explained(responses, offsets, _blurred(seen[some], blur))
+        explained[some] = high.explained(responses, q[some] - centres[some], seen[some], blurs)
 
     side_by_side(work, blocks(len(voters), BATCH_PIXELS))
     voted = ndimage.uniform_filter(
@@ -170,12 +168,14 @@ class HighResponses:
     def at(self, selected: slice | Integers, centres: NDArray[np.int64]) -> Floats:
         """Return re-centred responses over the noise, (n, channels, R), of some camera pixels."""
         noise = np.maximum(self.measurements.noise[selected], 1e-6)[..., None]
-        responses = self.measurements.responses[selected][..., self.indices]
+        responses = np.take(self.measurements.responses[selected], self.indices, axis=-1)
         recentred = self.centred.recentre(responses, centres)
         return recentred * (self.roots / noise).astype(np.float32)
 
-    def explained(self, responses: Floats, middles: Floats, footprints: Floats) -> Floats:
-        """Return how much of the power of responses direct light of footprints explains, (n,).
+    def explained(
+        self, responses: Floats, middles: Floats, footprints: Floats, blurs: Floats
+    ) -> Floats:
+        """Return how much of the power of responses direct light of footprints explains, (n, S).
 
         Parameters
         ----------
@@ -184,9 +184,12 @@ class HighResponses:
         middles : ndarray, shape (n, 2)
             Middles of the footprints, from the rounded q.
         footprints : ndarray, shape (n, 4)
+        blurs : ndarray, shape (S,)
+            Widths of boxes that they are blurred by.
         """
-        table = wave_table(self.centred, reach_of(footprints))
-        return explained_by_boxes(responses, self.roots, middles, footprints, table)
+        # A blurred box is no wider than the box and the blur.
+        table = wave_table(self.centred, reach_of(footprints, 0.5 * float(blurs.max())))
+        return explained_by_boxes(responses, self.roots, middles, footprints, blurs, table)
 
 
 def high_responses(measurements: Measurements, near_basis: NearBasis) -> HighResponses | None:
@@ -204,8 +207,8 @@ def high_responses(measurements: Measurements, near_basis: NearBasis) -> HighRes
     return HighResponses(measurements, measurements.response_indices(high), centred)
 
 
-def _blurred(footprints: Floats, blur: Floats | float) -> Floats:
-    """Return footprints whose boxes are blurred by a box of a width."""
+def _blurred(footprints: Floats, blur: Floats) -> Floats:
+    """Return footprints whose boxes are blurred by boxes of widths (C, 1)."""
     found = footprints.copy()
     found[:, :2] = np.hypot(found[:, :2], blur)
     return found

@@ -10,42 +10,51 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.compiled import compiled
-from nearfar.estimate.joint.box_waves import mean_wave
+from nearfar.estimate.joint.box_waves import power_along, put_mean_waves
 from nearfar.transport.boxes import LEAST_WIDTH
 
 
 @compiled
-def _waves_along(numbers: Floats, axis: int, waves: Floats, sums: Floats, found: Floats) -> None:
-    """Write the mean waves of both boxes of a footprint along an axis, (2, 2, R)."""
+def _put_both(
+    numbers: Floats, axis: int, waves: Floats, sums: Floats, means: Floats, place: int
+) -> None:
+    """Write the mean waves of both boxes of a footprint along an axis to two places of means."""
     side, skew = max(numbers[2 + axis], LEAST_WIDTH), numbers[4 + axis]
-    mean_wave(numbers[axis] - skew, side, waves[axis], sums[axis], found[0])
+    put_mean_waves(numbers[axis] - skew, side, axis, waves, sums, means, place)
     if skew == 0.0:
         for part in range(2):
-            for r in range(found.shape[2]):
-                found[1, part, r] = found[0, part, r]
+            for r in range(means.shape[2]):
+                means[place + 1, part, r] = means[place, part, r]
     else:
-        mean_wave(numbers[axis] + skew, side, waves[axis], sums[axis], found[1])
+        put_mean_waves(numbers[axis] + skew, side, axis, waves, sums, means, place + 1)
 
 
 @compiled
-def _power(responses: Floats, roots: Floats, down: Floats, across: Floats, slanted: bool) -> float:
-    """Return how much of the power of responses (channels, R) both boxes explain."""
-    squared, total = np.float32(0.0), 0.0
-    one_down, other_down = down[0], down[1]
-    one_across, other_across = across[0], across[1]
-    along = np.zeros(len(responses), dtype=np.float32)
+def _power(
+    responses: Floats,
+    n: int,
+    roots: Floats,
+    means: Floats,
+    down: int,
+    across: int,
+    slanted: bool,
+    direct: Floats,
+) -> float:
+    """Return how much of the power of responses[n], (channels, R), both boxes explain.
+
+    Their mean waves are at the places `down` and `across`, and the next ones; `direct`, (R,), is
+    overwritten.
+    """
     share = np.float32(0.5 if slanted else 1.0)
     for r in range(len(roots)):
-        direct = one_down[0, r] * one_across[0, r] + one_down[1, r] * one_across[1, r]
-        if slanted:
-            direct += other_down[0, r] * other_across[0, r] + other_down[1, r] * other_across[1, r]
-        direct *= share * roots[r]
-        squared += direct * direct
-        for channel in range(len(responses)):
-            along[channel] += responses[channel, r] * direct
-    for channel in range(len(responses)):
-        total += np.float64(max(along[channel], np.float32(0.0))) ** 2
-    return float(total / max(squared, np.float32(1e-12)))
+        one = means[down, 0, r] * means[across, 0, r] + means[down, 1, r] * means[across, 1, r]
+        direct[r] = share * one
+    if slanted:
+        down, across = down + 1, across + 1
+        for r in range(len(roots)):
+            other = means[down, 0, r] * means[across, 0, r]
+            direct[r] += share * (other + means[down, 1, r] * means[across, 1, r])
+    return float(power_along(responses, n, roots, direct))
 
 
 @compiled
@@ -65,8 +74,7 @@ def best_shapes(
     `shapes`, (S, 4), are in units of the footprints' sides.
     """
     count = len(roots)
-    down = np.empty((2, 2, count), dtype=np.float32)
-    across = np.empty_like(down)
+    means, direct = np.empty((4, 2, count), np.float32), np.empty(count, np.float32)
     tried = np.empty(6)
     for n in range(len(numbers)):
         height, width = numbers[n, 2], numbers[n, 3]
@@ -76,10 +84,10 @@ def best_shapes(
                 if i >= 2:
                     value = shapes[shape, i - 2] * (height if i % 2 == 0 else width)
                 tried[i] = min(max(value, lowest[n, i]), highest[n, i])
-            _waves_along(tried, 0, waves, sums, down)
-            _waves_along(tried, 1, waves, sums, across)
+            _put_both(tried, 0, waves, sums, means, 0)
+            _put_both(tried, 1, waves, sums, means, 2)
             slanted = tried[4] != 0.0 or tried[5] != 0.0
-            explained = _power(responses[n], roots, down, across, slanted)
+            explained = _power(responses, n, roots, means, 0, 2, slanted, direct)
             if explained > best[n]:
                 best[n] = explained
                 for i in range(6):
@@ -121,14 +129,21 @@ def descend(
         What they explain; overwritten.
     """
     count = len(roots)
-    held = np.empty((2, 2, 2, count), dtype=np.float32)
-    found = np.empty((2, 2, count), dtype=np.float32)
-    tried = np.empty(6)
+    # Two places for each axis, and two for what is tried.
+    means, direct = np.empty((6, 2, count), np.float32), np.empty(count, np.float32)
+    mine, tried, held = np.empty(6), np.empty(6), np.empty(2, np.int64)
     for n in range(len(numbers)):
-        mine = numbers[n]
-        _waves_along(mine, 0, waves, sums, held[0])
-        _waves_along(mine, 1, waves, sums, held[1])
+        for j in range(6):
+            mine[j] = numbers[n, j]
+        held[0], held[1], free = 0, 2, 4
+        _put_both(mine, 0, waves, sums, means, 0)
+        _put_both(mine, 1, waves, sums, means, 2)
+        has_moved = True
         for s in range(len(steps)):
+            # A step that has led nowhere leads nowhere again.
+            if s > 0 and steps[s] == steps[s - 1] and not has_moved:
+                continue
+            has_moved = False
             for way in range(2 * coordinates):
                 i = way % coordinates
                 sign = 1.0 if way < coordinates else -1.0
@@ -140,14 +155,13 @@ def descend(
                 if tried[i] == mine[i]:
                     continue
                 axis = i % 2
-                _waves_along(tried, axis, waves, sums, found)
-                down = found if axis == 0 else held[0]
-                across = found if axis == 1 else held[1]
+                _put_both(tried, axis, waves, sums, means, free)
+                down = free if axis == 0 else held[0]
+                across = free if axis == 1 else held[1]
                 slanted = tried[4] != 0.0 or tried[5] != 0.0
-                explained = _power(responses[n], roots, down, across, slanted)
+                explained = _power(responses, n, roots, means, down, across, slanted, direct)
                 if explained > best[n]:
-                    best[n], mine[i] = explained, tried[i]
-                    for box in range(2):
-                        for part in range(2):
-                            for r in range(count):
-                                held[axis, box, part, r] = found[box, part, r]
+                    best[n], mine[i], has_moved = explained, tried[i], True
+                    held[axis], free = free, held[axis]
+        for j in range(6):
+            numbers[n, j] = mine[j]

@@ -20,7 +20,11 @@ from nearfar.estimate.joint.chessboard import Part
 from nearfar.estimate.joint.choose import choose, is_doubtful
 from nearfar.estimate.joint.cut import border_distances, is_cut, near_responses
 from nearfar.estimate.joint.footprint import put_footprint_weights, unit_responses
-from nearfar.estimate.joint.neighbour_loops import expect_each_by_pixel, expect_together_by_pixel
+from nearfar.estimate.joint.neighbour_loops import (
+    Expectation,
+    expect_each_by_pixel,
+    expect_together_by_pixel,
+)
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem
 from nearfar.estimate.joint.shared_choice import chooser_of_each
@@ -73,6 +77,8 @@ def sweep_half(
         order,
         starts=before is None,
         is_new=not part.known.all(),
+        moves_q=part.moves_q,
+        has_offset=problem.has_offset_noise,
         misfit=np.zeros(len(order)),
     )
     sweep.run(chosen, report)
@@ -108,6 +114,8 @@ class _HalfSweep(NamedTuple):
     order: Integers  # camera pixel of each place
     starts: bool
     is_new: bool  # whether no sweep has estimated these camera pixels before
+    moves_q: bool  # whether shifts of q are estimated
+    has_offset: bool  # whether the references have noise
     misfit: Floats  # of each place's responses, by its choice
 
     def run(self, chosen: ComponentChoice | None, report: Callable[[float], None]) -> None:
@@ -257,29 +265,24 @@ class _HalfSweep(NamedTuple):
 
     def _choosing(self, places: Integers) -> PixelBatch:
         """Return a batch of places, with the responses that a choice asks for."""
-        pixels, selected = self.problem.pixels, self.order[places]
-        q, centres, lit = (
-            pixels.correspondence[selected],
-            pixels.centres[selected],
-            pixels.lit[selected],
-        )
-        middles = np.where(lit[:, None], q - centres, 0.0)
-        centred = self.problem.model.centred
-        weights = unit_responses(middles, pixels.footprint[selected], centred)
-        weights[~lit] = 0.0
-        nothing = np.zeros((len(places), 0, centred.basis.count), dtype=np.float32)
+        weights = _unit_direct(self.problem, self.order[places])
+        nothing = np.zeros((len(places), 0, weights.shape[1]), dtype=np.float32)
         return self._batch(places, weights[:, None], nothing)
 
     def _with_units(self, places: Integers) -> tuple[PixelBatch, Floats]:
         """Return a batch of places, and responses to unit amplitudes, which it has views of."""
         problem, selected = self.problem, self.order[places]
         pixels, centred = problem.pixels, problem.model.centred
-        centres, first = pixels.centres[selected], int(problem.has_offset_noise)
-        units = np.empty((len(places), first + 3, centred.basis.count), dtype=np.float32)
+        centres, first = pixels.centres[selected], int(self.has_offset)
+        of_direct = 3 if self.moves_q else 1
+        units = np.empty((len(places), first + of_direct, centred.basis.count), dtype=np.float32)
         if first:
             put_ones(centres, centred.basis.single_phases, units)
         q, footprints = pixels.correspondence[selected], pixels.footprint[selected]
-        put_footprint_weights(q, centres, footprints, centred, first, units)
+        if self.moves_q:
+            put_footprint_weights(q, centres, footprints, centred, first, units)
+        else:
+            units[:, first] = _unit_direct(problem, selected)
         return self._batch(places, units[:, first:], units[:, :first]), units
 
     def _batch(self, places: Integers, direct_weights: Floats, of_offset: Floats) -> PixelBatch:
@@ -298,6 +301,16 @@ class _HalfSweep(NamedTuple):
             white=pixels.white[selected],
             spike_expected=nothing.astype(bool),
         )
+
+
+def _unit_direct(problem: Problem, selected: Integers) -> Floats:
+    """Return responses of unit direct light of camera pixels, (n, R); 0 where there is none."""
+    pixels, lit = problem.pixels, problem.pixels.lit[selected]
+    offsets = pixels.correspondence[selected] - pixels.centres[selected]
+    middles = np.where(lit[:, None], offsets, 0.0)
+    found = unit_responses(middles, pixels.footprint[selected], problem.model.centred)
+    found[~lit] = 0.0
+    return found
 
 
 def _order(problem: Problem, selected: Integers) -> Integers:
@@ -355,11 +368,18 @@ def _whole(problem: Problem, order: Integers) -> _Left:
 
 def _less_expected(problem: Problem, rows: EstimatedRows, part: Part) -> _Left:
     """Return the expectation of a part's camera pixels from their neighbours, and the residuals."""
-    near, far = _expected(problem, rows, part)
+    near, far = (
+        np.empty((len(part.selected), *values.shape[1:]), dtype=np.float32)
+        for values in (rows.near, rows.far)
+    )
     found = _Left(near, far, np.empty_like(far))
+    put_near, put_far = _expectations(problem, rows, part.known)
 
     def work(batch: slice) -> None:
-        centres = problem.pixels.centres[part.selected[batch]]
+        some = part.selected[batch]
+        put_near(some, near[batch])
+        put_far(some, far[batch])
+        centres = problem.pixels.centres[some]
         found.responses[batch] = near_responses(near[batch], centres, problem.model.centred)
         _put_residuals(problem, part.selected, found, batch)
 
@@ -380,8 +400,10 @@ def _put_residuals(problem: Problem, order: Integers, left: _Left, batch: slice)
     )
 
 
-def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats, Floats]:
-    """Return n and f of a part's camera pixels as their neighbours lead to expect."""
+def _expectations(
+    problem: Problem, rows: EstimatedRows, known: Booleans
+) -> tuple[Expectation, Expectation]:
+    """Return filters that write n and f of camera pixels as their neighbours lead to expect."""
     pixels, measurements = problem.pixels, problem.measurements
     shape = (*measurements.camera, measurements.channels)
     white = pixels.white.reshape(shape)
@@ -389,19 +411,19 @@ def _expected(problem: Problem, rows: EstimatedRows, part: Part) -> tuple[Floats
     variance = np.clip((measurements.noise.reshape(shape) / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    far = expect_each_by_pixel(
+    of_far = expect_each_by_pixel(
         rows.far.reshape((*shape, -1)),
         white,
         variance,
         problem.model.multiplicity,
         np.flatnonzero(cycles >= np.median(cycles)),
-        part,
+        known,
     )
-    near = expect_together_by_pixel(
+    of_near = expect_together_by_pixel(
         rows.near.reshape((*shape, -1)),
         white,
         rows.near_noise.reshape(shape) / white**2,
         pixels.lit.reshape(measurements.camera),
-        part,
+        known,
     )
-    return near, far
+    return of_near, of_far

@@ -44,6 +44,8 @@ ROUNDS = 2
 MOST_GROWTH = 2.0
 # Camera pixels that are searched at once.
 SEARCHED_PIXELS = 1024
+# Voted footprints are blurred as they are.
+UNBLURRED = np.zeros(1)
 # Sides of a box are no narrower, in projector pixels; and q moves by at most as much.
 NARROWEST, FARTHEST = 0.1, 1.0
 
@@ -83,7 +85,7 @@ def own_footprints(
         selected = batch.start + np.flatnonzero(lit[batch])
         middles = q[selected] - centres[selected]
         responses = high.at(selected, centres[selected])
-        before[selected] = high.explained(responses, middles, footprints[selected])
+        before[selected] = high.explained(responses, middles, footprints[selected], UNBLURRED)[:, 0]
         power[selected] = np.sum(responses.astype(np.float64) ** 2, axis=(1, 2))
 
     side_by_side(explain, blocks(len(q), BATCH_PIXELS))

@@ -243,7 +243,7 @@ def lay_out(
     model = build_model(measurements.basis, measurements.multiplicity, near_basis, device)
     white = white_scale(measurements)
     pixels = AllPixels(
-        responses=measurements.responses[..., model.centred.response_indices],
+        responses=_in_order(measurements.responses, model.centred.response_indices, near_basis),
         correspondence=correspondence.reshape(-1, 2),
         centres=near.centre(correspondence, measurements.projector),
         lit=lit,
@@ -259,6 +259,17 @@ def lay_out(
     errors = measurements.quantisation_error[:, : None if near_basis.pitch == 1 else 0]
     errors = _a_row_each(errors, model.centred.response_indices)
     return Problem(measurements, model, pixels, near_basis, move(errors))
+
+
+def _in_order(responses: Floats, indices: Integers, near_basis: NearBasis) -> Floats:
+    """Return responses in the order of the centred basis.
+
+    Where functions are of several projector pixels, loops read a camera pixel's, which are side by
+    side; NumPy's indexing leaves those of all camera pixels to a frequency side by side.
+    """
+    if near_basis.pitch == 1:
+        return responses[..., indices]
+    return np.take(responses, indices, axis=-1)
 
 
 def _a_row_each(errors: Floats, indices: Integers) -> Floats:

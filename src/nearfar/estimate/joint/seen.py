@@ -6,8 +6,9 @@ Index convention: c runs over camera pixels, row by row.
 import numpy as np
 
 from nearfar.arrays import Floats, blocks
+from nearfar.compiled import compiled
 from nearfar.parallel import side_by_side
-from nearfar.transport.boxes import halves
+from nearfar.transport.boxes import LEAST_WIDTH
 
 # q moves from one camera pixel to the next by the median over a square of this side.
 MEDIAN_SIDE = 3
@@ -42,38 +43,71 @@ def seen_of_projector(correspondence: Floats) -> Floats:
         q.
     """
     moves: list[Floats] = [np.empty(0), np.empty(0)]
+    q = np.ascontiguousarray(correspondence, dtype=np.float64)
 
     def work(axis: int) -> None:
-        moves[axis] = _moves(correspondence, axis)
+        moves[axis] = _moves(q, axis)
 
     side_by_side(work, (0, 1))
-    of_rows, of_columns = moves
-    slants = [np.abs(np.prod(side, axis=1)) for side in (of_rows, of_columns)]
-    by_rows = (slants[0] >= slants[1])[:, None]
-    halved, other = np.where(by_rows, of_rows, of_columns), np.where(by_rows, of_columns, of_rows)
-    whole = np.hypot(halved, other)
-    upright = np.abs(np.prod(halved, axis=1)) <= LEAST_SLANT * np.prod(whole, axis=1)
-    found = np.concatenate([np.hypot(halved / 2, other), halved / 4], axis=1, dtype=np.float32)
-    found[upright] = np.pad(whole[upright], ((0, 0), (0, 2)))
+    found = np.empty((q.shape[0] * q.shape[1], 4), dtype=np.float32)
+    _put_parallelograms(moves[0], moves[1], found)
     return found
 
 
-def _moves(correspondence: Floats, axis: int) -> Floats:
-    """Return how far q moves along one axis of the camera, (C, 2)."""
-    move = np.diff(correspondence.astype(np.float64), axis=axis)
-    move[~(np.abs(move).max(axis=-1) <= LARGEST_MOVE)] = np.nan
-    padding = [(0, 0)] * 3
-    padding[axis] = (1, 1)
-    padded = np.pad(move, padding, constant_values=np.nan)
-    after, before = np.delete(padded, 0, axis=axis), np.delete(padded, -1, axis=axis)
-    lengths = [np.nan_to_num(np.abs(one).max(axis=-1), nan=np.inf) for one in (after, before)]
-    least, most = np.minimum(*lengths), np.maximum(*lengths)
-    # The mean of the moves to both sides, or the smaller if one leads to another surface.
-    alike = most <= LARGEST_RATIO * least + LARGEST_DIFFERENCE
-    smaller = np.where((lengths[0] <= lengths[1])[..., None], after, before)
-    known = np.nan_to_num(np.where(alike[..., None], (after + before) / 2, smaller), nan=0.0)
-    parts = [_median(known[..., part]) for part in (0, 1)]
-    return np.stack(parts, axis=-1).reshape(-1, 2)
+@compiled
+def _put_parallelograms(of_rows: Floats, of_columns: Floats, found: Floats) -> None:
+    """Write the footprints whose sides are moves from row to row and column to column, (C, 4)."""
+    for c in range(len(found)):
+        slant, other_slant = (
+            abs(of_rows[c, 0] * of_rows[c, 1]),
+            abs(of_columns[c, 0] * of_columns[c, 1]),
+        )
+        halved, other = (of_rows, of_columns) if slant >= other_slant else (of_columns, of_rows)
+        height = np.hypot(halved[c, 0], other[c, 0])
+        width = np.hypot(halved[c, 1], other[c, 1])
+        upright = max(slant, other_slant) <= LEAST_SLANT * (height * width)
+        found[c, 0] = height if upright else np.hypot(0.5 * halved[c, 0], other[c, 0])
+        found[c, 1] = width if upright else np.hypot(0.5 * halved[c, 1], other[c, 1])
+        for axis in range(2):
+            found[c, 2 + axis] = 0.0 if upright else 0.25 * halved[c, axis]
+
+
+def _moves(q: Floats, axis: int) -> Floats:
+    """Return how far q (Cy, Cx, 2) moves along one axis of the camera, (C, 2), float64."""
+    known = np.empty((2, *q.shape[:2]))
+    _put_moves(q, (1, 0) if axis == 0 else (0, 1), known)
+    return np.stack([_median(part) for part in known], axis=-1).reshape(-1, 2)
+
+
+@compiled
+def _put_moves(q: Floats, step: tuple[int, int], found: Floats) -> None:
+    """Write the mean of the moves to both sides, or the smaller if one leads to another surface."""
+    down, across = step
+    for y in range(q.shape[0]):
+        for x in range(q.shape[1]):
+            after_y = after_x = before_y = before_x = 0.0
+            after, before = np.inf, np.inf
+            if y + down < q.shape[0] and x + across < q.shape[1]:
+                after_y = q[y + down, x + across, 0] - q[y, x, 0]
+                after_x = q[y + down, x + across, 1] - q[y, x, 1]
+                # Not if either is NaN.
+                if abs(after_y) <= LARGEST_MOVE and abs(after_x) <= LARGEST_MOVE:
+                    after = max(abs(after_y), abs(after_x))
+            if y >= down and x >= across:
+                before_y = q[y, x, 0] - q[y - down, x - across, 0]
+                before_x = q[y, x, 1] - q[y - down, x - across, 1]
+                if abs(before_y) <= LARGEST_MOVE and abs(before_x) <= LARGEST_MOVE:
+                    before = max(abs(before_y), abs(before_x))
+            found[0, y, x], found[1, y, x] = 0.0, 0.0
+            if min(after, before) == np.inf:
+                continue
+            if max(after, before) <= LARGEST_RATIO * min(after, before) + LARGEST_DIFFERENCE:
+                found[0, y, x] = 0.5 * (after_y + before_y)
+                found[1, y, x] = 0.5 * (after_x + before_x)
+            elif after <= before:
+                found[0, y, x], found[1, y, x] = after_y, after_x
+            else:
+                found[0, y, x], found[1, y, x] = before_y, before_x
 
 
 def _median(values: Floats) -> Floats:
@@ -105,32 +139,39 @@ def box_centres(correspondence: Floats) -> Floats:
         q as correspondence finds it, a centroid.
     """
     q = correspondence.reshape(-1, 2).astype(np.float64)
-    footprints = seen_of_projector(correspondence)
-    found = np.nan_to_num(q, nan=0.0)
-
-    def work(batch: slice) -> None:
-        rounded = np.rint(found[batch])
-        wanted, its = found[batch] - rounded, footprints[batch]
-        middles = wanted.copy()
-        for _ in range(CENTRE_STEPS):
-            both, widths = halves(middles, its)
-            off = wanted - _centroids(both, widths).mean(axis=0)
-            # A centroid moves by at most 1 / width times as much as the middle.
-            middles += off * np.minimum(widths, 1.0)
-        found[batch] = rounded + middles
-
-    side_by_side(work, blocks(len(q), BATCH_PIXELS))
-    return np.where(np.isnan(q), np.nan, found).reshape(correspondence.shape)
+    footprints = seen_of_projector(correspondence).astype(np.float64)
+    found = np.empty_like(q)
+    side_by_side(
+        lambda batch: _put_centres(q[batch], footprints[batch], found[batch]),
+        blocks(len(q), BATCH_PIXELS),
+    )
+    return found.reshape(correspondence.shape)
 
 
-def _centroids(middles: Floats, widths: Floats) -> Floats:
-    """Return the centroids of boxes' shares in whole pixels, along each axis."""
-    ends = []
-    for end in (middles - 0.5 * widths, middles + 0.5 * widths):
-        pixel = np.floor(end + 0.5)
-        # The integral of the rounded position from 0 to the box's end.
-        ends.append(pixel * (end - 0.5 * pixel))
-    return np.asarray((ends[1] - ends[0]) / widths)
+@compiled
+def _centroid(middle: float, width: float) -> float:
+    """Return the centroid of a box's shares in whole pixels, along an axis."""
+    low, high = middle - 0.5 * width, middle + 0.5 * width
+    first, last = np.floor(low + 0.5), np.floor(high + 0.5)
+    # Integrals of the rounded position from 0 to the box's ends.
+    whole = last * (high - 0.5 * last) - first * (low - 0.5 * first)
+    return float(whole / width)
+
+
+@compiled
+def _put_centres(q: Floats, footprints: Floats, found: Floats) -> None:
+    """Write the middles of footprints (n, 4) with the centroids q (n, 2); NaN where these are."""
+    for n in range(len(q)):
+        for axis in range(2):
+            rounded, skew = np.rint(q[n, axis]), footprints[n, 2 + axis]
+            width = max(footprints[n, axis], LEAST_WIDTH)
+            wanted = q[n, axis] - rounded
+            middle = wanted
+            for _ in range(CENTRE_STEPS):
+                both = _centroid(middle - skew, width) + _centroid(middle + skew, width)
+                # A centroid moves by at most 1 / width times as much as the middle.
+                middle += (wanted - 0.5 * both) * min(width, 1.0)
+            found[n, axis] = rounded + middle
 
 
 def reach_of(footprints: Floats, margin: float = 0.0) -> int:

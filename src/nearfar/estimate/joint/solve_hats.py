@@ -32,6 +32,8 @@ from nearfar.priors.responses import ResponsePrior
 LEAST_VARIANCE = 0.01
 # Leading eigenvectors are counted in multiples of as many, so that camera pixels share a number.
 MULTIPLE = 32
+# Sums are over a multiple of as many numbers: those that a processor adds up at once.
+LANES = 16
 
 
 class Leading(NamedTuple):
@@ -156,21 +158,23 @@ def solve_hats(
 
 
 @compiled
-def _difference(one: Floats, other: Floats, less: Floats, times: Floats) -> float:
-    """Return the sum of products of two arrays less that of two others, in double precision."""
-    total = 0.0
-    for r in range(len(one)):
-        total += one[r] * np.float64(other[r])
-    for i in range(len(less)):
-        total -= less[i] * np.float64(times[i])
-    return total
-
-
-@compiled
-def _subtract(values: Floats, amplitude: float, unit: Floats) -> None:
-    times = np.float32(amplitude)
-    for r in range(len(values)):
-        values[r] -= times * unit[r]
+def _put_normal(
+    both: Floats, weight: Floats, weighted: Floats, normal: Floats, right: Floats
+) -> None:
+    """Write weighted sums of products of units (G, whole), and of them and the measured row."""
+    number, whole = weighted.shape
+    for g in range(number):
+        for r in range(whole):
+            weighted[g, r] = weight[r] * both[g, r]
+        total = 0.0
+        for r in range(whole):
+            total += weighted[g, r] * both[number, r]
+        right[g] = total
+        for h in range(g + 1):
+            total = 0.0
+            for r in range(whole):
+                total += weighted[g, r] * both[h, r]
+            normal[g, h] = total
 
 
 @compiled
@@ -213,39 +217,46 @@ def fit_leading(
     number, count = units.shape[1:]
     leading = len(eigenvalues)
     amplitudes, normal = np.empty((len(responses), number)), np.empty((number, number))
-    misfit = np.empty(len(responses))
+    right, misfit = np.empty(number), np.empty(len(responses))
+    # The responses and their leading coordinates, one after the other: units, and what is measured.
     # Sums of what the leading eigenvectors leave are small differences of large numbers.
-    whole, taken = np.empty((number, count)), np.empty((number, leading))
-    share = np.empty(leading)
+    # Zeros fill the last vector instructions.
+    whole = -(-(count + leading) // LANES) * LANES
+    both, weighted = np.zeros((number + 1, whole)), np.zeros((number, whole))
+    weight = np.zeros(whole)
     for m in range(len(responses)):
-        response, coordinates = responses[m], y[m]
-        unit, of_unit = units[pixel[m]], of_units[pixel[m]]
-        precise = 1.0 / np.float64(noise_variance[m])
+        n, precise = pixel[m], 1.0 / np.float64(noise_variance[m])
+        for r in range(count):
+            weight[r] = precise * np.float64(multiplicity[r])
+            both[number, r] = responses[m, r]
         for i in range(leading):
             variance = prior_variance[m] * eigenvalues[i]
-            share[i] = precise * np.float64(variance / (variance + noise_variance[m]))
+            weight[count + i] = -precise * np.float64(variance / (variance + noise_variance[m]))
+            both[number, count + i] = y[m, i]
         for g in range(number):
-            of_g, of_taken = whole[g], taken[g]
             for r in range(count):
-                of_g[r] = precise * np.float64(multiplicity[r]) * np.float64(unit[g, r])
+                both[g, r] = units[n, g, r]
             for i in range(leading):
-                of_taken[i] = share[i] * np.float64(of_unit[g, i])
-            amplitudes[m, g] = _difference(of_g, response, of_taken, coordinates)
-            for h in range(g + 1):
-                normal[g, h] = _difference(of_g, unit[h], of_taken, of_unit[h])
-            normal[g, g] += precision[m, g]
-        solve_small(normal, amplitudes[m])
+                both[g, count + i] = of_units[n, g, i]
+        _put_normal(both, weight, weighted, normal, right)
         for g in range(number):
-            _subtract(response, amplitudes[m, g], unit[g])
-            _subtract(coordinates, amplitudes[m, g], of_unit[g])
+            normal[g, g] += precision[m, g]
+        solve_small(normal, right)
+        for g in range(number):
+            amplitudes[m, g] = right[g]
+            times = np.float32(right[g])
+            for r in range(count):
+                responses[m, r] -= times * units[n, g, r]
+            for i in range(leading):
+                y[m, i] -= times * of_units[n, g, i]
         squares, less = np.float32(0.0), np.float32(0.0)
         for r in range(count):
-            squares += multiplicity[r] * response[r] * response[r]
+            squares += multiplicity[r] * responses[m, r] * responses[m, r]
         for i in range(leading):
-            weighted = coordinates[i] / (prior_variance[m] * eigenvalues[i] + noise_variance[m])
-            weighted *= prior_variance[m]
-            less += eigenvalues[i] * weighted * coordinates[i]
-            coordinates[i] = weighted
+            times = y[m, i] / (prior_variance[m] * eigenvalues[i] + noise_variance[m])
+            times *= prior_variance[m]
+            less += eigenvalues[i] * times * y[m, i]
+            y[m, i] = times
         misfit[m] = (np.float64(squares) - np.float64(less)) * precise
     return amplitudes, misfit
 

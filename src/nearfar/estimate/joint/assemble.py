@@ -100,10 +100,11 @@ def _far_range(rest: Floats, far: Floats, kept: Integers) -> Floats:
     """Return white's far-range light, (C, channels), and kept responses of f, in one array."""
     xp = namespace(far)
     found: Floats = xp.empty((*rest.shape, 1 + len(kept)), dtype=far.dtype, device=device(far))
+    here = beside(kept, far)
 
     def work(batch: slice) -> None:
         found[batch, :, 0] = rest[batch]
-        found[batch, :, 1:] = xp.take(far[batch], kept, axis=2)
+        found[batch, :, 1:] = xp.take(far[batch], here, axis=2)
 
     side_by_side(work, blocks(len(far), BATCH_PIXELS))
     return found

@@ -13,6 +13,9 @@ OUTLIER_FACTOR = 30.0
 # Fits of noise to light. The first weighs each variance by itself, so that those that are too small
 # by chance weigh most; the others weigh it by what the fit before expects.
 FITS = 3
+# Variances of a bin above this many times the expected one are not of noise: with 64 values of one
+# degree of freedom each, this is over five standard deviations.
+MOVING_FACTOR = 2.0
 
 
 class NoiseModel(NamedTuple):
@@ -80,6 +83,8 @@ def fit_noise(
         weight = 1.0 / np.maximum(expected, least_weighed)
         gain, offset = np.polyfit(level, binned, 1, w=weight)
         expected = gain * level + offset
+        # Something moved: as in the first fit, that hardly weighs.
+        expected = np.where(binned > MOVING_FACTOR * expected, binned, expected)
     if gain < 0:
         return NoiseModel(0.0, float(np.median(binned)) / photos, least)
     return NoiseModel(float(gain), max(float(offset) / photos, -float(gain) * dark), least)

@@ -56,7 +56,10 @@ def test_by_reference_and_by_pairs_agree(small_world, shoot, plan, black):
     error = np.abs(found.responses[..., here] - pairs.responses[..., there])
     assert error.max() <= 3.2 * level
     np.testing.assert_allclose(found.black, pairs.black, atol=level)
-    np.testing.assert_array_equal(found.quantisation_error[here], pairs.quantisation_error[there])
+    # Summed in another order.
+    np.testing.assert_allclose(
+        found.quantisation_error[here], pairs.quantisation_error[there], atol=1e-9
+    )
 
 
 def test_an_inverse_among_them_counts_with_its_sign(small_world, shoot):

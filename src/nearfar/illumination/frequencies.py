@@ -53,6 +53,13 @@ DC = Frequency(Fraction(0), Fraction(0))
 CHECKERBOARD = wrap(Fraction(1, 2), Fraction(1, 2))
 
 
+def is_on_grid(frequency: Frequency, projector: Size) -> bool:
+    """Return whether a frequency is a whole number of cycles per pattern grid."""
+    return all(
+        (part * side).denominator == 1 for part, side in zip(frequency, projector, strict=True)
+    )
+
+
 def frequency_from_text(parts: Iterable[str]) -> Frequency:
     """Read a frequency written as two fractions, such as ``["-1/19", "0"]``.
 

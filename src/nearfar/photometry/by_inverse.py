@@ -28,11 +28,11 @@ from nearfar.photometry.photos import (
     Photos,
     Reference,
     basis_of,
-    quantisation_error,
     size_of_rows,
     stripe_references,
     two_levels,
 )
+from nearfar.photometry.quantisation import without_quantisation
 from nearfar.plan import Plan, Sinusoid
 
 # Share of white by which pairs may sum to more or less than white + black; projector or camera is
@@ -162,13 +162,14 @@ def measure_pairs(
     left = _remove_visible_noise(differences, deviations, models, variance(pair_mean / 2) * 2)
     responses = _means(differences, places, multiplicity)
     responses[..., basis.response_indices([DC])[0]] = levels.light
+    responses, error = without_quantisation(basis, responses)
     return Measurements(
         camera=camera,
         basis=basis,
         responses=responses,
         noise=np.sqrt(pair_variance * left).astype(np.float32),
         black=levels.black.astype(np.float32),
-        quantisation_error=quantisation_error(basis),
+        quantisation_error=error,
         excess_of_sums=excess,
         multiplicity=multiplicity,
         light_noise=np.sqrt(levels.light_variance).astype(np.float32),

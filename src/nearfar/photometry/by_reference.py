@@ -27,11 +27,11 @@ from nearfar.photometry.photos import (
     find_waves,
     in_batches,
     mean_photo,
-    quantisation_error,
     size_of_rows,
     stripe_references,
     two_levels,
 )
+from nearfar.photometry.quantisation import without_quantisation
 from nearfar.plan import Plan
 
 
@@ -105,6 +105,7 @@ def measure_by_reference(
             progress(numbers[-1] + 1)
     responses /= multiplicity
     responses[..., basis.response_indices([DC])[0]] = levels.light
+    responses, error = without_quantisation(basis, responses)
 
     def deviation(variance: Floats) -> NDArray[np.float32]:
         return np.sqrt(variance).astype(np.float32)
@@ -115,7 +116,7 @@ def measure_by_reference(
         responses=responses,
         noise=2 * deviation(photos.variance(levels.black + levels.light / 2)),
         black=levels.black.astype(np.float32),
-        quantisation_error=quantisation_error(basis),
+        quantisation_error=error,
         multiplicity=multiplicity,
         white_noise=deviation(levels.white_variance),
         black_noise=deviation(levels.black_variance),

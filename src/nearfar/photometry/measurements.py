@@ -35,7 +35,8 @@ class Measurements:
     black : ndarray, shape (C, channels), float32
         The photo under black.
     quantisation_error : ndarray, shape (R, P), float32
-        The 8-bit pattern less the ideal cosine or sine; 0 in theory.
+        The 8-bit pattern less the ideal cosine or sine, as far as it holds frequencies that were
+        not measured: what the others add to the responses is taken off them. 0 in theory.
     excess_of_sums : float
         By what share of white inverse pairs sum to more than white + black; 0 where projector
         and camera are linear, and by reference.

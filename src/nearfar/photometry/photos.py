@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
-from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import Frequency
-from nearfar.illumination.real_basis import MOST_HELD, RealBasis, real_basis
+from nearfar.illumination.real_basis import RealBasis, real_basis
 from nearfar.parallel import ahead
 from nearfar.photometry.noise import NoiseModel, variance_by_channel
 from nearfar.plan import Plan, Sinusoid, Stripe
@@ -146,23 +145,6 @@ def basis_of(responses: Sequence[Wave], projector: Size) -> tuple[RealBasis, dic
                 f"again with both."
             )
     return basis, place
-
-
-def quantisation_error(basis: RealBasis) -> Floats:
-    """Return each 8-bit cosine and sine, 2 l / 255 - 1, less the ideal one, shape (R, P).
-
-    Without projector pixels, (R, 0), where there are so many of them that footprints of direct
-    light average the error.
-    """
-    if basis.count * basis.projector.pixels > MOST_HELD:
-        return np.empty((basis.count, 0), dtype=np.float32)
-    ideal = basis.patterns
-    error = np.empty_like(ideal)
-    for r, (i, sine) in enumerate(zip(basis.index, basis.is_sine, strict=True)):
-        draw = patterns.sine if sine else patterns.cosine
-        drawn = patterns.quantise(draw(basis.frequencies[i], basis.projector)).ravel()
-        error[r] = drawn.astype(np.float32) * np.float32(2 / 255) - 1 - ideal[r]
-    return error
 
 
 class Reference(NamedTuple):

@@ -13,7 +13,7 @@ from nearfar.estimate.joint.problem import EstimatedRows, Problem
 from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.joint.spikes import around_q, away_from_q
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
-from nearfar.illumination.frequencies import DC, Frequency, far_frequencies
+from nearfar.illumination.frequencies import DC, far_frequencies, is_on_grid
 from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
@@ -40,7 +40,7 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     low = [
         k
         for k in measured.frequencies
-        if k in wanted or -k in wanted or _on_grid(k, measurements.projector)
+        if k in wanted or -k in wanted or is_on_grid(k, measurements.projector)
     ]
     basis = real_basis([DC, *low], measurements.projector)
     kept = np.flatnonzero(np.isin(measured.index, [measured.frequencies.index(k) for k in low]))
@@ -144,13 +144,6 @@ def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> Estimated
     weights = direct_weights(problem.pixels.correspondence, problem.pixels.centres)[:, 0]
     windows[..., beside(around, windows)] += negative[..., None] * weights[:, None]
     return rows._replace(amplitudes=amplitudes, near=windows)
-
-
-def _on_grid(frequency: Frequency, projector: Size) -> bool:
-    """Return whether a frequency is a whole number of cycles per pattern grid."""
-    return all(
-        (part * side).denominator == 1 for part, side in zip(frequency, projector, strict=True)
-    )
 
 
 def _positive(

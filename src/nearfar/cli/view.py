@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,15 @@ if TYPE_CHECKING:
 
 def view(
     transport: TransportPath,
+    other: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--and",
+            help="Transport of a further projector before the same camera, with a light of its "
+            "own; one per --and.",
+            metavar="TRANSPORT.zarr",
+        ),
+    ] = None,
     beside: Annotated[
         Path | None,
         typer.Option(
@@ -57,12 +67,14 @@ def view(
 ) -> None:
     """Relight the scene in the browser: drag a light, and see its direct, near and far parts.
 
-    With --beside a second transport is shown next to it, with their signed difference and SNR.
+    With --beside a second transport is shown next to it, with their signed difference and SNR. With
+    --and further projectors light the scene, and the page shows the sum.
 
     Example: nearfar view transport.zarr --beside truth.zarr
     """
     import webbrowser
 
+    from nearfar.applications.several_projectors import require_same_camera
     from nearfar.capture import open_capture
     from nearfar.viewer.beside import open_beside
     from nearfar.viewer.held_out import photo_maps
@@ -72,7 +84,9 @@ def view(
     from nearfar.viewer.view import run_view
 
     available = parse_bytes(memory)
-    require_reconstructed(transport)
+    paths = [transport, *(other or ())]
+    for path in paths:
+        require_reconstructed(path)
     second: Beside | None = None
     maps: Mapping[str, Map] = {}
     series: PhotoSeries | None = None
@@ -80,6 +94,14 @@ def view(
         interactive = InteractiveTransport(
             transport, memory=available, progress=lambda share: report("reading", share)
         )
+        others = [
+            InteractiveTransport(
+                path, memory=available, progress=partial(report, f"reading {path}")
+            )
+            for path in paths[1:]
+        ]
+        stored = [each.stored for each in (interactive, *others)]
+        require_same_camera(stored, [str(path) for path in paths])
         if beside is not None:
             second = open_beside(
                 beside,
@@ -92,7 +114,7 @@ def view(
             maps = photo_maps(interactive.stored, opened, report)
             series = PhotoSeries(interactive, opened)
 
-    _tell_of_memory(interactive.stored.nbytes, available, quiet=quiet)
+    _tell_of_memory(max(each.nbytes for each in stored), available, quiet=quiet)
 
     def on_start(url: str) -> None:
         say(f"{transport} at {url}, Ctrl-C here ends it")
@@ -103,7 +125,13 @@ def view(
     with suppress(KeyboardInterrupt):
         listening = ListeningAddress(host, port)
         run_view(
-            interactive, listening, on_start, beside=second, photo_maps=maps, photo_series=series
+            interactive,
+            listening,
+            on_start,
+            beside=second,
+            photo_maps=maps,
+            photo_series=series,
+            others=others,
         )
     say("view ended", quiet=quiet)
 

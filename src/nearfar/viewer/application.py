@@ -1,6 +1,6 @@
 """The viewer's web application: its requests and their responses."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -29,6 +29,7 @@ from nearfar.viewer.messages import (
 from nearfar.viewer.numbers import PixelHeader, numbers_at
 from nearfar.viewer.payloads import (
     FILE_READERS,
+    ProjectorLink,
     describe_scene,
     encode_relit_exr,
     pack_column,
@@ -62,6 +63,7 @@ class _Handlers:
         beside: Beside | None,
         photo_maps: Mapping[str, Map],
         photo_series: PhotoSeries | None,
+        projectors: Sequence[ProjectorLink],
     ) -> None:
         self._photo_series = photo_series
         self._transport, self._physical = transport, PhysicalRelighting(transport)
@@ -81,9 +83,9 @@ class _Handlers:
         self._maximum_light_bytes = maximum_light_bytes(transport.projector)
         self._maximum_picture_bytes = maximum_light_bytes(transport.stored.camera)
         titles = {**TITLES, **{name: found.title for name, found in photo_maps.items()}}
-        named = {name: titles[name] for name in self._maps}
+        shown = {name: titles[name] for name in self._maps}
         photos = [] if photo_series is None else photo_series.describe()
-        self._scene = {**describe_scene(transport, named, beside), "photos": photos}
+        self._scene = {**describe_scene(transport, shown, beside, projectors), "photos": photos}
         self._sessions = self._films = 0
 
     async def asset(self, name: str) -> Response:
@@ -207,6 +209,7 @@ def application(
     beside: Beside | None = None,
     photo_maps: Mapping[str, Map] = MappingProxyType({}),
     photo_series: PhotoSeries | None = None,
+    projectors: Sequence[ProjectorLink] = (),
 ) -> FastAPI:
     """Return the ASGI application of a transport's page.
 
@@ -219,13 +222,15 @@ def application(
         Maps by photos, as `nearfar.viewer.held_out.photo_maps` makes them.
     photo_series : PhotoSeries, optional
         Photos to compare the scene with, each under its light.
+    projectors : sequence of ProjectorLink, optional
+        Pages of all projectors before the camera.
 
     Raises
     ------
     MissingFileError
         If the package was installed without the page.
     """
-    handlers = _Handlers(transport, beside, photo_maps, photo_series)
+    handlers = _Handlers(transport, beside, photo_maps, photo_series, projectors)
     routes = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     routes.exception_handler(NearfarError)(_error_response)
     routes.add_middleware(with_security_headers)

@@ -1,7 +1,7 @@
 """The content of the viewer's responses, independent of HTTP."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,26 @@ from nearfar.viewer.messages import WHITE_LEVEL, Gains, Light, pack
 from nearfar.viewer.transport_row import transport_row
 
 
+class ProjectorLink(NamedTuple):
+    """The page of a projector, from that of another one or of its own.
+
+    Attributes
+    ----------
+    name : str
+        Its transport.
+    path : str
+        Relative; empty for the page itself.
+    """
+
+    name: str
+    path: str
+
+
 def describe_scene(
-    transport: InteractiveTransport, maps: Mapping[str, str], beside: Beside | None = None
+    transport: InteractiveTransport,
+    maps: Mapping[str, str],
+    beside: Beside | None = None,
+    projectors: Sequence[ProjectorLink] = (),
 ) -> dict[str, Any]:
     """Return a transport's verdict and sizes, its plan and what there is of it, for JSON.
 
@@ -34,6 +52,8 @@ def describe_scene(
         Titles of the maps there are, by name.
     beside : Beside, optional
         The second transport.
+    projectors : sequence of ProjectorLink
+        Pages of all projectors before the camera; empty for one alone.
     """
     stored, verdict = transport.stored, transport.stored.verdict
     plan = stored.provenance.get("plan")
@@ -61,6 +81,7 @@ def describe_scene(
         "has_error_bars": stored.has_error_bars,
         "beside": beside
         and {"name": beside.name, "remark": beside.remark, "is_apart": beside.is_apart},
+        "projectors": [link._asdict() for link in projectors],
         "colour_maps": describe_colour_maps(),
         "mark": list(MARK),
     }

@@ -1,16 +1,16 @@
 """``nearfar view``: a transport under any light, in the browser."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from nearfar.report.maps import Map
-from nearfar.viewer.application import application
 from nearfar.viewer.beside import Beside
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.messages import maximum_light_bytes
 from nearfar.viewer.photo_series import PhotoSeries
 from nearfar.viewer.server import ListeningAddress, serve
+from nearfar.viewer.several_projectors import application_of_projectors
 
 
 def run_view(
@@ -22,6 +22,7 @@ def run_view(
     beside: Beside | None = None,
     photo_maps: Mapping[str, Map] = MappingProxyType({}),
     photo_series: PhotoSeries | None = None,
+    others: Sequence[InteractiveTransport] = (),
 ) -> None:
     """Serve the page of a transport until an interrupt, or until `stop` is set.
 
@@ -39,6 +40,8 @@ def run_view(
         Maps by photos, as `nearfar.viewer.held_out.photo_maps` makes them.
     photo_series : PhotoSeries, optional
         Photos to compare the scene with, each under its light.
+    others : sequence of InteractiveTransport, optional
+        Of further projectors before the same camera.
 
     Raises
     ------
@@ -46,11 +49,13 @@ def run_view(
         As `nearfar.viewer.server.serve`.
     """
     stop = stop or threading.Event()
-    largest = maximum_light_bytes(transport.projector)
-    page = application(transport, beside, photo_maps, photo_series)
+    transports = [transport, *others]
+    largest = max(maximum_light_bytes(each.projector) for each in transports)
+    page = application_of_projectors(transports, beside, photo_maps, photo_series)
     with serve(page, listening, maximum_message_bytes=largest) as url:
         on_start(url)
         try:
             stop.wait()
         finally:
-            transport.stop()
+            for each in transports:
+                each.stop()

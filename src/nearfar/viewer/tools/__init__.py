@@ -14,6 +14,7 @@ from nearfar.viewer.tools.beside import picture_beside
 from nearfar.viewer.tools.compensation import compensating_light
 from nearfar.viewer.tools.dual import seen_from_projector
 from nearfar.viewer.tools.error_bars import error_bars_of_picture
+from nearfar.viewer.tools.parts import parts_of_picture
 from nearfar.viewer.tools.reach import by_distance, by_reach
 from nearfar.viewer.tools.region import region_of
 
@@ -42,5 +43,6 @@ def tools_of(physical: PhysicalRelighting, beside: Beside | None) -> dict[str, T
         **TOOLS,
         "error-bars": partial(error_bars_of_picture, physical),
         "region": partial(region_of, physical),
+        "parts": partial(parts_of_picture, physical),
     }
     return tools if beside is None else {**tools, "beside": partial(picture_beside, beside)}

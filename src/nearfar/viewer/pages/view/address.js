@@ -59,6 +59,9 @@ export function stateOf(given, initial, scene) {
       state[name] = given[name];
   state.difference = given.difference === true;
   Object.assign(state, { ranges: readRanges(given.ranges), region: readRegion(given.region, scene.camera) });
+  // Each is read once its projector is known.
+  if (given.others && typeof given.others === 'object') state.others = { ...given.others };
+  if (Array.isArray(given.lit)) state.lit = given.lit.filter(number => Number.isInteger(number) && number in scene.projectors);
   if (Array.isArray(given.strokes)) state.strokes = given.strokes.filter(isStroke).slice(0, MAXIMUM_STROKES);
   if (Array.isArray(given.keyframes))
     state.keyframes = given.keyframes.slice(0, MAXIMUM_KEYFRAMES).map(frame => pick(stateOf({ ...frame, keyframes: [] }, initial, scene), LIGHT_KEYS));

@@ -16,10 +16,12 @@ function changedGains(scene, state, split) {
 
 // What the page shows, as the other tools are told of it.
 export function describe(page) {
-  const { scene, store: { state }, scenePictures: { split } } = page;
+  const { scene, store: { state }, scenePictures: { split }, otherProjectors } = page, own = { transport: scene.name, light: lightFile(page) };
+  // Of several projectors: those that are lit, of the relit scene alone.
+  const lit = state.tool === 'relit' ? [...(otherProjectors.isLit ? [own] : []), ...otherProjectors.files] : [], [first = own, ...others] = lit;
   const { exposure, gamma, channel, tool, range, reach, broad } = state;
   return {
-    transport: scene.name, light: lightFile(page), output: `${pictureName(page)}.png`, exposure, gamma, split,
+    ...first, others, output: `${pictureName(page)}.png`, exposure, gamma, split,
     channel: channel ? ['red', 'green', 'blue'].indexOf(channel) : null, gains: tool === 'reach' ? [] : changedGains(scene, state, split),
     mask: tool === 'reach' ? { within: [reach], ring: [reach, reach + broad], beyond: [reach] }[range] : null, range,
   };
@@ -31,9 +33,9 @@ const look = ({ exposure, gamma, channel }) => [
 ];
 
 export function commandOf(shown, light = quoted(shown.light), output = quoted(shown.output)) {
-  const { transport, gains, mask, range } = shown;
+  const { transport, gains, mask, range, others } = shown;
   const words = mask ? ['probe', quoted(transport), output, '--light', light, `--${range}`, mask.join(':')]
-    : ['relight', quoted(transport), light, output, ...gains.flatMap(([name, value]) => ['--gain', `${name}=${value}`])];
+    : ['relight', quoted(transport), light, output, ...gains.flatMap(([name, value]) => ['--gain', `${name}=${value}`]), ...others.flatMap(other => ['--and', quoted(`${other.transport}=${other.light}`)])];
   return ['nearfar', ...words, ...look(shown)].join(' ');
 }
 
@@ -43,11 +45,41 @@ export const loopOf = shown => `for light in lights/*.png; do
 done`;
 
 export function pythonOf(shown) {
-  const { transport, light, output, gains, mask, range, split, exposure, gamma, channel } = shown;
+  return shown.others.length ? pythonOfSeveral(shown) : pythonOfOne(shown);
+}
+
+function pythonOfSeveral(shown) {
+  const { transport, light, others, output } = shown, { made, developed } = calls(shown);
+  const pairs = [{ transport, light }, ...others].map(each => `    (${literal(each.transport)}, ${literal(each.light)}),`).join('\n');
+  return `from pathlib import Path
+
+import nearfar
+from nearfar.files import ${developed.length ? 'developed, ' : ''}read_light, write_picture
+from nearfar.transport.colour import as_channels_see
+
+picture = 0
+for name, file in (
+${pairs}
+):
+    transport = nearfar.load_transport(name)
+    light = read_light(Path(file), transport.projector)
+    light = as_channels_see(light, transport.channels, transport.provenance)
+    picture = picture + ${made}
+${developed.length ? `picture = developed(picture, ${developed.join(', ')})\n` : ''}write_picture(Path(${literal(output)}), picture)
+`;
+}
+
+// What makes the picture, and how it is developed.
+function calls({ gains, mask, range, split, exposure, gamma, channel }) {
   const given = gains.map(([name, value]) => `, ${name}=${value}`).join('');
   const made = mask ? `nearfar.probe(transport, light, nearfar.ProbingMask.${range}(${mask.join(', ')}))`
     : split === 'physical' && gains.length ? `nearfar.split_physically(transport).relight(light${given})` : `transport.relight(light${given})`;
   const developed = [...(exposure ? [`exposure=${exposure}`] : []), ...(gamma === 1 ? [] : [`gamma=${gamma}`]), ...(channel === null ? [] : [`channel=${channel}`])];
+  return { made, developed };
+}
+
+function pythonOfOne(shown) {
+  const { transport, light, output } = shown, { made, developed } = calls(shown);
   return `from pathlib import Path
 
 import nearfar

@@ -22,7 +22,9 @@ export function bindCopying(page) {
     get('as-command').textContent = commandOf(shown);
     get('as-python').textContent = pythonOf(shown);
     get('as-loop').textContent = loopOf(shown);
-    get('of-keyframes').hidden = page.store.state.keyframes.length < 2;
+    get('of-keyframes').hidden = page.store.state.keyframes.length < 2 || page.otherProjectors.isSum;
+    get('of-others').hidden = !page.otherProjectors.isSum;
+    get('of-others').textContent = `Lights: ${[shown, ...shown.others].map(({ transport, light }) => `${light} of ${transport}`).join(', ')}. Save each on the page of its projector.`;
     get('loop-note').hidden = page.store.state.metering !== 'auto';
     get('copied').textContent = '';
     get('light-file').textContent = shown.light;

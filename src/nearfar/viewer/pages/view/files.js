@@ -49,17 +49,17 @@ export async function showingFaultsOf(file, work) {
 const blobOf = url => new Blob([Uint8Array.from(atob(url.split(',')[1]), c => c.charCodeAt(0))], { type: 'image/png' });
 
 // The light of a photo of the capture.
-async function lightOfPhoto(url, light) {
-  const { arrays: [levels] } = await requestMessage(`photo/${PHOTO_URL.exec(url)[1]}`);
+async function lightOfPhoto(url, light, path) {
+  const { arrays: [levels] } = await requestMessage(`${path}photo/${PHOTO_URL.exec(url)[1]}`);
   return light.addLinear(levels.data, url);
 }
 
-// Adds the pictures that the address holds; returns them, and how many of them it does not.
-export async function restorePictures(urls, light) {
+// Adds the pictures that the address holds; returns them, and how many of them it does not. path: of the page that has the photos.
+export async function restorePictures(urls, light, path = '') {
   const pictures = [];
   let missing = 0;
   for (const url of urls)
-    try { pictures.push(await (PHOTO_URL.test(url) ? lightOfPhoto(url, light) : light.addPicture(blobOf(url)))); } catch {
+    try { pictures.push(await (PHOTO_URL.test(url) ? lightOfPhoto(url, light, path) : light.addPicture(blobOf(url)))); } catch {
       pictures.push(light.addMissing());
       missing += 1;
     }

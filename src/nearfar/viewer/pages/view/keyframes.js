@@ -7,20 +7,24 @@ import { LIGHT_KEYS, pick } from './state.js';
 
 const button = (textContent, ariaLabel, onclick, disabled = false) => Object.assign(document.createElement('button'), { textContent, ariaLabel, title: ariaLabel, onclick, disabled });
 
-function filmText(state) {
+function filmText(state, isSum) {
   if (state.keyframes.length < 2) return 'Keep two lights or more, by “keep as keyframe” below the light. The page goes from one to the next.';
-  const length = `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s` + (state.metering === 'auto' ? ', exposure follows the light' : '');
-  return state.tool === 'relit' ? length : `${length}. Films are of the relit scene: choose relit to save one.`;
+  const length = `${pictureCountOf(state)} pictures, ${+secondsOf(state).toFixed(1)} s`;
+  if (isSum) return `${length}. Films are of one projector: let only the chosen one be lit to save one.`;
+  if (state.tool !== 'relit') return `${length}. Films are of the relit scene: choose relit to save one.`;
+  return length + (state.metering === 'auto' ? ', exposure follows the light' : '');
 }
 
 export class Keyframes {
   #store;
   #playback;
+  #otherProjectors;
   // When it was started; 0 while it is stopped.
   #started = 0;
   #shown = null;
 
-  constructor({ store, playback, tabs }) {
+  constructor({ store, playback, tabs, otherProjectors }) {
+    this.#otherProjectors = otherProjectors;
     this.#store = store;
     this.#playback = playback;
     get('add-keyframe').onclick = () => {
@@ -59,12 +63,12 @@ export class Keyframes {
   #set(keyframes) { this.#store.update({ keyframes }); }
 
   show(state) {
-    const { keyframes } = state, isPlayable = keyframes.length > 1;
+    const { keyframes } = state, isPlayable = keyframes.length > 1, { isSum } = this.#otherProjectors;
     set(get('play-keyframes'), 'textContent', this.isPlaying ? 'stop' : 'play keyframes');
     set(get('play-keyframes'), 'ariaPressed', String(this.isPlaying));
     set(get('play-keyframes'), 'disabled', !isPlayable);
-    for (const id of ['film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable || state.tool !== 'relit');
-    set(get('film-length'), 'textContent', filmText(state));
+    for (const id of ['film-pictures', 'film-mp4']) set(get(id), 'disabled', !isPlayable || isSum || state.tool !== 'relit');
+    set(get('film-length'), 'textContent', filmText(state, isSum));
     if (this.#shown === keyframes) return;
     this.#shown = keyframes;
     get('keyframes').replaceChildren(...keyframes.map((frame, i) => this.#item(frame, i, keyframes)));

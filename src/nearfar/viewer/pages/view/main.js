@@ -19,8 +19,11 @@ import { Light } from './light.js';
 import { Maps } from './maps.js';
 import { meter } from './metering.js';
 import { Numbers } from './numbers.js';
+import { loadOthers } from './other-lights.js';
+import { OtherProjectors } from './other-projectors.js';
 import { PhotoSeries } from './photo-series.js';
 import { Playback } from './playback.js';
+import { Projectors } from './projectors.js';
 import { request } from './protocol.js';
 import { Reach } from './reach.js';
 import { Region } from './region.js';
@@ -37,13 +40,15 @@ async function load() {
   const scene = await (await request('scene')).json();
   const initial = initialState(scene), state = fromAddress(location.hash, initial, scene);
   const light = new Light(scene.projector, scene.light_block);
-  const { pictures, missing } = await restorePictures(state.pictures, light), last = Math.max(0, pictures.length - 1);
+  const { pictures, missing: ofOwn } = await restorePictures(state.pictures, light), last = Math.max(0, pictures.length - 1);
   Object.assign(state, { pictures, shown: Math.min(Math.max(0, Math.round(state.shown)), last) });
-  return { scene, initial, state, light, missing };
+  const others = await loadOthers(scene, state.others), missing = others.reduce((sum, other) => sum + other.missing, ofOwn);
+  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`, 'address');
+  return { scene, initial, state, light, others };
 }
 
 async function open() {
-  const { scene, initial, state, light, missing } = await load();
+  const { scene, initial, state, light, others } = await load();
   const writeAddress = createAddressWriter(initial), scenePictures = new ScenePictures(scene.camera, () => [page.numbers, page.region].forEach(each => each?.refresh()));
   const store = new Store(state, changes => {
     if (changesLight(changes)) {
@@ -54,17 +59,18 @@ async function open() {
       scenePictures.draw(store.state);
     }
   });
+  const otherProjectors = scenePictures.others = new OtherProjectors({ scene, store, others, onArrived: () => { scenePictures.draw(store.state); page.numbers?.refresh(); } });
   const figures = new Figures({ scene, store });
   const playback = new Playback({ store, light }), inspector = new Inspector({ scene, store, tabs: () => tabs, figures }), maps = new Maps({ scene, store, figures });
   const tabs = new Tabs({ store, onShown: () => figures.draw() });
   const lamps = new Lamps(scene), splits = new Splits({ scene, store, onReady: () => connection.lightChanged() });
   const lightCanvas = new LightCanvas({ light, store, lamps, onDrawn: () => { show(); connection.lightChanged(); for (const each of [tools, numbers, region, beside]) each.lightChanged(); } });
-  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits, figures, tabs };
+  const page = { scene, store, light, lightCanvas, scenePictures, playback, inspector, splits, figures, tabs, initial, otherProjectors };
   Object.assign(page, { dual: new Dual(page), compensation: new Compensation(page) });
   const tools = page.tools = new Tools(page, { reach: new Reach(page), dual: page.dual, compensation: page.compensation, 'error-bars': new ErrorBars(page) });
   const numbers = page.numbers = new Numbers(page);
   describe(scene);
-  const region = page.region = new Region(page), beside = page.beside = new Beside(page), photoSeries = new PhotoSeries(page);
+  const region = page.region = new Region(page), beside = page.beside = new Beside(page), photoSeries = new PhotoSeries(page), projectors = new Projectors(page);
   function show(changes) {
     photoSeries.show(store.state); // What the scene is compared with comes before what is said of it.
     const { hasReference, split } = scenePictures, { isPlaying } = playback;
@@ -73,7 +79,7 @@ async function open() {
     showControls(store.state, { hasReference, isPlaying, split });
     page.showKept(store.state);
     tools.show(store.state, changes);
-    for (const each of [tabs, figures, region, beside]) each.show(store.state);
+    for (const each of [tabs, figures, region, beside, projectors]) each.show(store.state);
     numbers.refresh();
     writeAddress(store.state);
   }
@@ -88,7 +94,6 @@ async function open() {
     onFrame: receiving(page, show),
     onFault: text => showFault(text, 'connection'),
   });
-  if (missing) showFault(`${missing} of the pictures ${missing > 1 ? 'are' : 'is'} not in the address: drop again what is missing.`, 'address');
   inspect(state, { inspector, maps });
   beside.compare();
 }

@@ -71,18 +71,20 @@ export class Numbers {
     this.refresh();
   }
 
-  #showReadout([y, x], { shown, parts, total, split, isRelit, textOf }, told) {
+  #showReadout([y, x], { shown, parts, total, others, split, isRelit, textOf }, told) {
     const { scene, store: { state } } = this.#page;
     const sigma = told?.sigma && isRelit ? ` ± ${valueText(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
     const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${valueText(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
     const { scenePictures } = this.#page, beside = !this.#isDual && isRelit && scenePictures.referenceAt([y, x]);
     const heldOut = this.#isDual ? '' : this.#heldOut.at([y, x], scene.camera);
     const share = state.tool === 'reach' && !isRelit ? [`${(100 * mean(shown) / (mean(total) || 1)).toFixed(1)} % of its light, ${valueText(mean(total))}`] : [];
-    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${sigma}`, ...share, ...apart,
+    const { projectors } = scene, isSeveral = isRelit && projectors.length > 0, own = isSeveral ? projectors.find(({ path }) => !path).name : '';
+    const each = isSeveral ? [`${own} ${valueText(mean(total))}${sigma} (${apart.join(', ')})`, ...others.map(([name, values]) => `${name} ${valueText(mean(values))}`)] : [];
+    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${isSeveral ? '' : sigma}`, ...each, ...share, ...(isSeveral ? [] : apart),
       ...(beside ? [`${scenePictures.referenceName} ${valueText(mean(beside))}`] : []), ...(heldOut ? [`off at held-out photos ${heldOut}`] : [])].join(' · '));
   }
 
-  #showTable([y, x], { parts, total, split }, told) {
+  #showTable([y, x], { parts, total, sum, others, split }, told) {
     const { scene } = this.#page, colours = total.length;
     set(get('numbers-pixel'), 'textContent', `row ${y}, column ${x}`);
     const names = SPLITS[split].filter(name => hasPart(scene, name));
@@ -91,8 +93,13 @@ export class Numbers {
     const head = ['', ...(colours === CHANNELS.length ? CHANNELS : ['light']), 'share'];
     get('numbers').replaceChildren(tableLine('th', head), ...rows.map(([title, values, sigma]) =>
       tableLine('td', [title, ...values.map((value, c) => valueText(value) + (sigma ? `\n± ${valueText(sigma[c] ?? null)}` : '')),
-        `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`])), ...this.#heldOutLine([y, x], colours));
+        `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`])), ...this.#otherLines(sum, others), ...this.#heldOutLine([y, x], colours));
     get('numbers').hidden = false;
+  }
+
+  // Of several projectors: the light of the others, and of all that are lit.
+  #otherLines(sum, others) {
+    return [...others, ...(this.#page.scene.projectors.length ? [['all that are lit', sum]] : [])].map(([name, values]) => tableLine('td', [name, ...values.map(valueText), '']));
   }
 
   #heldOutLine(place, colours) {

@@ -4,8 +4,8 @@ import { showComparison } from './comparison.js';
 import { compare, describeDifference, drawDifference, rangeOf } from './difference.js';
 import { get } from './dom.js';
 import { FrameStatus, describeFrame } from './frame-status.js';
-import { drawPicture, exposureFor, onePart, shrink, sumOfParts } from './picture.js';
-import { partsAt, valuesAt } from './picture-values.js';
+import { drawPicture, exposureFor, shrink, sumOfParts } from './picture.js';
+import { valuesAt } from './picture-values.js';
 import { markPixel } from './stage-marks.js';
 import { SPLITS, gainsOf } from './state.js';
 
@@ -21,10 +21,10 @@ export class ScenePictures {
   #frameCount = 0;
   #aspect = 0;
 
-  // onReplaced() is called once another picture is shown in place of the relit scene.
+  // others: pictures of other projectors, which are added to this one's. onReplaced() is called once another picture is shown in place of the relit scene.
   constructor(camera, onReplaced) {
     this.#camera = camera;
-    Object.assign(this, { isStageFinal: false, referenceName: '', onReplaced });
+    Object.assign(this, { isStageFinal: false, referenceName: '', others: null, onReplaced });
   }
 
   get hasReference() { return this.#reference !== null; }
@@ -32,7 +32,7 @@ export class ScenePictures {
   // The split of the newest frame.
   get split() { return this.#frame?.split || 'model'; }
 
-  get isExact() { return Boolean(this.#frame?.exact); }
+  get isExact() { return Boolean(this.#frame?.exact) && this.others.isReady(this.split); }
 
   // Whether the picture is exact, and of the newest light; or whether the picture in its place is.
   get isFinal() { return this.#stage ? this.isStageFinal : this.isExact && this.#frame.isNewest; }
@@ -47,12 +47,11 @@ export class ScenePictures {
   receive(header, parts, isNewest, state) {
     this.#frame = { exact: header.exact, split: header.split, isNewest, parts: { ...parts, scale: header.scale } };
     this.#status.arrived(header);
-    this.draw(state);
     this.#frameCount += 1;
-    this.#describeFrame();
+    this.draw(state);
   }
 
-  #describeFrame() { if (this.#frame) describeFrame(this.#frame, this.#frameCount, this.#stage ? this.isStageFinal : null); }
+  #describeFrame() { describeFrame({ ...this.#frame, exact: this.isExact }, this.#frameCount, this.#stage ? this.isStageFinal : null); }
 
   draw(state) {
     if (!this.#frame) return;
@@ -61,9 +60,10 @@ export class ScenePictures {
     if (this.#stage?.paint) this.#stage.paint(get('picture'));
     else if (!this.#drawDifference(picture, state)) drawPicture(get('picture'), picture, this.#stage?.look || state);
     SPLITS[this.split].forEach((name, i) =>
-      drawPicture(get('part' + i), shrink(onePart(this.#frame.parts, i, state[name]), MAXIMUM_PIXELS_OF_A_PART), state));
+      drawPicture(get('part' + i), shrink(this.others.part(this.#frame.parts, i, state[name], this.split), MAXIMUM_PIXELS_OF_A_PART), state));
     this.#drawReference(state);
     markPixel(this.#stage?.ofProjector ? null : state.pixel, this.#camera);
+    this.#describeFrame();
   }
 
   // Compares with the picture as it is, if it is exact; returns whether it is.
@@ -98,23 +98,21 @@ export class ScenePictures {
     this.#stage = picture && { picture, ofProjector, look, paint, textOf };
     this.isStageFinal = isFinal;
     this.draw(state);
-    this.#describeFrame();
     this.onReplaced();
   }
 
   // What is shown at a pixel [y, x] of a grid, and what the frame has there, colour by colour; null before there is one.
   valuesAt(place, size) {
     if (!this.#frame) return null;
-    const parts = partsAt(this.#frame.parts, place, size), total = parts[0].map((_, c) => parts.reduce((sum, part) => sum + part[c], 0));
-    const stage = this.#stage?.picture, shown = stage ? valuesAt(stage, place, size) : total;
-    return { shown, parts, total, split: this.split, isRelit: !stage, textOf: this.#stage?.textOf };
+    const found = this.others.valuesAt(this.#frame.parts, place, size, this.split), stage = this.#stage?.picture;
+    return { ...found, shown: stage ? valuesAt(stage, place, size) : found.sum, split: this.split, isRelit: !stage, textOf: this.#stage?.textOf };
   }
 
   // The exposure that suits the picture; null before there is one.
   exposure(state) { return this.#frame && exposureFor(this.#stage?.paint ? this.relit(state) : this.#picture(state)); }
 
   // The relit scene, whatever is shown in its place.
-  relit(state) { return this.#frame && sumOfParts(this.#frame.parts, gainsOf(state, this.split)); }
+  relit(state) { return this.#frame && this.others.relit(this.#frame.parts, gainsOf(state, this.split), this.split); }
 
   #picture(state) { return this.#stage?.picture || this.relit(state); }
 

@@ -21,8 +21,11 @@ export const CHANNELS = ['', 'red', 'green', 'blue'];
 export const METERINGS = ['fixed', 'auto'];
 export const KINDS = ['spot', 'stripe', 'sinusoid', 'checkerboard', 'white', 'paint', 'pixel', 'picture'];
 
+// Which of several projectors the page is of.
+export const numberOf = projectors => Math.max(0, projectors.findIndex(({ path }) => !path));
+
 // What a page opens with; the keys are those of the address.
-export function initialState({ projector: [height, width], camera: [rows, columns], beside }) {
+export function initialState({ projector: [height, width], camera: [rows, columns], beside, projectors }) {
   const side = Math.min(height, width);
   return Object.freeze({
     kind: 'spot', x: (width - 1) / 2, y: (height - 1) / 2, radius: Math.max(1, Math.round(side / 4)), soft: 0.5,
@@ -33,6 +36,8 @@ export function initialState({ projector: [height, width], camera: [rows, column
     colourMap: 'nearfar', ranges: {}, region: null, errorBars: 'absolute', arrangement: beside ? 'pair' : 'wipe',
     cameraLight: 'spot', cameraX: (columns - 1) / 2, cameraY: (rows - 1) / 2, cameraRadius: Math.max(1, Math.round(Math.min(rows, columns) / 8)),
     viewZoom: 1, viewX: 0.5, viewY: 0.5, channel: '', metering: 'fixed', keyframes: [], seconds: 2, rate: 25, blend: null,
+    // Of several projectors: the lights of the others by their numbers, and the numbers of those that are lit.
+    others: {}, lit: [numberOf(projectors)],
   });
 }
 
@@ -53,7 +58,7 @@ export function limitsOf({ projector, camera }) {
 // Everything else changes the light.
 const DISPLAY_ONLY = [...GAINS, 'solo', 'exposure', 'gamma', 'wipe', 'difference', 'zoom', 'map', 'pixel', 'column', 'theme',
   'tab', 'tool', 'range', 'reach', 'broad', 'cameraLight', 'cameraX', 'cameraY', 'cameraRadius',
-  'colourMap', 'ranges', 'region', 'errorBars', 'arrangement', 'viewZoom', 'viewX', 'viewY', 'channel', 'metering', 'keyframes', 'seconds', 'rate'];
+  'colourMap', 'ranges', 'region', 'errorBars', 'arrangement', 'viewZoom', 'viewX', 'viewY', 'channel', 'metering', 'keyframes', 'seconds', 'rate', 'others', 'lit'];
 
 // What a light is drawn by.
 export const LIGHT_KEYS = ['kind', 'x', 'y', 'radius', 'soft', 'angle', 'width', 'cycles', 'phase', 'side', 'shift', 'shown', 'colour', 'strokes'];

@@ -54,9 +54,17 @@ export class Tools {
 
   #label(state) {
     const { scenePictures } = this.#page, { split } = scenePictures;
-    const label = this.#tool?.label(state) || this.#relitLabel(state, split);
+    const of = this.#ofProjectors(), label = (this.#tool?.label(state) || this.#relitLabel(state, split)) + (of && `, ${of}`);
     if (!scenePictures.isCompared || scenePictures.isPair(state)) return label;
     return state.difference ? `${label} less ${scenePictures.referenceName}` : `${scenePictures.referenceName} | ${label}`;
+  }
+
+  // Of several projectors: which ones the picture is of.
+  #ofProjectors() {
+    const { scene: { projectors }, otherProjectors: { litCount } } = this.#page;
+    if (!projectors.length) return '';
+    if (this.#tool) return projectors.find(({ path }) => !path).name;
+    return litCount === 1 ? '1 projector lit' : `${litCount} projectors lit`;
   }
 
   #relitLabel(state, split) {

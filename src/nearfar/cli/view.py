@@ -15,8 +15,11 @@ from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
+    from nearfar.progress import Report
     from nearfar.report.maps import Map
     from nearfar.viewer.beside import Beside
+    from nearfar.viewer.interactive import InteractiveTransport
+    from nearfar.viewer.photo_series import PhotoSeries
 
 
 def view(
@@ -75,11 +78,8 @@ def view(
     import webbrowser
 
     from nearfar.applications.several_projectors import require_same_camera
-    from nearfar.capture import open_capture
     from nearfar.viewer.beside import open_beside
-    from nearfar.viewer.held_out import photo_maps
     from nearfar.viewer.interactive import InteractiveTransport
-    from nearfar.viewer.photo_series import PhotoSeries
     from nearfar.viewer.server import ListeningAddress
     from nearfar.viewer.view import run_view
 
@@ -110,9 +110,7 @@ def view(
                 progress=lambda share: report(f"reading {beside}", share),
             )
         if capture is not None:
-            opened = open_capture(capture)
-            maps = photo_maps(interactive.stored, opened, report)
-            series = PhotoSeries(interactive, opened)
+            maps, series = _photos_of(interactive, capture, report)
 
     _tell_of_memory(max(each.nbytes for each in stored), available, quiet=quiet)
 
@@ -134,6 +132,18 @@ def view(
             others=others,
         )
     say("view ended", quiet=quiet)
+
+
+def _photos_of(
+    transport: "InteractiveTransport", path: Path, report: "Report"
+) -> tuple[Mapping[str, "Map"], "PhotoSeries"]:
+    """Read what a page has of the capture that a transport was reconstructed from."""
+    from nearfar.capture import open_capture
+    from nearfar.viewer.held_out import photo_maps
+    from nearfar.viewer.photo_series import PhotoSeries
+
+    capture = open_capture(path)
+    return photo_maps(transport.stored, capture, report), PhotoSeries(transport, capture)
 
 
 def _tell_of_memory(needed: int, available: int, *, quiet: bool) -> None:

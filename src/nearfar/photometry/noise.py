@@ -10,12 +10,6 @@ from nearfar.arrays import Floats
 # Variances above this many times the mean of the lower nine tenths are not noise: something moved.
 # Variances of two photos each scatter most; fewer than one in ten thousand of them exceed it.
 OUTLIER_FACTOR = 30.0
-# Fits of noise to light. The first weighs each variance by itself, so that those that are too small
-# by chance weigh most; the others weigh it by what the fit before expects.
-FITS = 3
-# Variances of a bin above this many times the expected one are not of noise: with 64 values of one
-# degree of freedom each, this is over five standard deviations.
-MOVING_FACTOR = 2.0
 
 
 class NoiseModel(NamedTuple):
@@ -77,14 +71,8 @@ def fit_noise(
     binned = np.array([max(typical(part), least) for part in np.array_split(scatter, bins)])
     if np.ptp(level) <= 1e-9:
         return NoiseModel(0.0, float(np.mean(binned)) / photos, least)
-    least_weighed = 1e-3 * binned.max(initial=0.0) + 1e-30
-    expected = binned
-    for _ in range(FITS):
-        weight = 1.0 / np.maximum(expected, least_weighed)
-        gain, offset = np.polyfit(level, binned, 1, w=weight)
-        expected = gain * level + offset
-        # Something moved: as in the first fit, that hardly weighs.
-        expected = np.where(binned > MOVING_FACTOR * expected, binned, expected)
+    weight = 1.0 / np.maximum(binned, 1e-3 * binned.max(initial=0.0) + 1e-30)
+    gain, offset = np.polyfit(level, binned, 1, w=weight)
     if gain < 0:
         return NoiseModel(0.0, float(np.median(binned)) / photos, least)
     return NoiseModel(float(gain), max(float(offset) / photos, -float(gain) * dark), least)

@@ -16,6 +16,7 @@ from nearfar.arrays import Floats
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import is_on_grid
 from nearfar.illumination.real_basis import MOST_HELD, RealBasis
+from nearfar.parallel import single_threaded_products
 
 # Smaller answers are rounding. A rounded wave holds multiples of its own frequency alone, so that
 # all but 2 to 4 % of the answers are.
@@ -72,7 +73,9 @@ def _answers(basis: RealBasis) -> csr_array:
 
     Frequencies off the DFT grid have none: their waves are not orthogonal to the others.
     """
-    found = basis.analyse(quantisation_error(basis)).astype(np.float32)
+    # The last bits of a product change with its threads, and those of responses must not.
+    with single_threaded_products():
+        found = basis.analyse(quantisation_error(basis)).astype(np.float32)
     on_grid = np.array([is_on_grid(k, basis.projector) for k in basis.frequencies])[basis.index]
     found[:, ~on_grid] = 0.0
     found[np.abs(found) < LEAST_ANSWER] = 0.0

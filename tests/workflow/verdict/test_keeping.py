@@ -100,7 +100,9 @@ def test_a_judgement_that_is_interrupted_leaves_a_whole_transport(made, stored):
     def interrupt(_what, _share):
         raise KeyboardInterrupt
 
-    with pytest.raises(KeptInterrupt, match=r"interrupted; .*t\.zarr is whole, and was not judged"):
+    with pytest.raises(
+        KeptInterrupt, match=r"interrupted; .*t\.zarr stays as it is, and was not judged"
+    ):
         judge_transport(stored, open_capture(made / "capture.zarr"), progress=interrupt)
     assert load_transport(stored).verdict is None
 
@@ -116,8 +118,16 @@ def test_a_check_photo_that_cannot_be_read_leaves_a_whole_transport(made, tmp_pa
     told = run_nearfar("reconstruct", capture, output)
     assert told.status == 1
     assert f"written to {output}" in told.out
-    assert re.search(r"c\.zarr is damaged.*t\.zarr is whole, and was not judged", told.err)
+    assert re.search(r"c\.zarr is damaged.*t\.zarr stays as it is, and was not judged", told.err)
     assert load_transport(output).verdict is None
+
+
+def test_a_transport_that_is_damaged_itself_is_not_called_whole(made, stored):
+    chunk = next(path for path in sorted((stored / "near").rglob("c.*")) if path.is_file())
+    chunk.write_bytes(chunk.read_bytes()[:-9])
+    with pytest.raises(OSError, match=r"t\.zarr is damaged") as fault:
+        judge_transport(stored, open_capture(made / "capture.zarr"))
+    assert "whole" not in str(fault.value)
 
 
 def test_what_gains_changed_is_not_judged_by_the_photos(made, tmp_path):

@@ -124,7 +124,7 @@ class SimulatedRig:
                 number += 1
 
     def _drawing(self) -> Callable[[NDArray[np.uint8]], NDArray[np.uint8]]:
-        """Return what turns a pattern into the levels that the projector is sent."""
+        """Return the function from a pattern to the levels sent to the projector."""
         if self.calibration is None:
             return lambda pattern: pattern
         # The primaries of a simulated projector have one response.

@@ -160,10 +160,10 @@ def _connected(scheduler: str) -> Iterator[Client]:
 
 @contextmanager
 def _lost_scheduler(scheduler: str) -> Iterator[None]:
-    """Say that the scheduler was lost, however Dask tells it.
+    """Raise a ClusterError if the scheduler is lost.
 
-    Tasks are cancelled where Dask notices first, and connections break off where we ask first. The
-    latter are OSError, and must not be taken for faults of the disk.
+    Dask cancels the tasks if it notices first. If a result is asked for first, the connection
+    breaks off, which is an OSError and must not be taken for a fault of the disk.
     """
     try:
         yield

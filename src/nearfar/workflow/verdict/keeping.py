@@ -53,8 +53,8 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     StorageError
         If the verdict cannot be written.
     KeptInterrupt
-        If it was interrupted. The message says, as those of all faults of the photos do, that the
-        transport is whole.
+        If it was interrupted. As with every fault met while judging, the transport stays as it
+        is, and the message says so.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def judge_transport(path: AnyPath, capture: Capture, *, progress: Report | None 
     stored = open_transport(path)
     require_origin(stored, capture)
     require_writable(path, path / METADATA)
-    unjudged = f"{path} is whole, and was not judged"
+    unjudged = f"{path} stays as it is, and was not judged"
     try:
         verdict = judge_reconstruction(stored, capture, progress or ignore_progress)
         with storage_faults(path):

@@ -7,9 +7,11 @@ import pytest
 from scipy.optimize import minimize
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.correspondence import correspond_by_phase
+from nearfar.estimate.joint import estimate_jointly, positive
 from nearfar.estimate.joint.positive import raise_to
 from nearfar.illumination.near_basis import window_offsets
+from nearfar.scenes.hostile import hostile_transport
 from nearfar.transport import near
 from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
 from tests.worlds import model_transport
@@ -84,3 +86,23 @@ def test_an_estimate_has_no_negative_transport_in_its_windows(noise):
     # White is what the photos say.
     white = found @ np.ones(PROJECTOR)
     np.testing.assert_allclose(white.ravel(), measurements.responses[:, 0, 0], atol=1e-4)
+
+
+def test_photos_fit_once_windows_are_raised(monkeypatch):
+    camera, noise = Size(16, 20), 5e-4
+    rows = hostile_transport("hair", PROJECTOR, camera).rows(slice(0, camera.pixels))
+    measurements = measured(
+        rows.astype(np.float64), chosen_frequencies(), noise=noise, camera=camera
+    )
+    q = correspond_by_phase(measurements, pitch=1).q
+
+    def misfit():
+        found = estimate_jointly(measurements, q, WINDOW, FAR, pitch=1)
+        fitted = found.dense() @ measurements.basis.patterns.T
+        return np.sqrt(np.mean((fitted - measurements.responses)[found.lit.ravel()] ** 2))
+
+    mended = misfit()
+    monkeypatch.setattr(positive, "ROUNDS", 0)
+    raised = misfit()
+    assert raised > 20 * noise
+    assert mended < raised / 5

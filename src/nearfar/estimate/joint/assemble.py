@@ -6,19 +6,18 @@ Index convention: arrays are (C, channels, ...); w runs over window entries.
 import numpy as np
 from array_api_compat import device
 
-from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace
 from nearfar.estimate.joint.batch import dc_index
-from nearfar.estimate.joint.positive import raise_to
+from nearfar.estimate.joint.positive import make_positive
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
 from nearfar.estimate.joint.shares import share_on_projector
-from nearfar.estimate.joint.spikes import around_q, away_from_q
-from nearfar.illumination.centred_basis import CentredBasis, centred_basis
+from nearfar.estimate.joint.spikes import around_q
+from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, is_on_grid
 from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
-from nearfar.transport import near
 from nearfar.transport.boxes import share_of_boxes
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
@@ -55,18 +54,20 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     far_range = _far_range(rest, rows.far, far_indices)
     of_far = centred_basis(basis, problem.near_basis)
     of_far = of_far.put(lambda one: beside(one, rows.near))
-    windows = rows.near
-    if problem.near_basis.pitch == 1:
-        windows = _positive(problem, rows.near, far_range, of_far)
-    shape = (*measurements.camera, measurements.channels)
-    footprint = None
-    if problem.near_basis.pitch > 1:
-        footprint = fetch(pixels.footprint).reshape(*measurements.camera, 4)
     # Later sweeps estimate small differences from a mean that a camera pixel's own photos are part
     # of: prior component and scale by the first sweep's evidence fit the error (docs/decisions/0011
     # and 0061).
     of_error_bars = rows.choices.of_error_bars
     assert of_error_bars is not None
+    windows = rows.near
+    if problem.near_basis.pitch == 1:
+        windows, far_range = make_positive(
+            problem, rows.near, far_range, of_far, kept, of_error_bars
+        )
+    shape = (*measurements.camera, measurements.channels)
+    footprint = None
+    if problem.near_basis.pitch > 1:
+        footprint = fetch(pixels.footprint).reshape(*measurements.camera, 4)
     return Transport(
         projector=measurements.projector,
         correspondence=fetch(pixels.correspondence)
@@ -144,30 +145,6 @@ def _without_negative_direct(problem: Problem, rows: EstimatedRows) -> Estimated
     weights = direct_weights(problem.pixels.correspondence, problem.pixels.centres)[:, 0]
     windows[..., beside(around, windows)] += negative[..., None] * weights[:, None]
     return rows._replace(amplitudes=amplitudes, near=windows)
-
-
-def _positive(
-    problem: Problem, windows: Floats, far_range: Floats, centred: CentredBasis
-) -> Floats:
-    """Return windows with n + f not negative and the same response to white."""
-    away = away_from_q(problem.near_basis.count)
-    inside = near.inside(
-        problem.pixels.centres, problem.near_basis.window, problem.measurements.projector
-    )
-    xp = namespace(windows)
-    free = inside & beside(away, windows) & problem.pixels.lit[:, None]
-    found: Floats = xp.empty_like(windows)
-    weights = beside(centred.basis.weights.astype(np.float32), windows)
-
-    def work(batch: slice) -> None:
-        coefficients = far_range[batch] * weights
-        recentred = centred.recentre(coefficients, problem.pixels.centres[batch])
-        least = -product(recentred, centred.on_window)
-        mine = xp.broadcast_to(free[batch, None], least.shape)
-        found[batch] = raise_to(windows[batch], least, mine)
-
-    side_by_side(work, blocks(len(windows), BATCH_PIXELS))
-    return found
 
 
 def _share_of_white(measurements: Measurements) -> Floats:

@@ -75,16 +75,17 @@ def _prior_variance():
     return 1.0 / common_precision(np.array([[WHITE]]), np.array([[OFFSET]]), SHIFT_DEVIATION)[0, 0]
 
 
-def _dense(transport, c, ask):
+def _dense(transport, c, ask, scale=SCALE):
     """Posterior deviation of ask(o, white's own, d, n, f) by plain linear algebra.
 
-    `ask` holds weights of each; f is its responses to the measured patterns.
+    `ask` holds weights of each; f is its responses to the measured patterns. Entries of n beyond
+    the border are 0.
     """
     posterior = transport.posterior
     basis = real_basis(posterior.frequencies, PROJECTOR)
     centre = transport.correspondence[0, c].astype(int)
     on_window = basis.patterns_at(window_offsets(WINDOW) + centre)
-    s = SCALE * WHITE
+    s = scale * WHITE
     ones = np.ones((basis.count, 1))
     direct = basis.patterns[:, [centre[0] * PROJECTOR.width + centre[1]]]
     responses = np.concatenate(
@@ -95,7 +96,9 @@ def _dense(transport, c, ask):
     prior[1, 1] = LIGHT**2 - (SHARE * OFFSET) ** 2
     prior[2, 2] = _prior_variance()[1]
     end = 3 + WINDOW**2
-    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR)
+    inside = near.inside(centre[None], WINDOW, PROJECTOR)[0]
+    both = np.outer(inside, inside)
+    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR) * both
     prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
     noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
@@ -123,14 +126,59 @@ def _weights(transport, c, light, *, far_only_held=True):
 def test_a_picture_is_as_uncertain_as_dense_algebra_says():
     centres = np.array([[6, 8], [5, 7], [2, 13]])
     transport = _transport(centres)
-    low = np.zeros(PROJECTOR)
-    # A light without what the transport does not hold of f.
+    light = _held_light(transport)
+    found = ErrorBars(transport).picture(light)
+    expected = [_dense(transport, c, _weights(transport, c, light)) for c in range(len(centres))]
+    np.testing.assert_allclose(found[0], expected, rtol=2e-3)
+
+
+def _held_light(transport):
+    """Return a light without what the transport does not hold of f."""
+    light = np.zeros(PROJECTOR)
     for k, amount in zip(transport.far_basis.frequencies, (0.5, 0.2, 0.1, 0.15, 0.05), strict=True):
         y, x = np.indices(PROJECTOR)
-        low += amount * np.cos(2 * np.pi * (float(k.fy) * y + float(k.fx) * x) + amount)
-    found = ErrorBars(transport).picture(low)
-    expected = [_dense(transport, c, _weights(transport, c, low)) for c in range(len(centres))]
+        light += amount * np.cos(2 * np.pi * (float(k.fy) * y + float(k.fx) * x) + amount)
+    return light
+
+
+def test_entries_beyond_the_border_are_known_to_be_none():
+    # The estimate rounds variance ratios to powers of 2 there.
+    scale = np.sqrt(512) * NOISE / WHITE
+    centres = np.array([[0, 8], [6, 15], [1, 14], [11, 0], [11, 0], [6, 8]])
+    transport = _transport(centres)
+    posterior = transport.posterior
+    scales = np.full_like(posterior.prior_scale, scale)
+    transport = replace(transport, posterior=replace(posterior, prior_scale=scales))
+    light = _held_light(transport)
+    bars = ErrorBars(transport)
+    found = bars.picture(light)
+    expected = [
+        _dense(transport, c, _weights(transport, c, light), scale) for c in range(len(centres))
+    ]
     np.testing.assert_allclose(found[0], expected, rtol=2e-3)
+    # One camera pixel alone, and its many entries, are no different.
+    rows = bars.component_rows(slice(2, 3))
+    assert np.count_nonzero(rows.near) == 4 * 4
+    count = len(_weights(transport, 2, light))
+    for entry, offset in enumerate(window_offsets(WINDOW)):
+        y, x = centres[2] + offset
+        if y < 0 or x >= PROJECTOR.width:
+            continue
+        one = np.zeros(count)
+        one[3 + entry] = 1.0
+        expected = _dense(transport, 2, one, scale)
+        assert rows.near[0, 0, y * PROJECTOR.width + x] == pytest.approx(expected, rel=5e-3)
+    of_direct = np.zeros(count)
+    of_direct[2] = 1.0
+    assert bars.direct()[0, 2, 0] == pytest.approx(_dense(transport, 2, of_direct, scale), rel=2e-3)
+    single = np.zeros(PROJECTOR)
+    single[3, 12] = 1.0
+    weights = _weights(transport, 2, single)
+    weights[2] = -1.0 / PROJECTOR.pixels
+    inside = near.inside(centres[2:3], WINDOW, PROJECTOR)[0]
+    weights[3 : 3 + WINDOW**2] = inside * (-1.0 / PROJECTOR.pixels)
+    expected = _dense(transport, 2, weights, scale)
+    assert rows.far[0, 0, 3 * PROJECTOR.width + 12] == pytest.approx(expected, rel=5e-3)
 
 
 def test_what_the_transport_does_not_hold_adds_its_expected_power():

@@ -1,52 +1,23 @@
 """The posterior mean where the projector's border clips the window: entries beyond it are zero.
 
-f and noise together have a diagonal covariance s^2 S + sigma^2 / m = sigma^2 D, so the window can
-be solved for by itself: with n = diag(deviation) z, z has the precision
-
-    Lambda = (smooth + diag(independent))^-1 / ratio + diag(deviation) B^T D^-1 B diag(deviation)
-
-over the entries inside, ratio = (s / sigma)^2 and B the patterns over the window. Camera pixels
-whose windows are clipped to the same rectangle share one factor of Lambda, if they have the same
-prior component and ratio. Prior scales are tried in steps of 2, so ratios are rounded to the
-nearest power of 2 without loss.
+The window is solved for by itself; see `clipped_windows`.
 
 Index convention: arrays are (n, channels, ...); r runs over real responses, w over window entries
 inside, g over y and the amplitudes of `nuisance`; m over pairs of a camera pixel and a channel.
 """
 
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from array_api_compat import device
-from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, Size, beside, fetch, namespace, product
+from nearfar.arrays import Floats, beside, fetch, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
+from nearfar.estimate.joint.clipped_windows import clippings_of, solve_windows
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
-from nearfar.illumination.near_basis import NearBasis, reachable
-from nearfar.priors.covariance import CORRELATION_LENGTH, smooth_covariance
-from nearfar.priors.responses import VARIANCE_RATIOS, ResponsePrior
-from nearfar.transport import near
-
-
-def is_clipped(centres: NDArray[np.int64], near_basis: NearBasis, projector: Size) -> Booleans:
-    """Return whether the border cuts into the window about each rounded q, shape (C,)."""
-    xp = namespace(centres)
-    never_inside = beside(~reachable(near_basis.window, projector), centres)
-    inside = near.inside(centres, near_basis.window, projector)
-    found: Booleans = ~xp.all(inside | never_inside, axis=1)
-    return found
-
-
-def rounded_ratio(ratio: Floats) -> Floats:
-    """Round variance ratios to the nearest power of 2, so that camera pixels share them."""
-    xp = namespace(ratio)
-    within = xp.clip(ratio, float(VARIANCE_RATIOS[0]), float(VARIANCE_RATIOS[-1]))
-    power: Floats = 2.0 ** xp.round(xp.log2(within))
-    return power
+from nearfar.priors.responses import ResponsePrior
 
 
 def solve_clipped(
@@ -63,7 +34,7 @@ def solve_clipped(
     per_amplitude = nuisance.amplitude_responses(batch, centred)
     precision = nuisance.prior_precision(batch, centred.near_basis)
     patterns = xp.astype(centred.on_window, xp.float64) * deviation
-    clippings = _clippings(fetch(batch.inside))
+    clippings = clippings_of(fetch(batch.inside))
 
     def empty(*shape: int, dtype: Any = None) -> Any:
         return xp.empty(shape, dtype=dtype or xp.float32, device=device(batch.responses))
@@ -81,7 +52,7 @@ def solve_clipped(
         )
         weighted = y * weight
         right = product(weighted, patterns)
-        solved = _solved(right, clippings, of, prior, float(value), weight, centred)
+        solved = solve_windows(right, clippings, of, prior, float(value), weight, centred)
         products = y @ xp.permute_dims(weighted, (0, 2, 1))
         products -= right @ xp.permute_dims(solved, (0, 2, 1))
         variance = xp.astype(batch.noise[c, i], xp.float64)[:, None] ** 2
@@ -101,118 +72,3 @@ def solve_clipped(
         near_noise=near_noise(batch, prior, ratio),
         score=product(residual, centred.on_window),
     )
-
-
-class _Clippings(NamedTuple):
-    """The parts of camera pixels' windows that lie on the projector, each a rectangle.
-
-    Attributes
-    ----------
-    rows, columns : list of slice
-        Rows and columns of each rectangle that occurs.
-    rectangle : ndarray of int, shape (n,)
-        Index of each camera pixel's rectangle.
-    """
-
-    rows: list[slice]
-    columns: list[slice]
-    rectangle: Integers
-
-
-def _clippings(inside: Booleans) -> _Clippings:
-    """Find the rectangles that the entries inside, (n, W^2), form."""
-    side = round(np.sqrt(inside.shape[1]))
-    square = inside.reshape(-1, side, side)
-    sides: list[Booleans] = [np.any(square, axis=axis) for axis in (2, 1)]
-    ends = np.stack(
-        [end for on in sides for end in (on.argmax(axis=1), side - on[:, ::-1].argmax(axis=1))],
-        axis=1,
-    )
-    found, rectangle = np.unique(ends, axis=0, return_inverse=True)
-    rows = [slice(int(top), int(bottom)) for top, bottom, _, _ in found]
-    columns = [slice(int(first), int(last)) for _, _, first, last in found]
-    return _Clippings(rows, columns, rectangle.ravel())
-
-
-def _solved(
-    right: Floats,
-    clippings: _Clippings,
-    of: Integers,
-    prior: ResponsePrior,
-    ratio: float,
-    weight: Floats,
-    centred: CentredBasis,
-) -> Floats:
-    """Return Lambda^-1 times vectors (m, 1 + G, W^2) of camera pixels `of`, 0 beyond the border."""
-    xp = namespace(right)
-    side = round(np.sqrt(right.shape[-1]))
-    deviation = beside(prior.factors.deviation, right)
-    scaled = _information(centred, weight) * deviation * deviation[:, None]
-    entries = scaled.reshape((side, side, side, side))
-    entry_indices = np.arange(side * side).reshape(side, side)
-    solved: Floats = xp.zeros_like(right)
-    rectangle = clippings.rectangle[of]
-    for one in np.unique(rectangle):
-        rows, columns = clippings.rows[one], clippings.columns[one]
-        inner = entry_indices[rows, columns].ravel()
-        alike = beside(np.flatnonzero(rectangle == one)[:, None, None], right)
-        numbers = beside(np.arange(right.shape[1])[:, None], right)
-        at = (alike, numbers, beside(inner, right))
-        precision = _smooth_precision(prior, entry_indices[rows, columns]) / ratio
-        matrix = entries[rows, columns, rows, columns].reshape((len(inner), len(inner)))
-        matrix = matrix + beside(precision, right)
-        found = xp.linalg.solve(matrix, right[at].reshape((-1, len(inner))).T).T
-        solved[at] = found.reshape((len(alike), right.shape[1], len(inner)))
-    return solved
-
-
-def _information(centred: CentredBasis, weight: Floats) -> Floats:
-    """Return the information matrix B^T D^-1 B, (W^2, W^2).
-
-    A cosine and its sine of one weight add up to the cosine of the difference of two entries, so
-    there is one number for each difference.
-    """
-    xp = namespace(weight)
-    cosine = np.flatnonzero(~centred.basis.is_sine)
-    parts = np.diff(np.append(cosine, centred.basis.count))
-    weights = fetch(weight)
-    information: Floats
-    if not np.allclose(weights[cosine], weights[cosine + parts - 1], rtol=1e-6):
-        patterns = xp.astype(centred.on_window, xp.float64)
-        information = (patterns.T * weight) @ patterns
-        return information
-    window = round(np.sqrt(centred.on_window.shape[1]))
-    down, across = centred.side_waves
-    of_difference = np.real((down.T * weights[cosine]) @ across)
-    # [y, x, y', x'] is of_difference[y - y', x - x'], counted from the middle.
-    apart = np.subtract.outer(np.arange(window), np.arange(window)) + window - 1
-    table = of_difference[apart[:, None, :, None], apart[None, :, None, :]]
-    information = beside(table.reshape(window**2, window**2), weight)
-    return information
-
-
-def _smooth_precision(prior: ResponsePrior, entry_indices: Integers) -> Floats:
-    """Return (smooth + diag(independent))^-1 over a rectangle of window entries."""
-    independent = prior.factors.independent[entry_indices.ravel()]
-    everywhere = float(prior.factors.independent.min())
-    found = _inverse_of_smooth(CORRELATION_LENGTH, *entry_indices.shape, everywhere).copy()
-    # Entries around q may have a larger independent variance: a correction of low rank.
-    more = np.flatnonzero(independent > everywhere)
-    if len(more):
-        columns = found[:, more]
-        small = np.diag(1.0 / (independent[more] - everywhere)) + columns[more]
-        found -= columns @ np.linalg.solve(small, columns.T)
-    return found
-
-
-@lru_cache(maxsize=128)
-def _inverse_of_smooth(length: float, height: int, width: int, independent: float) -> Floats:
-    """Return (smooth + independent)^-1 over a rectangle, by the eigenvectors of its sides."""
-    sides = [np.linalg.eigh(smooth_covariance(length, side)) for side in (height, width)]
-    (eigenvalues_y, vectors_y), (eigenvalues_x, vectors_x) = sides
-    if independent == 0:
-        inverses = ((vectors / eigenvalues) @ vectors.T for eigenvalues, vectors in sides)
-        return np.asarray(np.kron(*inverses))
-    vectors = np.kron(vectors_y, vectors_x)
-    eigenvalues = np.kron(eigenvalues_y, eigenvalues_x) + independent
-    return np.asarray((vectors / eigenvalues) @ vectors.T)

@@ -13,13 +13,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import (
     DIFFERENCE_STEP,
     RELATIVE_NOISE_FLOOR,
     responses_of_direct,
 )
+from nearfar.estimate.joint.clipped_variance import clipped_variance
+from nearfar.estimate.joint.clipped_windows import is_clipped
 from nearfar.estimate.joint.footprint import footprint_weights
 from nearfar.estimate.joint.posterior_variance import (
     Functionals,
@@ -207,18 +209,47 @@ class JointVariances:
     def _variance(self, batch: slice, functionals: Functionals) -> Floats:
         """Return posterior variances, (n, channels), of each pixel's or of one pixel's many."""
         state = self._state(batch)
+        clips = self._clips(batch)
         if len(state.prior_component) == 1:
             (place,) = state.prior_component
             its = functionals._replace(truncated=functionals.truncated[place])
-            return posterior_variance(self._prior(int(place)), state, its)
+            return self._of_component(batch, int(place), bool(clips[0]), state, its)
         found = np.empty((len(functionals.white), self._transport.channels))
-        for place in np.unique(state.prior_component):
-            rows = np.flatnonzero(state.prior_component == place)
+        pixels = np.arange(*batch.indices(len(self._centres)))
+        for place, clipped in np.unique(np.stack([state.prior_component, clips]), axis=1).T:
+            rows = np.flatnonzero((state.prior_component == place) & (clips == clipped))
             theirs = Functionals._make(
                 (*(part[rows] for part in functionals[:-1]), functionals.truncated[place])
             )
-            found[rows] = posterior_variance(self._prior(int(place)), state.only(rows), theirs)
+            found[rows] = self._of_component(
+                pixels[rows], int(place), bool(clipped), state.only(rows), theirs
+            )
         return found
+
+    def _of_component(
+        self,
+        pixels: slice | Integers,
+        place: int,
+        clipped: bool,
+        state: PixelState,
+        functionals: Functionals,
+    ) -> Floats:
+        """Return posterior variances of camera pixels of one prior component, (n, channels)."""
+        prior = self._prior(place)
+        if not clipped:
+            return posterior_variance(prior, state, functionals)
+        transport = self._transport
+        inside = near.inside(self._centres[pixels], transport.window, transport.projector)
+        multiplicity = self._posterior.multiplicity.astype(np.float64)
+        return clipped_variance(prior, state, functionals, inside, self._centred, multiplicity)
+
+    def _clips(self, batch: slice) -> Booleans:
+        """Return whether the border clips the window of camera pixels with direct light, (n,)."""
+        transport, centres = self._transport, self._centres[batch]
+        lit = transport.lit.ravel()[batch]
+        if transport.pitch > 1:
+            return np.zeros_like(lit)
+        return np.asarray(lit & is_clipped(centres, transport.near_basis, transport.projector))
 
     def _prior(self, place: int) -> ResponsePrior:
         if place not in self._priors:

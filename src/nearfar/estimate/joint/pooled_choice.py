@@ -90,20 +90,25 @@ def _most_probable(own: Floats) -> Integers:
 
     def work(rows: slice) -> None:
         first, last = max(rows.start - REACH, 0), min(rows.stop + REACH, len(own))
-        down = _sum_along(own[first:last], 0)[rows.start - first : rows.stop - first]
-        pooled = _sum_along(down, 1) ** POWER
+        around = sum_of_neighbours(own[first:last], REACH)[rows.start - first : rows.stop - first]
+        pooled = around**POWER
         found[rows] = xp.argmax(own[rows] * pooled, axis=2)
 
     side_by_side(work, blocks(len(own), ROWS_AT_ONCE))
     return found.reshape(-1)
 
 
-def _sum_along(values: Floats, axis: int) -> Floats:
+def sum_of_neighbours(values: Floats, reach: int) -> Floats:
+    """Return the sums over squares of 2 reach + 1 camera pixels a side, (Cy, Cx, k)."""
+    return _sum_along(_sum_along(values, 0, reach), 1, reach)
+
+
+def _sum_along(values: Floats, axis: int, reach: int) -> Floats:
     """Return sums over what lies within reach along an axis, 0 or 1."""
     xp = namespace(values)
     along = xp.moveaxis(values, axis, 0)
     total = xp.asarray(along, copy=True)
-    for step in range(1, min(REACH, len(along) - 1) + 1):
+    for step in range(1, min(reach, len(along) - 1) + 1):
         total[step:] += along[:-step]
         total[:-step] += along[step:]
     summed: Floats = xp.moveaxis(total, 0, axis)

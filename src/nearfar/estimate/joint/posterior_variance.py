@@ -80,6 +80,28 @@ def posterior_variance(prior: ResponsePrior, state: PixelState, functionals: Fun
     ]
     weighted = per_amplitude * weight[:, :, None]
     normal = np.matmul(weighted, per_amplitude.transpose(0, 1, 3, 2))
+    through_rows = np.matmul(weighted, (squared * covariance)[..., None])[..., 0]
+    return add_amplitudes(given, normal, through_rows, state, functionals)
+
+
+def add_amplitudes(
+    given: Floats,
+    normal: Floats,
+    through_rows: Floats,
+    state: PixelState,
+    functionals: Functionals,
+) -> Floats:
+    """Return variances with what o, d, q and white's own error add to them, (n, channels).
+
+    Parameters
+    ----------
+    given : ndarray, shape (n, channels), float64
+        Variances of the functionals if o, d and q were known.
+    normal : ndarray, shape (n or 1, channels, 4, 4), float64
+        What photos tell of the amplitudes: their Fisher information.
+    through_rows : ndarray, shape (n, channels, 4), float64
+        Derivatives of the means of h_n.n + h_f.f by the amplitudes, negative.
+    """
     # Weights of o through white's error, of d and the shifts through direct light.
     shape = given.shape
     own = np.stack(
@@ -90,7 +112,7 @@ def posterior_variance(prior: ResponsePrior, state: PixelState, functionals: Fun
         axis=-1,
     )
     # Less those through n and f, whose means depend on o, d and q.
-    gradient = own - np.matmul(weighted, (squared * covariance)[..., None])[..., 0]
+    gradient = own - through_rows
     solved = nuisance.solve(
         np.broadcast_to(normal, (*gradient.shape, nuisance.COMMON_AMPLITUDES)),
         gradient,

@@ -17,7 +17,9 @@ from nearfar.arrays import Floats, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.choose import choose
-from nearfar.estimate.joint.clipped import is_clipped, rounded_ratio, solve_clipped
+from nearfar.estimate.joint.clipped import solve_clipped
+from nearfar.estimate.joint.clipped_windows import is_clipped, rounded_ratio
+from nearfar.estimate.joint.leave_one_out import calibrated, mean_errors, weights_of
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.pooled_choice import no_probabilities, pooled_choice
@@ -90,8 +92,38 @@ def sweep_once(
         of_error_bars = rows.choices.sweeps[-1]
         if pools:
             of_error_bars = pooled_choice(probability, problem.model, problem.measurements.camera)
+            of_error_bars = _calibrated(problem, of_error_bars, parts)
         rows = rows._replace(choices=rows.choices._replace(of_error_bars=of_error_bars))
     return rows
+
+
+def _calibrated(
+    problem: Problem, choice: ComponentChoice, parts: list[tuple[NDArray[np.int64], bool]]
+) -> ComponentChoice:
+    """Return a choice with scales by which responses foretell each other as well as they do."""
+    pixels, model = problem.pixels, problem.model
+    xp = namespace(pixels.white)
+    errors: Floats = xp.full(
+        len(pixels.white), xp.nan, dtype=xp.float32, device=device(pixels.white)
+    )
+    weights = weights_of(problem)
+
+    def work(some: tuple[NDArray[np.int64], bool]) -> None:
+        selected = beside(some[0], pixels.responses)
+        component, scale = choice.of(selected)
+        batch = gather(pixels, selected, model.centred, problem.measurements.projector)
+        for place in np.unique(fetch(component)).tolist():
+            if place >= len(LIT_COMPONENTS):
+                continue
+            (alike,) = xp.nonzero(component == place)
+            of_some = batch.only(alike)
+            prior = model.priors[place]
+            errors[selected[alike]] = mean_errors(
+                of_some, prior, scale[alike], weights, problem.near_basis
+            )
+
+    side_by_side(work, parts)
+    return calibrated(choice, errors, problem.measurements.camera)
 
 
 class _Sweep(NamedTuple):

@@ -1,0 +1,85 @@
+"""Posterior variances where the projector's border clips the window: entries beyond it are zero.
+
+Given the window n, a response of f has the mean G (y - B n), G = s^2 S D^-1 / sigma^2, and the
+variance sigma^2 G / m. So h_n.n + h_f.f has, with u = h_n - B^T G h_f and Lambda of
+`clipped_windows`, the variance sigma^2 (h_f.(G / m) h_f + u.Lambda^-1 u).
+
+Index convention: arrays are (n, channels, ...); r runs over real responses, w over window entries,
+g over o, d and shifts of q; m over pairs of a camera pixel and a channel, k over functionals of
+one camera pixel.
+"""
+
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats
+from nearfar.estimate.joint.clipped_windows import clippings_of, rounded_ratio, solve_windows
+from nearfar.estimate.joint.posterior_variance import Functionals, PixelState, add_amplitudes
+from nearfar.illumination.centred_basis import CentredBasis
+from nearfar.priors.responses import ResponsePrior
+
+
+def clipped_variance(
+    prior: ResponsePrior,
+    state: PixelState,
+    functionals: Functionals,
+    inside: Booleans,
+    centred: CentredBasis,
+    multiplicity: Floats,
+) -> Floats:
+    """Return posterior variances for one prior component, (n, channels).
+
+    Parameters
+    ----------
+    prior : ResponsePrior
+    state : PixelState
+        Of one camera pixel for each functional, or of one for all of them.
+    functionals : Functionals
+        Their weights of window entries beyond the border are 0.
+    inside : ndarray of bool, shape (pixels, W^2)
+        Which entries of each camera pixel's window lie on the projector.
+    centred : CentredBasis
+    multiplicity : ndarray, shape (R,)
+        How often each response was measured.
+    """
+    pixels, channels = state.noise.shape
+    count = len(functionals.white)
+    # Functionals side by side by camera pixel: (pixels, k, ...).
+    near = np.broadcast_to(functionals.near, (count, inside.shape[1])).astype(np.float64)
+    near = near.reshape(pixels, -1, near.shape[-1])
+    far = functionals.far.astype(np.float64).reshape(pixels, -1, functionals.far.shape[-1])
+    each = far.shape[1]
+    truncated = np.broadcast_to(functionals.truncated, count).reshape(pixels, each)
+    amplitudes = state.amplitude_responses.transpose(0, 2, 1).astype(np.float64)
+    deviation = prior.factors.deviation
+    patterns = centred.on_window.astype(np.float64) * deviation
+    noise_variance = state.noise.astype(np.float64) ** 2
+    ratios = rounded_ratio(state.scale.astype(np.float64) ** 2 / noise_variance)
+    clippings = clippings_of(inside)
+    number = amplitudes.shape[1]
+    given = np.empty((pixels, channels, each))
+    normal = np.empty((pixels, channels, number, number))
+    through_rows = np.empty((pixels, channels, each, number))
+    for ratio in np.unique(ratios):
+        of, channel = np.nonzero(ratios == ratio)
+        weight = 1.0 / (ratio * prior.far_variance + 1.0 / multiplicity)
+        gain = ratio * prior.far_variance * weight
+        weighted = amplitudes * weight
+        u = near * deviation - (far * gain) @ patterns
+        right = np.concatenate([u, weighted @ patterns], axis=1)[of]
+        solved = solve_windows(right, clippings, of, prior, float(ratio), weight, centred)
+        of_u, of_amplitudes = solved[:, :each], solved[:, each:]
+        before = far**2 @ (gain / multiplicity) + ratio * truncated
+        found = before[of] + np.sum(right[:, :each] * of_u, axis=-1)
+        told = (weighted @ amplitudes.transpose(0, 2, 1))[of]
+        told -= right[:, each:] @ of_amplitudes.transpose(0, 2, 1)
+        given[of, channel] = found * noise_variance[of, channel, None]
+        normal[of, channel] = told / noise_variance[of, channel, None, None]
+        by_amplitudes = (far * gain) @ amplitudes.transpose(0, 2, 1)
+        through_rows[of, channel] = by_amplitudes[of] + of_u @ right[:, each:].transpose(0, 2, 1)
+    return add_amplitudes(
+        given.transpose(0, 2, 1).reshape(count, channels),
+        normal,
+        through_rows.transpose(0, 2, 1, 3).reshape(count, channels, number),
+        state,
+        functionals,
+    )

@@ -1,0 +1,98 @@
+"""Prior scales of error bars by how well responses are foretold by one another."""
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.estimate.joint.leave_one_out import LARGEST_FACTOR, calibrated, mean_errors
+from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
+from nearfar.estimate.joint.problem import ComponentChoice
+from nearfar.illumination.near_basis import NearBasis
+from nearfar.priors.covariance import far_variance, near_covariance
+from nearfar.priors.responses import response_prior
+from tests.estimate.joint.draws import (
+    COMPONENT,
+    PROJECTOR,
+    WINDOW,
+    batch_of,
+    centred_on_all,
+    chosen_frequencies,
+    drawn_rows,
+    measured,
+)
+
+SCALE = 0.05
+CAMERA = Size(3, 5)
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    frequencies = chosen_frequencies()
+    centred = centred_on_all(frequencies)
+    centres = np.tile([8, 10], (60, 1))
+    rows, _ = drawn_rows(60, centres, SCALE, seed=4)
+    far = np.random.default_rng(5).normal(size=(60, 1, centred.basis.count))
+    far *= SCALE * np.sqrt(far_variance(centred.basis, COMPONENT))
+    measurements = measured(rows, frequencies, noise=1e-3, offset=1e-3)
+    responses = measurements.responses
+    responses[..., 1:] += centred.uncentre(far.astype(np.float32), centres)
+    batch = batch_of(measurements, centres, centred)
+    # Scales are shares of white.
+    scale = (SCALE / batch.white[:, 0]).astype(np.float32)
+    multiplicity = np.ones(centred.basis.count, dtype=np.float32)
+    return batch, centred, response_prior(COMPONENT, centred, multiplicity), scale
+
+
+def errors(drawn, factor=1.0, weights=None):
+    batch, centred, prior, scale = drawn
+    if weights is None:
+        weights = np.full(centred.basis.count, 1 / centred.basis.count, dtype=np.float32)
+    return mean_errors(batch, prior, factor * scale, weights, NearBasis(WINDOW))
+
+
+def test_each_response_is_foretold_as_dense_algebra_says(drawn):
+    batch, centred, _, scale = drawn
+    count = centred.basis.count
+    weights = np.random.default_rng(0).random(count).astype(np.float32)
+    weights /= weights.sum()
+    patterns = centred.on_window.astype(np.float64)
+    shape = patterns @ near_covariance(COMPONENT, WINDOW, PROJECTOR) @ patterns.T
+    shape += np.diag(far_variance(centred.basis, COMPONENT))
+    expected = []
+    for c in range(3):
+        design = amplitude_responses(batch, centred)[c].T.astype(np.float64)
+        precision = prior_precision(batch, NearBasis(WINDOW))[c, 0]
+        covariance = (scale[c] * batch.white[c, 0]) ** 2 * shape
+        covariance += design @ np.diag(1 / precision) @ design.T
+        covariance += batch.noise[c, 0] ** 2 * np.eye(count)
+        y = batch.responses[c, 0].astype(np.float64)
+        total = 0.0
+        for r in range(count):
+            others = np.delete(np.arange(count), r)
+            gain = np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, r])
+            deviation = np.sqrt(covariance[r, r] - gain @ covariance[others, r])
+            total += weights[r] * abs(y[r] - gain @ y[others]) / deviation
+        expected.append(total / np.sqrt(2 / np.pi))
+    np.testing.assert_allclose(errors(drawn, weights=weights)[:3], expected, rtol=5e-3)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_rows_drawn_from_the_component_tell_their_scale(drawn, factor):
+    assert errors(drawn, factor).mean() * factor == pytest.approx(1.0, abs=0.08)
+
+
+def test_neighbours_count_together_and_only_where_there_is_direct_light():
+    found = np.full(CAMERA, 1.2, dtype=np.float32)
+    found[1, 2] = 2.1
+    found[:, 0] = np.nan
+    scale = np.full(CAMERA.pixels, SCALE, dtype=np.float32)
+    choice = ComponentChoice(np.zeros(CAMERA.pixels, dtype=np.int64), scale)
+    changed = calibrated(choice, found.ravel(), CAMERA)
+    np.testing.assert_array_equal(changed.prior_component, choice.prior_component)
+    factor = (changed.prior_scale / SCALE).reshape(CAMERA)
+    np.testing.assert_allclose(factor[:, 0], 1.0, rtol=1e-6)
+    # Six have a neighbourhood of six, three one of nine.
+    np.testing.assert_allclose(factor[1, 1:4], [1.35, 1.3, 1.3], rtol=1e-5)
+    np.testing.assert_allclose(factor[:, 4], 1.2, rtol=1e-5)
+    far_off = calibrated(choice, np.full(CAMERA.pixels, 50.0, np.float32), CAMERA)
+    np.testing.assert_allclose(far_off.prior_scale, LARGEST_FACTOR * SCALE, rtol=1e-6)

@@ -165,10 +165,53 @@ def test_numbers_tell_each_projector(open_page, both, transport, right):
         assert float(told.split(name)[1].split()[0]) == pytest.approx(light.mean(), abs=4e-4)
     assert "± " in told.split("a scene.zarr ")[1].split("(direct")[0]
     rows = [row.split("\t") for row in page.locator("#numbers tr").all_inner_texts()]
-    table = {row[0]: row[1:4] for row in rows}
-    assert [float(cell) for cell in table["right.zarr"]] == pytest.approx(right_light, abs=4e-4)
-    summed = [float(cell) for cell in table["all that are lit"]]
-    assert summed == pytest.approx(left_light + right_light, abs=4e-4)
+    table = {row[0]: [cell.split("±") for cell in row[1:4]] for row in rows[1:]}
+    values = {name: [float(cell[0]) for cell in cells] for name, cells in table.items()}
+    assert values["right.zarr"] == pytest.approx(right_light, abs=4e-4)
+    assert values["all that are lit"] == pytest.approx(left_light + right_light, abs=4e-4)
+    # Errors of two captures are independent.
+    sigma = np.hypot(
+        *(
+            nearfar.ErrorBars(one).picture(np.ones(one.projector))[12, 30]
+            for one in (transport, other)
+        )
+    )
+    shown = [float(deviation) for _, deviation in table["all that are lit"]]
+    assert shown == pytest.approx(sigma, rel=0.03)
+    beside = told.split("row 12, column 30: ")[1].split("·")[0]
+    assert float(beside.split("±")[1]) == pytest.approx(sigma.mean(), rel=0.03)
+    # Of the one that is left, its own.
+    right_alone = {"kind": "white", "tab": "numbers", "pixel": [12, 30], "lit": [1]}
+    show(page, both, {**right_alone, "others": {"1": {"kind": "white"}}})
+    own = nearfar.ErrorBars(other).picture(np.ones(OTHER))[12, 30].mean()
+    wait_until(
+        lambda: (
+            float(page.inner_text("#readout").split("·")[0].partition("±")[2] or 0)
+            == pytest.approx(own, rel=0.03)
+        )
+    )
+
+
+def test_a_picture_that_failed_is_asked_for_once_its_projector_is_lit_again(
+    open_page, both, transport, right, tmp_path
+):
+    other = load_transport(right)
+    page = open_page(both, {**SPOT, "others": {"1": {"kind": "white"}}})
+    alone = seen(page)
+    refusal = {"status": 400, "json": {"fault": "it is busy."}}
+    page.route("**/projector/1/tool/parts", lambda route: route.fulfill(**refusal))
+    page.check("[aria-label='right.zarr is lit']")
+    page.wait_for_selector("#fault:has-text('right.zarr: it is busy')")
+    page.unroute("**/projector/1/tool/parts")
+    page.uncheck("[aria-label='right.zarr is lit']")
+    settled(page)
+    np.testing.assert_array_equal(seen(page), alone)
+    page.check("[aria-label='right.zarr is lit']")
+    settled(page)
+    expected = nearfar.relight_together(
+        [transport, other], [_light(page, tmp_path, PROJECTOR), np.ones((*OTHER, 3), np.float32)]
+    )
+    _check(page, expected)
 
 
 def test_what_is_copied_makes_the_sum_again(open_page, both, stored, right, tmp_path):

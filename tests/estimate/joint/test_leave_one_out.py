@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint.leave_one_out import LARGEST_FACTOR, calibrated, mean_errors
+from nearfar.estimate.joint.leave_one_out import (
+    LARGEST_FACTOR,
+    MARGIN,
+    calibrated,
+    mean_errors,
+)
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.problem import ComponentChoice
 from nearfar.illumination.near_basis import NearBasis
@@ -81,6 +86,10 @@ def test_rows_drawn_from_the_component_tell_their_scale(drawn, factor):
     assert errors(drawn, factor).mean() * factor == pytest.approx(1.0, abs=0.08)
 
 
+def test_the_mean_of_nine_varies_by_the_margin(drawn):
+    assert np.std(errors(drawn)) / 3 == pytest.approx(MARGIN, rel=0.3)
+
+
 def test_neighbours_count_together_and_only_where_there_is_direct_light():
     found = np.full(CAMERA, 1.2, dtype=np.float32)
     found[1, 2] = 2.1
@@ -91,8 +100,14 @@ def test_neighbours_count_together_and_only_where_there_is_direct_light():
     np.testing.assert_array_equal(changed.prior_component, choice.prior_component)
     factor = (changed.prior_scale / SCALE).reshape(CAMERA)
     np.testing.assert_allclose(factor[:, 0], 1.0, rtol=1e-6)
-    # Six have a neighbourhood of six, three one of nine.
-    np.testing.assert_allclose(factor[1, 1:4], [1.35, 1.3, 1.3], rtol=1e-5)
-    np.testing.assert_allclose(factor[:, 4], 1.2, rtol=1e-5)
-    far_off = calibrated(choice, np.full(CAMERA.pixels, 50.0, np.float32), CAMERA)
-    np.testing.assert_allclose(far_off.prior_scale, LARGEST_FACTOR * SCALE, rtol=1e-6)
+    # One has a neighbourhood of six, the others of nine.
+    np.testing.assert_allclose(factor[1, 1:4], np.array([1.35, 1.3, 1.3]) - MARGIN, rtol=1e-5)
+    np.testing.assert_allclose(factor[:, 4], 1.2 - MARGIN, rtol=1e-5)
+
+
+def test_scales_are_never_lowered_nor_raised_without_end():
+    scale = np.full(CAMERA.pixels, SCALE, dtype=np.float32)
+    choice = ComponentChoice(np.zeros(CAMERA.pixels, dtype=np.int64), scale)
+    for error, factor in ((0.3, 1.0), (50.0, LARGEST_FACTOR)):
+        found = calibrated(choice, np.full(CAMERA.pixels, error, np.float32), CAMERA)
+        np.testing.assert_allclose(found.prior_scale, factor * SCALE, rtol=1e-6)

@@ -4,9 +4,10 @@ The prior component and scale of a camera pixel are the most probable ones for i
 which show low frequencies. Under them a response is foretold by the others with an error of known
 variance: with y's covariance K, o, d and q integrated out, it is (K^-1 y)_r / (K^-1)_rr, and of
 variance 1 / (K^-1)_rr (Sundararajan and Keerthi, Neural Computation 13, 2001). Where these errors
-are larger or smaller than that, so are those of the transport, and prior scales are multiplied by
-their mean ratio. Each response counts for the unmeasured ones about it, as in `unmeasured`; camera
-pixels beside each other count together.
+are larger than that by more than chance, so are those of the transport, and prior scales are
+multiplied by their mean ratio less that. They are never made smaller:
+the scale was chosen by the same photos, and is a little too good for them. Each response counts for
+the unmeasured ones about it, as in `unmeasured`; camera pixels beside each other count together.
 
 Index convention: arrays are (n, channels, ...); r runs over real responses, i over eigenvectors, g
 over the amplitudes of `nuisance`.
@@ -30,7 +31,9 @@ MEAN_OF_NORMAL = sqrt(2 / pi)
 # Camera pixels on each side whose errors count. With those that have a say in a choice, they are as
 # many as the rows beside a tile.
 REACH = 1
-# Scales are changed by at most this factor.
+# Standard deviation of the mean of nine camera pixels by chance, of some 60 responses.
+MARGIN = 0.07
+# Scales are raised by at most this factor.
 LARGEST_FACTOR = 2.0
 # Least share of a response's information that is taken to be left once o, d and q are integrated
 # out: less is rounding.
@@ -82,7 +85,7 @@ def mean_errors(
 
 
 def calibrated(choice: ComponentChoice, errors: Floats, camera: Size) -> ComponentChoice:
-    """Return prior scales times the mean error of foretold responses among neighbours.
+    """Return prior scales times the mean error of foretold responses, where it is above 1.
 
     Parameters
     ----------
@@ -96,9 +99,9 @@ def calibrated(choice: ComponentChoice, errors: Floats, camera: Size) -> Compone
     known = xp.isfinite(errors)
     counts = xp.astype(known, xp.float32).reshape((*camera, 1))
     sums = xp.where(known, errors, 0.0).reshape((*camera, 1))
-    number = sum_of_neighbours(counts, REACH).reshape(-1)
-    mean = sum_of_neighbours(sums, REACH).reshape(-1) / xp.clip(number, min=1.0)
-    factor = xp.where(known, xp.clip(mean, min=1 / LARGEST_FACTOR, max=LARGEST_FACTOR), 1.0)
+    number = xp.clip(sum_of_neighbours(counts, REACH).reshape(-1), min=1.0)
+    mean = sum_of_neighbours(sums, REACH).reshape(-1) / number
+    factor = xp.where(known, xp.clip(mean - MARGIN, min=1.0, max=LARGEST_FACTOR), 1.0)
     return choice._replace(prior_scale=xp.astype(choice.prior_scale * factor, xp.float32))
 
 

@@ -16,6 +16,12 @@ export const valueText = value => {
   return value === 0 ? '0' : Math.abs(value) < 0.001 ? value.toExponential(1) : value.toFixed(4);
 };
 
+const plusMinus = sigma => sigma ? ` ± ${valueText(sigma.includes(null) ? null : mean(sigma))}` : '';
+
+// Of the sum of lights whose errors are independent, channel by channel; null where one is not known.
+const sigmaOfSum = sigmas => sigmas.length && sigmas.every(Boolean)
+  ? sigmas[0].map((_, c) => sigmas.some(each => each[c] === null) ? null : Math.hypot(...sigmas.map(each => each[c]))) : null;
+
 export class Numbers {
   #page;
   #job = new BackgroundJob(text => this.#note(text === 'computing' ? '' : text));
@@ -53,7 +59,7 @@ export class Numbers {
     const { store: { state }, scenePictures } = this.#page;
     const place = this.#pointed || (this.#isDual ? null : state.pixel), seen = place && scenePictures.valuesAt(place, this.#grid);
     if (!seen) { set(get('readout'), 'textContent', ''); return; }
-    const key = [place, this.#lights, seen.split].join();
+    const key = [place, this.#lights, seen.split, ...seen.others.map(([name]) => name)].join();
     const told = this.#told.key === key ? this.#told.numbers : null;
     this.#showReadout(place, seen, told);
     if (this.#isDual) return;
@@ -67,20 +73,24 @@ export class Numbers {
     // A light of blocks moves, and has no sigma.
     if (block > 1) return;
     const body = pack({ shape, colour, split, y, x }, values);
-    this.#told = { key, numbers: await (await request('numbers', { method: 'POST', body, signal })).json() };
+    const own = request('numbers', { method: 'POST', body, signal }).then(answer => answer.json());
+    const [numbers, others] = await Promise.all([own, this.#page.otherProjectors.numbersAt([y, x], split, signal)]);
+    const ofOthers = Object.fromEntries(others.map(({ name, sigma }) => [name, sigma]));
+    const lit = [...(this.#page.otherProjectors.isLit ? [numbers.sigma] : []), ...Object.values(ofOthers)];
+    this.#told = { key, numbers: { ...numbers, ofOthers, ofSum: sigmaOfSum(lit) } };
     this.refresh();
   }
 
   #showReadout([y, x], { shown, parts, total, others, split, isRelit, textOf }, told) {
     const { scene, store: { state } } = this.#page;
-    const sigma = told?.sigma && isRelit ? ` ± ${valueText(told.sigma.includes(null) ? null : mean(told.sigma))}` : '';
+    const sigma = isRelit ? plusMinus(told?.sigma) : '';
     const apart = isRelit ? SPLITS[split].filter(name => hasPart(scene, name)).map(name => `${titleOf(scene, name)} ${valueText(mean(parts[SPLITS[split].indexOf(name)]))}`) : [];
     const { scenePictures } = this.#page, beside = !this.#isDual && isRelit && scenePictures.referenceAt([y, x]);
     const heldOut = this.#isDual ? '' : this.#heldOut.at([y, x], scene.camera);
     const share = state.tool === 'reach' && !isRelit ? [`${(100 * mean(shown) / (mean(total) || 1)).toFixed(1)} % of its light, ${valueText(mean(total))}`] : [];
     const { projectors } = scene, isSeveral = isRelit && projectors.length > 0, own = isSeveral ? projectors.find(({ path }) => !path).name : '';
-    const each = isSeveral ? [`${own} ${valueText(mean(total))}${sigma} (${apart.join(', ')})`, ...others.map(([name, values]) => `${name} ${valueText(mean(values))}`)] : [];
-    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${isSeveral ? '' : sigma}`, ...each, ...share, ...(isSeveral ? [] : apart),
+    const each = isSeveral ? [`${own} ${valueText(mean(total))}${sigma} (${apart.join(', ')})`, ...others.map(([name, values]) => `${name} ${valueText(mean(values))}${plusMinus(told?.ofOthers[name])}`)] : [];
+    set(get('readout'), 'textContent', [`row ${y}, column ${x}: ${(textOf || valueText)(mean(shown))}${isSeveral ? plusMinus(told?.ofSum) : sigma}`, ...each, ...share, ...(isSeveral ? [] : apart),
       ...(beside ? [`${scenePictures.referenceName} ${valueText(mean(beside))}`] : []), ...(heldOut ? [`off at held-out photos ${heldOut}`] : [])].join(' · '));
   }
 
@@ -92,14 +102,15 @@ export class Numbers {
       [titleOf(scene, name), parts[SPLITS[split].indexOf(name)], Object.values(told?.components || {})[names.indexOf(name)]?.sigma])];
     const head = ['', ...(colours === CHANNELS.length ? CHANNELS : ['light']), 'share'];
     get('numbers').replaceChildren(tableLine('th', head), ...rows.map(([title, values, sigma]) =>
-      tableLine('td', [title, ...values.map((value, c) => valueText(value) + (sigma ? `\n± ${valueText(sigma[c] ?? null)}` : '')),
-        `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`])), ...this.#otherLines(sum, others), ...this.#heldOutLine([y, x], colours));
+      valuesLine(title, values, sigma, `${(100 * mean(values) / (mean(total) || 1)).toFixed(1)} %`)),
+    ...this.#otherLines(sum, others, told), ...this.#heldOutLine([y, x], colours));
     get('numbers').hidden = false;
   }
 
   // Of several projectors: the light of the others, and of all that are lit.
-  #otherLines(sum, others) {
-    return [...others, ...(this.#page.scene.projectors.length ? [['all that are lit', sum]] : [])].map(([name, values]) => tableLine('td', [name, ...values.map(valueText), '']));
+  #otherLines(sum, others, told) {
+    const ofSum = this.#page.scene.projectors.length ? [valuesLine('all that are lit', sum, told?.ofSum)] : [];
+    return [...others.map(([name, values]) => valuesLine(name, values, told?.ofOthers[name])), ...ofSum];
   }
 
   #heldOutLine(place, colours) {
@@ -108,6 +119,11 @@ export class Numbers {
   }
 
   #note(text) { if (text) set(get('numbers-note'), 'textContent', text); }
+}
+
+// A row of values with their standard deviations where these are known.
+function valuesLine(title, values, sigma, share = '') {
+  return tableLine('td', [title, ...values.map((value, c) => valueText(value) + (sigma ? `\n± ${valueText(sigma[c] ?? null)}` : '')), share]);
 }
 
 // A row of a table, whose first cell is its head.

@@ -43,6 +43,7 @@ export class OtherProjectors {
 
   // Whether the pictures of all that are lit are there; asks for those that are not.
   isReady(split) {
+    this.#forgetFaults();
     const waiting = this.#lit.filter(other => !this.#partsOf(other, split));
     for (const other of waiting) this.#ask(other, split);
     return !waiting.length;
@@ -51,6 +52,12 @@ export class OtherProjectors {
   #partsOf({ number }, split) {
     const found = this.#found.get(`${number} ${split}`);
     return found?.data ? found : null;
+  }
+
+  // What could not be had is asked for again once its projector was switched off and on.
+  #forgetFaults() {
+    const { lit } = this.#store.state;
+    for (const [key, { failedFor }] of this.#found) if (failedFor !== undefined && !lit.includes(failedFor)) this.#found.delete(key);
   }
 
   async #ask({ number, name, path, light }, split) {
@@ -64,6 +71,7 @@ export class OtherProjectors {
       this.#found.set(key, { ...parts, scale: header.scale });
       this.#onArrived();
     } catch (error) {
+      this.#found.set(key, { failedFor: number });
       showFault(`${name}: ${error.message}`, name);
     }
   }
@@ -96,5 +104,14 @@ export class OtherProjectors {
     const others = this.#lit.filter(other => this.#partsOf(other, split)).map(other =>
       [other.name, valuesAt(sumOfParts(this.#partsOf(other, split), gains), place, size)]);
     return { parts, total, others, sum: others.reduce((sum, [, light]) => sum.map((value, c) => value + light[c]), this.#own([...total])) };
+  }
+
+  // What the server tells of a camera pixel under each other light, with the projector's name.
+  numbersAt([y, x], split, signal) {
+    return Promise.all(this.#lit.map(async ({ name, path, light }) => {
+      const { sent: { values, shape }, colour } = light;
+      const body = pack({ shape, colour, split, y, x }, values);
+      return { name, ...await (await request(`${path}numbers`, { method: 'POST', body, signal })).json() };
+    }));
   }
 }

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.correspondence import correspond_by_phase
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.estimate import SWEEPS
 from nearfar.estimate.joint.leave_one_out import (
     LARGEST_FACTOR,
     MARGIN,
@@ -14,9 +17,12 @@ from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.problem import ComponentChoice
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.priors.covariance import far_variance, near_covariance
+from nearfar.priors.fitted import PRIOR_SCALES
 from nearfar.priors.responses import response_prior
+from nearfar.scenes.hostile import hostile_transport
 from tests.estimate.joint.draws import (
     COMPONENT,
+    FAR,
     PROJECTOR,
     WINDOW,
     batch_of,
@@ -111,3 +117,22 @@ def test_scales_are_never_lowered_nor_raised_without_end():
     for error, factor in ((0.3, 1.0), (50.0, LARGEST_FACTOR)):
         found = calibrated(choice, np.full(CAMERA.pixels, error, np.float32), CAMERA)
         np.testing.assert_allclose(found.prior_scale, factor * SCALE, rtol=1e-6)
+
+
+def test_rows_beside_a_tile_tell_all_that_the_whole_camera_does():
+    camera = Size(16, 20)
+    rows = hostile_transport("hair", PROJECTOR, camera).rows(slice(0, camera.pixels))
+    measurements = measured(
+        rows.astype(np.float64), chosen_frequencies(), noise=5e-4, camera=camera
+    )
+    q = correspond_by_phase(measurements, pitch=1).q
+    whole = estimate_jointly(measurements, q, WINDOW, FAR, pitch=1).posterior.prior_scale
+    plain = np.log2(whole / PRIOR_SCALES[0])
+    # Many of them are raised.
+    assert np.mean(np.abs(plain - np.rint(plain)) > 0.01) > 0.3
+    first, last = 4, 12
+    pixels = slice(first * camera.width, last * camera.width)
+    some = measurements.of_pixels(Size(last - first, camera.width), pixels)
+    part = estimate_jointly(some, q[first:last], WINDOW, FAR, pitch=1).posterior.prior_scale
+    inner = slice(SWEEPS, -SWEEPS)
+    np.testing.assert_allclose(part[inner], whole[first:last][inner], rtol=1e-5)

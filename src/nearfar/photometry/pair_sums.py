@@ -44,7 +44,7 @@ def sum_pairs(
     photos : Photos
         A capture of a plan with offset inverse.
     bands : sequence of slice
-        Rows of the camera that are measured.
+        Rows of the camera that are measured; they may have steps.
     progress : callable, optional
         Called with the share that is done.
 

@@ -24,7 +24,7 @@ from nearfar.workflow.evaluate import decibels, exposure_of
 from nearfar.workflow.reconstruction.options import ReconstructionOptions
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 from nearfar.workflow.verdict import bands as bands_of_cameras
-from nearfar.workflow.verdict.bands import CAMERA_PIXELS, bands, taller_bands
+from nearfar.workflow.verdict.bands import CAMERA_PIXELS, bands, sampled_rows
 from nearfar.workflow.verdict.by_check_photos import measure_held_out
 from nearfar.workflow.verdict.verdict import judge_reconstruction
 from tests.cli.conftest import run_nearfar
@@ -197,10 +197,22 @@ def test_bands_are_spread_and_few(camera):
     assert count <= max(2 * CAMERA_PIXELS, 8 * camera.width)
     if camera.pixels <= CAMERA_PIXELS:
         assert count == camera.pixels
-    assert {row for rows in taller_bands(camera) for row in range(*rows.indices(10**6))} == {
-        row for rows in found for row in range(*rows.indices(10**6))
-    }
-    assert len(taller_bands(camera)) <= len(found)
+
+
+@pytest.mark.parametrize("camera", [Size(5, 7), Size(64, 64), Size(1000, 2000), Size(3, 400_000)])
+def test_sampled_rows_are_spread_and_of_few_slices(camera):
+    found = sampled_rows(camera)
+    rows = [row for each in found for row in range(*each.indices(camera.height))]
+    assert rows
+    assert len(rows) == len(set(rows))
+    assert np.ptp(np.diff(rows)) == 0 if len(rows) > 1 else True
+    assert len(rows) * camera.width <= max(2 * CAMERA_PIXELS, camera.width)
+    if camera.pixels <= CAMERA_PIXELS:
+        assert rows == list(range(camera.height))
+    else:
+        assert len(found) == 1
+        # As far from one end as from the other, to a step.
+        assert abs(rows[0] - (camera.height - 1 - rows[-1])) <= camera.height / len(rows)
 
 
 def test_bands_of_any_height_are_the_whole_camera(reconstructed, monkeypatch):

@@ -145,10 +145,14 @@ def find_changes(
         step if step.explained < beyond_noise else step._replace(explained=0.0)
         for step in (projector, focus)
     )
-    # White looks the same wherever the projector is, and under any lamp but for its brightness.
-    of_white = _explained_of_white(equations, whites) > LEAST_OF_WHITE
+    # White looks the same wherever the projector is, and under any lamp but for its brightness. The
+    # transport does not bend to it, so that it tells a motion from another focus.
+    shift_of_white = _explained_of_white(equations, whites, [DOWN, ACROSS])
+    of_white = shift_of_white > LEAST_OF_WHITE
     if of_white:
         projector = projector._replace(explained=0.0)
+        if _explained_of_white(equations, whites, [CAMERA_FOCUS]) < shift_of_white:
+            focus = focus._replace(explained=0.0)
     if projector.explained > max(least, in_regions, focus.explained):
         found.append((projector.explained, Moved("projector", projector.photo, None)))
     elif focus.explained > max(least, in_regions):
@@ -194,12 +198,12 @@ def _explained_by_bend(whole: NormalEquations, of_pairs: Bend | None) -> float:
     return _explained(matrix, vector, [BEND]) / whole.values
 
 
-def _explained_of_white(equations: NormalEquations, whites: Integers) -> float:
-    """Return the misfit of the photos of white that a motion of what they show explains."""
+def _explained_of_white(equations: NormalEquations, whites: Integers, causes: list[int]) -> float:
+    """Return the misfit of the photos of white that one change of some causes explains."""
     steps = [
         _best_step(
-            equations.matrix[whites, region][:, [DOWN, ACROSS]][:, :, [DOWN, ACROSS]],
-            equations.vector[whites, region][:, [DOWN, ACROSS]],
+            equations.matrix[whites, region][:, causes][:, :, causes],
+            equations.vector[whites, region][:, causes],
             np.arange(1, len(whites)),
         )
         for region in range(equations.matrix.shape[1])

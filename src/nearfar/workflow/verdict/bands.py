@@ -15,7 +15,8 @@ CAMERA_PIXELS = 2**17
 ROWS_PER_BAND = 8
 # The same at a pitch of several projector pixels, where lights are blurred anew for every band.
 CAMERA_PIXELS_AT_PITCH, BANDS_AT_PITCH = 2**15, 8
-PIXELS_PER_TALLER_BAND = 2**14
+# Camera pixels of a slice of rows of a small camera, about.
+PIXELS_PER_SLICE = 2**14
 
 
 def bands(camera: Size, pitch: int = 1) -> list[slice]:
@@ -43,16 +44,16 @@ def bands(camera: Size, pitch: int = 1) -> list[slice]:
     return every[step // 2 :: step] or every[:1]
 
 
-def taller_bands(camera: Size) -> list[slice]:
-    """Return the rows of `bands` in fewer bands, where they are all rows of the camera.
+def sampled_rows(camera: Size) -> list[slice]:
+    """Return rows of a camera, all of a small one, otherwise about `CAMERA_PIXELS` spread evenly.
 
-    For what is done to each camera pixel by itself. A photo of a small camera is one chunk, which
-    every band reads again.
+    For what is done to each camera pixel by itself. A photo of up to some megapixels is one chunk,
+    which is decoded whole for each slice: there are few of them.
     """
-    found = bands(camera)
-    if sum(rows.stop - rows.start for rows in found) < camera.height:
-        return found
-    return list(blocks(camera.height, max(ROWS_PER_BAND, PIXELS_PER_TALLER_BAND // camera.width)))
+    step = max(1, round(camera.pixels / CAMERA_PIXELS))
+    if step > 1:
+        return [slice(min(step // 2, camera.height - 1), camera.height, step)]
+    return list(blocks(camera.height, max(ROWS_PER_BAND, PIXELS_PER_SLICE // camera.width)))
 
 
 def usable_pixels(block: Transport) -> Booleans:

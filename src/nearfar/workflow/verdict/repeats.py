@@ -20,7 +20,7 @@ from nearfar.plan.checks import is_reference
 from nearfar.progress import Report, ignore_progress
 from nearfar.workflow.evaluate import decibels
 from nearfar.workflow.reconstruction.sources import photos_without_drift
-from nearfar.workflow.verdict.bands import taller_bands
+from nearfar.workflow.verdict.bands import sampled_rows
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def measure_repeats(
     photos = photos_with_noise(capture, progress)
     shown = [_numbers(capture.plan, inverse=inverse) for inverse in (False, True)]
     signal = noise = scattered = expected = 0.0
-    for rows in taller_bands(photos.camera):
+    for rows in sampled_rows(photos.camera):
         white, black = (mean_photo(photos, numbers, rows) for numbers in shown)
         usable = below_full_scale(photos, shown[0], rows)
         signal += float(np.sum((white - black)[usable] ** 2))
@@ -125,7 +125,7 @@ def photos_with_noise(
     if isinstance(photos, PhotosWithoutDrift):
         return photos
     return sum_pairs(
-        photos, taller_bands(capture.camera), lambda share: progress("inverse pairs", share)
+        photos, sampled_rows(capture.camera), lambda share: progress("inverse pairs", share)
     )
 
 

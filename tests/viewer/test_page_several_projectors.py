@@ -165,8 +165,8 @@ def test_numbers_tell_each_projector(open_page, both, transport, right):
         assert float(told.split(name)[1].split()[0]) == pytest.approx(light.mean(), abs=4e-4)
     assert "± " in told.split("a scene.zarr ")[1].split("(direct")[0]
     rows = [row.split("\t") for row in page.locator("#numbers tr").all_inner_texts()]
-    table = {row[0]: [cell.split("±") for cell in row[1:4]] for row in rows[1:]}
-    values = {name: [float(cell[0]) for cell in cells] for name, cells in table.items()}
+    cells = {row[0]: [cell.split("±") for cell in row[1:4]] for row in rows[1:]}
+    values = {name: [float(cell[0]) for cell in mine] for name, mine in cells.items()}
     assert values["right.zarr"] == pytest.approx(right_light, abs=4e-4)
     assert values["all that are lit"] == pytest.approx(left_light + right_light, abs=4e-4)
     # Errors of two captures are independent.
@@ -176,10 +176,13 @@ def test_numbers_tell_each_projector(open_page, both, transport, right):
             for one in (transport, other)
         )
     )
-    shown = [float(deviation) for _, deviation in table["all that are lit"]]
+    shown = [float(deviation) for _, deviation in cells["all that are lit"]]
     assert shown == pytest.approx(sigma, rel=0.03)
     beside = told.split("row 12, column 30: ")[1].split("·")[0]
     assert float(beside.split("±")[1]) == pytest.approx(sigma.mean(), rel=0.03)
+    # Long names do not push numbers out of the panel.
+    table, panel = (page.locator(one).bounding_box() for one in ("#numbers", "#panel-numbers"))
+    assert table["x"] + table["width"] <= panel["x"] + panel["width"] + 1
     # Of the one that is left, its own.
     right_alone = {"kind": "white", "tab": "numbers", "pixel": [12, 30], "lit": [1]}
     show(page, both, {**right_alone, "others": {"1": {"kind": "white"}}})

@@ -1,13 +1,15 @@
 """Prior scales of error bars by how well each response is foretold by all the others.
 
 The prior component and scale of a camera pixel are the most probable ones for its photos, most of
-which show low frequencies. Under them a response is foretold by the others with an error of known
-variance: with y's covariance K, o, d and q integrated out, it is (K^-1 y)_r / (K^-1)_rr, and of
-variance 1 / (K^-1)_rr (Sundararajan and Keerthi, Neural Computation 13, 2001). Where these errors
-are larger than that by more than chance, so are those of the transport, and prior scales are
-multiplied by their mean ratio less that. They are never made smaller:
-the scale was chosen by the same photos, and is a little too good for them. Each response counts for
-the unmeasured ones about it, as in `unmeasured`; camera pixels beside each other count together.
+which show low frequencies. Under them each response is foretold by the others. With K the
+covariance of the responses y, o, d and q integrated out, the error is (K^-1 y)_r / (K^-1)_rr and
+its variance 1 / (K^-1)_rr (Sundararajan and Keerthi, Neural Computation 13, 2001).
+
+Where these errors are larger than expected by more than chance, so are those of the transport: the
+prior scale is multiplied by the mean ratio of their sizes to the expected ones, less `MARGIN`. No
+scale is made smaller: it was chosen by the same photos, and fits them a little too well. Each
+response counts for the unmeasured ones about it, as in `unmeasured`; camera pixels beside each
+other count together.
 
 Index convention: arrays are (n, channels, ...); r runs over real responses, i over eigenvectors, g
 over the amplitudes of `nuisance`.
@@ -43,7 +45,7 @@ LEAST_SHARE = 1e-4
 def mean_errors(
     batch: PixelBatch, prior: ResponsePrior, scale: Floats, weights: Floats, near_basis: NearBasis
 ) -> Floats:
-    """Return the mean error of foretold responses over the expected one, shape (n,).
+    """Return the mean size of errors of foretold responses over the expected one, (n,).
 
     Parameters
     ----------

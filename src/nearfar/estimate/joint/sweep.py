@@ -100,7 +100,7 @@ def sweep_once(
 def _calibrated(
     problem: Problem, choice: ComponentChoice, parts: list[tuple[NDArray[np.int64], bool]]
 ) -> ComponentChoice:
-    """Return a choice with scales by which responses foretell each other as well as they do."""
+    """Return a choice with larger scales where responses are foretold worse than expected."""
     pixels, model = problem.pixels, problem.model
     xp = namespace(pixels.white)
     errors: Floats = xp.full(

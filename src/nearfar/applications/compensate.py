@@ -26,6 +26,7 @@ from nearfar.applications.compensation_problem import (
     compensation_problem,
     direct_alone,
     error_bar_under,
+    light_by_direct,
     picture_of_camera,
     scale_of_needed,
     wanted_picture,
@@ -166,7 +167,7 @@ def compensate(
     if scale is None:
         # Without an upper limit the light for each of both is proportional to it.
         nothing = np.zeros_like(problem.diagonal)
-        free = problem.solve(target, nothing, inf)
+        free = problem.solve(target, light_by_direct(transport, target, weights), inf)
         saved = nothing if black is None else problem.solve(dark, nothing, inf)
         scale = _scale_within_reach(transport, free, saved, target, weights)
         start = scale * free - saved

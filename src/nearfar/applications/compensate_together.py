@@ -24,8 +24,8 @@ from scipy import ndimage
 from nearfar.applications.compensation_problem import (
     camera_weights,
     compensation_problem,
-    direct_alone,
     error_bar_under,
+    light_by_direct,
     light_needed,
     scale_of_needed,
     wanted_picture,
@@ -231,13 +231,10 @@ def joint_problem(transports: Sequence[Transport], weights: Floats) -> JointLeas
 
 def blended_lights(transports: Sequence[Transport], target: Floats, weights: Floats) -> Floats:
     """Return lights, flat, whose direct light makes a picture, each fading towards its edge."""
-    lights = []
-    for transport, share in zip(transports, _shares(transports), strict=True):
-        direct = compensation_problem(direct_alone(transport), weights)
-        white = direct.adjoint(weights * direct.forward(np.ones_like(direct.diagonal)))
-        wanted = direct.adjoint(weights * share[..., None] * target)
-        lights.append(np.divide(wanted, white, out=np.zeros_like(wanted), where=white > 0))
-    return _flat(lights)
+    shares = zip(transports, _shares(transports), strict=True)
+    return _flat(
+        [light_by_direct(one, share[..., None] * target, weights) for one, share in shares]
+    )
 
 
 def _shares(transports: Sequence[Transport]) -> list[Floats]:

@@ -97,6 +97,14 @@ def compensation_problem(transport: Transport, weights: Floats) -> LeastSquares:
     return LeastSquares(forward, adjoint, weights, diagonal, SMOOTHNESS * usual)
 
 
+def light_by_direct(transport: Transport, picture: Floats, weights: Floats) -> Floats:
+    """Return the light whose direct light makes about a picture, (Py, Px, colours)."""
+    direct = compensation_problem(direct_alone(transport), weights)
+    white = direct.adjoint(weights * direct.forward(np.ones_like(direct.diagonal)))
+    wanted = direct.adjoint(weights * picture)
+    return np.divide(wanted, white, out=np.zeros_like(wanted), where=white > 0)
+
+
 def light_needed(transport: Transport, light: Floats) -> Floats:
     """Return the light at each camera pixel's q, of the brightest colour, shape (C,)."""
     return np.asarray(at_q(transport, light).max(axis=0))

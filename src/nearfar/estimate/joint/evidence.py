@@ -315,10 +315,11 @@ def _weighted_sums(
     sums = [xp.empty(shape, dtype=xp.float64, device=device(y)) for _ in range(count)]
     log_determinant = xp.empty(shape, dtype=xp.float64, device=device(y))
     first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1)).tolist()
-    for start, stop in zip(first, [*first[1:], len(y)], strict=True):
-        steps = table_step[start] + STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
-        table = _table(steps, eigenbasis.eigenvalues, xp)
-        weights, log_determinants = table
+    starts, step = table_step[first], STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
+    steps, rows = np.unique(starts[:, None] + step, return_inverse=True)
+    table = _table(steps, eigenbasis.eigenvalues, xp)
+    for start, stop, mine in zip(first, [*first[1:], len(y)], rows, strict=True):
+        weights, log_determinants = (values[beside(mine, y)] for values in table)
         of_y, pixel = y[start:stop], whitened.pixel[start:stop]
         of_u = u[pixel]
         pairs = [(of_y, of_y), (of_u, of_y), (of_u, of_u)]

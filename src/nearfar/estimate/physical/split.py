@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
+from scipy import fft
 
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.checks import as_number
@@ -190,10 +190,15 @@ def _spread(source: Dipole, slope: Integers, lit: Floats, where: Footprint) -> F
     """Return light under a surface at a body's camera pixels for unit amplitude, shape (n,)."""
     found = np.zeros(len(slope))
     radius = _radius(source, max(lit.shape))
+    # Room for light that leaves the projector's grid. `scipy.signal.fftconvolve` would do the same,
+    # but half a second is a long time for its import in every command that relights.
+    shape = tuple(fft.next_fast_len(length + 2 * radius, real=True) for length in lit.shape)
+    waves = fft.rfft2(lit, shape)
     for number in np.unique(slope):
         seen = slope == number
-        spread = signal.fftconvolve(lit, kernel(source, radius, SLOPES[number]), mode="same")
-        found[seen] = look_up(spread.ravel(), Footprint(where.pixels[seen], where.weights[seen]))
+        spread = fft.irfft2(waves * fft.rfft2(kernel(source, radius, SLOPES[number]), shape), shape)
+        middle = spread[radius:, radius:][: lit.shape[0], : lit.shape[1]]
+        found[seen] = look_up(middle.ravel(), Footprint(where.pixels[seen], where.weights[seen]))
     return found
 
 

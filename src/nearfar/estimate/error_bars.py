@@ -16,6 +16,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.any_patterns.error_bars import PatternVariances
 from nearfar.estimate.free_rows.error_bars import FreeVariances
 from nearfar.estimate.joint.error_bars import JointVariances
+from nearfar.parallel import side_by_side
 from nearfar.transport import near
 from nearfar.transport.boxes import box_axes
 from nearfar.transport.components import Components
@@ -162,12 +163,16 @@ class ErrorBars:
         found = np.empty((number, channels), dtype=np.float32)
         for place, flat in enumerate(lights):
             variances = self._variances.of_picture(flat, gains)
-            for batch in blocks(number, BATCH_PIXELS):
-                deviation = self._widening * np.sqrt(variances(batch))
-                if len(lights) == 1:
-                    found[batch] = deviation
-                else:
-                    found[batch, place] = deviation[:, place]
+            own = slice(None) if len(lights) == 1 else slice(place, place + 1)
+
+            def work(
+                batch: slice,
+                variances: Callable[[slice], Floats] = variances,
+                own: slice = own,
+            ) -> None:
+                found[batch, own] = self._widening * np.sqrt(variances(batch)[:, own])
+
+            side_by_side(work, blocks(number, BATCH_PIXELS))
         found[self._unknown] = np.inf
         return transport.picture(found)
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
+from scipy import sparse
 
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.illumination.near_basis import NearBasis
-from nearfar.parallel import side_by_side
+from nearfar.transport.widening import widen
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,29 +61,27 @@ class Pyramid:
         """Blur a light (Py, Px) by the hat of each pitch, flat; dark beyond the border."""
         levels = np.zeros(self.shape, dtype=light.dtype)
         lit = bounds(light)
-
-        def work(number: int) -> None:
+        if not light[lit].size:
+            return levels.reshape(-1)
+        placed = [slice(side.start + self.margin, side.stop + self.margin) for side in lit]
+        levels[0][tuple(placed)] = light[lit]
+        for narrow, wide, pitch in zip(levels, levels[1:], self.basis.rising_pitches, strict=False):
             # No farther than the hat carries light, which is next to nothing for a small spot.
-            pitch = self.basis.rising_pitches[number]
-            placed = [slice(side.start + self.margin, side.stop + self.margin) for side in lit]
-            levels[number][tuple(placed)] = light[lit]
-            blurred = [slice(side.start - pitch, side.stop + pitch) for side in placed]
-            _blur(levels[number][tuple(blurred)], pitch)
-
-        if light[lit].size:
-            side_by_side(work, range(len(levels)))
+            down, across = (slice(s.start - 2 * pitch, s.stop + 2 * pitch) for s in placed)
+            widen(narrow, pitch, (down, across), wide)
         return levels.reshape(-1)
 
     def spread(self, levels: NDArray[Any]) -> Floats:
-        """Adjoint of `levels`: (levels * rows * columns) to (Py, Px); blurs them in place."""
+        """Adjoint of `levels`: (levels * rows * columns) to (Py, Px); changes them."""
         around = self.margin
         own = levels.reshape(self.shape)
-
-        def work(number: int) -> None:
-            _blur(own[number], self.basis.rising_pitches[number])
-
-        side_by_side(work, range(len(own)))
-        return np.asarray(own[:, around:-around, around:-around].sum(axis=0))
+        blurred, other = own[-1], np.empty_like(own[-1])
+        pitches = self.basis.rising_pitches[:-1]
+        for finer, pitch in zip(own[-2::-1], reversed(pitches), strict=True):
+            widen(blurred, pitch, (slice(None), slice(None)), other)
+            other += finer
+            blurred, other = other, blurred
+        return np.array(blurred[around:-around, around:-around])
 
     def scatter(self, near: Floats, places: Integers, image: Floats, levels: NDArray[Any]) -> None:
         """Add near-range light (n, J), times an image (n,), to `levels`, flat and float64.
@@ -122,14 +120,3 @@ def bounds(light: Floats) -> tuple[slice, slice]:
         places = np.flatnonzero(light.any(axis=axis))
         found.append(slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 0))
     return found[0], found[1]
-
-
-def _blur(level: Floats, pitch: int) -> None:
-    """Blur an array by a hat with a sum of 1, in place: two boxes of `pitch` along each axis."""
-    if pitch == 1:
-        return
-    for axis in (0, 1):
-        for origin in (0, -1 if pitch % 2 == 0 else 0):
-            ndimage.uniform_filter1d(
-                level, pitch, axis=axis, output=level, mode="constant", origin=origin
-            )

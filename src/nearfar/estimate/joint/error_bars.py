@@ -9,7 +9,8 @@ runs over real responses, w over window entries, i over eigenvectors, g over o, 
 """
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,10 +38,31 @@ from nearfar.illumination.real_basis import real_basis
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.responses import ResponsePrior, response_prior
 from nearfar.transport import near
-from nearfar.transport.boxes import box_axes, summed_area
+from nearfar.transport.blurred import BlurredLight, blurred_light
+from nearfar.transport.boxes import box_axes
 from nearfar.transport.gains import Gains
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
+
+
+class _Light(NamedTuple):
+    """A light whose pictures have error bars.
+
+    Attributes
+    ----------
+    mean : float
+    seen : callable
+        As `JointVariances._seen`, for a batch of camera pixels.
+    overlap : ndarray, shape (R,), float32
+        With the responses that the transport holds, times the gain of far-range light.
+    truncated : ndarray, shape (components,)
+        See `Functionals`.
+    """
+
+    mean: float
+    seen: Callable[[slice], tuple[Floats, Floats]]
+    overlap: Floats
+    truncated: Floats
 
 
 class JointVariances:
@@ -55,7 +77,6 @@ class JointVariances:
 
     def __init__(self, transport: Transport, posterior: Posterior) -> None:
         self._transport, self._posterior = transport, posterior
-        self._levels: tuple[Floats, Floats, Floats] | None = None
         self._centred: CentredBasis = _centred_on(
             posterior.frequencies, transport.projector, transport.near_basis
         )
@@ -70,7 +91,13 @@ class JointVariances:
         truncated = gains.far**2 * truncated_variance(
             self._transport, light, self._posterior.prior_components
         )
-        return lambda batch: self._variance(batch, self._of_light(batch, light, truncated, gains))
+        transport, blurred = self._transport, None
+        if transport.pitch > 1:
+            blurred = blurred_light(light.astype(np.float32), transport.pyramid)
+        seen = partial(self._seen, light=light, blurred=blurred)
+        overlap = gains.far * self._centred.basis.analyse(light) * self._is_held
+        shown = _Light(float(light.mean()), seen, overlap.astype(np.float32), truncated)
+        return lambda batch: self._variance(batch, self._of_light(batch, shown, gains))
 
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
@@ -116,17 +143,14 @@ class JointVariances:
             np.zeros(len(self._posterior.prior_components)),
         )
 
-    def _of_light(
-        self, batch: slice, light: Floats, truncated: Floats, gains: Gains
-    ) -> Functionals:
-        """Return the functional that is the picture under a light (P,)."""
+    def _of_light(self, batch: slice, light: "_Light", gains: Gains) -> Functionals:
+        """Return the functional that is the picture under a light."""
         transport, centred = self._transport, self._centred
         centres = self._centres[batch]
-        mean = gains.far * float(light.mean())
-        in_window, direct = self._seen(batch, light)
+        mean = gains.far * light.mean
+        in_window, direct = light.seen(batch)
         inside = self._inside(batch)
-        overlap = (gains.far * centred.basis.analyse(light) * self._is_held).astype(np.float32)
-        overlaps = np.broadcast_to(overlap, (len(centres), 1, len(overlap)))
+        overlaps = np.broadcast_to(light.overlap, (len(centres), 1, len(light.overlap)))
         lit = transport.lit.ravel()[batch]
         direct = gains.direct * direct
         direct[:, 0] -= mean * lit
@@ -135,10 +159,12 @@ class JointVariances:
             direct,
             (lit[:, None] * (gains.near * in_window - mean * inside)).astype(np.float32),
             centred.recentre(overlaps, centres)[:, 0],
-            truncated,
+            light.truncated,
         )
 
-    def _seen(self, batch: slice, light: Floats) -> tuple[Floats, Floats]:
+    def _seen(
+        self, batch: slice, light: Floats, blurred: BlurredLight | None
+    ) -> tuple[Floats, Floats]:
         """Return the responses of unit near-range and unit direct light to a light (P,).
 
         Returns
@@ -149,25 +175,20 @@ class JointVariances:
         """
         transport, projector = self._transport, self._transport.projector
         centres, q = self._centres[batch], transport.correspondence.reshape(-1, 2)[batch]
-        if transport.pitch == 1:
+        if blurred is None:
             return (
                 near.look_up(light.reshape(projector), centres, transport.window, projector),
                 responses_of_direct(q, light[None], projector)[..., 0],
             )
-        pyramid = transport.pyramid
-        if self._levels is None or self._levels[0] is not light:
-            square = light.reshape(projector).astype(np.float32)
-            self._levels = (light, pyramid.levels(square), summed_area(square))
-        _, levels, summed = self._levels
-        boxes = transport.boxes[batch]
+        pyramid, boxes = transport.pyramid, transport.boxes[batch]
 
         def at(places: Floats) -> Floats:
-            return box_axes(places, boxes, projector).means(summed, projector)
+            return box_axes(places, boxes, projector).means(blurred.table, projector)
 
         steps = DIFFERENCE_STEP * np.eye(2)
         derivatives = [(at(q + step) - at(q - step)) / (2 * DIFFERENCE_STEP) for step in steps]
         return (
-            levels[pyramid.places(centres)[:, None] + pyramid.steps],
+            blurred.levels[pyramid.places(centres)[:, None] + pyramid.steps],
             np.stack([at(q), *derivatives], axis=-1),
         )
 

@@ -65,10 +65,16 @@ class JointEstimator(Estimator):
             + len(VARIANCE_RATIOS) * entries
             + 2 * entries**2
         )
-        # Responses, re-ordered; and four sets of rows: what a sweep starts from, what is expected
-        # from neighbours, what it finds, and their sum.
-        each = channels * (2 * responses + 4 * (responses + entries))
-        probabilities = components * len(PRIOR_SCALES)
+        if plan.pitch == 1:
+            # Responses, re-ordered; and four sets of rows: what a sweep starts from, what is
+            # expected from neighbours, what it finds, and their sum.
+            each = channels * (2 * responses + 4 * (responses + entries))
+            probabilities = components * len(PRIOR_SCALES)
+        else:
+            # Responses, re-ordered; rows, which sweeps change in place; and of half of the camera
+            # pixels what is expected, and what it leaves of the responses.
+            each = channels * (4 * responses + 2 * entries)
+            probabilities = 0
         # Inverse pairs are in memory while they are measured.
         pairs = channels * len(plan.patterns) if plan.offset == "inverse" else 0
         return Memory(

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.illumination.frequencies import DC
+from nearfar.parallel import side_by_side
 from nearfar.photometry.photos import Photos
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import is_reference
@@ -39,8 +40,8 @@ SMALLEST_CHANGE = 0.01
 # Share of a change of light that is left of it in the sum of the photo and that of the inverse
 # pattern.
 LEAST_IN_SUM = 0.5
-# Values of patterns that are drawn at a time.
-MOST_DRAWN = 2**26
+# Values of patterns that a thread draws at a time.
+MOST_DRAWN = 2**24
 # The picture is divided into as many regions down and across.
 REGIONS_A_SIDE = 3
 
@@ -178,13 +179,13 @@ def model_variance(white: Floats) -> Floats:
 def relight(plan: Plan, transport: Transport, numbers: Iterable[int]) -> Floats:
     """Relight under some patterns of a plan and add black, (n, rows, columns, channels)."""
     wanted = list(numbers)
-    relit = [
-        transport.pictures(
-            np.stack([plan.draw(number) / np.float32(255) for number in wanted[together]])
-        )
-        for together in blocks(len(wanted), MOST_DRAWN // plan.projector.pixels)
-    ]
-    found = relit[0] if len(relit) == 1 else np.concatenate(relit)
+    found = np.empty((len(wanted), *transport.camera, transport.channels), dtype=np.float32)
+
+    def work(together: slice) -> None:
+        drawn = np.stack([plan.draw(number) / np.float32(255) for number in wanted[together]])
+        found[together] = transport.pictures(drawn)
+
+    side_by_side(work, blocks(len(wanted), MOST_DRAWN // plan.projector.pixels))
     found += transport.black
     return found
 

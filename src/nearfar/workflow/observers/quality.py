@@ -25,7 +25,7 @@ from nearfar.plan import Plan
 from nearfar.plan.checks import check_lights, ends
 from nearfar.workflow.evaluate import HIGHEST
 from nearfar.workflow.verdict.bars import bars_of
-from nearfar.workflow.verdict.by_check_photos import compare_light
+from nearfar.workflow.verdict.by_check_photos import compare_lights
 from nearfar.workflow.verdict.held_out import HeldOut
 
 # The chosen rows of the camera come in bands of this many, because the estimate of a camera pixel
@@ -147,11 +147,8 @@ class QualityObserver:
         estimate = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
         every = slice(0, photos_so_far.camera.height)
         bars = bars_of(estimate)
-        held_out = HeldOut(
-            tuple(
-                compare_light(estimate, bars, photos, light, every) for light in check_lights(plan)
-            )
-        )
+        compared = compare_lights(estimate, bars, photos, check_lights(plan), [every])
+        held_out = HeldOut(tuple(compared))
         limit: Limit = "photos" if (held_out.unmeasured_share or 0.0) > 0.5 else "noise"
         if (held_out.error_ratio or 0.0) > MODEL_ERROR_RATIO:
             limit = "model"

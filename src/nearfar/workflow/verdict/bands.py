@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Size, blocks
+from nearfar.arrays import Booleans, Floats, Size, blocks
 from nearfar.transport.model import Transport
+from nearfar.transport.rows import stacked
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.verdict.bars import Bars, bars_of
 from nearfar.workflow.verdict.held_out import HeldOutLight, joined
@@ -13,7 +14,7 @@ from nearfar.workflow.verdict.held_out import HeldOutLight, joined
 # Camera pixels that are compared, about, in bands of this many rows.
 CAMERA_PIXELS = 2**17
 ROWS_PER_BAND = 8
-# The same at a pitch of several projector pixels, where lights are blurred anew for every band.
+# The same at a pitch of several projector pixels, where all bands are compared at once.
 CAMERA_PIXELS_AT_PITCH, BANDS_AT_PITCH = 2**15, 8
 # Camera pixels of a slice of rows of a small camera, about.
 PIXELS_PER_SLICE = 2**14
@@ -65,20 +66,21 @@ def usable_pixels(block: Transport) -> Booleans:
 
 def compare_in_bands(
     transport: StoredTransport,
-    compare: Callable[[Transport, Bars | None, slice], Sequence[HeldOutLight]],
+    compare: Callable[[Transport, Bars | None, Sequence[slice]], Sequence[HeldOutLight]],
     progress: Callable[[float], None],
 ) -> tuple[HeldOutLight, ...]:
     """Compare a transport with photos under some lights, in the bands of its camera.
 
-    Bands whose camera pixels are all saturated are skipped.
+    Bands whose camera pixels are all saturated are skipped. At a pitch of several projector pixels
+    lights are blurred first, so all bands are compared together.
 
     Parameters
     ----------
     transport : StoredTransport
         Of the camera's pixels, not a square T.
     compare : callable
-        Called with the transport of a band, its error bars and its rows. Returns the comparison
-        under each light, in the same order for every band.
+        Called with the transport of one or several bands, its error bars and the rows of each band.
+        Returns the comparison under each light, always in the same order.
     progress : callable
         Called with the share of the camera that is done.
 
@@ -88,11 +90,19 @@ def compare_in_bands(
         Of each light, over all bands; empty if every camera pixel is saturated.
     """
     found: Sequence[HeldOutLight] = ()
-    for rows in bands(transport.camera, transport.pitch):
-        block = transport.rows(rows)
-        if not usable_pixels(block).any():
+    every = bands(transport.camera, transport.pitch)
+    for some in [every] if transport.pitch > 1 else [[rows] for rows in every]:
+        read = [(rows, transport.rows(rows)) for rows in some]
+        usable = [(rows, block) for rows, block in read if usable_pixels(block).any()]
+        if not usable:
             continue
-        compared = compare(block, bars_of(block), rows)
+        block = stacked([block for _, block in usable])
+        compared = compare(block, bars_of(block), [rows for rows, _ in usable])
         found = [joined(*both) for both in zip(found, compared, strict=True)] if found else compared
-        progress(rows.stop / transport.camera.height)
+        progress(some[-1].stop / transport.camera.height)
     return tuple(found)
+
+
+def of_bands(read: Callable[[slice], Floats], bands: Sequence[slice]) -> Floats:
+    """Read each band's camera pixels, (..., C, channels), and join them band after band."""
+    return np.concatenate([read(rows) for rows in bands], axis=-2)

@@ -1,6 +1,7 @@
 """Held-out SNR_b of a capture with check photos."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.reconstruction.sources import photos_without_drift
-from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
+from nearfar.workflow.verdict.bands import compare_in_bands, of_bands, usable_pixels
 from nearfar.workflow.verdict.bars import Bars, mean_square
 from nearfar.workflow.verdict.check_pairs import compare_pair
 from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
@@ -54,67 +55,75 @@ def measure_held_out(
         return None
     compared = compare_in_bands(
         transport,
-        lambda block, bars, rows: [
-            compare_light(block, bars, photos, light, rows) for light in lights
-        ],
+        lambda block, bars, rows: compare_lights(block, bars, photos, lights, rows),
         lambda share: progress("check photos", share),
     )
     return HeldOut(compared) if compared else None
 
 
-def compare_light(
+def compare_lights(
     block: Transport,
     bars: Bars | None,
     photos: PhotosWithoutDrift,
-    light: CheckLight,
-    rows: slice,
-) -> HeldOutLight:
-    """Compare the camera pixels of a block of rows that are not saturated.
+    lights: Sequence[CheckLight],
+    rows: Sequence[slice],
+) -> list[HeldOutLight]:
+    """Compare the camera pixels of some bands of rows that are not saturated.
 
     Parameters
     ----------
     block : Transport
-        Of these rows.
+        Of these bands.
     bars : Bars, optional
         Of the block.
     photos : PhotosWithoutDrift
-    light : CheckLight
-        Of the plan of the photos; with its inverse.
-    rows : slice
+    lights : sequence of CheckLight
+        Of the plan of the photos; with their inverses.
+    rows : sequence of slice
+        Of each band.
     """
     size = (block.camera.pixels, block.channels)
     usable = usable_pixels(block)
-    pattern = light.pattern.draw(block.projector) / np.float32(255)
-    relit, white = (
-        np.asarray(block @ shown).reshape(size)[usable]
-        for shown in (pattern, np.ones_like(pattern))
-    )
+    ones = np.ones(block.projector, dtype=np.float32)
+    white = np.asarray(block @ ones).reshape(size)[usable]
     black = block.black.reshape(size)[usable]
-    means = [
-        photos.read(numbers, rows).reshape(len(numbers), *size).mean(axis=0)[usable]
-        for numbers in (light.photos, light.inverses)
-    ]
     whites, blacks = find_references(photos.plan)
     of_white = _noise(photos, white + black, whites) + _noise(photos, black, blacks)
-    expected = unmeasured = None
-    share_of_pattern = 1.0
     if bars is not None:
-        of_white = mean_square(bars.of_all, np.ones_like(pattern), usable)
-        expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
-        of_inverse = mean_square(bars.of_all, 1 - pattern, usable)
-        share_of_pattern = 2 * expected / max(expected + of_inverse, 1e-300)
-    pair = compare_pair(
-        means[0] - black,
-        means[1] - black,
-        relit,
-        white=white,
-        noise=(_noise(photos, means[0], light.photos) + _noise(photos, means[1], light.inverses))
-        / 2,
-        error_of_white=of_white,
-        share_of_pattern=share_of_pattern,
-    )
-    is_binary = isinstance(light.pattern, HalfScreen)
-    return HeldOutLight(light.pattern.description, is_binary, pair, expected, unmeasured)
+        of_white = mean_square(bars.of_all, ones, usable)
+    found = []
+    for light in lights:
+        pattern = light.pattern.draw(block.projector) / np.float32(255)
+        means = [
+            of_bands(partial(_read, photos, numbers), rows).mean(axis=0)[usable]
+            for numbers in (light.photos, light.inverses)
+        ]
+        expected = unmeasured = None
+        share_of_pattern = 1.0
+        if bars is not None:
+            expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
+            of_inverse = mean_square(bars.of_all, 1 - pattern, usable)
+            share_of_pattern = 2 * expected / max(expected + of_inverse, 1e-300)
+        noise = _noise(photos, means[0], light.photos) + _noise(photos, means[1], light.inverses)
+        pair = compare_pair(
+            means[0] - black,
+            means[1] - black,
+            np.asarray(block @ pattern).reshape(size)[usable],
+            white=white,
+            noise=noise / 2,
+            error_of_white=of_white,
+            share_of_pattern=share_of_pattern,
+        )
+        is_binary = isinstance(light.pattern, HalfScreen)
+        description = light.pattern.description
+        found.append(HeldOutLight(description, is_binary, pair, expected, unmeasured))
+    return found
+
+
+def _read(photos: PhotosWithoutDrift, numbers: Sequence[int], rows: slice) -> Floats:
+    """Read some photos of a band, (n, C, channels)."""
+    read = photos.read(numbers, rows)
+    return read.reshape(len(read), -1, read.shape[-1])
 
 
 def _noise(photos: PhotosWithoutDrift, mean: Floats, numbers: Sequence[int] | Integers) -> float:

@@ -1,5 +1,7 @@
 """Held-out SNR_b of a capture without check photos, by its photos for correspondence."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
@@ -9,7 +11,7 @@ from nearfar.photometry.photos import PhotosWithNoise, in_batches, mean_photo
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
-from nearfar.workflow.verdict.bands import compare_in_bands, usable_pixels
+from nearfar.workflow.verdict.bands import compare_in_bands, of_bands, usable_pixels
 from nearfar.workflow.verdict.bars import Bars, mean_square
 from nearfar.workflow.verdict.correspondence_lights import WeighedLight, correspondence_lights
 from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
@@ -68,9 +70,9 @@ def _compare(
     bars: Bars | None,
     photos: PhotosWithNoise,
     lights: list[WeighedLight],
-    rows: slice,
+    rows: Sequence[slice],
 ) -> list[HeldOutLight]:
-    """Compare the camera pixels of a block of rows that are not saturated."""
+    """Compare the camera pixels of some bands of rows that are not saturated."""
     size = (block.camera.pixels, block.channels)
     usable = usable_pixels(block)
     ones = np.ones(block.projector, dtype=np.float32)
@@ -79,10 +81,10 @@ def _compare(
     white, relit = relit[0], relit[1:]
     black = block.black.reshape(size)[usable]
     of_white = _error_of_white(bars, photos, usable, rows)
-    shown, variance = _weighed(photos, lights, rows)
+    shown, variance = of_bands(lambda one: _weighed(photos, lights, one), rows)
     found = []
     for number, light in enumerate(lights):
-        both = mean_photo(photos, light.photos, rows)[usable] if light.has_inverse else None
+        both = _mean(photos, light.photos, rows)[usable] if light.has_inverse else None
         weighed = compare_weighed(
             shown[number][usable],
             relit[number],
@@ -102,10 +104,16 @@ def _compare(
     return found
 
 
-def _weighed(
-    photos: PhotosWithNoise, lights: list[WeighedLight], rows: slice
-) -> tuple[Floats, Floats]:
-    """Return the weighted sum of the photos of each light, and its variance, (L, C, channels)."""
+def _mean(photos: PhotosWithNoise, numbers: Sequence[int], rows: Sequence[slice]) -> Floats:
+    """Return the mean of photos in some bands, (C, channels)."""
+    return of_bands(lambda one: mean_photo(photos, numbers, one), rows)
+
+
+def _weighed(photos: PhotosWithNoise, lights: list[WeighedLight], rows: slice) -> Floats:
+    """Return the weighted sum of the photos of each light, and its variance.
+
+    Shape (2, L, C, channels).
+    """
     numbers = sorted({number for light in lights for number in light.photos})
     place = {number: i for i, number in enumerate(numbers)}
     weights = np.zeros((len(lights), len(numbers)))
@@ -117,11 +125,11 @@ def _weighed(
         variances = np.stack([photos.variance(photo) for photo in read])
         shown = shown + np.tensordot(mine, read, axes=1)
         variance = variance + np.tensordot(mine**2, variances, axes=1)
-    return shown, variance
+    return np.stack([shown, variance])
 
 
 def _error_of_white(
-    bars: Bars | None, photos: PhotosWithNoise, usable: Booleans, rows: slice
+    bars: Bars | None, photos: PhotosWithNoise, usable: Booleans, rows: Sequence[slice]
 ) -> float:
     """Return the mean square that the error of the picture under white is expected to have."""
     if bars is not None:
@@ -131,7 +139,6 @@ def _error_of_white(
         # All pairs measure white, so that it has hardly any error.
         return 0.0
     return sum(
-        float(photos.variance(mean_photo(photos, numbers.tolist(), rows))[usable].mean())
-        / len(numbers)
+        float(photos.variance(_mean(photos, numbers.tolist(), rows))[usable].mean()) / len(numbers)
         for numbers in find_references(photos.plan)
     )

@@ -88,16 +88,31 @@ def address(stored: Path) -> Iterator[str]:
 
 
 @pytest.fixture
-def serve_it(stored: Path) -> Iterator[Callable[..., str]]:
-    """Serve it in other ways: with little memory, with all quick copies coarse, elsewhere."""
+def serving() -> Iterator[ExitStack]:
+    """Whatever serves pages of a test, ended after the pages are put back: they would miss it."""
     with ExitStack() as stack:
+        yield stack
 
-        def serve(listening: ListeningAddress = ANYWHERE, memory: int = 10**9) -> str:
-            return stack.enter_context(
-                served_view(InteractiveTransport(stored, memory=memory), listening)
-            )
 
-        yield serve
+@pytest.fixture
+def serve(serving: ExitStack) -> Callable[..., str]:
+    """Serve the page of a transport to the end of the test; returns its address."""
+
+    def of(transport: InteractiveTransport, **shown: Any) -> str:
+        return serving.enter_context(served_view(transport, **shown))
+
+    return of
+
+
+@pytest.fixture
+def serve_it(stored: Path, serving: ExitStack) -> Callable[..., str]:
+    """Serve it in other ways: with little memory, with all quick copies coarse, elsewhere."""
+
+    def of(listening: ListeningAddress = ANYWHERE, memory: int = 10**9) -> str:
+        transport = InteractiveTransport(stored, memory=memory)
+        return serving.enter_context(served_view(transport, listening))
+
+    return of
 
 
 @pytest.fixture
@@ -133,7 +148,10 @@ def pages(browser: Browser) -> Pages:
 
 
 @pytest.fixture
-def open_page(pages: Pages) -> Iterator[Callable[..., Page]]:
-    """Open the viewer's page; any output on its console is a failure."""
+def open_page(pages: Pages, serving: ExitStack) -> Iterator[Callable[..., Page]]:
+    """Open the viewer's page; any output on its console is a failure.
+
+    What serves it is asked for so that it ends later.
+    """
     yield pages.open
     assert pages.put_back() == []

@@ -78,27 +78,29 @@ def test_a_dropped_picture_comes_back(open_page, address):
         ),
     ],
 )
-def test_the_page_leads_with_the_verdict(open_page, transport, tmp_path, verdict, leads, follows):
+def test_the_page_leads_with_the_verdict(
+    open_page, serve, transport, tmp_path, verdict, leads, follows
+):
     save_transport(replace(transport, verdict=verdict), tmp_path / "t.zarr")
-    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
-        page = open_page(address)
-        assert page.inner_text("#verdict").startswith(leads)
-        assert not page.is_visible("#meaning")
-        # By the keyboard, and without starting what the space plays.
-        page.focus("#verdict summary")
-        page.keyboard.press("Space")
-        page.wait_for_selector("#meaning", state="visible")
-        assert follows in page.inner_text("#verdict")
-        assert page.inner_text("#play") == "animate"
+    address = serve(InteractiveTransport(tmp_path / "t.zarr"))
+    page = open_page(address)
+    assert page.inner_text("#verdict").startswith(leads)
+    assert not page.is_visible("#meaning")
+    # By the keyboard, and without starting what the space plays.
+    page.focus("#verdict summary")
+    page.keyboard.press("Space")
+    page.wait_for_selector("#meaning", state="visible")
+    assert follows in page.inner_text("#verdict")
+    assert page.inner_text("#play") == "animate"
 
 
-def test_what_gains_changed_cannot_be_judged(open_page, transport, tmp_path):
+def test_what_gains_changed_cannot_be_judged(open_page, serve, transport, tmp_path):
     save_transport(transport.with_gains(near=2.5), tmp_path / "t.zarr")
-    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
-        page = open_page(address)
-        assert page.inner_text("#verdict").startswith("Not judged.")
-        meaning = page.text_content("#meaning")
-        assert meaning.startswith("It was multiplied by the gains direct 1, near 2.5 and far 1 ")
+    address = serve(InteractiveTransport(tmp_path / "t.zarr"))
+    page = open_page(address)
+    assert page.inner_text("#verdict").startswith("Not judged.")
+    meaning = page.text_content("#meaning")
+    assert meaning.startswith("It was multiplied by the gains direct 1, near 2.5 and far 1 ")
 
 
 @pytest.mark.parametrize(
@@ -231,7 +233,6 @@ def test_it_is_used_by_the_keyboard(open_page, address, tmp_path):
 def test_the_page_reports_a_lost_server_and_reconnects(open_page, stored, browser):
     from nearfar.viewer.interactive import InteractiveTransport
     from nearfar.viewer.server import ListeningAddress
-    from tests.viewer.conftest import served_view
 
     context = browser.new_context()
     context.set_default_timeout(1000 * LONGEST_WAIT)

@@ -10,7 +10,6 @@ from nearfar.viewer.interactive import InteractiveTransport, StoppedError
 from nearfar.viewer.tools import compensation
 from tests.viewer.asking import CAMERA, PROJECTOR, message, refused
 from tests.viewer.browsing import drop, saved, seen, settled, slide, tone
-from tests.viewer.conftest import served_view
 
 pytestmark = pytest.mark.slow
 
@@ -88,15 +87,15 @@ def test_an_ordinary_picture_of_any_size_and_what_is_none(open_page, address, wa
     page.wait_for_selector("#fault:has-text('s.exr is 3x3')")
 
 
-def test_what_cannot_be_compensated_gets_a_sentence(open_page, stored, address):
+def test_what_cannot_be_compensated_gets_a_sentence(open_page, serve, stored, address):
     status, said = refused(address, "/tool/compensation", message(np.zeros(CAMERA)))
     assert status == 400
     assert "the wanted picture is black" in said
-    with served_view(InteractiveTransport(stored, memory=10**4)) as here:
-        page = open_page(here, {"tool": "compensation"})
-        drop(page, "#stage", "w.png", encode_png(np.full((9, 9, 3), 90, np.uint8)))
-        page.wait_for_selector("#tool-status:has-text('of 1GB')")
-        page.goto("about:blank")
+    here = serve(InteractiveTransport(stored, memory=10**4))
+    page = open_page(here, {"tool": "compensation"})
+    drop(page, "#stage", "w.png", encode_png(np.full((9, 9, 3), 90, np.uint8)))
+    page.wait_for_selector("#tool-status:has-text('of 1GB')")
+    page.goto("about:blank")
 
 
 def test_a_server_that_stops_gives_it_up(stored, wanted):

@@ -11,7 +11,6 @@ from nearfar.transport.store import save_transport
 from nearfar.viewer.interactive import InteractiveTransport
 from tests.viewer.asking import CAMERA, PROJECTOR, message, refused
 from tests.viewer.browsing import seen, settled, slide
-from tests.viewer.conftest import served_view
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.slow
@@ -149,44 +148,46 @@ def test_numbers_under_the_pointer_are_those_of_the_transport(open_page, address
     wait_until(lambda: page.inner_text("#readout") != before)
 
 
-def test_pixels_that_are_none_and_transports_without_error_bars(open_page, transport, tmp_path):
+def test_pixels_that_are_none_and_transports_without_error_bars(
+    open_page, serve, transport, tmp_path
+):
     save_transport(replace(transport, posterior=None), tmp_path / "t.zarr")
-    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
-        status, said = refused(address, "/numbers", message(WHITE, y=CAMERA.height, x=0))
-        assert (status, "no pixel of the camera" in said) == (400, True)
-        page = open_page(address, {"kind": "white", "pixel": [3, 9], "tab": "numbers"})
-        page.wait_for_selector("#numbers td")
-        with page.expect_response("**/numbers") as answer:
-            page.keyboard.press("1")
-        assert answer.value.json()["sigma"] is None
-        assert "±" not in page.inner_text("#readout")
-        page.goto("about:blank")
+    address = serve(InteractiveTransport(tmp_path / "t.zarr"))
+    status, said = refused(address, "/numbers", message(WHITE, y=CAMERA.height, x=0))
+    assert (status, "no pixel of the camera" in said) == (400, True)
+    page = open_page(address, {"kind": "white", "pixel": [3, 9], "tab": "numbers"})
+    page.wait_for_selector("#numbers td")
+    with page.expect_response("**/numbers") as answer:
+        page.keyboard.press("1")
+    assert answer.value.json()["sigma"] is None
+    assert "±" not in page.inner_text("#readout")
+    page.goto("about:blank")
 
 
-def test_negative_light_and_q_are_seen_in_a_row(open_page, transport, tmp_path):
+def test_negative_light_and_q_are_seen_in_a_row(open_page, serve, transport, tmp_path):
     """Light below zero is an error of the estimate: it must not look like light."""
     far = transport.far.copy()
     far[10, 10] *= -1
     save_transport(replace(transport, far=far), tmp_path / "t.zarr")
-    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
-        page = open_page(address, {"pixel": [10, 10], "tab": "row"})
-        page.wait_for_selector("#row:not([hidden])")
-        row = transport.component_rows(slice(10 * CAMERA.width + 10, 10 * CAMERA.width + 11))
-        values = -row.far[0].mean(axis=0).reshape(PROJECTOR)
-        share = -values[values < 0].sum() / np.abs(values).sum()
-        assert share > 0.5
-        told = float(re.search(r"([\d.]+) % of it negative", page.inner_text("#row-negative"))[1])
-        assert told == pytest.approx(100 * share, abs=0.6)
-        red = seen(page, "row-far").astype(int)
-        strong = np.abs(values) > 0.5 * np.abs(values).max()
-        # The page's own scale ends in yellow, which is hardly redder than green.
-        assert (red[..., 0] > 1.4 * red[..., 1])[strong & (values < 0)].all()
-        assert (red[..., 0] < 1.2 * red[..., 1])[strong & (values > 0)].all()
-        q = transport.correspondence[10, 10]
-        cross, canvas = _box(page, "#row-q"), _box(page, "#row-far")
-        at = (cross["x"] + cross["width"] / 2 - canvas["x"]) / canvas["width"]
-        assert at * PROJECTOR.width - 0.5 == pytest.approx(q[1], abs=0.3)
-        page.goto("about:blank")
+    address = serve(InteractiveTransport(tmp_path / "t.zarr"))
+    page = open_page(address, {"pixel": [10, 10], "tab": "row"})
+    page.wait_for_selector("#row:not([hidden])")
+    row = transport.component_rows(slice(10 * CAMERA.width + 10, 10 * CAMERA.width + 11))
+    values = -row.far[0].mean(axis=0).reshape(PROJECTOR)
+    share = -values[values < 0].sum() / np.abs(values).sum()
+    assert share > 0.5
+    told = float(re.search(r"([\d.]+) % of it negative", page.inner_text("#row-negative"))[1])
+    assert told == pytest.approx(100 * share, abs=0.6)
+    red = seen(page, "row-far").astype(int)
+    strong = np.abs(values) > 0.5 * np.abs(values).max()
+    # The page's own scale ends in yellow, which is hardly redder than green.
+    assert (red[..., 0] > 1.4 * red[..., 1])[strong & (values < 0)].all()
+    assert (red[..., 0] < 1.2 * red[..., 1])[strong & (values > 0)].all()
+    q = transport.correspondence[10, 10]
+    cross, canvas = _box(page, "#row-q"), _box(page, "#row-far")
+    at = (cross["x"] + cross["width"] / 2 - canvas["x"]) / canvas["width"]
+    assert at * PROJECTOR.width - 0.5 == pytest.approx(q[1], abs=0.3)
+    page.goto("about:blank")
 
 
 def test_the_edge_of_what_is_compared_with_is_dragged(open_page, address):

@@ -16,7 +16,6 @@ from nearfar.viewer.held_out import photo_maps
 from nearfar.viewer.interactive import InteractiveTransport
 from tests.viewer.asking import CAMERA, PROJECTOR
 from tests.viewer.browsing import seen, settled
-from tests.viewer.conftest import served_view
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.slow
@@ -190,19 +189,19 @@ def test_an_address_holds_the_region(open_page, address, transport):
     _check_numbers(page, transport, WHITE, REGION)
 
 
-def test_held_out_photos_are_told_under_the_pointer(open_page, stored):
+def test_held_out_photos_are_told_under_the_pointer(open_page, serve, stored):
     maps = photo_maps(open_transport(stored), open_capture(stored.parent / "capture.zarr"))
-    with served_view(InteractiveTransport(stored), photo_maps=maps) as address:
-        page = open_page(address, {"kind": "white", "tab": "numbers", "map": "held-out"})
-        page.mouse.move(*_at(page, 12, 33))
-        page.wait_for_selector("#readout:has-text('off at held-out photos')")
-        told = re.search(r"off at held-out photos ([\d.]+) %", page.inner_text("#readout"))
-        assert float(told[1]) == pytest.approx(maps["held-out"].values[12, 33], rel=0.06)
-        last = page.locator("#numbers tr").last.inner_text()
-        assert last.split("\t")[0] == "off at held-out photos"
-        assert told[1] in last
-        page.click("#tab-map")
-        page.wait_for_selector("#map-caption:has-text('that no estimate used')")
-        page.goto("about:blank")
-        listed = json.loads(page.request.get(f"{address}/scene").text())["maps"]
-        assert [each["name"] for each in listed][-2:] == ["held-out", "misfit"]
+    address = serve(InteractiveTransport(stored), photo_maps=maps)
+    page = open_page(address, {"kind": "white", "tab": "numbers", "map": "held-out"})
+    page.mouse.move(*_at(page, 12, 33))
+    page.wait_for_selector("#readout:has-text('off at held-out photos')")
+    told = re.search(r"off at held-out photos ([\d.]+) %", page.inner_text("#readout"))
+    assert float(told[1]) == pytest.approx(maps["held-out"].values[12, 33], rel=0.06)
+    last = page.locator("#numbers tr").last.inner_text()
+    assert last.split("\t")[0] == "off at held-out photos"
+    assert told[1] in last
+    page.click("#tab-map")
+    page.wait_for_selector("#map-caption:has-text('that no estimate used')")
+    page.goto("about:blank")
+    listed = json.loads(page.request.get(f"{address}/scene").text())["maps"]
+    assert [each["name"] for each in listed][-2:] == ["held-out", "misfit"]

@@ -141,22 +141,22 @@ def test_the_models_split_is_shown_until_the_physical_one_is_made(
             one.goto("about:blank")
 
 
-def test_what_cannot_be_split_physically_says_why(open_page, stored_wax, wax, tmp_path):
-    with served_view(InteractiveTransport(stored_wax, memory=10**4)) as address:
-        page = open_page(address, {"kind": "white"})
-        page.click("[data-split=physical]")
-        page.wait_for_selector("#split-status:has-text('of 1GB')")
-        assert page.get_attribute("[data-split=model]", "aria-pressed") == "true"
-        page.goto("about:blank")
+def test_what_cannot_be_split_physically_says_why(open_page, serve, stored_wax, wax, tmp_path):
+    address = serve(InteractiveTransport(stored_wax, memory=10**4))
+    page = open_page(address, {"kind": "white"})
+    page.click("[data-split=physical]")
+    page.wait_for_selector("#split-status:has-text('of 1GB')")
+    assert page.get_attribute("[data-split=model]", "aria-pressed") == "true"
+    page.goto("about:blank")
     far_alone = replace(wax, parts=("direct", "far"), near=wax.near[..., :0, :0])
     save_transport(far_alone, tmp_path / "t.zarr")
-    with served_view(InteractiveTransport(tmp_path / "t.zarr")) as address:
-        page = open_page(address, {"split": "physical"})
-        assert not page.is_visible("#splits")
-        page.goto("about:blank")
-        status, said = refused(address, "/split", b"")
-        assert status == 400
-        assert "it has no near-range light" in said
+    address = serve(InteractiveTransport(tmp_path / "t.zarr"))
+    page = open_page(address, {"split": "physical"})
+    assert not page.is_visible("#splits")
+    page.goto("about:blank")
+    status, said = refused(address, "/split", b"")
+    assert status == 400
+    assert "it has no near-range light" in said
 
 
 @pytest.mark.parametrize("light_of", ["grey", "tinted", "coloured"])

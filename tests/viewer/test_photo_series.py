@@ -119,11 +119,11 @@ def test_an_address_with_a_photo_that_is_not_there_says_so(open_page, address):
 
 
 @pytest.mark.slow
-def test_without_a_capture_there_are_no_photos(open_page, stored):
-    with served_view(InteractiveTransport(stored)) as address:
-        page = open_page(address)
-        assert not page.is_visible("#photo-series")
-        assert not page.is_visible("#next-held-out")
-        refused = page.request.get(f"{address}/photo/0")
-        assert refused.status == 400
-        assert "give their capture" in refused.json()["fault"]
+def test_without_a_capture_there_are_no_photos(open_page, serve, stored):
+    address = serve(InteractiveTransport(stored))
+    page = open_page(address)
+    assert not page.is_visible("#photo-series")
+    assert not page.is_visible("#next-held-out")
+    refused = page.request.get(f"{address}/photo/0")
+    assert refused.status == 400
+    assert "give their capture" in refused.json()["fault"]

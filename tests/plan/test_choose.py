@@ -165,6 +165,7 @@ def _quick_look(component, scale, noise=0.01, shape=(6, 8, 3)):
             offset_noise=dark,
             light_noise=dark,
             share_of_white=dark,
+            noise_share=np.ones(shape, np.float32),
         ),
     )
 

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from shutil import rmtree
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ def _believed(transport: Transport) -> Transport:
     shape = transport.direct.shape
     values = {
         name: generator.random(shape).astype(np.float32)
-        for name in ("white", "offset_noise", "light_noise", "share_of_white")
+        for name in ("white", "offset_noise", "light_noise", "share_of_white", "noise_share")
     }
     frequencies = transport.far_basis.frequencies[1:]
     posterior = Posterior(
@@ -100,6 +101,17 @@ def test_what_error_bars_follow_from_comes_back(tmp_path, generator):
         values = getattr(load_transport(tmp_path / "t.zarr").quality, name)
         np.testing.assert_array_equal(values, getattr(transport.quality, name))
         assert values.dtype == getattr(transport.quality, name).dtype
+
+
+def test_a_file_of_a_version_before_neighbours_took_off_noise_has_all_of_it(tmp_path, generator):
+    path, transport = tmp_path / "t.zarr", _believed(_transport(generator))
+    save_transport(transport, path)
+    belief = json.loads((path / "zarr.json").read_text())["attributes"]["belief"]
+    change_attributes(path, belief={k: v for k, v in belief.items() if k != "added"})
+    rmtree(path / "belief_noise_share")
+    loaded = load_transport(path)
+    np.testing.assert_array_equal(loaded.posterior.noise_share, np.ones_like(transport.black))
+    np.testing.assert_array_equal(loaded.posterior.white, transport.posterior.white)
 
 
 def _middle(whole, step):
@@ -167,6 +179,7 @@ def test_a_damaged_posterior_gets_a_sentence(tmp_path, generator):
         ({"kinds": [[1.0, -2.0, 1.0]]}, "does not describe a transport"),
         ({"kinds": [[1e-9, 2.0, 1.0]]}, "does not describe a transport"),
         ({"repeats": [float("inf")]}, "does not describe a transport"),
+        ({"added": 3}, "does not describe a transport"),
     ):
         change_attributes(path, belief={**posterior, **change})
         with pytest.raises(UnreadableFileError, match=message):

@@ -79,6 +79,8 @@ class ResponsePrior(Eigenbasis):
     noise_gain : ndarray, shape (T,)
         Mean variance of an estimated window entry that noise causes, in units of one
         measurement's.
+    response_gain : ndarray, shape (T,)
+        Mean gain with which responses enter the estimate: 1 without noise.
     factors : NearCovariance
     covariance : ndarray, shape (W^2, W^2), float64
         C.
@@ -92,6 +94,7 @@ class ResponsePrior(Eigenbasis):
     variance_ratios: Floats
     spike_information: Floats
     noise_gain: Floats
+    response_gain: Floats
     factors: NearCovariance
     covariance: Floats
     far_variance: Floats
@@ -154,6 +157,7 @@ def response_prior(
         variance_ratios=VARIANCE_RATIOS,
         spike_information=(precision @ of_window**2).astype(np.float32),
         noise_gain=shrinkage**2 @ np.sum(to_near**2, axis=1) / to_near.shape[1],
+        response_gain=np.mean(shrinkage * eigenvalues, axis=1),
         factors=near_covariance_factors(prior_component, centred.near_basis.window, projector),
         covariance=covariance,
         far_variance=variance,

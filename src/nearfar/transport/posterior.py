@@ -36,6 +36,9 @@ class Posterior:
         Standard deviation of the response to white.
     share_of_white : ndarray, shape (Cy, Cx, channels), float32
         Mean share of the references' error that is the error of the response to white.
+    noise_share : ndarray, shape (Cy, Cx, channels), float32
+        Variance of the noise of a measured response that is left after neighbours, as a share of
+        that which the transport's `noise` has.
     """
 
     prior_components: tuple[PriorComponent, ...]
@@ -47,6 +50,7 @@ class Posterior:
     offset_noise: Floats
     light_noise: Floats
     share_of_white: Floats
+    noise_share: Floats
 
 
 @dataclass(frozen=True, eq=False)

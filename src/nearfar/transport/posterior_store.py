@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,9 @@ SHARED: Mapping[type[AnyPosterior], tuple[str, ...]] = {
 OF_PROJECTOR_PIXELS = {"patterns", "modes", "gain_errors"}
 # Fields with a value for each camera pixel, whatever the channels.
 OF_PIXELS = {"prior_component", "prior_scale", "variance_ratio"}
+# Fields that files of older versions lack, and the values that they have there. The metadata names
+# those that are there.
+ADDED_FIELDS: Mapping[type[AnyPosterior], Mapping[str, float]] = {Posterior: {"noise_share": 1.0}}
 # Some fields have older names in the format.
 STORED_FIELDS = {"prior_component": "kind", "prior_scale": "strength"}
 
@@ -52,6 +55,7 @@ def described(posterior: AnyPosterior) -> dict[str, Any]:
         **components,
         "frequencies": [frequency_to_text(k) for k in posterior.frequencies],
         "repeats": [float(count) for count in posterior.multiplicity],
+        "added": list(ADDED_FIELDS[Posterior]),
     }
 
 
@@ -72,14 +76,21 @@ class SharedPosterior:
         `Posterior`, `PatternPosterior` or `FreePosterior`.
     shared : mapping
         Values of its fields.
+    added : mapping
+        Those of its other fields that the file lacks, and the value that each has everywhere.
     """
 
     kind: type[AnyPosterior]
     shared: Mapping[str, Any]
+    added: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def _stored(self) -> list[str]:
+        return [name for name in FIELDS[self.kind] if name not in self.added]
 
     def arrays(self, part: str) -> list[str]:
         """Return the names of the arrays of its other fields."""
-        return [array_name(part, name) for name in FIELDS[self.kind]]
+        return [array_name(part, name) for name in self._stored]
 
     def of(self, read: dict[str, Any], part: str) -> AnyPosterior:
         """Return the posterior of some camera rows, whose arrays are taken out of `read`.
@@ -89,7 +100,11 @@ class SharedPosterior:
         ValueError
             If it is of prior components that there are not.
         """
-        fields = {name: read.pop(array_name(part, name)) for name in FIELDS[self.kind]}
+        fields = {name: read.pop(array_name(part, name)) for name in self._stored}
+        fields |= {
+            name: np.full(read["black"].shape, value, dtype=np.float32)
+            for name, value in self.added.items()
+        }
         if "prior_component" in fields:
             last = int(fields["prior_component"].max(initial=0))
             if last >= len(self.shared["prior_components"]):
@@ -104,7 +119,7 @@ class SharedPosterior:
             count = real_basis(self.shared["frequencies"], projector).count
             if len(self.shared["multiplicity"]) != count:
                 return False
-        fields = {name: arrays[array_name(part, name)] for name in FIELDS[self.kind]}
+        fields = {name: arrays[array_name(part, name)] for name in self._stored}
         if "prior_component" in fields and fields["prior_component"].dtype != np.uint8:
             return False
         return all(
@@ -144,7 +159,9 @@ def shared_posterior(
         frequencies = tuple(frequency_from_text(k) for k in listed(attributes["frequencies"]))
         repeats = np.array(_finite(attributes["repeats"]), dtype=np.float32)
         shared |= {"frequencies": frequencies, "multiplicity": repeats}
-    return SharedPosterior(kind, shared)
+    there = listed(attributes.get("added", []))
+    added = {n: value for n, value in ADDED_FIELDS.get(kind, {}).items() if n not in there}
+    return SharedPosterior(kind, shared, added)
 
 
 def _read_shared(group: zarr.Group, part: str, name: str, projector: Size) -> Floats:

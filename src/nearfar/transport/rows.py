@@ -22,6 +22,7 @@ POSTERIOR_FIELDS = (
     "offset_noise",
     "light_noise",
     "share_of_white",
+    "noise_share",
 )
 QUALITY_FIELDS = ("confidence", "saturated")
 PATTERN_POSTERIOR_FIELDS = ("prior_component", "variance_ratio", "black_deviation")

@@ -35,6 +35,8 @@ PROJECTOR = Size(12, 16)
 WINDOW = 5
 COMPONENT = PriorComponent(1.5, 8.0, 2.0)
 NOISE, OFFSET, LIGHT, SHARE = 2e-3, 1e-3, 1.5e-3, 0.4
+# NOISE is what neighbours leave of that of the photos.
+NOISE_SHARE = 0.6
 SCALE, WHITE = 0.05, 0.8
 
 
@@ -55,7 +57,7 @@ def _transport(centres, lit=True):
         far=np.zeros((*shape, basis.count), np.float32),
         far_basis=basis,
         black=np.zeros(shape, np.float32),
-        noise=np.full(shape, NOISE, np.float32),
+        noise=np.full(shape, NOISE / NOISE_SHARE**0.5, np.float32),
         posterior=Posterior(
             prior_components=(PriorComponent(0.0, 1.0, 1.0), COMPONENT),
             frequencies=measured,
@@ -66,6 +68,7 @@ def _transport(centres, lit=True):
             offset_noise=np.full(shape, OFFSET, np.float32),
             light_noise=np.full(shape, LIGHT, np.float32),
             share_of_white=np.full(shape, SHARE, np.float32),
+            noise_share=np.full(shape, NOISE_SHARE, np.float32),
         ),
     )
 
@@ -283,6 +286,7 @@ def test_colour_lights_go_channel_by_channel():
             posterior,
             **{n: doubled(getattr(posterior, n)) for n in ("white", "offset_noise", "light_noise")},
             share_of_white=np.repeat(posterior.share_of_white, 2, axis=2),
+            noise_share=np.repeat(posterior.noise_share, 2, axis=2),
         ),
     )
     lights = np.random.default_rng(1).random((*PROJECTOR, 2))

@@ -5,7 +5,12 @@ import pytest
 
 from nearfar.estimate.joint import neighbour_loops, neighbours
 
-BY_ARRAYS = (neighbours.expect_each, neighbours.expect_together)
+
+def _expect_each(*given):
+    return neighbours.expect_each(*given)[0]
+
+
+BY_ARRAYS = (_expect_each, neighbours.expect_together)
 
 
 def _of_every_pixel(expect):
@@ -104,3 +109,27 @@ def test_a_camera_pixel_that_is_not_known_is_the_mean_of_its_neighbours():
     expected = mean * white[y[inner], x[inner], :, None]
     np.testing.assert_allclose(each[inner], expected, rtol=1e-12)
     np.testing.assert_allclose(together[inner], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (2, 5), (6, 7)])
+def test_noise_that_is_left_is_that_of_the_mean(shape):
+    # Far less of it than the variance says, so that every camera pixel takes the mean.
+    generator = np.random.default_rng(3)
+    variance = 1.0 + generator.random((*shape, 1))
+    ones, one = np.ones((*shape, 1)), np.ones(1)
+    sums = np.zeros(shape)
+    for place in np.ndindex(shape):
+        values = np.full((*shape, 1, 1), 5.0)
+        values[place] += 1e-3
+        found, left = neighbours.expect_each(values, ones, variance, one, np.array([0]))
+        sums += ((found[..., 0, 0] - 5.0) / 1e-3) ** 2 * variance[(*place, 0)]
+    np.testing.assert_allclose(left[..., 0], sums / variance[..., 0], rtol=1e-6)
+
+
+def test_all_noise_is_left_where_rows_have_nothing_in_common():
+    values = np.random.default_rng(0).normal(size=(20, 20, 1, 40))
+    variance = np.full((20, 20, 1), 1e-6)
+    _, left = neighbours.expect_each(
+        values, np.ones((20, 20, 1)), variance, np.ones(40), np.arange(20, 40)
+    )
+    assert 0.99 < left.min() <= left.max() <= 1.0

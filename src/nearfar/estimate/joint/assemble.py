@@ -25,6 +25,9 @@ from nearfar.transport.posterior import Posterior
 
 # Camera pixels of a batch.
 BATCH_PIXELS = 2048
+# Of the noise that neighbours take off, error bars leave out this share: what the filter blurs is
+# an error too.
+LEFT_OUT_SHARE = 0.5
 
 
 def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
@@ -93,6 +96,7 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
             offset_noise=fetch(pixels.offset_noise).reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),
             share_of_white=share_of_white.reshape(shape),
+            noise_share=fetch(1.0 - LEFT_OUT_SHARE * (1.0 - rows.noise_left)).reshape(shape),
         ),
     )
 

@@ -214,7 +214,8 @@ class JointVariances:
         offset_noise = posterior.offset_noise.reshape(-1, channels)[batch]
         share_of_white = posterior.share_of_white.reshape(-1, channels)[batch]
         light_noise = posterior.light_noise.reshape(-1, channels)[batch]
-        noise = transport.noise.reshape(-1, channels)[batch]
+        noise_share = posterior.noise_share.reshape(-1, channels)[batch]
+        noise = transport.noise.reshape(-1, channels)[batch] * np.sqrt(noise_share)
         return PixelState(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
             nuisance.common_precision(

@@ -236,6 +236,7 @@ def _of_rows(
             near=found.near[some],
             far=found.far[some],
             near_noise=found.near_noise[some],
+            noise_left=found.noise_left[some],
             choices=found.choices.of(some),
         )
     return problem, found

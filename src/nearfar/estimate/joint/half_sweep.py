@@ -351,6 +351,7 @@ def _empty_rows(problem: Problem) -> EstimatedRows:
         zeros(problem.near_basis.count),
         zeros(count),
         zeros(),
+        np.ones((number, channels), dtype=np.float32),
         Choices((choice,)),
     )
 

@@ -11,7 +11,9 @@ Index convention: arrays are (Cy, Cx, channels, j), j over coefficients.
 
 import math
 
-from nearfar.arrays import Booleans, Floats, Integers, blocks, namespace
+import numpy as np
+
+from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, namespace
 from nearfar.parallel import side_by_side
 
 # Standard deviation, as a share of white, below which noise counts as this much.
@@ -29,7 +31,7 @@ BYTES_AT_ONCE = 2**22
 
 def expect_each(
     values: Floats, white: Floats, variance: Floats, multiplicity: Floats, highest: Integers
-) -> Floats:
+) -> tuple[Floats, Floats]:
     """Filter each coefficient with a gain of its own.
 
     Parameters
@@ -47,10 +49,14 @@ def expect_each(
 
     Returns
     -------
-    ndarray, shape (Cy, Cx, channels, J)
+    expected : ndarray, shape (Cy, Cx, channels, J)
+    noise_left : ndarray, shape (Cy, Cx, channels)
+        Variance that noise has in what is expected, as a share of that which it has in a camera
+        pixel's own values; the mean over j.
     """
     xp = namespace(values)
     found: Floats = xp.empty_like(values)
+    noise_left: Floats = xp.empty_like(white)
     precision = xp.astype(1.0 / variance[..., None], values.dtype)
     # Scatter that noise alone has, relative to its variance, and two standard deviations of the
     # mean of that of nine values.
@@ -68,9 +74,11 @@ def expect_each(
         change = xp.clip(xp.maximum(change, HIGHEST_FACTOR * common * noise), min=0.0)
         gain = change / (change + noise)
         found[rows] = (mean + gain * (some[1:-1, 1:-1] - mean)) * white[rows, ..., None]
+        gains = xp.mean(gain, axis=-1), xp.mean(gain**2, axis=-1)
+        noise_left[rows] = _noise_left(weight[..., 0], total[..., 0], rows, len(values), gains)
 
     side_by_side(work, _row_blocks(values))
-    return found
+    return found, noise_left
 
 
 def expect_together(values: Floats, white: Floats, variance: Floats, lit: Booleans) -> Floats:
@@ -124,6 +132,46 @@ def _with_neighbours(values: Floats, rows: slice) -> Floats:
     tall = xp.concat([*above, some, *below], axis=0)
     wide: Floats = xp.concat([tall[:, :1], tall, tall[:, -1:]], axis=1)
     return wide
+
+
+def _noise_left(
+    weight: Floats, total: Floats, rows: slice, height: int, gains: tuple[Floats, Floats]
+) -> Floats:
+    """Return the variance of noise in what is expected over that in a camera pixel's own values.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (n + 2, Cx + 2, channels)
+        Of rows and those beside them: 1 / variance.
+    total : ndarray, shape (n, Cx, channels)
+        Its sum over each neighbourhood.
+    rows : slice
+    height : int
+        Rows of the camera.
+    gains : tuple of ndarray, shape (n, Cx, channels)
+        Mean gain of a camera pixel's difference from the mean, and mean of its square.
+    """
+    xp = namespace(weight)
+    down, across = _copies(height)[rows], _copies(weight.shape[1] - 2)
+    count, width = down.shape[0], across.shape[0]
+    down, across = (beside(copies.astype(np.float32), weight) for copies in (down, across))
+    # Each camera pixel as often as the mean holds it.
+    held = sum(down[:, i, None, None] * weight[i : count + i] for i in range(3))
+    held = sum(across[:, i, None] * held[:, i : width + i] for i in range(3))
+    gain, square = gains
+    own = weight[1:-1, 1:-1] / total
+    of_own = down[:, 1, None, None] * across[:, 1, None] * own
+    left: Floats = xp.clip(
+        square + 2 * (gain - square) * of_own + (1 - 2 * gain + square) * own * held / total,
+        max=1.0,
+    )
+    return left
+
+
+def _copies(length: int) -> Integers:
+    """Return how often the mean over three pixels in a line holds each of them, (length, 3)."""
+    held = np.clip(np.arange(length)[:, None] + np.arange(-1, 2), 0, length - 1)
+    return np.asarray((held[:, :, None] == held[:, None, :]).sum(axis=-1))
 
 
 def _sum(values: Floats) -> Floats:

@@ -94,6 +94,8 @@ class EstimatedRows(NamedTuple):
     near: Floats  # (C, channels, W^2)
     far: Floats  # (C, channels, R), as measured
     near_noise: Floats  # (C, channels)
+    # Variance of noise in the responses, as a share of that in a camera pixel's own; (C, channels).
+    noise_left: Floats
     choices: Choices
 
 

@@ -52,20 +52,33 @@ def variance_ratio(batch: PixelBatch, scale: Floats) -> Floats:
 
 def near_noise(batch: PixelBatch, prior: ResponsePrior, ratio: Floats) -> Floats:
     """Return the mean variance of a window entry that noise causes, shape (n, channels)."""
+    known = _in_table(prior.noise_gain, prior, ratio)
+    xp = namespace(ratio)
+    noise: Floats = xp.astype(batch.noise**2 * known, xp.float32)
+    return noise
+
+
+def response_gain(prior: ResponsePrior, ratio: Floats) -> Floats:
+    """Return the mean gain with which responses enter the estimate, shape (n, channels)."""
+    xp = namespace(ratio)
+    gain: Floats = xp.astype(_in_table(prior.response_gain, prior, ratio), xp.float32)
+    return gain
+
+
+def _in_table(table: Floats, prior: ResponsePrior, ratio: Floats) -> Floats:
+    """Look up variance ratios in a table of the prior, between its values."""
     if is_numpy_array(ratio):
-        known = np.interp(ratio, prior.variance_ratios, prior.noise_gain)
-        return np.asarray(batch.noise**2 * known, dtype=np.float32)
+        return np.asarray(np.interp(ratio, prior.variance_ratios, table))
     xp = namespace(ratio)
     lowest, highest = float(prior.variance_ratios[0]), float(prior.variance_ratios[-1])
-    table, ratios = beside(prior.noise_gain, ratio), beside(prior.variance_ratios, ratio)
+    table, ratios = beside(table, ratio), beside(prior.variance_ratios, ratio)
     # Successive ratios of the table differ by a factor sqrt(2).
     within = xp.clip(ratio, lowest, highest)
     step = xp.astype(xp.floor(2 * xp.log2(within / lowest)), xp.int64)
     step = xp.clip(step, 0, len(prior.variance_ratios) - 2)
     share = (within - ratios[step]) / (ratios[step + 1] - ratios[step])
-    gain = table[step] + share * (table[step + 1] - table[step])
-    noise: Floats = xp.astype(batch.noise**2 * gain, xp.float32)
-    return noise
+    found: Floats = table[step] + share * (table[step + 1] - table[step])
+    return found
 
 
 def solve_whole(

@@ -29,7 +29,12 @@ from nearfar.estimate.joint.problem import (
     EstimatedRows,
     Problem,
 )
-from nearfar.estimate.joint.solve import PosteriorMean, solve_whole, variance_ratio
+from nearfar.estimate.joint.solve import (
+    PosteriorMean,
+    response_gain,
+    solve_whole,
+    variance_ratio,
+)
 from nearfar.estimate.joint.spikes import (
     LEAST_GAIN,
     MAXIMUM_SPIKES,
@@ -167,6 +172,12 @@ class _Sweep(NamedTuple):
             add_rows(rows.near, of_some, found.near)
             add_rows(rows.far, of_some, centred.uncentre(found.far, some.centres))
             rows.near_noise[of_some] = found.near_noise
+            if place < len(LIT_COMPONENTS):
+                # Neighbours across edges of direct light cost as much as they gain.
+                rows.noise_left[of_some] = 1.0
+            elif not starts:
+                gain = response_gain(self.priors[place], ratio)
+                rows.noise_left[of_some] = gain + (1.0 - gain) * rows.noise_left[of_some]
 
 
 def _explained(
@@ -199,6 +210,7 @@ def _empty_rows(problem: Problem) -> EstimatedRows:
         zeros(number, channels, problem.near_basis.count),
         zeros(number, channels, count),
         zeros(number, channels),
+        xp.ones((number, channels), dtype=xp.float32, device=device(responses)),
         Choices((ComponentChoice(zeros(number, dtype=xp.int64), zeros(number)),)),
     )
 
@@ -262,14 +274,14 @@ def _with_spikes(
 
 def _from_neighbours(problem: Problem, before: EstimatedRows) -> EstimatedRows:
     """Return the rows that a later sweep starts from: those expected from neighbours."""
-    windows, far = _expected(problem, before)
+    windows, far, noise_left = _expected(problem, before)
     sweeps = (*before.choices.sweeps, before.choices.sweeps[-1].of(slice(None)))
     choices = before.choices._replace(sweeps=sweeps)
-    return before._replace(choices=choices, near=windows, far=far)
+    return before._replace(choices=choices, near=windows, far=far, noise_left=noise_left)
 
 
-def _expected(problem: Problem, rows: EstimatedRows) -> tuple[Floats, Floats]:
-    """Return n and f of camera pixels as their neighbours lead to expect."""
+def _expected(problem: Problem, rows: EstimatedRows) -> tuple[Floats, Floats, Floats]:
+    """Return n and f of camera pixels as neighbours lead to expect, and the noise left in f."""
     pixels, measurements = problem.pixels, problem.measurements
     camera, channels = measurements.camera, measurements.channels
     xp, shape = namespace(rows.near), (*camera, channels)
@@ -279,7 +291,7 @@ def _expected(problem: Problem, rows: EstimatedRows) -> tuple[Floats, Floats]:
     variance = xp.clip((noise / white) ** 2, min=tiny)
     basis = problem.model.centred.basis
     cycles = np.linalg.norm(basis.cycles * np.array(basis.projector), axis=1)[basis.index]
-    far = expect_each(
+    far, noise_left = expect_each(
         rows.far.reshape((*shape, -1)),
         white,
         variance,
@@ -295,4 +307,5 @@ def _expected(problem: Problem, rows: EstimatedRows) -> tuple[Floats, Floats]:
     windows = windows.reshape((-1, *rows.near.shape[1:]))
     inside = near.inside_basis(pixels.centres, problem.near_basis, measurements.projector)
     windows *= inside[:, None]
-    return windows, far.reshape((-1, *rows.far.shape[1:]))
+    shapes = (-1, *rows.far.shape[1:]), rows.noise_left.shape
+    return windows, far.reshape(shapes[0]), xp.astype(noise_left.reshape(shapes[1]), xp.float32)

@@ -98,7 +98,9 @@ class Body:
         ndarray, shape (m, R)
         """
         flat = kernel(source, REACH, slope).ravel()
-        at_q = (flat * self.covered[chosen]) @ self.at_offsets
+        covered = flat * self.covered[chosen]
+        # A product of real numbers takes half the time of one of real and complex numbers.
+        at_q = (covered @ self.at_offsets.view(np.float64)).view(np.complex128)
         seen = at_q * self.of_footprint[chosen]
         if self.cell_side > 1:
             seen = seen * self._of_pixels(source, slope) / (flat @ self.at_offsets)

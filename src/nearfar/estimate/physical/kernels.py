@@ -8,9 +8,9 @@ depth, in projector pixels a projector pixel.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
-from scipy import ndimage
 
 from nearfar.arrays import Floats
 from nearfar.transport.dipole import Dipole, boundary_mismatch, diffuse_profile
@@ -64,11 +64,21 @@ def kernel(source: Dipole, radius: int, slope: Slope = FLAT) -> Floats:
     """
     reach = (radius + 1) * SAMPLES
     side = np.arange(-reach, reach + 1) / SAMPLES
-    y, x = np.meshgrid(side, side, indexing="ij")
-    profile = diffuse_profile(source, y**2 + x**2 + (slope[0] * y + slope[1] * x) ** 2)
+    y, x = np.meshgrid(side[: reach + 1], side, indexing="ij")
+    half = diffuse_profile(source, y**2 + x**2 + (slope[0] * y + slope[1] * x) ** 2)
+    # The same half a turn about q.
+    profile = np.concatenate([half, half[-2::-1, ::-1]])
+    over_pixels = _over_pixels(radius)
+    return np.asarray(over_pixels @ profile @ over_pixels.T)
+
+
+@lru_cache(maxsize=4)
+def _over_pixels(radius: int) -> Floats:
+    """Return weights of samples in integrals over both pixels, one dimension; (2 radius + 1, n)."""
     pixel = np.full(SAMPLES, 1 / SAMPLES)
     both = np.convolve(pixel, pixel)
-    for axis in (0, 1):
-        profile = ndimage.convolve1d(profile, both, axis=axis, mode="nearest")
-    kept = slice(SAMPLES, -SAMPLES, SAMPLES)
-    return np.asarray(profile[kept, kept])
+    weights = np.zeros((2 * radius + 1, 2 * (radius + 1) * SAMPLES + 1))
+    for number, row in enumerate(weights):
+        first = number * SAMPLES + 1
+        row[first : first + len(both)] = both
+    return weights

@@ -151,13 +151,11 @@ def _logarithms(source: Dipole) -> NDArray[np.float64]:
 def _fit(body: Body, channel: int, shape: Floats, power: Floats, chosen: Integers) -> Amplitudes:
     """Fit d and s to responses of some power of what they leave, by weighted least squares."""
     responses, unit = body.responses[chosen, channel], body.to_direct[chosen]
-    of_direct, of_both, of_shape = (
-        np.einsum("cr,cr,r->c", one, other, 1 / power)
-        for one, other in ((unit, unit), (unit, shape), (shape, shape))
+    weighed_unit, weighed_shape = unit / power, shape / power
+    of_direct, of_both, with_direct = (
+        np.vecdot(weighed_unit, other) for other in (unit, shape, responses)
     )
-    with_direct, with_shape = (
-        np.einsum("cr,cr,r->c", responses, one, 1 / power) for one in (unit, shape)
-    )
+    of_shape, with_shape = (np.vecdot(weighed_shape, other) for other in (shape, responses))
     determinant = of_direct * of_shape - of_both**2
     tiny = np.finfo(float).tiny
     subsurface = (of_direct * with_shape - of_both * with_direct) / np.maximum(determinant, tiny)
@@ -180,7 +178,7 @@ def _fit_slopes(
 
 def _weighed(left: Floats, power: Floats) -> Floats:
     """Return the sum of squares over power, shape (m,)."""
-    return np.asarray(np.einsum("cr,cr,r->c", left, left, 1 / power))
+    return np.asarray(np.vecdot(left / power, left))
 
 
 def _misfit(
@@ -240,8 +238,8 @@ def _explained(body: Body, fits: list[Amplitudes], power: Floats) -> Floats:
     unit = body.to_direct
     for i, fit in enumerate(fits):
         responses = body.responses[:, i]
-        overlap = np.einsum("cr,cr,r->c", unit, responses, 1 / power[i])
-        alone = overlap / np.einsum("cr,cr,r->c", unit, unit, 1 / power[i])
+        weighed = unit / power[i]
+        alone = np.vecdot(weighed, responses) / np.vecdot(weighed, unit)
         left += _weighed(fit.left, power[i])
         without += _weighed(responses - alone[:, None] * unit, power[i])
     return np.asarray(1 - left / np.maximum(without, np.finfo(float).tiny))

@@ -55,7 +55,7 @@ def _at(drift, numbers):
 def test_lamp_and_ambient_are_followed(world, shoot, black):
     lamp = SimulatedDrift(per_100_photos=-0.05, swing=0.02, period=80)
     ambient = SimulatedDrift(per_100_photos=0.8, swing=0.2, period=60)
-    drift = follow_drift(_drifting(shoot, world, lamp, ambient, black=black))
+    drift = follow_drift(_drifting(shoot, world, lamp, ambient, black=black)).drift
     whites, blacks = drift.references
     true = _at(lamp, whites)
     np.testing.assert_allclose(drift.lamp, np.stack([true / true.mean()] * 2, axis=1), atol=1e-3)
@@ -71,7 +71,7 @@ def test_lamp_and_ambient_are_followed(world, shoot, black):
 
 
 def test_a_steady_rig_is_found_steady(world, shoot):
-    drift = follow_drift(_drifting(shoot, world, STEADY, STEADY))
+    drift = follow_drift(_drifting(shoot, world, STEADY, STEADY)).drift
     assert drift.lamp_range < 2e-3
     assert drift.ambient_range < 2e-3
 
@@ -201,7 +201,7 @@ def test_whites_and_blacks_may_be_shot_at_other_times(world, shoot, black):
         QUIET.model_copy(update={"ambient": 0.05, "ambient_drift": ambient}),
         SimulatedProjector(lamp_drift=lamp, black_level=black),
     )
-    drift = follow_drift(photos)
+    drift = follow_drift(photos).drift
     light = (world @ np.ones(PROJECTOR)) * _at(lamp, drift.references.whites).mean()
     np.testing.assert_allclose(drift.light, light, atol=3e-4)
     steadied = drift.remove_from(
@@ -212,12 +212,12 @@ def test_whites_and_blacks_may_be_shot_at_other_times(world, shoot, black):
 
 def test_what_moves_or_saturates_does_not_decide(world, shoot):
     photos = _drifting(shoot, world, LAMP, AMBIENT)
-    still = follow_drift(photos)
+    still = follow_drift(photos).drift
     spoiled = photos.photos.copy()
     generator = np.random.default_rng(0)
     spoiled[:, 3:6] = generator.integers(300, 9000, size=spoiled[:, 3:6].shape)
     spoiled[:, 10:12] = 16383
-    drift = follow_drift(replace(photos, photos=spoiled))
+    drift = follow_drift(replace(photos, photos=spoiled)).drift
     np.testing.assert_allclose(drift.lamp, still.lamp, atol=1e-3)
     rest = np.r_[0:3, 6:10, 12:24]
     for number in range(0, PHOTOS, 9):
@@ -232,7 +232,7 @@ def test_a_channel_without_light_is_taken_as_steady(world, shoot):
     photos = _drifting(shoot, world, LAMP, STEADY)
     dark = photos.photos.copy()
     dark[..., 1] = np.random.default_rng(0).integers(300, 304, size=dark[..., 1].shape)
-    drift = follow_drift(replace(photos, photos=dark))
+    drift = follow_drift(replace(photos, photos=dark)).drift
     assert np.all(drift.lamp[:, 1] == 1.0)
     assert drift.lamp_range == pytest.approx(0.1, abs=0.01)
     assert np.all(np.isfinite(measure(replace(photos, photos=dark)).responses))

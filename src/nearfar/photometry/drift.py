@@ -11,7 +11,7 @@ Index convention: t runs over photos, c over camera pixels row by row, i over ch
 the shapes of a change: 1, black, light = white - black.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC
+from nearfar.parallel import side_by_side
 from nearfar.photometry.photos import Photos, in_batches
 from nearfar.photometry.robust import robust_fit
 from nearfar.plan import Plan, Sinusoid
@@ -29,6 +30,8 @@ from nearfar.plan.references import FEWEST
 # Camera pixels of a fit, evenly spaced. At half a percent of noise they determine the lamp's gain
 # to 1e-5; more would only take time.
 SAMPLED_PIXELS = 2**17
+# 1, black and light.
+SHAPES = 3
 # Standard deviation of the lamp's gain above which a channel's lamp is taken as constant.
 LARGEST_GAIN_ERROR = 0.02
 # Gain of the lamp, over its mean, below which it has failed.
@@ -124,6 +127,15 @@ class Drift:
         ambient, lamp = np.zeros_like(self.ambient), np.ones_like(self.lamp)
         return replace(self, references=references, ambient=ambient, lamp=lamp)
 
+    def of_pixels(self, chosen: slice) -> "Drift":
+        """Return the drift at some camera pixels, as those of a camera of one row."""
+        channels = self.black.shape[-1]
+        pictures = ("black", "light", "unsaturated")
+        return replace(
+            self,
+            **{name: getattr(self, name).reshape(1, -1, channels)[:, chosen] for name in pictures},
+        )
+
     def remove_from(self, photos: Floats, numbers: Sequence[int], rows: slice) -> Floats:
         """Remove the drift from photos: as if lamp and ambient light had been at their means.
 
@@ -149,6 +161,11 @@ class Drift:
             out[...] = black + (photo - (constant + (1 + own) * black + white * light)) / gain
         return corrected
 
+    def remove_from_sample(self, sample: Floats, number: int) -> Floats:
+        """Remove the drift from a photo of these camera pixels, (S, channels)."""
+        still: Floats = self.remove_from(sample[None, None], [number], slice(None))[0, 0]
+        return still
+
 
 def _between(values: Floats, at: Integers, numbers: Sequence[int]) -> NDArray[np.float64]:
     """Interpolate `values`, (references, ...), to photo numbers: (n, ...)."""
@@ -157,19 +174,36 @@ def _between(values: Floats, at: Integers, numbers: Sequence[int]) -> NDArray[np
     return found.reshape(len(numbers), *values.shape[1:])
 
 
-def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) -> Drift:
+class Followed(NamedTuple):
+    """The drift of a capture, and samples of its references.
+
+    Attributes
+    ----------
+    drift : Drift
+    sampled : slice
+        Camera pixels of the samples.
+    samples : mapping
+        Those of each white and black as it was taken, (S, channels), float32.
+    """
+
+    drift: Drift
+    sampled: slice
+    samples: Mapping[int, Floats]
+
+
+def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) -> Followed:
     """Estimate the drift of lamp and ambient light by robust least squares over the camera.
 
     Parameters
     ----------
     photos : Photos
-        With at least two whites and two blacks; only these are read.
+        With at least two whites and two blacks; only these are read, once each.
     progress : callable, optional
-        Called with the number of photos read so far.
+        Called with the number of photos read, and then fitted, so far.
 
     Returns
     -------
-    Drift
+    Followed
 
     Raises
     ------
@@ -182,16 +216,19 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
     rows, shape = slice(0, photos.camera.height), (photos.camera.pixels, photos.channels)
     unsaturated = np.ones(shape, dtype=bool)
     white, black = np.zeros(shape), np.zeros(shape)
-    for _, read in in_batches(photos, whites.tolist(), rows):
+    sampled = sampled_pixels(photos)
+    samples: dict[int, Floats] = {}
+    for numbers, read in in_batches(photos, whites.tolist(), rows):
         white += read.sum(axis=0, dtype=np.float64) / len(whites)
         unsaturated &= (read < 1.0).all(axis=0)
-    report(len(whites))
-    for _, read in in_batches(photos, blacks.tolist(), rows):
+        samples |= zip(numbers, read[:, sampled].copy(), strict=True)
+        report(len(samples))
+    for numbers, read in in_batches(photos, blacks.tolist(), rows):
         black += read.sum(axis=0, dtype=np.float64) / len(blacks)
-    report(len(whites) + len(blacks))
+        samples |= zip(numbers, read[:, sampled].copy(), strict=True)
+        report(len(samples))
 
     mean_light = white - black
-    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLED_PIXELS))
     channels = [
         _Channel(
             np.stack([np.ones_like(black[sampled, i]), black[sampled, i], mean_light[sampled, i]]),
@@ -200,13 +237,14 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
         )
         for i in range(photos.channels)
     ]
-    changes = []
-    for _, read in in_batches(photos, blacks.tolist(), rows):
-        changes += [
-            [channel.change(photo[:, i]) for i, channel in enumerate(channels)]
-            for photo in read[:, sampled]
-        ]
-        report(len(whites) + len(blacks) + len(changes))
+    changes = np.empty((len(blacks), len(channels), SHAPES))
+
+    def fit_change(t: int) -> None:
+        taken = samples[blacks[t]]
+        changes[t] = [channel.change(taken[:, i]) for i, channel in enumerate(channels)]
+
+    side_by_side(fit_change, range(len(blacks)))
+    report(len(whites) + 2 * len(blacks))
     # The ambient light at the whites differs from its mean at the blacks; the mean white less that
     # ambient light is the lamp's.
     ambient = np.swapaxes(changes, 1, 2)
@@ -223,17 +261,25 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
         ambient=ambient,
         lamp=np.ones((len(whites), photos.channels)),
     )
-    gains: list[list[tuple[float, float]]] = []
-    for numbers, read in in_batches(photos, whites.tolist(), rows):
+    gains, at_samples = np.empty((len(whites), len(channels), 2)), drift.of_pixels(sampled)
+
+    def fit_gain(t: int) -> None:
         # Without the ambient light's drift; the lamp's gain is still 1 here.
-        corrected = drift.remove_from(read.reshape(-1, *drift.black.shape), numbers, rows)
-        lit = corrected.reshape(read.shape)[:, sampled] - black[sampled]
-        gains += [
-            [channel.gain(photo[:, i], light[sampled, i]) for i, channel in enumerate(channels)]
-            for photo in lit
+        still = at_samples.remove_from_sample(samples[whites[t]], whites[t])
+        lit = still - black[sampled]
+        gains[t] = [
+            channel.gain(lit[:, i], light[sampled, i]) for i, channel in enumerate(channels)
         ]
-        report(len(whites) + 2 * len(blacks) + len(gains))
-    return replace(drift, lamp=_lamp(np.array(gains), ambient[:, 2], references))
+
+    side_by_side(fit_gain, range(len(whites)))
+    report(2 * len(samples))
+    lamp = _lamp(gains, ambient[:, 2], references)
+    return Followed(replace(drift, lamp=lamp), sampled, samples)
+
+
+def sampled_pixels(photos: Photos) -> slice:
+    """Return the camera pixels, row by row, that fits go by."""
+    return slice(None, None, -(-photos.camera.pixels // SAMPLED_PIXELS))
 
 
 def _lamp(

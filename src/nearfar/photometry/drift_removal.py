@@ -4,14 +4,14 @@ Index convention: arrays are (photos, C, channels) with C camera pixels row by r
 channels.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.errors import InputError
-from nearfar.photometry.drift import SAMPLED_PIXELS, Drift, find_references, follow_drift
+from nearfar.photometry.drift import Drift, find_references, follow_drift, sampled_pixels
 from nearfar.photometry.in_memory import PhotosInMemory
 from nearfar.photometry.noise import NoiseModel, fit_noise, mean_of_few
 from nearfar.photometry.photos import (
@@ -58,7 +58,7 @@ class PhotosWithoutDrift(PhotosWithNoise):
         read = self.read(numbers.tolist(), slice(0, self.camera.height))
         drift = self.drift.with_nothing_left(find_references(plan))
         some = PhotosWithoutDrift(PhotosInMemory(plan, read, 1.0), (), drift)
-        return replace(some, noise=_noise_of_repeated_patterns(some, self.photos))
+        return replace(some, noise=_noise_of_repeated_patterns(some, self.photos, {}))
 
 
 def remove_drift(
@@ -71,7 +71,7 @@ def remove_drift(
     photos : Photos
         A capture of a plan with offset reference.
     progress : callable, optional
-        Called with the number of photos read so far.
+        Called with the number of references read, and then fitted, so far.
 
     Returns
     -------
@@ -83,37 +83,34 @@ def remove_drift(
     InputError
         If the plan has fewer than two whites or two blacks, or the lamp failed.
     """
-    drift = follow_drift(photos, progress)
+    drift, _, samples = follow_drift(photos, progress)
     found = PhotosWithoutDrift(photos, (), drift)
-    return replace(found, noise=_noise_of_repeated_patterns(found, photos))
+    return replace(found, noise=_noise_of_repeated_patterns(found, photos, samples))
 
 
 def _noise_of_repeated_patterns(
-    photos: PhotosWithoutDrift, as_taken: Photos
+    photos: PhotosWithoutDrift, as_taken: Photos, samples: Mapping[int, Floats]
 ) -> tuple[NoiseModel, ...]:
     """Fit shot and read noise to the scatter of every pattern that was projected repeatedly.
 
-    The levels of the camera are those of photos as they were taken.
+    The levels of the camera are those of photos as they were taken. Of some photos there are
+    samples, and they are not read again.
     """
     repeated: dict[tuple[Wave, bool], list[int]] = {}
     for wave, signed in find_waves(photos.plan).items():
         for number, sign in signed:
             repeated.setdefault((wave, sign > 0), []).append(number)
-    rows = slice(0, photos.camera.height)
-    sampled = slice(None, None, -(-photos.camera.pixels // SAMPLED_PIXELS))
-    usable = photos.drift.unsaturated.reshape(-1, photos.channels)[sampled]
+    drift = photos.drift.of_pixels(sampled_pixels(photos))
+    usable = drift.unsaturated[0]
     means, variances = [], []
     for numbers in repeated.values():
         if len(numbers) > 1:
-            first = photos.read(numbers[:1], rows).reshape(-1, photos.channels)[sampled]
-            total, squares = np.zeros(first.shape), np.zeros(first.shape)
-            for _, read in in_batches(photos, numbers, rows):
-                # Differences from the first photo are small: their sums lose no digits.
-                off = (read[:, sampled] - first).astype(np.float64)
-                total += off.sum(axis=0)
-                squares += (off**2).sum(axis=0)
-            means.append(first + total / len(numbers))
-            variances.append((squares - total**2 / len(numbers)) / (len(numbers) - 1))
+            mean, variance = _mean_and_variance(
+                drift.remove_from_sample(taken, number)
+                for number, taken in _sampled(photos.photos, numbers, samples)
+            )
+            means.append(mean)
+            variances.append(variance)
     mean, variance = np.stack(means), np.maximum(np.stack(variances), 0.0)
     rounding = _rounding_variance(as_taken)
     models = []
@@ -135,6 +132,32 @@ def _noise_of_repeated_patterns(
             )
         )
     return tuple(models)
+
+
+def _mean_and_variance(values: Iterable[Floats]) -> tuple[Floats, Floats]:
+    """Return the mean and the variance of at least two arrays, one after another."""
+    rest = iter(values)
+    first = next(rest)
+    # Differences from the first are small: their sums lose no digits.
+    total, squares, count = np.zeros(first.shape), np.zeros(first.shape), 1
+    for one in rest:
+        off = (one - first).astype(np.float64)
+        total += off
+        squares += off**2
+        count += 1
+    return first + total / count, (squares - total**2 / count) / (count - 1)
+
+
+def _sampled(
+    photos: Photos, numbers: Sequence[int], samples: Mapping[int, Floats]
+) -> Iterator[tuple[int, Floats]]:
+    """Yield photos as they were taken at the sampled camera pixels, (S, channels) each."""
+    if all(number in samples for number in numbers):
+        yield from ((number, samples[number]) for number in numbers)
+        return
+    chosen = sampled_pixels(photos)
+    for some, read in in_batches(photos, numbers, slice(0, photos.camera.height)):
+        yield from zip(some, read[:, chosen], strict=True)
 
 
 def _rounding_variance(photos: Photos) -> float:

@@ -52,10 +52,13 @@ class Memory(NamedTuple):
         Bytes that all camera pixels share.
     pixel : int
         Bytes of each camera pixel.
+    peak_factor : float
+        Memory at its peak, with temporary arrays, over that of the arrays that are counted.
     """
 
     shared: int
     pixel: int
+    peak_factor: float = 1.5
 
 
 class Estimator(ABC):

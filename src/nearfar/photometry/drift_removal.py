@@ -163,6 +163,10 @@ def _sampled(
 def _rounding_variance(photos: Photos) -> float:
     """Variance of rounding to whole levels, a twelfth of their squared distance."""
     numbers = range(min(PHOTOS_AT_ONCE, len(photos.plan.patterns)))
-    some = photos.read(numbers, slice(0, photos.camera.height)).ravel()
-    levels = np.unique(some[:: -(-some.size // SAMPLED_VALUES)].astype(np.float64))
+    step = -(-len(numbers) * photos.camera.pixels * photos.channels // SAMPLED_VALUES)
+    some, first = [], 0
+    for _, read in in_batches(photos, numbers, slice(0, photos.camera.height)):
+        some.append(read.ravel()[-first % step :: step])
+        first += read.size
+    levels = np.unique(np.concatenate(some).astype(np.float64))
     return float(np.diff(levels).min()) ** 2 / 12 if len(levels) > 1 else 0.0

@@ -21,6 +21,9 @@ from nearfar.plan import Plan, Sinusoid, Stripe
 
 # Photos read at once.
 PHOTOS_AT_ONCE = 16
+# Bytes that photos read at once take at most, but for a single one.
+BATCH_BYTES = 2**26
+FLOAT32_BYTES = 4
 
 # A wave: a frequency, and whether it is the sine and not the cosine.
 Wave = tuple[Frequency, bool]
@@ -96,12 +99,14 @@ def size_of_rows(photos: Photos, rows: slice) -> Size:
 def in_batches(
     photos: Photos, numbers: Sequence[int], rows: slice
 ) -> Iterator[tuple[Sequence[int], Floats]]:
-    """Yield photo numbers and their photos, (n, C, channels), `PHOTOS_AT_ONCE` at once."""
+    """Yield photo numbers and their photos, (n, C, channels), `PHOTOS_AT_ONCE` or fewer at once."""
+    photo = FLOAT32_BYTES * size_of_rows(photos, rows).pixels * photos.channels
+    count = max(1, min(PHOTOS_AT_ONCE, BATCH_BYTES // max(1, photo)))
 
     def read(mine: Sequence[int]) -> Floats:
         return photos.read(mine, rows).reshape(len(mine), -1, photos.channels)
 
-    yield from ahead(read, [list(numbers[batch]) for batch in blocks(len(numbers), PHOTOS_AT_ONCE)])
+    yield from ahead(read, [list(numbers[batch]) for batch in blocks(len(numbers), count)])
 
 
 def mean_photo(photos: Photos, numbers: Sequence[int], rows: slice) -> NDArray[np.float64]:

@@ -22,6 +22,8 @@ from nearfar.priors.responses import VARIANCE_RATIOS
 from nearfar.transport.model import Transport
 
 FLOAT32_BYTES = 4
+# At a pitch over 1, memory at its peak over that of the arrays that are counted.
+HATS_PEAK_FACTOR = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +79,12 @@ class JointEstimator(Estimator):
             probabilities = 0
         # Inverse pairs are in memory while they are measured.
         pairs = channels * len(plan.patterns) if plan.offset == "inverse" else 0
-        return Memory(
+        counted = Memory(
             FLOAT32_BYTES * components * component,
             FLOAT32_BYTES * (each + pairs + probabilities) + entries,
         )
+        # Half sweeps change rows in place, a batch at a time.
+        return counted._replace(peak_factor=HATS_PEAK_FACTOR) if plan.pitch > 1 else counted
 
     def estimate(
         self,

@@ -15,16 +15,15 @@ from nearfar.plan.patterns import Stripe
 
 # Memory of Python and the libraries.
 LIBRARY_BYTES = 4 * 10**8
-# Memory at its peak, with temporary arrays, over that of the arrays that an estimator counts.
-TEMPORARY_FACTOR = 1.5
 # Tiles of at least twice this many rows have a multiple of it: the rows of a chunk in the file must
 # divide those of a tile, and a prime number of rows would leave chunks of one row.
 ROWS_MULTIPLE = 8
 # Memory of the references for each camera pixel and channel: mean white and black as float32, and
 # a flag of saturated white.
 REFERENCE_BYTES_PER_VALUE = 9
-# Memory of a photo of a stripe for each camera pixel, summed over channels, as float32.
-BYTES_PER_STRIPE = 4
+# Memory of a photo of a stripe for each camera pixel, summed over channels, as float32, with
+# temporary arrays.
+BYTES_PER_STRIPE = 6
 
 
 class Tiling(NamedTuple):
@@ -128,12 +127,13 @@ def _shared_and_row(
     plan: Plan, camera: Size, channels: int, estimator: Estimator
 ) -> tuple[float, float]:
     """Return the memory in bytes that all rows share, and that of one row."""
-    shared, pixel = estimator.memory(plan, channels)
+    counted = estimator.memory(plan, channels)
+    shared, pixel = float(counted.shared), counted.peak_factor * counted.pixel
     shared += LIBRARY_BYTES + reference_bytes(plan, camera, channels)
     if plan.offset != "inverse":
         # Where there are pairs, estimators count all photos, stripes among them.
         pixel += BYTES_PER_STRIPE * _stripes_at_once(plan)
-    return shared, TEMPORARY_FACTOR * pixel * camera.width
+    return shared, pixel * camera.width
 
 
 def _stripes_at_once(plan: Plan) -> int:

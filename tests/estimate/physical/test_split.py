@@ -10,6 +10,8 @@ from nearfar import Size, Transport
 from nearfar.errors import InputError
 from nearfar.estimate.physical import PhysicalErrorBars, split_physically
 from nearfar.estimate.physical.kernels import kernel, source_at
+from nearfar.estimate.physical.medium import SLOPES
+from nearfar.estimate.physical.split import Translucent
 from nearfar.illumination.frequencies import DC, grid, representatives
 from nearfar.illumination.near_basis import NearBasis, window_offsets
 from nearfar.illumination.pictures import random_pattern
@@ -196,6 +198,34 @@ def test_a_kernel_holds_all_the_light_of_a_flat_surface():
     assert slanted[30, 33] < 0.7 * flat[30, 33]
     assert slanted[33, 30] < flat[33, 30]
     assert slanted[33, 30] > slanted[30, 33]
+
+
+def test_kernels_many_projector_pixels_wide_need_fewer_samples():
+    wide = source_at(8 * DEPTH, ATTENUATION / 8)
+    dense = kernel(wide, 40, (0.6, 0.0))
+    for samples, relative in ((3, 1e-3), (1, 1e-2)):
+        np.testing.assert_allclose(kernel(wide, 40, (0.6, 0.0), samples), dense, rtol=relative)
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (3, 19), (20, 22)])
+def test_light_under_a_body_is_the_sum_of_kernels_wherever_it_lies(corner):
+    down, across = corner
+    coverage = np.zeros(PROJECTOR)
+    coverage[down : down + 10, across : across + 9] = np.linspace(0.2, 1.0, 9)
+    # One camera pixel sees the body beyond what lights it.
+    places = np.array([[down + 4, across + 3], [down + 1, across + 8], [16, 16]])
+    slope = np.array([0, 3, 0])
+    source = source_at(DEPTH, 0.3 * ATTENUATION)
+    body = Translucent(
+        np.arange(3), places.astype(float), coverage, (source,), slope, np.ones((3, 1)), np.ones(3)
+    )
+    light = random_pattern(PROJECTOR, 5).astype(float)
+    expected = []
+    for (y, x), one in zip(places, slope, strict=True):
+        flat = kernel(source, 32, SLOPES[one])[32 - y : 64 - y, 32 - x : 64 - x]
+        expected.append(np.sum(flat * coverage * light))
+    found = body.under(light.reshape(1, -1), PROJECTOR)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=2e-3)
 
 
 def test_other_things_than_transports_are_refused():

@@ -7,6 +7,7 @@ Index convention: c runs over the body's camera pixels, o over `kernel_offsets`,
 over real responses.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from scipy import ndimage
 
 from nearfar.arrays import Booleans, Complexes, Floats, Integers, Size
 from nearfar.estimate.physical.kernels import Slope, enlarged, kernel
-from nearfar.estimate.physical.responses import Waves, responses
+from nearfar.estimate.physical.responses import Responses, Waves, responses
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import footprint, spread
@@ -29,6 +30,8 @@ LEAST_COVERAGE = 0.5
 # What the outline's pixels, of which the body covers a part, are worth at least.
 OUTLINE_COVERAGE = 0.7
 SQUARE = np.ones((3, 3), dtype=bool)
+# Samples on each side of a projector pixel, of kernels many of them wide.
+CELL_SAMPLES = 3
 
 
 def cell_side(transport: Transport) -> int:
@@ -108,10 +111,18 @@ class Body:
 
     def _of_pixels(self, source: Dipole, slope: Slope) -> Complexes:
         """Return the responses to a kernel over single projector pixels, shape (K,)."""
+        down, across = self._along_axes
+        single = kernel(enlarged(source, self.cell_side), len(down) // 2, slope, CELL_SAMPLES)
+        by_rows = (single @ across.view(np.float64)).view(np.complex128)
+        return np.asarray(np.sum(down * by_rows, axis=0))
+
+    @cached_property
+    def _along_axes(self) -> tuple[Complexes, Complexes]:
+        """Waves at offsets of single projector pixels down and across, (n, K) each."""
         radius = REACH * self.cell_side + self.cell_side // 2
-        single = kernel(enlarged(source, self.cell_side), radius, slope)
-        waves = self.waves.at(window_offsets(2 * radius + 1))
-        return np.asarray(single.ravel() @ waves)
+        offsets = np.arange(-radius, radius + 1)
+        down, across = (np.exp(2j * np.pi * np.outer(offsets, k)) for k in self.waves.cycles.T)
+        return down, across
 
     @cached_property
     def to_direct(self) -> Floats:
@@ -152,22 +163,49 @@ def coverage_of(transport: Transport, seen: Booleans) -> Floats:
     return np.asarray(share[tuple(nearest)])
 
 
-def body_at(transport: Transport, seen: Booleans, waves: Waves) -> Body:
-    """Gather a body's responses.
+def bodies_at(transport: Transport, seen: Booleans, waves: Waves) -> Iterator[Body]:
+    """Yield the bodies that camera pixels see, which do not touch, with their responses.
 
     Parameters
     ----------
     transport : Transport
     seen : ndarray of bool, shape (Cy, Cx)
-        Camera pixels that see it, with direct light.
+        Camera pixels that see a body, with direct light.
     waves : Waves
     """
-    projector, lit, side = transport.projector, transport.lit, cell_side(transport)
+    lit, side = transport.lit, cell_side(transport)
+    labels, count = ndimage.label(seen, SQUARE)
+    if not count:
+        return
     places = transport.correspondence[lit]
     extent = np.prod(np.ptp(places, axis=0) / side + 1.0)
     finer = max(1, int(np.ceil(np.sqrt(lit.sum() / extent) - 0.25)))
-    # Outlines cross camera pixels as large as a cell.
-    grown = ndimage.binary_dilation(seen, SQUARE, iterations=finer) & lit
+
+    def grown(mask: Booleans) -> Booleans:
+        # Outlines cross camera pixels as large as a cell.
+        return np.asarray(ndimage.binary_dilation(mask, SQUARE, iterations=finer) & lit)
+
+    pixels = np.flatnonzero(grown(seen))
+    rounded = centre(transport.correspondence, transport.projector)[pixels]
+    shown = responses(transport, pixels, rounded, waves)
+    for number in range(1, count + 1):
+        mine = labels == number
+        with_outline = grown(mine)
+        places_of_mine = np.searchsorted(pixels, np.flatnonzero(with_outline))
+        its = shown.of(places_of_mine)
+        yield _body(transport, mine, with_outline, waves, its, finer)
+
+
+def _body(
+    transport: Transport,
+    seen: Booleans,
+    grown: Booleans,
+    waves: Waves,
+    shown: Responses,
+    finer: int,
+) -> Body:
+    """Gather what a body is fitted to; its responses are given."""
+    projector, side = transport.projector, cell_side(transport)
     inside = coverage_of(transport, seen)
     about = OUTLINE_COVERAGE * (coverage_of(transport, grown) > LEAST_COVERAGE)
     coverage = np.maximum(inside, about)
@@ -178,7 +216,6 @@ def body_at(transport: Transport, seen: Booleans, waves: Waves) -> Body:
     around = rounded[:, None] + side * kernel_offsets()
     inside = np.all((around >= 0) & (around < np.array(projector)), axis=-1)
     down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
-    found = responses(transport, pixels, rounded, waves)
     return Body(
         camera=transport.camera,
         pixels=pixels,
@@ -187,8 +224,8 @@ def body_at(transport: Transport, seen: Booleans, waves: Waves) -> Body:
         covered=of_cells[down, across] * inside,
         waves=waves,
         at_offsets=waves.at(side * kernel_offsets()),
-        of_footprint=found.to_direct,
-        responses=found.total,
+        of_footprint=shown.to_direct,
+        responses=shown.total,
         cell_side=side,
         reach=finer,
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.physical.elsewhere import Elsewhere, sees_single_pixels
-from nearfar.estimate.physical.rows_about import REACH, rows_about_q
+from nearfar.estimate.physical.rows_about import REACH, of_rows_about_q
 from nearfar.estimate.physical.told import told_by_lines, told_by_planes
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
@@ -77,8 +77,9 @@ def _falls_off(
     side[rows, axis] = np.sign(drawn[rows, axis]).astype(np.int64)
     along = np.zeros_like(side)
     along[rows, 1 - axis] = 1
-    parts = [entries.mean(axis=1) for _, entries in rows_about_q(transport, chosen.ravel(), 1)]
-    entries = np.concatenate([np.empty((0, (2 * REACH + 1) ** 2)), *parts])
+    entries = of_rows_about_q(
+        transport, chosen.ravel(), 1, lambda _pixels, each: np.asarray(each.mean(axis=1))
+    )
     shift = centres - centre(transport.correspondence, transport.projector)[chosen.ravel()]
 
     def beyond(sign: int) -> Floats:

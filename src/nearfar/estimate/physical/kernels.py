@@ -47,7 +47,7 @@ def enlarged(source: Dipole, factor: float) -> Dipole:
     )
 
 
-def kernel(source: Dipole, radius: int, slope: Slope = FLAT) -> Floats:
+def kernel(source: Dipole, radius: int, slope: Slope = FLAT, samples: int = SAMPLES) -> Floats:
     """Return a dipole over (2 radius + 1)^2 projector pixels about q.
 
     Parameters
@@ -57,28 +57,30 @@ def kernel(source: Dipole, radius: int, slope: Slope = FLAT) -> Floats:
     radius : int
     slope : (float, float)
         Slope of depth down and across.
+    samples : int
+        On each side of a projector pixel.
 
     Returns
     -------
     ndarray, shape (2 radius + 1, 2 radius + 1), float64
     """
-    reach = (radius + 1) * SAMPLES
-    side = np.arange(-reach, reach + 1) / SAMPLES
+    reach = (radius + 1) * samples
+    side = np.arange(-reach, reach + 1) / samples
     y, x = np.meshgrid(side[: reach + 1], side, indexing="ij")
     half = diffuse_profile(source, y**2 + x**2 + (slope[0] * y + slope[1] * x) ** 2)
     # The same half a turn about q.
     profile = np.concatenate([half, half[-2::-1, ::-1]])
-    over_pixels = _over_pixels(radius)
+    over_pixels = _over_pixels(radius, samples)
     return np.asarray(over_pixels @ profile @ over_pixels.T)
 
 
 @lru_cache(maxsize=4)
-def _over_pixels(radius: int) -> Floats:
+def _over_pixels(radius: int, samples: int) -> Floats:
     """Return weights of samples in integrals over both pixels, one dimension; (2 radius + 1, n)."""
-    pixel = np.full(SAMPLES, 1 / SAMPLES)
+    pixel = np.full(samples, 1 / samples)
     both = np.convolve(pixel, pixel)
-    weights = np.zeros((2 * radius + 1, 2 * (radius + 1) * SAMPLES + 1))
+    weights = np.zeros((2 * radius + 1, 2 * (radius + 1) * samples + 1))
     for number, row in enumerate(weights):
-        first = number * SAMPLES + 1
+        first = number * samples + 1
         row[first : first + len(both)] = both
     return weights

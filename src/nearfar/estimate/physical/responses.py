@@ -24,8 +24,9 @@ SPREAD_WAVES = 96
 # The plastic number: multiples of its inverse and of that of its square fill a square evenly
 # (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
 PLASTIC = 1.32471795724474602596
-# Waves that light a transport at a time.
+# Waves that light a transport at a time, and their values on projector pixels at most, but for one.
 WAVES_AT_ONCE = 16
+VALUES_AT_ONCE = 2**22
 
 
 class Waves(NamedTuple):
@@ -69,6 +70,10 @@ class Responses(NamedTuple):
 
     to_direct: Complexes
     total: Floats
+
+    def of(self, chosen: Integers) -> "Responses":
+        """Return those of some camera pixels."""
+        return Responses(self.to_direct[chosen], self.total[chosen])
 
 
 def waves_of(transport: Transport) -> Waves:
@@ -129,7 +134,8 @@ def responses(transport: Transport, pixels: Integers, places: Integers, waves: W
     )
     to_direct = np.empty((len(pixels), len(waves.cycles)), dtype=np.complex128)
     of_rows = np.empty((len(pixels), transport.channels, len(waves.cycles)), dtype=np.complex128)
-    for block in blocks(len(waves.cycles), WAVES_AT_ONCE):
+    at_once = max(1, min(WAVES_AT_ONCE, VALUES_AT_ONCE // (height * width)))
+    for block in blocks(len(waves.cycles), at_once):
         drawn = down[block, :, None] * across[block, None, :]
         parts = np.concatenate([drawn.real, drawn.imag]).reshape(-1, 1, height * width)
         lights = parts.astype(np.float32)

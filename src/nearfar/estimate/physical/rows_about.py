@@ -4,13 +4,14 @@ Index convention: c runs over chosen camera pixels, o over a square of (2 REACH 
 the rounded q, row by row.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.illumination.near_basis import window_offsets
+from nearfar.parallel import side_by_side
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
 
@@ -25,10 +26,10 @@ def offsets() -> NDArray[np.int64]:
     return window_offsets(2 * REACH + 1)
 
 
-def rows_about_q(
-    transport: Transport, chosen: Booleans, step: int
-) -> Iterator[tuple[Integers, Floats]]:
-    """Read near- and far-range light about q, block by block.
+def of_rows_about_q(
+    transport: Transport, chosen: Booleans, step: int, reduce: Callable[[Integers, Floats], Floats]
+) -> Floats:
+    """Return what a function makes of near- and far-range light about q, block by block.
 
     Parameters
     ----------
@@ -37,25 +38,32 @@ def rows_about_q(
         Camera pixels with direct light.
     step : int
         Projector pixels between offsets.
+    reduce : callable
+        Called with the chosen camera pixels of a block, (n,), and with their light of step x step
+        projector pixels at `offsets`, (n, channels, O), float32, 0 beyond the projector's border;
+        returns an array (n, ...). Several blocks are worked at side by side.
 
-    Yields
-    ------
-    pixels : ndarray of int, shape (n,)
-        The chosen camera pixels of a block.
-    entries : ndarray, shape (n, channels, O), float32
-        Light of step x step projector pixels at `offsets`; 0 beyond the projector's border.
+    Returns
+    -------
+    ndarray, shape (number of chosen camera pixels, ...)
     """
     projector, factors = transport.projector, transport.factors
     centres = centre(transport.correspondence, projector)
     steps = step * offsets()
     functions = transport.near_basis.values_at(steps).T.astype(np.float32)
     basis = factors.far_basis
-    waves = basis.weights[:, None] * basis.patterns_at(steps)
+    waves = (basis.weights[:, None] * basis.patterns_at(steps)).astype(np.float32)
     every = np.flatnonzero(chosen)
-    for block in blocks(len(every), BLOCK_PIXELS):
+    parts = list(blocks(len(every), BLOCK_PIXELS)) or [slice(0, 0)]
+    found: dict[int, Floats] = {}
+
+    def work(block: slice) -> None:
         pixels = every[block]
         far = basis.recentre(factors.far[pixels], centres[pixels])
-        entries = factors.near[pixels] @ functions + far @ waves.astype(np.float32)
+        entries = factors.near[pixels] @ functions + far @ waves
         places = centres[pixels, None] + steps
         inside: Booleans = np.all((places >= 0) & (places < np.array(projector)), axis=-1)
-        yield pixels, step**2 * entries * inside[:, None]
+        found[block.start] = reduce(pixels, step**2 * entries * inside[:, None])
+
+    side_by_side(work, parts)
+    return np.concatenate([found[block.start] for block in parts])

@@ -14,7 +14,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import neighbours
 from nearfar.estimate.physical.body import cell_side
-from nearfar.estimate.physical.rows_about import offsets, rows_about_q
+from nearfar.estimate.physical.rows_about import of_rows_about_q, offsets
 from nearfar.estimate.physical.split import PhysicalSplit
 from nearfar.transport.model import Transport
 
@@ -75,6 +75,10 @@ def _light_next_to_q(transport: Transport) -> Floats:
     q = transport.correspondence
     whole = transport.lit & np.all((q >= margin) & (q <= last), axis=-1)
     found = np.full((transport.camera.pixels, transport.channels), np.nan)
-    for pixels, entries in rows_about_q(transport, whole.ravel(), step):
-        found[pixels] = entries[..., near].sum(axis=-1)
+    found[whole.ravel()] = of_rows_about_q(
+        transport,
+        whole.ravel(),
+        step,
+        lambda _pixels, entries: np.asarray(entries[..., near].sum(axis=-1)),
+    )
     return found.reshape(transport.direct.shape)

@@ -15,7 +15,7 @@ from scipy import fft
 from nearfar.arrays import Floats, Integers, Size
 from nearfar.checks import as_number
 from nearfar.estimate.physical.elsewhere import Elsewhere
-from nearfar.estimate.physical.kernels import kernel
+from nearfar.estimate.physical.kernels import SAMPLES, kernel
 from nearfar.estimate.physical.medium import SLOPES
 from nearfar.markup import card
 from nearfar.transport.dipole import Dipole
@@ -25,6 +25,10 @@ from nearfar.transport.summary_card import floodlit_and_apart
 
 # Kernels end where the light is down by exp(-FADED), or at the size of the projector.
 FADED = 7.0
+# Samples on each side of a projector pixel, those of wide kernels fewer: these are smooth. The most
+# samples on each side of q.
+ODD_SAMPLES = (SAMPLES, 3, 1)
+LARGEST_REACH = 1000
 
 
 class PhysicalComponents(NamedTuple):
@@ -73,12 +77,27 @@ class Translucent(NamedTuple):
             Flat, of each channel or of all.
         projector : Size
         """
-        where = footprint(self.places, projector)
+        down, across, where = self._seen(projector)
+        coverage = self.coverage[down, across]
         found = np.empty((len(self.pixels), len(self.sources)))
         for channel, source in enumerate(self.sources):
             picture = lights[min(channel, len(lights) - 1)].reshape(projector)
-            found[:, channel] = _spread(source, self.slope, picture * self.coverage, where)
+            lit = picture[down, across] * coverage
+            found[:, channel] = _spread(source, self.slope, lit, where)
         return found
+
+    def _seen(self, projector: Size) -> tuple[slice, slice, Footprint]:
+        """Return the rows and columns that hold the body's light, and its footprint in them."""
+        pixels, weights = footprint(self.places, projector)
+        y, x = np.divmod(pixels, projector.width)
+        sides = []
+        for axis, places in enumerate((y, x)):
+            lit = np.flatnonzero(self.coverage.any(axis=1 - axis))
+            ends = [places.min(initial=0), places.max(initial=0), *lit[:1], *lit[-1:]]
+            sides.append(slice(int(min(ends)), int(max(ends)) + 1))
+        down, across = sides
+        width = across.stop - across.start
+        return down, across, Footprint((y - down.start) * width + x - across.start, weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,13 +209,15 @@ def _spread(source: Dipole, slope: Integers, lit: Floats, where: Footprint) -> F
     """Return light under a surface at a body's camera pixels for unit amplitude, shape (n,)."""
     found = np.zeros(len(slope))
     radius = _radius(source, max(lit.shape))
+    samples = next(n for n in ODD_SAMPLES if n * radius < LARGEST_REACH or n == 1)
     # Room for light that leaves the projector's grid. `scipy.signal.fftconvolve` would do the same,
     # but half a second is a long time for its import in every command that relights.
     shape = tuple(fft.next_fast_len(length + 2 * radius, real=True) for length in lit.shape)
     waves = fft.rfft2(lit, shape)
     for number in np.unique(slope):
         seen = slope == number
-        spread = fft.irfft2(waves * fft.rfft2(kernel(source, radius, SLOPES[number]), shape), shape)
+        drawn = kernel(source, radius, SLOPES[number], samples)
+        spread = fft.irfft2(waves * fft.rfft2(drawn, shape), shape)
         middle = spread[radius:, radius:][: lit.shape[0], : lit.shape[1]]
         found[seen] = look_up(middle.ravel(), Footprint(where.pixels[seen], where.weights[seen]))
     return found

@@ -1,11 +1,10 @@
 """How a transport is split into direct light, subsurface light and inter-reflection."""
 
 import numpy as np
-from scipy import ndimage
 
 from nearfar.checks import require_instance
 from nearfar.errors import InputError
-from nearfar.estimate.physical.body import body_at, cell_side
+from nearfar.estimate.physical.body import bodies_at, cell_side
 from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
@@ -14,7 +13,7 @@ from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.specks import without_specks
 from nearfar.estimate.physical.split import PhysicalSplit, Translucent
-from nearfar.estimate.physical.translucent import SQUARE, translucent
+from nearfar.estimate.physical.translucent import translucent
 from nearfar.transport.model import Transport
 
 
@@ -49,11 +48,9 @@ def split_physically(transport: Transport) -> PhysicalSplit:
             "the transport cannot be split physically: it has no near-range light. Estimate it "
             "with near-range light, from patterns of a projector."
         )
-    labels, count = ndimage.label(translucent(transport), SQUARE)
     direct = transport.direct.reshape(-1, transport.channels).copy()
-    bodies, waves = [], waves_of(transport)
-    for number in range(1, count + 1):
-        body = body_at(transport, labels == number, waves)
+    bodies = []
+    for body in bodies_at(transport, translucent(transport), waves_of(transport)):
         media = media_of(body)
         if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or is_even(media):
             continue

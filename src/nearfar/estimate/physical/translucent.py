@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from nearfar.arrays import Booleans, Floats
-from nearfar.estimate.physical.rows_about import offsets, rows_about_q
+from nearfar.arrays import Booleans, Floats, Integers
+from nearfar.estimate.physical.rows_about import of_rows_about_q, offsets
 from nearfar.transport.model import Transport
 
 # Distances from q in steps: where light under a surface is seen beside direct light,
@@ -96,9 +96,13 @@ def _sides(transport: Transport) -> Sides:
     white = np.asarray(transport @ np.ones(transport.projector, dtype=np.float32))
     white = white.reshape(-1, transport.channels).mean(axis=1)
     found = np.zeros((transport.camera.pixels, 2))
-    for pixels, entries in rows_about_q(transport, transport.lit.ravel(), step):
+
+    def darkest(pixels: Integers, entries: Floats) -> Floats:
         mean = entries.mean(axis=1)
         light = mean @ next_to_q.T - np.maximum(mean @ background.T, 0.0)
         light *= ENTRIES / (white[pixels, None] + DARK)
-        found[pixels] = np.sort(light, axis=1)[:, :2]
+        return np.asarray(np.sort(light, axis=1)[:, :2])
+
+    lit = transport.lit.ravel()
+    found[lit] = of_rows_about_q(transport, lit, step, darkest)
     return Sides(found[:, 0], found[:, 1])

@@ -14,10 +14,11 @@ from functools import cached_property
 import numpy as np
 from scipy import ndimage
 
-from nearfar.arrays import Booleans, Complexes, Floats, Integers, Size
+from nearfar.arrays import Booleans, Complexes, Floats, Integers, Size, blocks
 from nearfar.estimate.physical.kernels import Slope, enlarged, kernel
 from nearfar.estimate.physical.responses import Responses, Waves, responses
 from nearfar.illumination.near_basis import window_offsets
+from nearfar.parallel import side_by_side
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import footprint, spread
 from nearfar.transport.model import Transport
@@ -32,6 +33,8 @@ OUTLINE_COVERAGE = 0.7
 SQUARE = np.ones((3, 3), dtype=bool)
 # Samples on each side of a projector pixel, of kernels many of them wide.
 CELL_SAMPLES = 3
+# Camera pixels of a batch.
+BATCH_PIXELS = 4096
 
 
 def cell_side(transport: Transport) -> int:
@@ -101,13 +104,23 @@ class Body:
         ndarray, shape (m, R)
         """
         flat = kernel(source, REACH, slope).ravel()
-        covered = flat * self.covered[chosen]
         # A product of real numbers takes half the time of one of real and complex numbers.
-        at_q = (covered @ self.at_offsets.view(np.float64)).view(np.complex128)
-        seen = at_q * self.of_footprint[chosen]
+        at_offsets = flat[:, None] * self.at_offsets
         if self.cell_side > 1:
-            seen = seen * self._of_pixels(source, slope) / (flat @ self.at_offsets)
-        return self.waves.real(np.asarray(seen))
+            at_offsets *= self._of_pixels(source, slope) / (flat @ self.at_offsets)
+        found = np.empty((len(chosen), len(self.frequency)))
+
+        def work(batch: slice) -> None:
+            some = chosen[batch]
+            at_q = (self.covered[some] @ at_offsets.view(np.float64)).view(np.complex128)
+            found[batch] = self.waves.real(np.asarray(at_q * self.of_footprint[some]))
+
+        if len(chosen) <= BATCH_PIXELS:
+            # Its product then has all processors.
+            work(slice(None))
+        else:
+            side_by_side(work, blocks(len(chosen), BATCH_PIXELS))
+        return found
 
     def _of_pixels(self, source: Dipole, slope: Slope) -> Complexes:
         """Return the responses to a kernel over single projector pixels, shape (K,)."""

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
-from nearfar.arrays import Floats, Integers
-from nearfar.estimate.physical.body import REACH, Body
+from nearfar.arrays import Floats, Integers, blocks
+from nearfar.estimate.physical.body import BATCH_PIXELS, REACH, Body
 from nearfar.estimate.physical.kernels import slopes, source_at
+from nearfar.parallel import side_by_side
 from nearfar.transport.dipole import Dipole
 
 # First guesses of the source's depth in cells, and of attenuation times depth.
@@ -217,10 +218,21 @@ def _slopes(body: Body, sources: list[Dipole], power: Floats) -> Integers:
     for number, slope in enumerate(SLOPES):
         for i, source in enumerate(sources):
             shape = body.to_kernel(source, slope, everywhere)
-            left = _fit(body, i, shape, power[i], everywhere).left
-            misfits[number] += body.share(_weighed(left, power[i]))
+            misfits[number] += body.share(_misfits(body, i, shape, power[i]))
     misfits[0] *= FLAT_PREFERENCE
     return np.asarray(misfits.argmin(axis=0))
+
+
+def _misfits(body: Body, channel: int, shape: Floats, power: Floats) -> Floats:
+    """Return what kernels leave of the responses of each camera pixel, (n,)."""
+    found = np.empty(len(shape))
+
+    def work(batch: slice) -> None:
+        chosen = np.arange(*batch.indices(len(shape)))
+        found[batch] = _weighed(_fit(body, channel, shape[batch], power, chosen).left, power)
+
+    side_by_side(work, blocks(len(shape), BATCH_PIXELS))
+    return found
 
 
 def _power(body: Body, fit: Amplitudes) -> Floats:

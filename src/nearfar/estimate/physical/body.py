@@ -8,7 +8,7 @@ over real responses.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -222,19 +222,14 @@ def _body(
     inside = coverage_of(transport, seen)
     about = OUTLINE_COVERAGE * (coverage_of(transport, grown) > LEAST_COVERAGE)
     coverage = np.maximum(inside, about)
-    of_cells = _means(coverage, side)
     pixels = np.flatnonzero(grown)
     rounded = centre(transport.correspondence, projector)[pixels]
-    # Cells about the rounded q; at the border they may reach beyond it.
-    around = rounded[:, None] + side * kernel_offsets()
-    inside = np.all((around >= 0) & (around < np.array(projector)), axis=-1)
-    down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
     return Body(
         camera=transport.camera,
         pixels=pixels,
         inner=seen.ravel()[pixels],
         coverage=coverage,
-        covered=of_cells[down, across] * inside,
+        covered=_covered(coverage, rounded, side),
         waves=waves,
         at_offsets=waves.at(side * kernel_offsets()),
         of_footprint=shown.to_direct,
@@ -242,6 +237,29 @@ def _body(
         cell_side=side,
         reach=finer,
     )
+
+
+def with_wider_cells(body: Body, transport: Transport) -> Body:
+    """Return a body of a transport with cells twice as wide, so that kernels reach twice as far."""
+    side = 2 * body.cell_side
+    rounded = centre(transport.correspondence, transport.projector)[body.pixels]
+    return replace(
+        body,
+        covered=_covered(body.coverage, rounded, side),
+        at_offsets=body.waves.at(side * kernel_offsets()),
+        cell_side=side,
+        reach=2 * body.reach,
+    )
+
+
+def _covered(coverage: Floats, rounded: Integers, side: int) -> Floats:
+    """Return mean coverage in the cells about rounded q, (n, O); 0 beyond the border."""
+    of_cells = _means(coverage, side)
+    # Cells at the border may reach beyond it.
+    around = rounded[:, None] + side * kernel_offsets()
+    inside = np.all((around >= 0) & (around < np.array(coverage.shape)), axis=-1)
+    down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
+    return np.asarray(of_cells[down, across] * inside)
 
 
 def _means(picture: Floats, side: int) -> Floats:

@@ -28,6 +28,9 @@ PRODUCTS = (0.1, 0.4, 1.0)
 # Least and largest: depths that responses can tell, and products sqrt(3 (1 - a')) of media that
 # scatter.
 RANGES = ((0.2, REACH / 2), (0.01, 1.7))
+# Depth of a source in cells beyond which light that is compared is too near to it to tell how it
+# fades.
+DEEP = 2.0
 # Logarithms this close to them are at them.
 AT_BOUND = 0.01
 # Camera pixels that the medium is fitted to, and how far a misfit may stand out from the median.
@@ -138,6 +141,11 @@ def is_even(media: Media) -> bool:
     return bool(
         np.any(found[:, 0] > most[0] - AT_BOUND) or np.any(found[:, 1] < least[1] + AT_BOUND)
     )
+
+
+def is_deep(media: Media) -> bool:
+    """Return whether kernels are compared too near to q to tell the medium, in any channel."""
+    return max(source.real for source in media.sources) > DEEP
 
 
 def _guesses() -> list[Dipole]:

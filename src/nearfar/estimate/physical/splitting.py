@@ -4,11 +4,11 @@ import numpy as np
 
 from nearfar.checks import require_instance
 from nearfar.errors import InputError
-from nearfar.estimate.physical.body import bodies_at, cell_side
+from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
 from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
-from nearfar.estimate.physical.medium import is_even, media_of
+from nearfar.estimate.physical.medium import Media, is_deep, is_even, media_of
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.specks import without_specks
@@ -50,14 +50,14 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         )
     direct = transport.direct.reshape(-1, transport.channels).copy()
     bodies = []
-    for body in bodies_at(transport, translucent(transport), waves_of(transport)):
-        media = media_of(body)
+    for seen in bodies_at(transport, translucent(transport), waves_of(transport)):
+        body, media = _fitted(seen, transport)
         if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or is_even(media):
             continue
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]
         found = media.slope[kept], media.amplitude[kept], media.explained[kept]
-        sources = tuple(enlarged(source, cell_side(transport)) for source in media.sources)
+        sources = tuple(enlarged(source, body.cell_side) for source in media.sources)
         places = transport.correspondence.reshape(-1, 2)[body.pixels[kept]]
         bodies.append(Translucent(body.pixels[kept], places, body.coverage, sources, *found))
     opaque = transport.lit.copy()
@@ -67,3 +67,12 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     direct[creases.pixels] = 0.0
     split = PhysicalSplit(transport, direct.reshape(transport.direct.shape), tuple(bodies), creases)
     return without_holes(without_specks(with_outlines(split)))
+
+
+def _fitted(body: Body, transport: Transport) -> tuple[Body, Media]:
+    """Fit a body's media; in wider cells where light comes from too deep for its own."""
+    media = media_of(body)
+    while 1 < body.cell_side < transport.pitch and is_deep(media):
+        body = with_wider_cells(body, transport)
+        media = media_of(body)
+    return body, media

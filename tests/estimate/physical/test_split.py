@@ -235,15 +235,22 @@ def test_other_things_than_transports_are_refused():
         PhysicalErrorBars(np.eye(4))
 
 
-def test_where_functions_are_of_several_projector_pixels_media_are_the_same():
+# The second is deeper than cells of two projector pixels tell, and fitted in wider ones.
+@pytest.mark.parametrize(
+    ("side", "depth", "attenuation"), [(64, 2 * DEPTH, ATTENUATION / 2), (96, 5.0, 0.2)]
+)
+def test_where_functions_are_of_several_projector_pixels_media_are_the_same(
+    side, depth, attenuation
+):
     """Subsurface light is given by its responses; cells are two projector pixels wide."""
-    projector, pitch, camera = Size(64, 64), 8, Size(20, 20)
-    depth, attenuation = 2 * DEPTH, ATTENUATION / 2
+    projector, pitch, camera = Size(side, side), 8, Size((side - 4) // 3, (side - 4) // 3)
     y, x = np.mgrid[: camera.height, : camera.width]
     places = 3 * np.stack([y, x], axis=-1) + 3
     basis = real_basis(representatives(grid(projector, projector)), projector)
-    flat = AMPLITUDE * kernel(source_at(depth, attenuation), 64)
-    rows = np.stack([flat[64 - y : 128 - y, 64 - x : 128 - x] for y, x in places.reshape(-1, 2)])
+    flat = AMPLITUDE * kernel(source_at(depth, attenuation), side)
+    rows = np.stack(
+        [flat[side - y : 2 * side - y, side - x : 2 * side - x] for y, x in places.reshape(-1, 2)]
+    )
     far = rows.reshape(camera.pixels, -1) @ basis.patterns.T
     count = NearBasis(9, pitch).count
     transport = Transport(

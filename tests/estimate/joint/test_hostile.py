@@ -101,3 +101,25 @@ def test_errors_of_lamps_with_an_edge_are_about_as_large_as_their_bars():
     errors = [(found @ light).ravel() - truth[:, 0] @ light.ravel() for light in lights]
     expected = [bars.picture(light).ravel() for light in lights]
     assert 0.6 < np.mean(np.square(errors)) / np.mean(np.square(expected)) < 1.8
+
+
+def test_bars_leave_out_noise_that_neighbours_take_off_where_there_is_no_direct_light():
+    projector = Size(15, 15)
+    truth, plan, measurements = shot("lamps", 158, 1 / 100, projector)
+    nowhere = np.full((*CAMERA, 2), np.nan, dtype=np.float32)
+    found = estimate_jointly(measurements, nowhere, plan.window, plan.far, pitch=plan.pitch)
+    # Half of what is taken off, and never more.
+    assert 0.5 <= found.posterior.noise_share.min() <= found.posterior.noise_share.max() < 0.8
+    lights = np.random.default_rng(0).random((60, *projector))
+    bars = ErrorBars(found)
+    within = [
+        np.abs((found @ light).ravel() - truth[:, 0] @ light.ravel()) < bars.picture(light).ravel()
+        for light in lights
+    ]
+    assert 0.55 < np.mean(within) < 0.8
+    # Rows of camera pixels with direct light have edges that neighbours blur.
+    truth, plan, measurements = shot("hair", 120, 1 / 100)
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+    assert found.lit.any()
+    assert np.all(found.posterior.noise_share[found.lit] == 1.0)

@@ -77,6 +77,8 @@ class Translucent(NamedTuple):
             Flat, of each channel or of all.
         projector : Size
         """
+        if not len(self.pixels):
+            return np.empty((0, len(self.sources)))
         down, across, where = self._seen(projector)
         coverage = self.coverage[down, across]
         found = np.empty((len(self.pixels), len(self.sources)))
@@ -87,14 +89,13 @@ class Translucent(NamedTuple):
         return found
 
     def _seen(self, projector: Size) -> tuple[slice, slice, Footprint]:
-        """Return the rows and columns that hold the body's light, and its footprint in them."""
+        """Return rows and columns that hold the body's light, and its footprint in them."""
         pixels, weights = footprint(self.places, projector)
         y, x = np.divmod(pixels, projector.width)
         sides = []
         for axis, places in enumerate((y, x)):
-            lit = np.flatnonzero(self.coverage.any(axis=1 - axis))
-            ends = [places.min(initial=0), places.max(initial=0), *lit[:1], *lit[-1:]]
-            sides.append(slice(int(min(ends)), int(max(ends)) + 1))
+            both = np.append(places, np.flatnonzero(self.coverage.any(axis=1 - axis)))
+            sides.append(slice(int(both.min()), int(both.max()) + 1))
         down, across = sides
         width = across.stop - across.start
         return down, across, Footprint((y - down.start) * width + x - across.start, weights)

@@ -180,14 +180,11 @@ class Followed(NamedTuple):
     Attributes
     ----------
     drift : Drift
-    sampled : slice
-        Camera pixels of the samples.
     samples : mapping
-        Those of each white and black as it was taken, (S, channels), float32.
+        Each white and black as it was taken, at `sampled_pixels`, (S, channels), float32.
     """
 
     drift: Drift
-    sampled: slice
     samples: Mapping[int, Floats]
 
 
@@ -274,7 +271,7 @@ def follow_drift(photos: Photos, progress: Callable[[int], None] | None = None) 
     side_by_side(fit_gain, range(len(whites)))
     report(2 * len(samples))
     lamp = _lamp(gains, ambient[:, 2], references)
-    return Followed(replace(drift, lamp=lamp), sampled, samples)
+    return Followed(replace(drift, lamp=lamp), samples)
 
 
 def sampled_pixels(photos: Photos) -> slice:

@@ -83,7 +83,7 @@ def remove_drift(
     InputError
         If the plan has fewer than two whites or two blacks, or the lamp failed.
     """
-    drift, _, samples = follow_drift(photos, progress)
+    drift, samples = follow_drift(photos, progress)
     found = PhotosWithoutDrift(photos, (), drift)
     return replace(found, noise=_noise_of_repeated_patterns(found, photos, samples))
 

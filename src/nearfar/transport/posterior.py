@@ -37,8 +37,8 @@ class Posterior:
     share_of_white : ndarray, shape (Cy, Cx, channels), float32
         Mean share of the references' error that is the error of the response to white.
     noise_share : ndarray, shape (Cy, Cx, channels), float32
-        Variance of the noise of a measured response that is left after neighbours, as a share of
-        that which the transport's `noise` has.
+        Variance of noise that error bars count in a measured response, as a share of the variance
+        that the transport's `noise` gives; below 1 where neighbours take noise off.
     """
 
     prior_components: tuple[PriorComponent, ...]

@@ -76,17 +76,17 @@ class SharedPosterior:
         `Posterior`, `PatternPosterior` or `FreePosterior`.
     shared : mapping
         Values of its fields.
-    added : mapping
+    lacking : mapping
         Those of its other fields that the file lacks, and the value that each has everywhere.
     """
 
     kind: type[AnyPosterior]
     shared: Mapping[str, Any]
-    added: Mapping[str, float] = field(default_factory=dict)
+    lacking: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def _stored(self) -> list[str]:
-        return [name for name in FIELDS[self.kind] if name not in self.added]
+        return [name for name in FIELDS[self.kind] if name not in self.lacking]
 
     def arrays(self, part: str) -> list[str]:
         """Return the names of the arrays of its other fields."""
@@ -103,7 +103,7 @@ class SharedPosterior:
         fields = {name: read.pop(array_name(part, name)) for name in self._stored}
         fields |= {
             name: np.full(read["black"].shape, value, dtype=np.float32)
-            for name, value in self.added.items()
+            for name, value in self.lacking.items()
         }
         if "prior_component" in fields:
             last = int(fields["prior_component"].max(initial=0))
@@ -159,9 +159,9 @@ def shared_posterior(
         frequencies = tuple(frequency_from_text(k) for k in listed(attributes["frequencies"]))
         repeats = np.array(_finite(attributes["repeats"]), dtype=np.float32)
         shared |= {"frequencies": frequencies, "multiplicity": repeats}
-    there = listed(attributes.get("added", []))
-    added = {n: value for n, value in ADDED_FIELDS.get(kind, {}).items() if n not in there}
-    return SharedPosterior(kind, shared, added)
+    added = listed(attributes.get("added", []))
+    lacking = {n: value for n, value in ADDED_FIELDS.get(kind, {}).items() if n not in added}
+    return SharedPosterior(kind, shared, lacking)
 
 
 def _read_shared(group: zarr.Group, part: str, name: str, projector: Size) -> Floats:

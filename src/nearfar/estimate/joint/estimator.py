@@ -22,7 +22,7 @@ from nearfar.priors.responses import VARIANCE_RATIOS
 from nearfar.transport.model import Transport
 
 FLOAT32_BYTES = 4
-# At a pitch over 1, memory at its peak over that of the arrays that are counted.
+# `Memory.peak_factor` at a pitch over 1, where there are no inverse pairs.
 HATS_PEAK_FACTOR = 1.2
 
 
@@ -83,8 +83,10 @@ class JointEstimator(Estimator):
             FLOAT32_BYTES * components * component,
             FLOAT32_BYTES * (each + pairs + probabilities) + entries,
         )
-        # Half sweeps change rows in place, a batch at a time.
-        return counted._replace(peak_factor=HATS_PEAK_FACTOR) if plan.pitch > 1 else counted
+        if plan.pitch > 1 and not pairs:
+            # Half sweeps change rows in place, a batch at a time.
+            return counted._replace(peak_factor=HATS_PEAK_FACTOR)
+        return counted
 
     def estimate(
         self,

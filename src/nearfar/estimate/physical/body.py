@@ -204,8 +204,7 @@ def bodies_at(transport: Transport, seen: Booleans, waves: Waves) -> Iterator[Bo
     for number in range(1, count + 1):
         mine = labels == number
         with_outline = grown(mine)
-        places_of_mine = np.searchsorted(pixels, np.flatnonzero(with_outline))
-        its = shown.of(places_of_mine)
+        its = shown.of(np.searchsorted(pixels, np.flatnonzero(with_outline)))
         yield _body(transport, mine, with_outline, waves, its, finer)
 
 

@@ -232,7 +232,7 @@ def _slopes(body: Body, sources: list[Dipole], power: Floats) -> Integers:
 
 
 def _misfits(body: Body, channel: int, shape: Floats, power: Floats) -> Floats:
-    """Return what kernels leave of the responses of each camera pixel, (n,)."""
+    """Return the weighted sum of squared residuals of each camera pixel, shape (n,)."""
     found = np.empty(len(shape))
 
     def work(batch: slice) -> None:

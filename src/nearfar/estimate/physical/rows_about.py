@@ -29,7 +29,7 @@ def offsets() -> NDArray[np.int64]:
 def of_rows_about_q(
     transport: Transport, chosen: Booleans, step: int, reduce: Callable[[Integers, Floats], Floats]
 ) -> Floats:
-    """Return what a function makes of near- and far-range light about q, block by block.
+    """Apply a function to near- and far-range light about q, block by block, and join its results.
 
     Parameters
     ----------

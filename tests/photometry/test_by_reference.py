@@ -177,6 +177,14 @@ def test_rows_are_measured_on_their_own(small_world, shoot, plan):
     np.testing.assert_array_equal(cut.multiplicity, whole.multiplicity)
 
 
+def test_blocks_of_camera_pixels_are_measured_as_the_whole(small_world, shoot, monkeypatch):
+    photos = remove_drift(shoot(PLAN, small_world, NOISY))
+    whole = measure(photos)
+    monkeypatch.setattr("nearfar.photometry.by_reference.PIXELS_AT_ONCE", 5)
+    monkeypatch.setattr("nearfar.photometry.quantisation.ROWS_AT_ONCE", 7)
+    np.testing.assert_array_equal(measure(photos).responses, whole.responses)
+
+
 def test_the_mean_over_camera_pixels_is_that_much_better(shoot):
     fine = model_transport(PROJECTOR, Size(32, 40), window=5, far=Size(3, 3))
     whole = measure(shoot(PLAN, fine, NOISY))

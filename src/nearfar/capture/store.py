@@ -22,7 +22,7 @@ from nearfar.plan.patterns import Shown, SideBySide
 from nearfar.plan.recognition.contents import Fringes, Uniform
 
 # Bytes of a chunk at most: rows of a large camera are read without the rest of it.
-CHUNK_BYTES = 2**22
+CHUNK_BYTES = 2**20
 # Pixels along the longer side of a photo that a notebook shows.
 THUMBNAIL_PIXELS = 256
 KIND = "nearfar capture"

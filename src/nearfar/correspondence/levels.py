@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.correspondence.footprints import filters, kept, widths
+from nearfar.correspondence.maxima import MISSED_DEVIATIONS, MISSED_SHARE, local_maxima
 from nearfar.correspondence.weighing import Weighed
 from nearfar.illumination.real_basis import RealBasis
 
@@ -29,10 +30,6 @@ PLACES_PER_PERIOD = 3.5
 WINDOW_REACH = 0.75
 # One in so many widths of footprints is tried while searching.
 WIDTHS_STEP = 2
-# Share of the score of new frequencies that may be missed between scored places, and deviations
-# that noise may take: candidates that score lower are dropped.
-MISSED_SHARE = 0.4
-MISSED_DEVIATIONS = 3.0
 MOST_CANDIDATES = 8
 # Values of scores that are in memory at once.
 SCORES_AT_ONCE = 2**21
@@ -187,29 +184,16 @@ def _local_maxima(level: Level, weighed: Weighed, candidates: Candidates) -> Can
     centred = level.basis.recentre(weighed.responses[pixel, None], candidates.place)[:, 0]
     deviations = np.sqrt(weighed.weights[pixel, : level.frequencies] @ level.power)
     scores = centred[:, : len(level.filters)] @ level.filters
-    shape = (len(level.down), len(level.across))
-    scores = scores.reshape(len(pixel), -1, *shape)
-    scores /= deviations[..., None, None]
-    window = scores.max(axis=1)
-    # Beyond the border whole cycles across the projector begin again.
-    y, x = candidates.place.T
-    down, across = y[:, None] + level.down, x[:, None] + level.across
-    height, width = level.basis.projector
-    window += np.where((down < 0) | (down >= height), -np.inf, np.float32(0))[:, :, None]
-    window += np.where((across < 0) | (across >= width), -np.inf, np.float32(0))[:, None]
-    highest = window.max(axis=(1, 2))
-    least = highest - MISSED_SHARE * np.abs(highest) - MISSED_DEVIATIONS
-    which, row, column = np.nonzero(_is_maximum(window) & (window >= least[:, None, None]))
-    place = np.stack([down[which, row], across[which, column]], axis=-1)
-    return Candidates(pixel[which], place, window[which, row, column])
-
-
-def _is_maximum(window: Floats) -> Booleans:
-    """Return which values are no lower than their neighbours, (m, rows, columns)."""
-    padded = np.pad(window, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
-    highest = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
-    highest = np.maximum(np.maximum(highest[..., :-2], highest[..., 1:-1]), highest[..., 2:])
-    return np.asarray(window >= highest)
+    shape = (len(pixel), -1, len(level.down), len(level.across))
+    which, place, score = local_maxima(
+        scores.reshape(shape),
+        deviations,
+        candidates.place,
+        level.down,
+        level.across,
+        np.array(level.basis.projector),
+    )
+    return Candidates(pixel[which], place, score)
 
 
 def _best(found: Candidates, new_share: Floats) -> Candidates:

@@ -10,14 +10,15 @@ Index convention: arrays are (photos, C, channels) with C camera pixels row by r
 real responses.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, blocks
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.real_basis import RealBasis
+from nearfar.parallel import side_by_side
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.photometry.measurements import Measurements
@@ -33,6 +34,9 @@ from nearfar.photometry.photos import (
 )
 from nearfar.photometry.quantisation import without_quantisation
 from nearfar.plan import Plan
+
+# Camera pixels to which photos are added at once.
+PIXELS_AT_ONCE = 2**12
 
 
 def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, int]], Floats]:
@@ -58,6 +62,20 @@ def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, 
     multiplicity = np.bincount(places, minlength=basis.count).astype(np.float32)
     multiplicity[place[DC, False]] = len(find_references(plan)[0])
     return basis, terms, multiplicity
+
+
+def _add_photos(
+    responses: Floats, photos: Floats, both: Floats, terms: Sequence[tuple[int, int]]
+) -> None:
+    """Add photos (n, C, channels), less white and black, to the responses that they measure."""
+
+    def work(block: slice) -> None:
+        for (r, sign), photo in zip(terms, photos, strict=True):
+            responses[block, :, r] += sign * (2 * photo[block] - both[block])
+
+    # Responses of one photo lie far apart in memory: photo after photo takes from a block's what
+    # the processor has at hand.
+    side_by_side(work, blocks(len(both), PIXELS_AT_ONCE))
 
 
 def measure_by_reference(
@@ -98,9 +116,7 @@ def measure_by_reference(
     both = (2 * levels.black + levels.light).astype(np.float32)
     responses = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
     for numbers, read in in_batches(photos, sorted(terms), rows):
-        for number, photo in zip(numbers, read, strict=True):
-            r, sign = terms[number]
-            responses[..., r] += sign * (2 * photo - both)
+        _add_photos(responses, read, both, [terms[number] for number in numbers])
         if progress is not None:
             progress(numbers[-1] + 1)
     responses /= multiplicity

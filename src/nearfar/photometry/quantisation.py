@@ -12,15 +12,17 @@ from functools import lru_cache
 import numpy as np
 from scipy.sparse import csr_array
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Floats, blocks
 from nearfar.illumination import patterns
 from nearfar.illumination.frequencies import is_on_grid
 from nearfar.illumination.real_basis import MOST_HELD, RealBasis
-from nearfar.parallel import single_threaded_products
+from nearfar.parallel import side_by_side, single_threaded_products
 
 # Smaller answers are rounding. A rounded wave holds multiples of its own frequency alone, so that
 # all but 2 to 4 % of the answers are.
 LEAST_ANSWER = 1e-6
+# Camera pixels, each channel apart, whose answers are taken off at once.
+ROWS_AT_ONCE = 2**12
 
 
 def quantisation_error(basis: RealBasis) -> Floats:
@@ -61,9 +63,14 @@ def without_quantisation(basis: RealBasis, responses: Floats) -> tuple[Floats, F
     error = quantisation_error(basis)
     if not error.shape[1]:
         return responses, error
-    answers = _answers(basis)
-    off = (answers @ responses.reshape(-1, basis.count).T).T.reshape(responses.shape)
-    return responses - off, error - answers @ basis.patterns
+    answers, flat = _answers(basis), responses.reshape(-1, basis.count)
+    found = np.empty_like(flat)
+
+    def work(block: slice) -> None:
+        found[block] = flat[block] - (answers @ flat[block].T).T
+
+    side_by_side(work, blocks(len(flat), ROWS_AT_ONCE))
+    return found.reshape(responses.shape), error - answers @ basis.patterns
 
 
 # Tiles of camera rows share it.

@@ -65,6 +65,8 @@ Use the transport
     probe                  relight by chosen projector pixels for each camera pixel
     ProbingMask            these: within a distance of q, a ring, a band about a line, any
     dual_view              the scene as the projector sees it, lit from the camera
+    find_reciprocity       whether light goes back as it came, which sharpens dual views
+    Reciprocity            what was found
     widen_subsurface       let light travel farther under translucent surfaces, or less far
     recolour               change the colour of one component
     cut_far                cut far-range light between regions of the projector and the camera
@@ -142,6 +144,7 @@ if TYPE_CHECKING:
     from nearfar.applications.editing import Cut, cut_far, recolour, widen_subsurface
     from nearfar.applications.masks import ProbingMask
     from nearfar.applications.probe import probe
+    from nearfar.applications.reciprocity import Reciprocity, find_reciprocity
     from nearfar.applications.several_projectors import relight_together
     from nearfar.arrays import Size, parse_size
     from nearfar.capture import Capture, open_capture, write_capture
@@ -231,6 +234,8 @@ _HOMES = {
     "probe": "nearfar.applications.probe",
     "ProbingMask": "nearfar.applications.masks",
     "dual_view": "nearfar.applications.dual",
+    "find_reciprocity": "nearfar.applications.reciprocity",
+    "Reciprocity": "nearfar.applications.reciprocity",
     "widen_subsurface": "nearfar.applications.editing",
     "recolour": "nearfar.applications.editing",
     "cut_far": "nearfar.applications.editing",
@@ -306,6 +311,8 @@ __all__ = [  # noqa: RUF022
     "probe",
     "ProbingMask",
     "dual_view",
+    "find_reciprocity",
+    "Reciprocity",
     "widen_subsurface",
     "recolour",
     "cut_far",

@@ -33,7 +33,14 @@ def test_the_light_is_white_by_default(job):
     check_done(run_nearfar("probe", job.transport, out, "--within", 3))
     expected = nearfar.probe(transport, np.ones((16, 20)), MASK.within(3))
     np.testing.assert_allclose(np.load(out), expected, atol=1e-6)
-    check_done(run_nearfar("dual", job.transport, out, "--force"))
+    ran = check_done(run_nearfar("dual", job.transport, out, "--force"))
+    found = nearfar.find_reciprocity(transport)
+    assert found.holds
+    assert "by reciprocity" in ran.out
+    view = nearfar.dual_view(transport, reciprocity=found)
+    np.testing.assert_allclose(np.load(out), view, rtol=1e-4)
+    ran = check_done(run_nearfar("dual", job.transport, out, "--force", "--transpose"))
+    assert "reciprocity" not in ran.out
     np.testing.assert_allclose(np.load(out), nearfar.dual_view(transport), rtol=1e-4)
 
 
@@ -48,7 +55,9 @@ def test_flat_fields_are_divided_out_of_a_dual_view(job):
         np.save(path, flats[f"{side}_flat"])
         options += [f"--{side}-flat", path]
     check_done(run_nearfar("dual", job.transport, out, *options))
-    np.testing.assert_allclose(np.load(out), nearfar.dual_view(transport, **flats), rtol=1e-4)
+    found = nearfar.find_reciprocity(transport)
+    view = nearfar.dual_view(transport, **flats, reciprocity=found)
+    np.testing.assert_allclose(np.load(out), view, rtol=1e-4)
     np.save(path, np.zeros(transport.projector, np.float32))
     check_sentence(run_nearfar("dual", job.transport, out, *options, "--force"), path, "black")
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import nearfar
 from nearfar.arrays import Size
 from nearfar.transport.store import save_transport
 from nearfar.viewer import interactive
@@ -30,23 +31,25 @@ def _shows(page, expected):
     )
 
 
+def _dual(transport, light):
+    """Return the dual view of a light, with far-range light by reciprocity."""
+    return nearfar.dual_view(transport, light, reciprocity=nearfar.find_reciprocity(transport))
+
+
 def _column(transport, y, x):
-    """Return the row of T of one camera pixel, at the projector's pixels."""
-    pixel = y * CAMERA.width + x
-    row = transport.rows(slice(pixel, pixel + 1))[0]
-    return row.T.reshape(*PROJECTOR, 3)
+    """Return the dual view of one camera pixel."""
+    light = np.zeros(CAMERA, np.float32)
+    light[y, x] = 1
+    return _dual(transport, light)
 
 
 def test_light_on_the_cameras_side_is_dragged(open_page, address, transport):
     page = open_page(address, {"kind": "white", "tool": "dual", "cameraLight": "white"})
-    whole = sum(
-        transport.rows(slice(i, i + CAMERA.width)).sum(axis=0)
-        for i in range(0, CAMERA.pixels, CAMERA.width)
-    )
-    _shows(page, whole.T.reshape(*PROJECTOR, 3))
+    assert nearfar.find_reciprocity(transport).holds
+    _shows(page, _dual(transport, np.ones(CAMERA, np.float32)))
     assert page.inner_text("#stage-label") == "as the projector sees it, lit from the camera"
     assert not page.is_visible("#light")
-    # The smallest spot is one camera pixel: its row of T.
+    # The smallest spot is one camera pixel.
     page.click("[data-camera-light=spot]")
     page.evaluate("""() => { const s = document.querySelector('[data-of=cameraRadius]');
         s.value = 0.5; s.dispatchEvent(new Event('input')); }""")
@@ -98,7 +101,7 @@ def test_a_camera_of_another_shape_and_a_transport_on_the_disk(
     monkeypatch.setattr(interactive, "BLOCK_BYTES", 50_000)
     assert len(list(InteractiveTransport(stored, memory=10**4).blocks())) > 3
     light = np.random.default_rng(1).random((*CAMERA, 3)).astype(np.float32)
-    expected = transport.adjoint(light)
+    expected = _dual(transport, light)
     with served_view(InteractiveTransport(stored, memory=10**4)) as address:
         header, (halves,) = unpack(ask(address, "/tool/dual", message(light)))
         np.testing.assert_allclose(halves / header["scale"], expected, rtol=2e-3, atol=1e-2)

@@ -5,10 +5,14 @@ picture on the projector's: Sen et al., "Dual photography", SIGGRAPH 2005.
 
 A lens dims light towards the corners. With the flat fields v of the camera and w of the projector,
 T is V T_0 W, and the view without both is T_0^T l = W^-1 T^T V^-1 l.
+
+Measured far-range light is blurred on the projector's side; `nearfar.applications.reciprocity` has
+what sharpens it.
 """
 
 import numpy as np
 
+from nearfar.applications.reciprocity import FarByReciprocity, Reciprocity, blocks_of
 from nearfar.arrays import Floats, Size
 from nearfar.checks import as_light
 from nearfar.errors import InputError
@@ -25,6 +29,7 @@ def dual_view(
     *,
     camera_flat: Floats | None = None,
     projector_flat: Floats | None = None,
+    reciprocity: Reciprocity | None = None,
 ) -> Floats:
     """Return the scene as the projector sees it, lit from the camera: T^T by a picture.
 
@@ -39,6 +44,9 @@ def dual_view(
     projector_flat : ndarray, shape (Py, Px) or (Py, Px, channels), optional
         That of the projector: the light of each of its pixels under white on an even surface. The
         view is divided by it over its mean.
+    reciprocity : Reciprocity, optional
+        Of a measured transport, by `nearfar.find_reciprocity`: far-range light follows from it,
+        if it holds, and is as sharp as in a relit picture.
 
     Returns
     -------
@@ -50,7 +58,8 @@ def dual_view(
     ------
     InputError
         If the picture does not hold finite numbers, or has another size than the camera or other
-        channels; the same of the flat fields, which must be above 0.
+        channels; the same of the flat fields, which must be above 0. If reciprocity is given for
+        a transport that was not measured.
 
     Examples
     --------
@@ -67,7 +76,15 @@ def dual_view(
     camera, projector, channels = transport.camera, transport.projector, transport.channels
     image = _image(picture, camera, channels) / _flat(camera_flat, camera, channels, "camera")
     flat = _flat(projector_flat, projector, channels, "projector")
-    seen = np.reshape(transport.adjoint(image), (*projector, channels))
+    if reciprocity is None:
+        seen = np.reshape(transport.adjoint(image), (*projector, channels))
+    elif isinstance(transport, Transport):
+        seen = _sent_back(transport, image, {}, reciprocity)
+    else:
+        raise InputError(
+            "reciprocity sharpens the far-range light of a measured transport, and this one is "
+            "known: leave `reciprocity` out."
+        )
     return _shaped(seen / flat)
 
 
@@ -78,6 +95,7 @@ def dual_view_of_stored(
     *,
     camera_flat: Floats | None = None,
     projector_flat: Floats | None = None,
+    reciprocity: Reciprocity | None = None,
 ) -> Floats:
     """Return the dual view of a transport in a file, some rows of the camera at a time.
 
@@ -88,7 +106,7 @@ def dual_view_of_stored(
         As `dual_view` takes it.
     gains : dict of str to float
         Gain of each part, ``"direct"``, ``"near"``, ``"far"`` or ``"free"``; 1 where left out.
-    camera_flat, projector_flat : ndarray, optional
+    camera_flat, projector_flat, reciprocity : optional
         As `dual_view` takes them.
 
     Raises
@@ -100,13 +118,33 @@ def dual_view_of_stored(
     image = _image(picture, stored.camera, stored.channels)
     image = image / _flat(camera_flat, stored.camera, stored.channels, "camera")
     flat = _flat(projector_flat, stored.projector, stored.channels, "projector")
-    total, first = np.zeros((*stored.projector, stored.channels)), 0
-    for rows in stored.blocks():
+    return _shaped(_sent_back(stored, image, gains, reciprocity) / flat)
+
+
+def _sent_back(
+    transport: Transport | StoredTransport,
+    image: Floats,
+    gains: dict[str, float],
+    reciprocity: Reciprocity | None,
+) -> Floats:
+    """Return T^T by an image, (Py, Px, channels); far-range light by reciprocity if it holds."""
+    blocks, channels = blocks_of(transport), transport.channels
+    far = None
+    if reciprocity is not None and reciprocity.holds and gains.get("far", 1.0) != 0:
+        far = FarByReciprocity(reciprocity, channels)
+    total, first = np.zeros((*transport.projector, channels)), 0
+    for rows in blocks():
         lit = image[first : first + rows.camera.height]
         block = rows.with_gains(**gains) if gains else rows
         total += block.adjoint(lit).reshape(total.shape)
+        if far is not None:
+            far.send(block, lit)
         first += rows.camera.height
-    return _shaped(total / flat)
+    if far is None:
+        return total
+    for rows in blocks():
+        far.see(rows.with_gains(**gains) if gains else rows)
+    return total + far.picture() - far.transposed()
 
 
 def _image(picture: Floats | None, camera: Size, channels: int) -> Floats:

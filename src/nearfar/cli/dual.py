@@ -1,5 +1,6 @@
 """``nearfar dual``."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
+    from nearfar.applications.reciprocity import Reciprocity
     from nearfar.arrays import Floats
 
 
@@ -47,6 +49,13 @@ def dual(
             metavar="PICTURE", help="Flat field of the projector, which is divided out; linear."
         ),
     ] = None,
+    transpose: Annotated[
+        bool,
+        typer.Option(
+            "--transpose",
+            help="Send far-range light back as it was measured, smooth, and not by reciprocity.",
+        ),
+    ] = False,
     srgb: Srgb = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -56,6 +65,7 @@ def dual(
     Example: nearfar dual transport.zarr dual.png --light photo.png --srgb
     """
     from nearfar.applications.dual import dual_view_of_stored
+    from nearfar.applications.reciprocity import find_reciprocity
     from nearfar.files import check_output, check_picture_ending, write_picture
 
     require_light(light, srgb=srgb, resize=False)
@@ -77,8 +87,22 @@ def dual(
             "camera_flat": _flat(camera_flat, camera),
             "projector_flat": _flat(projector_flat, opened.projector),
         }
-        write_picture(output, dual_view_of_stored(opened, sent, gains, **flats), force=force)
-    say(f"dual view of {opened.projector} written to {output}", quiet=quiet)
+        found = None if transpose else find_reciprocity(opened)
+        view = dual_view_of_stored(opened, sent, gains, **flats, reciprocity=found)
+        write_picture(output, view, force=force)
+    say(f"dual view of {opened.projector} written to {output}{_told(found)}", quiet=quiet)
+
+
+def _told(reciprocity: "Reciprocity | None") -> str:
+    """Say how far-range light was found."""
+    if reciprocity is None or reciprocity.complete or not math.isfinite(reciprocity.disagreement):
+        return ""
+    share = f"{100 * reciprocity.disagreement:.0f} %"
+    if reciprocity.holds:
+        return (
+            f"; far-range light is by reciprocity, which differs by {share} from what was measured"
+        )
+    return f"; far-range light is smooth, as measured: by reciprocity it would differ by {share}"
 
 
 def _flat(path: Path | None, size: Size) -> "Floats | None":

@@ -25,6 +25,8 @@ from nearfar.transport.direct import Footprint
 LEAST_WIDTH = 1e-3
 # Camera pixels of a batch.
 BATCH_PIXELS = 4096
+# The same where they are summed: all projector pixels are gone through once for each batch.
+BATCH_PIXELS_BACK = 2**16
 
 
 def summed_area(light: Floats) -> Floats:
@@ -102,6 +104,17 @@ class BoxAxes(NamedTuple):
             along.append((before @ weights[..., None])[..., 0])
             sides.append(slice(first, last))
         return (sides[0], sides[1]), along[0].T @ along[1]
+
+
+def boxes_adjoint(image: Floats, where: BoxAxes, projector: Size) -> Floats:
+    """Adjoint of `BoxAxes.means`: spread an image (C,) over footprints, (Py, Px), float64."""
+    table = np.zeros((projector.height + 1) * (projector.width + 1))
+    lit = np.flatnonzero(where.of_rows.any(axis=(0, 2)) & (image != 0))
+    for some in blocks(len(lit), BATCH_PIXELS_BACK):
+        here = where.of(lit[some]).places(projector)
+        shares = here.weights * np.asarray(image, dtype=np.float64)[lit[some], None]
+        table += np.bincount(here.pixels.ravel(), shares.ravel(), len(table))
+    return spread_summed_area(table, projector)
 
 
 def box_axes(correspondence: Floats, footprints: Floats, projector: Size) -> BoxAxes:

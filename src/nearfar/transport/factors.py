@@ -17,7 +17,7 @@ from nearfar.transport import direct as footprints
 from nearfar.transport import near as windows
 from nearfar.transport.analysed import AnalysedLight, analysed_light, overlaps_of
 from nearfar.transport.blurred import blurred_adjoint, blurred_pictures, blurred_rows
-from nearfar.transport.boxes import BoxAxes, box_axes
+from nearfar.transport.boxes import BoxAxes, box_axes, boxes_adjoint
 from nearfar.transport.components import Components
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.pyramid import Pyramid
@@ -128,6 +128,17 @@ class Factors:
             values = n[batch] * image[batch, None]
             back += windows.spread(values, self.centres[batch], window, self.projector)
         return np.asarray(back)
+
+    def spread_directly(self, image: Floats) -> Floats:
+        """Send an image (C,) back to where direct light comes from, as if d were 1: (Py, Px)."""
+        if self.of_single_pixels:
+            return footprints.spread(image, self.footprint, self.projector).reshape(self.projector)
+        return boxes_adjoint(image, self.box_axes, self.projector)
+
+    def far_picture(self, light: Floats) -> Floats:
+        """Return the picture of f (C, channels) under a light."""
+        (picture,) = far_pictures(self.far, overlaps_of(light[None], self.far_basis))
+        return np.asarray(picture)
 
     def rows(self, pixels: slice) -> Components:
         """Return dense rows of D, N and F of camera pixels, (n, channels, P)."""

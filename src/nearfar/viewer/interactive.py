@@ -10,12 +10,14 @@ components being direct, near and far. Frames have 1 colour or 3.
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nearfar.applications.reciprocity import Reciprocity, find_reciprocity
 from nearfar.arrays import AnyPath, Floats, Size, middles
 from nearfar.errors import InputError, NearfarError
 from nearfar.files import luminance
@@ -236,6 +238,11 @@ class InteractiveTransport:
     def at_display_stride(self, picture: NDArray[Any]) -> NDArray[Any]:
         """Return the rows and columns of a camera picture that are displayed."""
         return picture[np.ix_(*(middles(side, self.display_stride) for side in picture.shape[:2]))]
+
+    @cached_property
+    def reciprocity(self) -> Reciprocity:
+        """How far-range light on the projector's side follows from that on the camera's."""
+        return find_reciprocity(self.stored, self.blocks)
 
     def blocks(self) -> Iterator[Transport]:
         """Iterate over blocks of camera rows, from memory or from the disk.

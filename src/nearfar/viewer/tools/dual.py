@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nearfar.applications.dual import dual_view
+from nearfar.applications.reciprocity import FarByReciprocity
 from nearfar.arrays import Floats, Size, middles
 from nearfar.files import luminance
 from nearfar.viewer.interactive import (
@@ -32,7 +33,9 @@ class DualHeader(LightHeader):
 
 
 def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iterator[bytes | None]:
-    """Make the dual view of a light at the camera, in one step for each block of camera rows.
+    """Make the dual view of a light at the camera, in steps of a block of camera rows.
+
+    Far-range light of a light at rest is by reciprocity, where it holds.
 
     Raises
     ------
@@ -45,13 +48,24 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
     picture: Floats = light.as_array().astype(np.float32)
     if picture.ndim == 3 and channels != COLOUR:
         picture = luminance(picture)
+    picture = np.broadcast_to(picture.reshape(*camera, -1), (*camera, channels))
     total, first = np.zeros((*transport.projector, channels), dtype=np.float32), 0
+    far = None
+    if not header.coarse and transport.reciprocity.holds:
+        far = FarByReciprocity(transport.reciprocity, channels)
     for block in transport.blocks():
         rows = picture[first : first + block.camera.height]
         if rows.any():
             total += dual_view(block, rows).reshape(total.shape)
+        if far is not None:
+            far.send(block, rows)
         first += block.camera.height
         yield None
+    if far is not None:
+        for block in transport.blocks():
+            far.see(block)
+            yield None
+        total += far.picture() - far.transposed()
     most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
     scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
     # A projector pixel adds up the camera pixels that see its light.

@@ -195,5 +195,5 @@ def test_a_stored_transport_gives_the_same_with_gains(tmp_path, monkeypatch):
 def test_a_known_transport_needs_no_reciprocity():
     transport, _ = diffuse()
     known = nearfar.ExactTransport((2, 2), (2, 2), (), (), np.ones((1, 4, 4), np.float32))
-    with pytest.raises(InputError, match="leave `reciprocity` out"):
+    with pytest.raises(InputError, match="leave reciprocity out"):
         nearfar.dual_view(known, reciprocity=nearfar.find_reciprocity(transport))

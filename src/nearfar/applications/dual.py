@@ -83,7 +83,7 @@ def dual_view(
     else:
         raise InputError(
             "reciprocity sharpens the far-range light of a measured transport, and this one is "
-            "known: leave `reciprocity` out."
+            "known: leave reciprocity out."
         )
     return _shaped(seen / flat)
 

@@ -149,6 +149,13 @@ def find_reciprocity(
     ------
     UnreadableFileError
         If a file is damaged.
+
+    Examples
+    --------
+    >>> found = nearfar.find_reciprocity(transport)
+    >>> dual = nearfar.dual_view(transport, reciprocity=found)
+    >>> found.ratio.shape, dual.shape
+    ((8, 8), (8, 8))
     """
     cells = Size(*np.minimum(MOST_CELLS, transport.projector).tolist())
     basis = transport.far_basis

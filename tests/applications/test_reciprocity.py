@@ -160,6 +160,28 @@ def test_gaps_between_camera_pixels_are_filled():
     assert np.ptp(view) < 1e-3 * view.max()
 
 
+@pytest.mark.parametrize("make", [world, blurred_world], ids=["single pixels", "hats"])
+def test_near_range_light_is_the_mean_of_both_sides(make):
+    transport = make()
+    transport = replace(transport, far=np.zeros_like(transport.far))
+    camera, projector = transport.camera, transport.projector
+    each = np.eye(camera.pixels)
+    spread = np.stack([transport.factors.spread_directly(one).ravel() for one in each], axis=1)
+    count = spread.sum(axis=1)
+    picture = np.random.default_rng(3).uniform(0, 1, camera).astype(np.float32)
+    _, near, _ = transport.component_rows(slice(None))
+    seen = np.einsum("cip,p->ci", near, spread @ picture.ravel())
+    given = nearfar.Reciprocity(projector, np.zeros(5), 0.0, complete=False)
+    change = nearfar.dual_view(transport, picture, reciprocity=given)
+    change = (change - nearfar.dual_view(transport, picture)).reshape(-1, 2)
+    surely = count > 0.2 * np.median(count[count > 0])
+    assert surely.sum() > 50
+    by = (spread @ seen)[surely] / count[surely, None]
+    transposed = np.einsum("cip,c->pi", near, picture.ravel())[surely]
+    np.testing.assert_allclose(change[surely], (by - transposed) / 2, atol=2e-5)
+    assert np.abs(by - transposed).max() > 1e-3
+
+
 @pytest.mark.parametrize("make", [world, blurred_world], ids=["single pixels", "boxes"])
 def test_what_is_sent_back_directly_is_the_adjoint_of_direct_light(make):
     transport = make(channels=1) if make is world else make()
@@ -185,8 +207,10 @@ def test_a_stored_transport_gives_the_same_with_gains(tmp_path, monkeypatch):
     here, there = (nearfar.find_reciprocity(each) for each in (transport, stored))
     np.testing.assert_allclose(there.coefficients, here.coefficients, rtol=1e-5)
     assert there.disagreement == pytest.approx(here.disagreement)
-    expected = nearfar.dual_view(transport.with_gains(far=2, direct=0.5), reciprocity=here)
-    view = dual_view_of_stored(stored, None, {"far": 2.0, "direct": 0.5}, reciprocity=there)
+    expected = nearfar.dual_view(transport.with_gains(far=2, near=3, direct=0.5), reciprocity=here)
+    view = dual_view_of_stored(
+        stored, None, {"far": 2.0, "near": 3.0, "direct": 0.5}, reciprocity=there
+    )
     np.testing.assert_allclose(view, expected, rtol=1e-4, atol=1e-6)
     off = dual_view_of_stored(stored, None, {"far": 0.0}, reciprocity=there)
     np.testing.assert_array_equal(off, dual_view_of_stored(stored, None, {"far": 0.0}))

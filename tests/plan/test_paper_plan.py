@@ -239,3 +239,8 @@ def test_plans_are_frozen():
         plan.window = 5
     assert issubclass(PlanError, InputError)
     assert isinstance(plan, Plan)
+
+
+def test_a_plan_prints_in_a_line():
+    plan = paper_plan((8, 8), 3, (3, 3))
+    assert str(plan) == f"<nearfar plan: projector 8x8, {len(plan.patterns)} photos>"

@@ -6,13 +6,13 @@ picture on the projector's: Sen et al., "Dual photography", SIGGRAPH 2005.
 A lens dims light towards the corners. With the flat fields v of the camera and w of the projector,
 T is V T_0 W, and the view without both is T_0^T l = W^-1 T^T V^-1 l.
 
-Measured far-range light is blurred on the projector's side; `nearfar.applications.reciprocity` has
+Measured far-range light is blurred on the projector's side: `nearfar.applications.reciprocity` has
 what sharpens it.
 """
 
 import numpy as np
 
-from nearfar.applications.reciprocity import FarByReciprocity, Reciprocity, blocks_of
+from nearfar.applications.reciprocity import ByReciprocity, Reciprocity, blocks_of
 from nearfar.arrays import Floats, Size
 from nearfar.checks import as_light
 from nearfar.errors import InputError
@@ -45,8 +45,8 @@ def dual_view(
         That of the projector: the light of each of its pixels under white on an even surface. The
         view is divided by it over its mean.
     reciprocity : Reciprocity, optional
-        Of a measured transport, by `nearfar.find_reciprocity`: far-range light follows from it,
-        if it holds, and is as sharp as in a relit picture.
+        Of a measured transport, by `nearfar.find_reciprocity`: far-range light and half of
+        near-range light follow from it, if it holds, as sharp as in a relit picture.
 
     Returns
     -------
@@ -127,24 +127,24 @@ def _sent_back(
     gains: dict[str, float],
     reciprocity: Reciprocity | None,
 ) -> Floats:
-    """Return T^T by an image, (Py, Px, channels); far-range light by reciprocity if it holds."""
+    """Return T^T by an image, (Py, Px, channels); by reciprocity if it holds."""
     blocks, channels = blocks_of(transport), transport.channels
-    far = None
-    if reciprocity is not None and reciprocity.holds and gains.get("far", 1.0) != 0:
-        far = FarByReciprocity(reciprocity, channels)
+    sharper = None
+    if reciprocity is not None and reciprocity.holds:
+        sharper = ByReciprocity(reciprocity, channels)
     total, first = np.zeros((*transport.projector, channels)), 0
     for rows in blocks():
         lit = image[first : first + rows.camera.height]
         block = rows.with_gains(**gains) if gains else rows
         total += block.adjoint(lit).reshape(total.shape)
-        if far is not None:
-            far.send(block, lit)
+        if sharper is not None:
+            sharper.send(block, lit)
         first += rows.camera.height
-    if far is None:
+    if sharper is None:
         return total
     for rows in blocks():
-        far.see(rows.with_gains(**gains) if gains else rows)
-    return total + far.picture() - far.transposed()
+        sharper.see(rows.with_gains(**gains) if gains else rows)
+    return total + sharper.change()
 
 
 def _image(picture: Floats | None, camera: Size, channels: int) -> Floats:

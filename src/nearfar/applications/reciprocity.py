@@ -1,4 +1,4 @@
-"""Far-range light of dual views by reciprocity.
+"""Light of dual views by reciprocity.
 
 A measured row of far-range light has a few waves, so F^T blurs texture on the projector's side. The
 camera shows that texture: where surfaces are diffuse, light goes from one point of the scene to
@@ -9,7 +9,8 @@ lights c. Then
     F[c, p] = F[c', p'] r(p) / r(p')
 
 with one smooth function r for what lenses and lamps do to the four rays. Far-range light at p is
-thus relit from the camera's light, sent to where it comes from directly, and seen at c'.
+thus relit from the camera's light, sent to where it comes from directly, and seen at c'. The same
+holds of near-range light, of which N^T is as good: it is the mean of both.
 
 log r is a polynomial of second degree, fitted to F between cells of the projector. Where the two
 sides do not agree at measured frequencies, as with gloss, glass or mirrors, F^T stays.
@@ -38,6 +39,8 @@ BLUR_CELLS = 2.0
 # Far-range light by reciprocity differs from F^T by less than this share at measured frequencies:
 # 0.08 to 0.15 in seven scenes of rooms, 0.30 to 0.56 where most is gloss, glass, hair or wax.
 LARGEST_DISAGREEMENT = 0.2
+# Share of near-range light that is seen by the camera; the rest is N^T.
+NEAR_SHARE = 0.5
 # Of a light that both sides are compared under, as a share of the projector's sides.
 DISC_RADIUS = 0.25
 # A projector pixel is seen where at least this share of the usual number of camera pixels sees it,
@@ -86,8 +89,8 @@ class Reciprocity:
         return np.asarray(np.exp(logarithm).reshape(self.projector))
 
 
-class FarByReciprocity:
-    """Far-range light of a dual view, added up over blocks of camera rows that are read twice.
+class ByReciprocity:
+    """What reciprocity changes in a dual view, added up over blocks of rows that are read twice.
 
     Parameters
     ----------
@@ -106,27 +109,24 @@ class FarByReciprocity:
         flat, factors = picture.reshape(-1, picture.shape[-1]), block.factors
         for i in range(flat.shape[1]):
             if flat[:, i].any():
-                back = factors.far_basis.synthesise(flat[:, i] @ factors.far[:, i])
-                self._transposed[..., i] += back.reshape(block.projector)
+                self._transposed[..., i] += factors.far_back(flat[:, i], i)
+                self._transposed[..., i] += NEAR_SHARE * factors.near_back(flat[:, i], i)
                 self._light[..., i] += factors.spread_directly(flat[:, i])
         self._count += factors.spread_directly(np.ones(len(flat)))
 
     def see(self, block: Transport) -> None:
         """See the camera pixels of a block in the light that was sent; after all were sent."""
-        factors = block.factors
-        light = np.moveaxis(self._light / self._ratio, -1, 0).reshape(self._light.shape[-1], -1)
-        far = factors.far_picture(light.astype(np.float32))
-        for i in range(far.shape[1]):
-            self._seen[..., i] += factors.spread_directly(far[:, i])
+        light = (self._light / self._ratio).astype(np.float32)
+        components = block.components(light if light.shape[-1] > 1 else light[..., 0])
+        seen = components.far + NEAR_SHARE * components.near
+        flat = np.reshape(seen, (block.camera.pixels, -1))
+        for i in range(flat.shape[1]):
+            self._seen[..., i] += block.factors.spread_directly(flat[:, i])
 
-    def picture(self) -> Floats:
-        """Return far-range light, (Py, Px, channels): F^T by the picture where nothing is seen."""
+    def change(self) -> Floats:
+        """Return what to add to T^T by the picture, (Py, Px, channels); 0 where nothing is seen."""
         seen = _mean_seen(self._seen, self._count)
-        return np.where(np.isnan(seen), self._transposed, self._ratio * seen)
-
-    def transposed(self) -> Floats:
-        """Return F^T by the picture, (Py, Px, channels)."""
-        return self._transposed
+        return np.where(np.isnan(seen), 0.0, self._ratio * seen - self._transposed)
 
 
 def find_reciprocity(

@@ -268,6 +268,9 @@ class Plan(Frozen):
     def __repr__(self) -> str:
         return f"<nearfar plan: projector {self.projector}, {len(self.patterns)} photos>"
 
+    # Pydantic's own lists every pattern.
+    __str__ = __repr__
+
     def _repr_html_(self) -> str:
         """Show the plan in a notebook."""
         # Plans are made without what pictures need.

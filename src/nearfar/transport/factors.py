@@ -117,28 +117,34 @@ class Factors:
 
     def back(self, image: Floats, channel: int) -> Floats:
         """Send one channel of an image (C,) back to the projector, (Py, Px)."""
-        d, n, f = (part[:, channel] for part in (self.direct, self.near, self.far))
-        of_far = self.far_basis.synthesise(image @ f).reshape(self.projector)
+        of_far, d = self.far_back(image, channel), self.direct[:, channel]
         if not self.of_single_pixels:
+            n = self.near[:, channel]
             return of_far + blurred_adjoint(d, n, image, self.pyramid, self.centres, self.box_axes)
-        back = footprints.spread(d * image, self.footprint, self.projector).reshape(self.projector)
-        back = back + of_far
-        window = self.near_basis.window
+        return self.spread_directly(d * image) + of_far + self.near_back(image, channel)
+
+    def far_back(self, image: Floats, channel: int) -> Floats:
+        """Send one channel of an image (C,) back by f alone, (Py, Px)."""
+        of_far = self.far_basis.synthesise(image @ self.far[:, channel])
+        return of_far.reshape(self.projector)
+
+    def near_back(self, image: Floats, channel: int) -> Floats:
+        """Send one channel of an image (C,) back by n alone, (Py, Px)."""
+        n, window = self.near[:, channel], self.near_basis.window
+        if not self.of_single_pixels:
+            d = np.zeros(len(image), dtype=np.float32)
+            return blurred_adjoint(d, n, image, self.pyramid, self.centres, self.box_axes)
+        back = np.zeros(self.projector)
         for batch in blocks(len(image), BATCH_PIXELS) if window else ():
             values = n[batch] * image[batch, None]
             back += windows.spread(values, self.centres[batch], window, self.projector)
-        return np.asarray(back)
+        return back
 
     def spread_directly(self, image: Floats) -> Floats:
         """Send an image (C,) back to where direct light comes from, as if d were 1: (Py, Px)."""
         if self.of_single_pixels:
             return footprints.spread(image, self.footprint, self.projector).reshape(self.projector)
         return boxes_adjoint(image, self.box_axes, self.projector)
-
-    def far_picture(self, light: Floats) -> Floats:
-        """Return the picture of f (C, channels) under a light."""
-        (picture,) = far_pictures(self.far, overlaps_of(light[None], self.far_basis))
-        return np.asarray(picture)
 
     def rows(self, pixels: slice) -> Components:
         """Return dense rows of D, N and F of camera pixels, (n, channels, P)."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nearfar.applications.dual import dual_view
-from nearfar.applications.reciprocity import FarByReciprocity
+from nearfar.applications.reciprocity import ByReciprocity
 from nearfar.arrays import Floats, Size, middles
 from nearfar.files import luminance
 from nearfar.viewer.interactive import (
@@ -50,22 +50,22 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
         picture = luminance(picture)
     picture = np.broadcast_to(picture.reshape(*camera, -1), (*camera, channels))
     total, first = np.zeros((*transport.projector, channels), dtype=np.float32), 0
-    far = None
+    sharper = None
     if not header.coarse and transport.reciprocity.holds:
-        far = FarByReciprocity(transport.reciprocity, channels)
+        sharper = ByReciprocity(transport.reciprocity, channels)
     for block in transport.blocks():
         rows = picture[first : first + block.camera.height]
         if rows.any():
             total += dual_view(block, rows).reshape(total.shape)
-        if far is not None:
-            far.send(block, rows)
+        if sharper is not None:
+            sharper.send(block, rows)
         first += block.camera.height
         yield None
-    if far is not None:
+    if sharper is not None:
         for block in transport.blocks():
-            far.see(block)
+            sharper.see(block)
             yield None
-        total += far.picture() - far.transposed()
+        total += sharper.change()
     most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
     scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
     # A projector pixel adds up the camera pixels that see its light.

@@ -22,15 +22,16 @@ capture = nearfar.acquire(plan, f"{folder.name}/capture.zarr", rig)
 transport, _ = nearfar.reconstruct(capture)
 
 # %%
-# A measured row of far-range light is smooth over the projector, and so is its transpose. The camera
-# sees what is missing: light that goes from one place of the scene to another goes back alike.
+# A measured row of far-range light is smooth over the projector, and so is its transpose. The
+# camera sees what is missing: light that goes from one place of the scene to another goes back
+# alike.
 reciprocity = nearfar.find_reciprocity(transport)
 print(f"both sides differ by {reciprocity.disagreement:.0%}, so it holds: {reciprocity.holds}")
 
 # %%
 # Shadows change sides: what the camera does not see is dark in the dual view. A projector pixel
-# adds up the camera pixels that see its light: thin lines are brighter where there is one more. Where
-# half of the camera's view is lit, the other half shows far-range light alone.
+# adds up the camera pixels that see its light: thin lines are brighter where there is one more.
+# Where half of the camera's view is lit, the other half shows far-range light alone.
 primal = transport @ nearfar.white(size)
 half = np.zeros(transport.camera, dtype=np.float32)
 half[:, : transport.camera.width // 2] = 1

@@ -309,7 +309,7 @@ def test_the_middle_of_a_box_follows_from_its_centroid_on_whole_pixels(moves):
         axis=-1,
     )
     centroids[4, 4] = np.nan
-    found = box_centres(centroids)
+    found = box_centres(centroids, seen_of_projector(centroids))
     assert np.isnan(found[4, 4]).all()
     # Boxes are of the mean move nearby; within one pixel every middle has the same centroid.
     off = np.abs(found - middles)[np.isfinite(centroids)]
@@ -317,6 +317,18 @@ def test_the_middle_of_a_box_follows_from_its_centroid_on_whole_pixels(moves):
     assert off.max() <= max(0.5 * (1.0 - min(moves)), 0.0) + 0.12
     before = np.abs(centroids - middles)[np.isfinite(centroids)]
     assert off.mean() <= before.mean()
+
+
+@pytest.mark.parametrize("moves", [(0.4, 0.37), (0.25, 0.6)])
+def test_what_fine_camera_pixels_see_is_told_though_their_centroids_go_in_stairs(moves):
+    """Camera pixels of three by three rays, each of which ends on one projector pixel."""
+    y, x = np.meshgrid(np.arange(60.0), np.arange(56.0), indexing="ij")
+    middles = np.stack([3.2 + moves[0] * y, 6.1 + moves[1] * x], axis=-1)
+    centroids = np.mean([np.rint(middles + ray * np.array(moves)) for ray in (-1 / 3, 0, 1 / 3)], 0)
+    centroids += 0.02 * np.random.default_rng(0).standard_normal(middles.shape)
+    seen = seen_of_projector(centroids).reshape(60, 56, 4)[5:-5, 5:-5, :2]
+    # Moves to the next camera pixel come to 0.1 to 0.5 of it.
+    np.testing.assert_allclose(np.mean(seen, axis=(0, 1)), moves, rtol=0.2)
 
 
 @pytest.mark.parametrize("blur", [0.0, 2.0, 4.0])
@@ -341,8 +353,7 @@ def test_the_highest_frequencies_show_the_blur_of_the_projector(blur):
     measurements = Measurements(
         camera, basis, responses, level, level, np.empty((basis.count, 0), dtype=np.float32)
     )
-    found = footprint_boxes(measurements, q, BASIS).reshape(*camera, 4)
+    found = footprint_boxes(measurements, q, seen_of_projector(q), BASIS).reshape(*camera, 4)
     assert not found[2, 3].any()
     lit = np.isfinite(q[..., 0])
     np.testing.assert_allclose(found[lit], boxes.reshape(*camera, 4)[lit], rtol=0.02)
-    assert footprint_boxes(measurements, q, NearBasis(5)) is None

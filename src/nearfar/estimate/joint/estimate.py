@@ -21,7 +21,7 @@ from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.quantisation import subtract_quantisation
-from nearfar.estimate.joint.seen import box_centres
+from nearfar.estimate.joint.seen import box_centres, seen_of_projector
 from nearfar.estimate.joint.shifts import moved_q, with_unshifted_light
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.near_basis import NearBasis
@@ -133,12 +133,13 @@ def _laid_out(
             f"a plan for every projector pixel, at a pitch of {near_basis.pitch}, is estimated on "
             f"the processor alone: leave out `device`."
         )
-    if near_basis.pitch > 1:
-        correspondence = box_centres(correspondence)
-    boxes = footprint_boxes(measurements, correspondence, near_basis)
-    if boxes is not None:
-        correspondence, boxes = own_footprints(measurements, correspondence, boxes, near_basis)
-    return lay_out(measurements, correspondence, near_basis, device, boxes)
+    if near_basis.pitch == 1:
+        return lay_out(measurements, correspondence, near_basis, device, None)
+    seen = seen_of_projector(correspondence)
+    middles = box_centres(correspondence, seen)
+    voted = footprint_boxes(measurements, middles, seen, near_basis)
+    middles, boxes = own_footprints(measurements, middles, voted, near_basis)
+    return lay_out(measurements, middles, near_basis, device, boxes)
 
 
 def _sweep(
@@ -251,8 +252,7 @@ def _with_new_footprints(problem: Problem) -> Problem:
     """Return the problem with the footprints of the q that its last sweep found."""
     pixels, measurements = problem.pixels, problem.measurements
     q = fetch(pixels.correspondence).reshape(*measurements.camera, 2)
-    voted = footprint_boxes(measurements, q, problem.near_basis)
-    assert voted is not None
+    voted = footprint_boxes(measurements, q, seen_of_projector(q), problem.near_basis)
     q, footprints = own_footprints(measurements, q, voted, problem.near_basis)
     changes = (q.reshape(-1, 2), footprints)
     moved, boxes = (beside(values, pixels.white) for values in changes)

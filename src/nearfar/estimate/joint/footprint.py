@@ -21,7 +21,7 @@ from nearfar.estimate.joint.box_waves import (
     put_with_derivatives,
     wave_table,
 )
-from nearfar.estimate.joint.seen import MEDIAN_SIDE, reach_of, seen_of_projector
+from nearfar.estimate.joint.seen import SEEN_ROWS, reach_of
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
@@ -40,7 +40,7 @@ BLURS = np.array([0.0, 0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0]
 # Side of the square of camera pixels that vote.
 VOTERS = 7
 # Rows of the camera on either side of a camera pixel that its footprint depends on.
-VOTING_ROWS = VOTERS // 2 + MEDIAN_SIDE // 2 + 1
+VOTING_ROWS = VOTERS // 2 + SEEN_ROWS
 # Step of the differences by which direct light's derivatives are taken, in projector pixels. Boxes
 # that lie within one pixel do not change with q: with 0.05, derivatives next to such places say too
 # little, and q moves too far.
@@ -96,26 +96,26 @@ def unit_responses(middles: Floats, footprints: Floats, centred: CentredBasis) -
 
 
 def footprint_boxes(
-    measurements: Measurements, correspondence: Floats, near_basis: NearBasis
-) -> Floats | None:
+    measurements: Measurements, correspondence: Floats, seen: Floats, near_basis: NearBasis
+) -> Floats:
     """Return each camera pixel's footprint, blurred as neighbours vote.
 
     Parameters
     ----------
     measurements : Measurements
     correspondence : ndarray, shape (Cy, Cx, 2)
+        Middles of the footprints.
+    seen : ndarray, shape (C, 4)
+        What each camera pixel sees without blur, as `seen_of_projector` tells it.
     near_basis : NearBasis
+        At a pitch over 1.
 
     Returns
     -------
     ndarray, shape (C, 4), float32
-        As `nearfar.transport.boxes` describes them; 0 without direct light. None where functions
-        are of single pixels, and the footprint is bilinear.
+        As `nearfar.transport.boxes` describes them; 0 without direct light.
     """
-    if near_basis.pitch == 1:
-        return None
     camera = measurements.camera
-    seen = seen_of_projector(correspondence)
     q = correspondence.reshape(-1, 2).astype(np.float64)
     lit: Booleans = np.asarray(np.isfinite(q).all(axis=1))
     high = high_responses(measurements, near_basis)

@@ -23,6 +23,12 @@ LARGEST_MOVE = 24.0
 # Moves to both sides stay on one surface if the larger is at most as many times the smaller, plus
 # as many projector pixels.
 LARGEST_RATIO, LARGEST_DIFFERENCE = 1.5, 0.5
+# Centroids of camera pixels that are finer than projector pixels go in stairs: they stay in a pixel
+# and leap to the next. Where q moves by less than this, in projector pixels, it is told over as
+# many camera pixels to each side.
+STAIR_MOVE, STAIR_REACH = 0.7, 3
+# Rows of the camera on either side of a camera pixel that what it sees is told by.
+SEEN_ROWS = MEDIAN_SIDE // 2 + STAIR_REACH
 # Parallelograms whose sides are less slanted, as a correlation of y and x, are taken as one box:
 # half of it is narrower than a projector pixel sooner, and then tells little of q.
 LEAST_SLANT = 0.1
@@ -46,7 +52,11 @@ def seen_of_projector(correspondence: Floats) -> Floats:
     q = np.ascontiguousarray(correspondence, dtype=np.float64)
 
     def work(axis: int) -> None:
-        moves[axis] = _moves(q, axis)
+        near, far = (_moves(q, axis, reach) for reach in (1, STAIR_REACH))
+        longest = np.abs(far).max(axis=1)
+        # 0 where all camera pixels that far away see other surfaces, or nothing.
+        is_fine = (longest > 0) & (np.maximum(longest, np.abs(near).max(axis=1)) < STAIR_MOVE)
+        moves[axis] = np.where(is_fine[:, None], far, near)
 
     side_by_side(work, (0, 1))
     found = np.empty((q.shape[0] * q.shape[1], 4), dtype=np.float32)
@@ -72,17 +82,24 @@ def _put_parallelograms(of_rows: Floats, of_columns: Floats, found: Floats) -> N
             found[c, 2 + axis] = 0.0 if upright else 0.25 * halved[c, axis]
 
 
-def _moves(q: Floats, axis: int) -> Floats:
-    """Return how far q (Cy, Cx, 2) moves along one axis of the camera, (C, 2), float64."""
+def _moves(q: Floats, axis: int, reach: int) -> Floats:
+    """Return how far q (Cy, Cx, 2) moves along one axis of the camera, (C, 2), float64.
+
+    By the camera pixels `reach` away on both sides.
+    """
     known = np.empty((2, *q.shape[:2]))
-    _put_moves(q, (1, 0) if axis == 0 else (0, 1), known)
+    _put_moves(q, (reach, 0) if axis == 0 else (0, reach), known)
     return np.stack([_median(part) for part in known], axis=-1).reshape(-1, 2)
 
 
 @compiled
 def _put_moves(q: Floats, step: tuple[int, int], found: Floats) -> None:
-    """Write the mean of the moves to both sides, or the smaller if one leads to another surface."""
+    """Write the mean of the moves to both sides, or the smaller if one leads to another surface.
+
+    Moves of as many camera pixels as a step has, over their number.
+    """
     down, across = step
+    scale = 1.0 / (down + across)
     for y in range(q.shape[0]):
         for x in range(q.shape[1]):
             after_y = after_x = before_y = before_x = 0.0
@@ -102,12 +119,12 @@ def _put_moves(q: Floats, step: tuple[int, int], found: Floats) -> None:
             if min(after, before) == np.inf:
                 continue
             if max(after, before) <= LARGEST_RATIO * min(after, before) + LARGEST_DIFFERENCE:
-                found[0, y, x] = 0.5 * (after_y + before_y)
-                found[1, y, x] = 0.5 * (after_x + before_x)
+                found[0, y, x] = 0.5 * scale * (after_y + before_y)
+                found[1, y, x] = 0.5 * scale * (after_x + before_x)
             elif after <= before:
-                found[0, y, x], found[1, y, x] = after_y, after_x
+                found[0, y, x], found[1, y, x] = scale * after_y, scale * after_x
             else:
-                found[0, y, x], found[1, y, x] = before_y, before_x
+                found[0, y, x], found[1, y, x] = scale * before_y, scale * before_x
 
 
 def _median(values: Floats) -> Floats:
@@ -127,7 +144,7 @@ def _median(values: Floats) -> Floats:
     return nine[4]
 
 
-def box_centres(correspondence: Floats) -> Floats:
+def box_centres(correspondence: Floats, seen: Floats) -> Floats:
     """Return the middles of the footprints whose centroids on the pixels are q, (Cy, Cx, 2).
 
     The centroid of the shares of a box in whole pixels is not its middle: that of a box within one
@@ -137,9 +154,11 @@ def box_centres(correspondence: Floats) -> Floats:
     ----------
     correspondence : ndarray, shape (Cy, Cx, 2)
         q as correspondence finds it, a centroid.
+    seen : ndarray, shape (C, 4)
+        The footprints, as `seen_of_projector` tells them.
     """
     q = correspondence.reshape(-1, 2).astype(np.float64)
-    footprints = seen_of_projector(correspondence).astype(np.float64)
+    footprints = seen.astype(np.float64)
     found = np.empty_like(q)
     side_by_side(
         lambda batch: _put_centres(q[batch], footprints[batch], found[batch]),

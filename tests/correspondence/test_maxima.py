@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nearfar.correspondence.maxima import MISSED_DEVIATIONS, MISSED_SHARE, local_maxima
+from nearfar.correspondence.levels import MISSED_DEVIATIONS, MISSED_SHARE
+from nearfar.correspondence.maxima import local_maxima
 
 PROJECTOR = (12, 15)
 
@@ -43,7 +44,13 @@ def test_maxima_are_those_of_loops_over_places(widths, down, across, anywhere):
     deviations = np.float32(2.0) ** generator.integers(-1, 2, (200, widths))
     places = generator.integers(0, PROJECTOR, (200, 2)) if anywhere else np.zeros((200, 2), int)
     which, place, score = local_maxima(
-        scores, deviations, places, down, across, np.array(PROJECTOR)
+        scores,
+        deviations,
+        places,
+        down,
+        across,
+        np.array(PROJECTOR),
+        (MISSED_SHARE, MISSED_DEVIATIONS),
     )
     expected = [
         (m, *found)

@@ -37,7 +37,7 @@ CELLS_PER_PERIOD = 3.0
 # Standard deviation, in cells, by which both sides are blurred before their ratio is fitted.
 BLUR_CELLS = 2.0
 # Far-range light by reciprocity differs from F^T by less than this share at measured frequencies:
-# 0.08 to 0.15 in seven scenes of rooms, 0.30 to 0.56 where most is gloss, glass, hair or wax.
+# 0.08 to 0.15 in six scenes; 0.30 to 0.56 on shelves, a hand of wax, caustics, glass and hair.
 LARGEST_DISAGREEMENT = 0.2
 # Share of near-range light that is seen by the camera; the rest is N^T.
 NEAR_SHARE = 0.5

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.correspondence.footprints import filters, kept, widths
-from nearfar.correspondence.maxima import MISSED_DEVIATIONS, MISSED_SHARE, local_maxima
 from nearfar.correspondence.weighing import Weighed
 from nearfar.illumination.real_basis import RealBasis
 
@@ -30,6 +29,10 @@ PLACES_PER_PERIOD = 3.5
 WINDOW_REACH = 0.75
 # One in so many widths of footprints is tried while searching.
 WIDTHS_STEP = 2
+# Share of the score of new frequencies that may be missed between scored places, and deviations
+# that noise may take: candidates that score lower are dropped.
+MISSED_SHARE = 0.4
+MISSED_DEVIATIONS = 3.0
 MOST_CANDIDATES = 8
 # Values of scores that are in memory at once.
 SCORES_AT_ONCE = 2**21
@@ -180,6 +183,9 @@ def _narrow(
 
 
 def _local_maxima(level: Level, weighed: Weighed, candidates: Candidates) -> Candidates:
+    # Numba takes a while to load, and plans are made with this module, without a search.
+    from nearfar.correspondence.maxima import local_maxima
+
     pixel = candidates.pixel
     centred = level.basis.recentre(weighed.responses[pixel, None], candidates.place)[:, 0]
     deviations = np.sqrt(weighed.weights[pixel, : level.frequencies] @ level.power)
@@ -192,6 +198,7 @@ def _local_maxima(level: Level, weighed: Weighed, candidates: Candidates) -> Can
         level.down,
         level.across,
         np.array(level.basis.projector),
+        (MISSED_SHARE, MISSED_DEVIATIONS),
     )
     return Candidates(pixel[which], place, score)
 

@@ -10,11 +10,6 @@ from numpy.typing import NDArray
 from nearfar.arrays import Floats, Integers
 from nearfar.compiled import compiled
 
-# Share of the score of new frequencies that may be missed between scored places, and deviations
-# that noise may take: candidates that score lower are dropped.
-MISSED_SHARE = 0.4
-MISSED_DEVIATIONS = 3.0
-
 
 def local_maxima(
     scores: Floats,
@@ -23,6 +18,7 @@ def local_maxima(
     down: Integers,
     across: Integers,
     projector: Integers,
+    missed: tuple[float, float],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     """Return the places that score no lower than their neighbours, and not much too low.
 
@@ -38,6 +34,8 @@ def local_maxima(
         begin again, so places there do not count.
     projector : ndarray, shape (2,), int64
         Height and width.
+    missed : tuple of float
+        Share of the highest score of a window, and deviations, by which maxima may be lower.
 
     Returns
     -------
@@ -47,7 +45,7 @@ def local_maxima(
     score : ndarray, shape (i,), float32
     """
     windows = np.empty((len(scores), *scores.shape[2:]), dtype=scores.dtype)
-    counts = _count(scores, deviations, places, down, across, projector, windows)
+    counts = _count(scores, deviations, places, down, across, projector, missed, windows)
     starts = np.cumsum(counts) - counts
     which = np.repeat(np.arange(len(scores)), counts)
     place = np.empty((len(which), 2), dtype=np.int64)
@@ -64,6 +62,7 @@ def _count(
     down: Integers,
     across: Integers,
     projector: Integers,
+    missed: tuple[float, float],
     windows: Floats,
 ) -> NDArray[np.int64]:
     """Put into `windows` the scores of maxima, and -inf elsewhere; return how many there are."""
@@ -89,7 +88,7 @@ def _count(
                 score = best[row * columns + column] if inside and 0 <= x < projector[1] else none
                 bordered[row + 1, column + 1] = score
                 highest = score if score > highest else highest
-        least = highest - np.float32(MISSED_SHARE) * abs(highest) - np.float32(MISSED_DEVIATIONS)
+        least = highest - np.float32(missed[0]) * abs(highest) - np.float32(missed[1])
         for row in range(rows):
             for column in range(columns):
                 score = bordered[row + 1, column + 1]

@@ -96,7 +96,8 @@ def test_pixels_views_gains_and_what_plays_are_undone(open_page, address):
     page.click("#play")
     settled(page)
     _press(page, "Control+z")
-    np.testing.assert_array_equal(seen(page, "light"), before)
+    # It is drawn with the next frame of the screen.
+    wait_until(lambda: np.array_equal(seen(page, "light"), before))
     assert page.is_disabled("#undo")
 
 

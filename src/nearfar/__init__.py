@@ -66,7 +66,7 @@ Use the transport
     ProbingMask            these: within a distance of q, a ring, a band about a line, any
     dual_view              the scene as the projector sees it, lit from the camera
     find_reciprocity       whether light goes back as it came, which sharpens dual views
-    Reciprocity            what was found
+    Reciprocity            how far both directions agree, and the ratio between them
     widen_subsurface       let light travel farther under translucent surfaces, or less far
     recolour               change the colour of one component
     cut_far                cut far-range light between regions of the projector and the camera

@@ -10,9 +10,11 @@ Measured far-range light is blurred on the projector's side: `nearfar.applicatio
 what sharpens it.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from nearfar.applications.reciprocity import ByReciprocity, Reciprocity, blocks_of
+from nearfar.applications.reciprocity import Blocks, ByReciprocity, Reciprocity, blocks_of
 from nearfar.arrays import Floats, Size
 from nearfar.checks import as_light
 from nearfar.errors import InputError
@@ -127,24 +129,50 @@ def _sent_back(
     gains: dict[str, float],
     reciprocity: Reciprocity | None,
 ) -> Floats:
-    """Return T^T by an image, (Py, Px, channels); by reciprocity if it holds."""
-    blocks, channels = blocks_of(transport), transport.channels
+    """Send an image back; see `sent_back_in_steps`."""
+    read = blocks_of(transport)
+
+    def blocks() -> Iterator[Transport]:
+        return (block.with_gains(**gains) if gains else block for block in read())
+
+    total = np.zeros((*transport.projector, transport.channels))
+    for _ in sent_back_in_steps(blocks, image, reciprocity, total):
+        pass
+    return total
+
+
+def sent_back_in_steps(
+    blocks: Blocks, image: Floats, reciprocity: Reciprocity | None, total: Floats
+) -> Iterator[None]:
+    """Send an image back to the projector, one block of camera rows in each step.
+
+    Parameters
+    ----------
+    blocks : callable
+        Yields the transport in blocks of camera rows; called a second time for reciprocity.
+    image : ndarray, shape (Cy, Cx, channels)
+    reciprocity : Reciprocity, optional
+        Used if it holds.
+    total : ndarray, shape (Py, Px, channels)
+        Zeros, to which the view is added.
+    """
     sharper = None
     if reciprocity is not None and reciprocity.holds:
-        sharper = ByReciprocity(reciprocity, channels)
-    total, first = np.zeros((*transport.projector, channels)), 0
-    for rows in blocks():
-        lit = image[first : first + rows.camera.height]
-        block = rows.with_gains(**gains) if gains else rows
-        total += block.adjoint(lit).reshape(total.shape)
+        sharper = ByReciprocity(reciprocity, total.shape[-1])
+    first = 0
+    for block in blocks():
+        lit = image[first : first + block.camera.height]
+        if lit.any():
+            total += block.adjoint(lit).reshape(total.shape)
         if sharper is not None:
             sharper.send(block, lit)
-        first += rows.camera.height
-    if sharper is None:
-        return total
-    for rows in blocks():
-        sharper.see(rows.with_gains(**gains) if gains else rows)
-    return total + sharper.change()
+        first += block.camera.height
+        yield
+    if sharper is not None:
+        for block in blocks():
+            sharper.see(block)
+            yield
+        total += sharper.correction()
 
 
 def _image(picture: Floats | None, camera: Size, channels: int) -> Floats:

@@ -90,7 +90,7 @@ class Reciprocity:
 
 
 class ByReciprocity:
-    """What reciprocity changes in a dual view, added up over blocks of rows that are read twice.
+    """The correction of a transposed view by reciprocity, summed over blocks that are read twice.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class ByReciprocity:
         self._count += factors.spread_directly(np.ones(len(flat)))
 
     def see(self, block: Transport) -> None:
-        """See the camera pixels of a block in the light that was sent; after all were sent."""
+        """Relight the camera pixels of a block by all the light that was sent, and add them up."""
         light = (self._light / self._ratio).astype(np.float32)
         components = block.components(light if light.shape[-1] > 1 else light[..., 0])
         seen = components.far + NEAR_SHARE * components.near
@@ -123,8 +123,11 @@ class ByReciprocity:
         for i in range(flat.shape[1]):
             self._seen[..., i] += block.factors.spread_directly(flat[:, i])
 
-    def change(self) -> Floats:
-        """Return what to add to T^T by the picture, (Py, Px, channels); 0 where nothing is seen."""
+    def correction(self) -> Floats:
+        """Return the correction of the transposed view, shape (Py, Px, channels).
+
+        0 at projector pixels that no camera pixel sees.
+        """
         seen = _mean_seen(self._seen, self._count)
         return np.where(np.isnan(seen), 0.0, self._ratio * seen - self._transposed)
 

@@ -87,7 +87,8 @@ def dual(
             "camera_flat": _flat(camera_flat, camera),
             "projector_flat": _flat(projector_flat, opened.projector),
         }
-        found = None if transpose else find_reciprocity(opened)
+        is_direct = all(gains.get(part, 1.0) == 0 for part in ("near", "far"))
+        found = None if transpose or is_direct else find_reciprocity(opened)
         view = dual_view_of_stored(opened, sent, gains, **flats, reciprocity=found)
         write_picture(output, view, force=force)
     say(f"dual view of {opened.projector} written to {output}{_told(found)}", quiet=quiet)

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nearfar.applications.dual import dual_view
-from nearfar.applications.reciprocity import ByReciprocity
+from nearfar.applications.dual import sent_back_in_steps
 from nearfar.arrays import Floats, Size, middles
 from nearfar.files import luminance
 from nearfar.viewer.interactive import (
@@ -49,23 +48,9 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
     if picture.ndim == 3 and channels != COLOUR:
         picture = luminance(picture)
     picture = np.broadcast_to(picture.reshape(*camera, -1), (*camera, channels))
-    total, first = np.zeros((*transport.projector, channels), dtype=np.float32), 0
-    sharper = None
-    if not header.coarse and transport.reciprocity.holds:
-        sharper = ByReciprocity(transport.reciprocity, channels)
-    for block in transport.blocks():
-        rows = picture[first : first + block.camera.height]
-        if rows.any():
-            total += dual_view(block, rows).reshape(total.shape)
-        if sharper is not None:
-            sharper.send(block, rows)
-        first += block.camera.height
-        yield None
-    if sharper is not None:
-        for block in transport.blocks():
-            sharper.see(block)
-            yield None
-        total += sharper.change()
+    total = np.zeros((*transport.projector, channels), dtype=np.float32)
+    reciprocity = None if header.coarse else transport.reciprocity
+    yield from sent_back_in_steps(transport.blocks, picture, reciprocity, total)
     most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
     scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
     # A projector pixel adds up the camera pixels that see its light.

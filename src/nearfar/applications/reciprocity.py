@@ -1,19 +1,19 @@
 """Light of dual views by reciprocity.
 
-A measured row of far-range light has a few waves, so F^T blurs texture on the projector's side. The
-camera shows that texture: where surfaces are diffuse, light goes from one point of the scene to
-another as it goes back (Helmholtz; Sen et al., "Dual photography", SIGGRAPH 2005). Let c' be the
-camera pixels that a projector pixel p lights directly, and p' = q(c) the projector pixel that
-lights c. Then
+A measured row of far-range light has a few waves, so that F^T blurs the projector's side. Columns
+are as sharp as photos. Between two points of diffuse surfaces, light is transported alike in both
+directions (Helmholtz reciprocity; Sen et al., "Dual photography", SIGGRAPH 2005). Let c' be a
+camera pixel with q(c') = p, and p' = q(c). Then
 
     F[c, p] = F[c', p'] r(p) / r(p')
 
-with one smooth function r for what lenses and lamps do to the four rays. Far-range light at p is
-thus relit from the camera's light, sent to where it comes from directly, and seen at c'. The same
-holds of near-range light, of which N^T is as good: it is the mean of both.
+with one smooth function r for the vignetting of both lenses. So F^T by a picture is found in three
+steps: the picture is spread over the projector at q, far-range light is relit under that, and each
+projector pixel takes the mean of the camera pixels c'. Near-range light is the mean of this and of
+N^T.
 
-log r is a polynomial of second degree, fitted to F between cells of the projector. Where the two
-sides do not agree at measured frequencies, as with gloss, glass or mirrors, F^T stays.
+log r is a polynomial of second degree, fitted to F between cells of the projector. If the two
+directions disagree at measured frequencies, as with gloss, glass or mirrors, F^T is kept.
 
 Index convention: i and j run over cells of projector pixels, m over real responses.
 """

@@ -83,6 +83,28 @@ def test_light_on_the_cameras_side_is_dragged(open_page, address, transport):
     assert page.is_visible("#light")
 
 
+def test_components_are_sent_back_apart_with_their_gains(open_page, address, transport):
+    white = np.ones(CAMERA, np.float32)
+    state = {"kind": "white", "tool": "dual", "cameraLight": "white"}
+    page = open_page(address, {**state, "solo": "direct"})
+    direct = transport.with_gains(near=0, far=0)
+    _shows(page, nearfar.dual_view(direct, white))
+    said = "as the projector sees it, lit from the camera"
+    assert page.inner_text("#stage-label") == f"{said}, direct light only"
+    page.evaluate("""() => { const s = document.querySelector('[data-of=direct]');
+        s.value = 0.5; s.dispatchEvent(new Event('input')); }""")
+    _shows(page, 0.5 * nearfar.dual_view(direct, white))
+    page.click("[data-solo=direct]")
+    assert page.inner_text("#stage-label") == f"{said}, direct × 0.5"
+    found = nearfar.find_reciprocity(transport)
+    whole = nearfar.dual_view(transport.with_gains(direct=0.5), white, reciprocity=found)
+    _shows(page, whole)
+    # The physical split cannot be sent back: the view is whole.
+    page.click("[data-split=physical]")
+    _shows(page, _dual(transport, white))
+    assert page.inner_text("#stage-label") == said
+
+
 def test_the_address_keeps_the_light_on_the_cameras_side(open_page, address, transport):
     state = {"tool": "dual", "cameraX": 7, "cameraY": 3, "cameraRadius": 0.5}
     page = open_page(address, {**state, "cameraLight": "<b>"})

@@ -7,6 +7,7 @@ import numpy as np
 from nearfar.applications.dual import sent_back_in_steps
 from nearfar.arrays import Floats, Size, middles
 from nearfar.files import luminance
+from nearfar.transport.model import Transport
 from nearfar.viewer.interactive import (
     COLOUR,
     MAXIMUM_DISPLAYED_PIXELS,
@@ -34,7 +35,8 @@ class DualHeader(LightHeader):
 def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iterator[bytes | None]:
     """Make the dual view of a light at the camera, in steps of a block of camera rows.
 
-    Far-range light of a light at rest is by reciprocity, where it holds.
+    Components have the gains of the header. Far-range light of a light at rest is by reciprocity,
+    where it holds.
 
     Raises
     ------
@@ -49,8 +51,16 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
         picture = luminance(picture)
     picture = np.broadcast_to(picture.reshape(*camera, -1), (*camera, channels))
     total = np.zeros((*transport.projector, channels), dtype=np.float32)
-    reciprocity = None if header.coarse else transport.reciprocity
-    yield from sent_back_in_steps(transport.blocks, picture, reciprocity, total)
+    gains = header.gains.of_parts(transport.stored.parts)
+    is_direct = all(gain == 0 for part, gain in gains.items() if part != "direct")
+    reciprocity = None if header.coarse or is_direct else transport.reciprocity
+
+    as_it_is = all(gain == 1 for gain in gains.values())
+
+    def weighed() -> Iterator[Transport]:
+        return (b if as_it_is else b.with_gains(**gains) for b in transport.blocks())
+
+    yield from sent_back_in_steps(weighed, picture, reciprocity, total)
     most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
     scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
     # A projector pixel adds up the camera pixels that see its light.

@@ -7,8 +7,12 @@ import { ONE_PIXEL } from './painting.js';
 import { drawPicture, exposureFor, pictureOf } from './picture.js';
 import { pack, requestMessage } from './protocol.js';
 import { shapeOf } from './shapes.js';
+import { shareText } from './splits.js';
+import { SPLITS, gainsOf } from './state.js';
 
-const KEYS = ['cameraLight', 'cameraX', 'cameraY', 'cameraRadius'];
+// Of the splits, the model's alone can be sent back.
+const SPLIT = 'model';
+const KEYS = ['cameraLight', 'cameraX', 'cameraY', 'cameraRadius', 'split', 'solo', ...SPLITS[SPLIT]];
 const SOFT = 0.3;
 const CLICK_DISTANCE = 4;
 // Larger pictures come coarsely while the light moves.
@@ -20,6 +24,8 @@ export class Dual {
   #page;
   #job;
   #levels;
+  // That the picture was asked for in.
+  #split;
 
   constructor(page) {
     this.#page = page;
@@ -38,9 +44,15 @@ export class Dual {
 
   frameArrived() { this.#draw(this.#page.store.state); }
 
+  // Another split draws the light anew.
+  lightChanged() { if (this.#page.store.state.split !== this.#split) this.#ask(); }
+
   changed(changes) { if (KEYS.some(name => name in changes)) this.#ask(); }
 
-  label() { return 'as the projector sees it, lit from the camera'; }
+  label(state) {
+    const share = state.split === SPLIT && shareText(this.#page.scene, state, SPLIT);
+    return ['as the projector sees it, lit from the camera', share].filter(Boolean).join(', ');
+  }
 
   show(state) {
     for (const button of all('[data-camera-light]')) set(button, 'ariaPressed', String(button.dataset.cameraLight === state.cameraLight));
@@ -56,7 +68,8 @@ export class Dual {
   }
 
   #ask() {
-    const { scene: { projector: [height, width] }, scenePictures } = this.#page;
+    const { scene: { projector: [height, width] }, scenePictures, store } = this.#page;
+    this.#split = store.state.split;
     scenePictures.isStageFinal = false;
     const isSmall = height * width <= SMALL_PIXELS;
     this.#job.ask((isSmall ? [false] : [true, false]).map(coarse => signal => this.#look(coarse, signal)));
@@ -67,7 +80,8 @@ export class Dual {
     const isPixel = state.cameraLight === 'spot' && state.cameraRadius <= ONE_PIXEL;
     const spot = { kind: isPixel ? 'pixel' : state.cameraLight, x: state.cameraX, y: state.cameraY, radius: state.cameraRadius, soft: SOFT };
     this.#levels.fill(shapeOf(spot, rows, columns));
-    const body = pack({ shape: this.#levels.shape, colour: [1, 1, 1], coarse }, this.#levels.values);
+    const gains = state.split === SPLIT ? Object.fromEntries(gainsOf(state, SPLIT).map((gain, i) => [SPLITS[SPLIT][i], gain])) : {};
+    const body = pack({ shape: this.#levels.shape, colour: [1, 1, 1], coarse, gains }, this.#levels.values);
     const { header, arrays: [found] } = await requestMessage('tool/dual', { method: 'POST', body, signal });
     // As bright as the relit scene, however many camera pixels there are for each of the projector.
     const picture = pictureOf(found, header.scale / header.brightness);

@@ -2,7 +2,7 @@
 
 import { all, get, set } from './dom.js';
 import { request } from './protocol.js';
-import { SPLITS, canSplitPhysically, hasPart, isFree } from './state.js';
+import { SPLITS, canSplitPhysically, gainsOf, hasPart, isFree, soloOf } from './state.js';
 
 // What each component is called, by the name of its gain.
 const TITLES = {
@@ -10,6 +10,14 @@ const TITLES = {
 };
 
 export const titleOf = (scene, name) => name === 'far' && isFree(scene) ? 'lamp by lamp' : TITLES[name];
+
+// What is shown of a split's components: '' for all of them as they are.
+export function shareText(scene, state, split) {
+  const solo = soloOf(state, split);
+  if (solo) return `${titleOf(scene, solo)} light only`;
+  const gains = gainsOf(state, split);
+  return SPLITS[split].filter((_, i) => gains[i] !== 1).map(name => `${titleOf(scene, name)} × ${+state[name].toFixed(2)}`).join(', ');
+}
 
 // The physical split takes the server seconds, once: until then the model's is shown.
 export class Splits {

@@ -1,8 +1,8 @@
 // What the scene's picture shows: the relit scene, or what a tool makes of it.
 
 import { all, get, set } from './dom.js';
-import { SPLITS, gainsOf, soloOf } from './state.js';
-import { titleOf } from './splits.js';
+import { shareText } from './splits.js';
+import { soloOf } from './state.js';
 
 export class Tools {
   #page;
@@ -68,9 +68,7 @@ export class Tools {
   }
 
   #relitLabel(state, split) {
-    const { scene } = this.#page, solo = soloOf(state, split);
-    if (solo) return `${titleOf(scene, solo)} light only`;
-    const gains = gainsOf(state, split), changed = SPLITS[split].filter((_, i) => gains[i] !== 1);
-    return ['relit', ...changed.map(name => `${titleOf(scene, name)} × ${+state[name].toFixed(2)}`)].join(', ');
+    const share = shareText(this.#page.scene, state, split);
+    return soloOf(state, split) ? share : ['relit', share].filter(Boolean).join(', ');
   }
 }

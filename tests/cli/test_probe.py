@@ -110,3 +110,29 @@ def test_srgb_is_of_a_light_that_is_named(job, command):
     assert ran.status == 2
     assert "goes with --light only" in ran.err
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        ("subsurface=2", "give direct, near, far or free"),
+        ("foo=1", "write direct=1, near=2, far=0 or free=1, a finite number each"),
+        ("near=nan", "a finite number each"),
+    ],
+)
+def test_a_gain_that_dual_views_do_not_take_is_answered_by_those_they_do(job, gain, words):
+    out = job.folder / "dual.npy"
+    ran = run_nearfar("dual", job.transport, out, "--gain", gain)
+    assert ran.status == 2
+    said = " ".join(ran.err.replace("│", " ").split())
+    assert words in said
+    assert "interreflection" not in said
+    assert not out.exists()
+
+
+def test_far_range_light_that_is_left_out_is_not_spoken_of(job):
+    out = job.folder / "dual.npy"
+    assert "far-range" in run_nearfar("dual", job.transport, out).out
+    assert (
+        "far-range" not in run_nearfar("dual", job.transport, out, "--force", "--gain", "far=0").out
+    )

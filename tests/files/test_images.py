@@ -242,6 +242,26 @@ def test_an_array_holds_any_number_of_channels(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.load(tmp_path / "a.npy"), image)
 
 
+@pytest.mark.parametrize("channels", [1, 3])
+def test_a_jpeg_is_an_ordinary_picture_as_a_light_and_nothing_else(
+    tmp_path: Path, channels: int
+) -> None:
+    levels = np.full((8, 16, channels), 128, np.uint8)
+    path = tmp_path / "light.jpg"
+    path.write_bytes(imagecodecs.jpeg8_encode(levels.squeeze(), level=99))
+    light = read_light(path, Size(8, 16), srgb=True)
+    assert light.shape == levels.squeeze().shape
+    np.testing.assert_allclose(light, from_srgb(np.array(128 / 255)), rtol=0.02)
+    with pytest.raises(InputError, match="an ordinary sRGB picture and not linear: say so by"):
+        read_light(path, Size(8, 16))
+    # Photos are linear.
+    with pytest.raises(UnreadableFileError, match="is a JPEG"):
+        read_picture(path)
+    path.write_bytes(path.read_bytes()[:60])
+    with pytest.raises(UnreadableFileError, match="is a damaged JPEG"):
+        read_light(path, Size(8, 16), srgb=True)
+
+
 def test_srgb_is_there_and_back() -> None:
     values = np.linspace(0, 1, 65536, dtype=np.float32)
     np.testing.assert_allclose(to_srgb(from_srgb(values)), values, atol=1e-6)

@@ -69,13 +69,7 @@ def dual(
     from nearfar.files import check_output, check_picture_ending, write_picture
 
     require_light(light, srgb=srgb, resize=False)
-    gains = gains_of(gain or [])
-    for name in gains:
-        if name not in MODEL:
-            raise typer.BadParameter(
-                f"{name} is a component of the physical split: give direct, near, far or free.",
-                param_hint="--gain",
-            )
+    gains = gains_of(gain or [], MODEL)
     check_picture_ending(output)
     keep_input(output, transport, *filter(None, (light, camera_flat, projector_flat)))
     check_output(output, force=force)
@@ -91,7 +85,8 @@ def dual(
         found = None if transpose or is_direct else find_reciprocity(opened)
         view = dual_view_of_stored(opened, sent, gains, **flats, reciprocity=found)
         write_picture(output, view, force=force)
-    say(f"dual view of {opened.projector} written to {output}{_told(found)}", quiet=quiet)
+    told = "" if gains.get("far", 1.0) == 0 else _told(found)
+    say(f"dual view of {opened.projector} written to {output}{told}", quiet=quiet)
 
 
 def _told(reciprocity: "Reciprocity | None") -> str:

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -80,6 +81,22 @@ def decode_picture(data: bytes, path: Path) -> NDArray[Any]:
             f"{path} is damaged or cut short: copy or save it again."
         ) from error
     return _checked(path, pixels)
+
+
+def decode_jpeg(data: bytes, path: Path) -> NDArray[np.uint8]:
+    """Decode the bytes of a JPEG, whose levels are those of a screen, not the light's.
+
+    Raises
+    ------
+    UnreadableFileError
+        If it is damaged.
+    """
+    try:
+        return np.asarray(imagecodecs.jpeg8_decode(data), dtype=np.uint8)
+    except (imagecodecs.Jpeg8Error, ValueError, RuntimeError):
+        raise UnreadableFileError(
+            f"{path} is a damaged JPEG: copy, take or save it again."
+        ) from None
 
 
 def is_raw(path: Path) -> bool:
@@ -180,7 +197,7 @@ def read_light(path: Path, projector: Size, *, srgb: bool = False) -> NDArray[np
     projector : Size
         Size that the light must have.
     srgb : bool
-        The file is an ordinary sRGB picture of 8 or 16 bits.
+        The file is an ordinary sRGB picture of 8 or 16 bits; a JPEG is nothing else.
 
     Returns
     -------
@@ -203,7 +220,16 @@ def read_light_of_any_size(path: Path, *, srgb: bool = False) -> NDArray[np.floa
     array
         float32, shape (height, width) or (height, width, 3).
     """
-    pixels = read_picture(path)
+    data = _read_bytes(path)
+    if not data.startswith(JPEG_SIGNATURE):
+        pixels = decode_picture(data, path)
+    elif srgb:
+        pixels = _checked(path, decode_jpeg(data, path))
+    else:
+        raise InputError(
+            f"{path} is a JPEG, an ordinary sRGB picture and not linear: say so by `srgb`, or give "
+            f"linear light as {PICTURE_KINDS}."
+        )
     if srgb and pixels.dtype.kind == "f":
         raise InputError(f"{path} holds floats, which are linear light: leave out `srgb`.")
     light = pixels.astype(np.float32) / np.float32(full_scale_of(pixels.dtype))

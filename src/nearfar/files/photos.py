@@ -3,12 +3,16 @@
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.errors import UnreadableFileError
-from nearfar.files.images import JPEG_SIGNATURE, decode_picture, full_scale_of, is_raw
+from nearfar.files.images import (
+    JPEG_SIGNATURE,
+    decode_jpeg,
+    decode_picture,
+    full_scale_of,
+    is_raw,
+)
 from nearfar.files.raw import decode_raw
 
 
@@ -38,11 +42,7 @@ def decode_camera_file(data: bytes, name: Path) -> CameraFile:
         As `nearfar.files.read_picture`.
     """
     if data.startswith(JPEG_SIGNATURE):
-        try:
-            levels = np.atleast_3d(np.asarray(imagecodecs.jpeg8_decode(data)))
-        except (imagecodecs.Jpeg8Error, ValueError, RuntimeError):
-            raise UnreadableFileError(f"{name} is a damaged JPEG: take it again.") from None
-        return CameraFile(levels, 255.0, linear=False)
+        return CameraFile(np.atleast_3d(decode_jpeg(data, name)), 255.0, linear=False)
     if is_raw(name):
         levels, white = decode_raw(data, name)
         return CameraFile(levels, white, linear=True)

@@ -62,6 +62,12 @@ class Shot:
         """Return values as a camera's counts."""
         return np.rint(np.clip(values, 0, self.full_scale)).astype(self.photos.dtype)
 
+    def middle_of(self, level: float) -> int:
+        """Return the photo in the middle of those of black, 0, or white, 1."""
+        drawn = [self.plan.draw(number) / 255.0 for number in range(len(self.photos))]
+        of_it = [number for number, light in enumerate(drawn) if np.all(light == level)]
+        return of_it[len(of_it) // 2]
+
     def chosen(self, count: int) -> list[int]:
         """Choose some photos of transport."""
         own = [
@@ -162,6 +168,22 @@ def _(shot: Shot, pixels: float) -> Photos:
     return shot.counts(photos)
 
 
+@spoil("camera moved for a while, pixels", ("moved",), 0.2, 0.4, 1.0, 2.0)
+def _(shot: Shot, pixels: float) -> Photos:
+    photos = shot.photos.astype(float)
+    for number in range(shot.half // 2, shot.half):
+        photos[number] = ndimage.shift(photos[number], (pixels, 0, 0), order=3, mode="nearest")
+    return shot.counts(photos)
+
+
+@spoil("camera moved far, pixels", ("moved",), 2.0, 8.0)
+def _(shot: Shot, pixels: float) -> Photos:
+    photos = shot.photos.astype(float)
+    for number in range(shot.half, len(photos)):
+        photos[number] = ndimage.shift(photos[number], (pixels, 0, 0), order=3, mode="nearest")
+    return shot.counts(photos)
+
+
 @spoil("part of the scene moved, pixels", ("moved",), 0.1, 0.2, 0.3, 1.0)
 def _(shot: Shot, pixels: float) -> Photos:
     photos = shot.photos.astype(float)
@@ -246,6 +268,56 @@ def _(shot: Shot, count: float) -> Photos:
         return both
 
     return shot.each(interlaced, int(count))
+
+
+@spoil("photos cut off", ("torn",), 1, 2)
+def _(shot: Shot, count: float) -> Photos:
+    def cut_off(photo: Photos, _: int) -> Photos:
+        rest = photo.copy()
+        rest[len(photo) // 2 :] = 0
+        return rest
+
+    return shot.each(cut_off, int(count))
+
+
+@spoil("all photos in reverse", ("order",), 1)
+def _(shot: Shot, _: float) -> Photos:
+    return shot.photos[::-1].copy()
+
+
+@spoil("photos late from the middle on", ("order",), 1, 2)
+def _(shot: Shot, late: float) -> Photos:
+    photos, by = shot.photos.copy(), int(late)
+    photos[shot.half :] = shot.photos[shot.half - by : len(photos) - by]
+    return photos
+
+
+@spoil("highlights compressed", ("not-linear",), 0.7, 0.6, 0.5)
+def _(shot: Shot, knee: float) -> Photos:
+    light = shot.photos / shot.full_scale
+    return shot.counts(shot.full_scale * np.minimum(light, knee + (light - knee) / 2))
+
+
+@spoil("one black under room light", ("exposure", "lamp"), 0.02, 0.05)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    photos[shot.middle_of(0.0)] += share * shot.full_scale
+    return shot.counts(photos)
+
+
+@spoil("one white brighter", ("exposure", "lamp"), 0.05, 0.1)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    photos[shot.middle_of(1.0)] *= 1 + share
+    return shot.counts(photos)
+
+
+@spoil("a hand before one white", ("unknown", "exposure"), 0.5, 1.0)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    side = photos.shape[1] // 3
+    photos[shot.middle_of(1.0), :side, :side] *= 1 - share / 2
+    return shot.counts(photos)
 
 
 @spoil("exposure of three photos", ("exposure",), 0.05, 0.07, 0.1, 0.2)

@@ -17,6 +17,10 @@ Cause = Literal[
     "unknown",
 ]
 
+# Photos that are swapped, and named one by one.
+MOST_SWAPS = 4
+# Which photo it is that is so many places away.
+LATE = {1: "photo", 2: "second photo", 3: "third photo"}
 SHOOT_AGAIN = "shoot again from there on, or all, with camera, projector and scene at rest"
 
 
@@ -54,17 +58,20 @@ class ShowsOtherPattern:
 
     def __str__(self) -> str:
         pairs = dict(zip(self.photos, self.others, strict=True))
+        if len(pairs) > MOST_SWAPS and len({photo + other for photo, other in pairs.items()}) == 1:
+            return f"{_photos(self.photos)} are in reverse: put them in the order of the plan."
         if len(pairs) > 1 and all(pairs.get(other) == photo for photo, other in pairs.items()):
             swaps = [(a, b) for a, b in pairs.items() if a < b]
             what = ", ".join(f"{a} and {b}" for a, b in swaps)
             return f"photos {what} are swapped: put them in the order of the plan, or shoot again."
         shift = {photo - other for photo, other in pairs.items()}
-        if len(shift) == 1 and abs(*shift) == 1:
-            late = "the photo before" if shift == {1} else "the photo after"
+        if len(shift) == 1 and (abs(*shift) == 1 or len(pairs) > MOST_SWAPS):
+            (by,) = shift
+            late = LATE.get(abs(by), f"photo {abs(by)} places")
             return (
-                f"{_photos(self.photos)} show{'s' if len(pairs) == 1 else ''} the pattern of "
-                f"{late}: camera and projector were out of step; shoot again with "
-                f"more time between a pattern and its photo."
+                f"{_photos(self.photos)} show{'s' if len(pairs) == 1 else ''} the pattern of the "
+                f"{late} {'before' if by > 0 else 'after'}: camera and projector were out of step; "
+                f"shoot again with more time between a pattern and its photo."
             )
         what = ", ".join(f"{a} is of pattern {b}" for a, b in list(pairs.items())[:4])
         return f"photos are out of order ({what}): put them in the order of the plan."
@@ -189,11 +196,14 @@ class Moved:
         First photo after it.
     pixels : float or None
         How far, in camera pixels, where that is known.
+    until : int or None
+        First photo after it was back where it had been; None if it stayed.
     """
 
     what: str
     photo: int
     pixels: float | None
+    until: int | None = None
 
     @property
     def cause(self) -> Cause:
@@ -202,6 +212,13 @@ class Moved:
 
     def __str__(self) -> str:
         where = f"before photo {self.photo}: {SHOOT_AGAIN}."
+        if self.until is not None:
+            between = listed_numbers(range(self.photo, self.until))
+            photos = "photo" if self.until == self.photo + 1 else "photos"
+            where = (
+                f"before photo {self.photo} and was back before photo {self.until}: shoot {photos} "
+                f"{between} again, with camera, projector and scene at rest."
+            )
         match self.what:
             case "projector":
                 return f"the projector moved, or its focus changed, {where}"
@@ -209,7 +226,8 @@ class Moved:
                 return f"the camera's focus changed {where}"
             case _:
                 what = "the camera" if self.what == "camera" else "part of the scene"
-                return f"{what} moved by about {self.pixels or 0.0:.2g} camera pixels {where}"
+                far = "" if self.pixels is None else f" by about {self.pixels:.2g} camera pixels"
+                return f"{what} moved{far} {where}"
 
 
 @dataclass(frozen=True)
@@ -260,6 +278,20 @@ class Compressed:
 
 
 @dataclass(frozen=True)
+class PhotosIncomplete:
+    """Photos with rows of one value from side to side, which no camera takes."""
+
+    photos: tuple[int, ...]
+    cause: ClassVar[Cause] = "torn"
+
+    def __str__(self) -> str:
+        return (
+            f"{_photos(self.photos)} {_is(self.photos)} incomplete, with rows of one value from "
+            f"side to side: shoot {'it' if len(self.photos) == 1 else 'them'} again."
+        )
+
+
+@dataclass(frozen=True)
 class PhotosMisfit:
     """Photos that do not fit the others, for no reason that is known."""
 
@@ -288,5 +320,6 @@ Spoilt = (
     | BlackClipped
     | NotLinear
     | Compressed
+    | PhotosIncomplete
     | PhotosMisfit
 )

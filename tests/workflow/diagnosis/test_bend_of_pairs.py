@@ -57,3 +57,20 @@ def test_a_linear_response_has_none_within_its_deviation():
 
 def test_without_pairs_nothing_is_told():
     assert bend_of_pairs(bent(0, 0.05, patterns=PAIRS[:2])) is None
+
+
+def test_all_pairs_share_a_bend_and_a_photo_under_other_exposure_bends_its_own_alone():
+    fits = bent(0, -0.08, error=0.0)
+    assert bend_of_pairs(fits).shared == pytest.approx(0.08, abs=0.01)
+    good = bent(0, 0.0, error=0.0)
+    good.photos[0] *= 1.1
+    found = bend_of_pairs(good)
+    assert abs(found.size) > 0.03
+    assert found.shared < 0.005
+
+
+def test_one_pair_shares_nothing():
+    patterns = (PAIRS[0], Picture(seed=3), PAIRS[2], Picture(seed=4, inverse=True))
+    found = bend_of_pairs(bent(0, -0.08, patterns=patterns, error=0.0))
+    assert found.size < -0.05
+    assert found.shared == 0.0

@@ -64,6 +64,15 @@ def test_good_photos_are_not_accused(spoilt_by):
         ("photos doubled", 1),
         ("exposure of three photos", 0.2),
         ("colours swapped", 1),
+        ("camera moved for a while, pixels", 0.4),
+        ("camera moved for a while, pixels", 2.0),
+        ("camera moved far, pixels", 2.0),
+        ("photos cut off", 1),
+        ("all photos in reverse", 1),
+        ("photos late from the middle on", 1),
+        ("one black under room light", 0.05),
+        ("one white brighter", 0.1),
+        ("a hand before one white", 1.0),
     ],
 )
 def test_what_spoils_photos_is_named(spoilt_by, name, strength):
@@ -71,10 +80,30 @@ def test_what_spoils_photos_is_named(spoilt_by, name, strength):
     assert found[0].cause in SPOILS[name].causes, "; ".join(map(str, found))
 
 
-@pytest.mark.parametrize("name", ["photos rotated", "photos doubled"])
+@pytest.mark.parametrize("name", ["photos rotated", "photos doubled", "photos cut off"])
 def test_the_photo_is_named(shot, spoilt_by, name):
     (found,) = spoilt_by(name, 1)
     assert list(found.photos) == shot.chosen(1)
+
+
+@pytest.mark.parametrize(
+    ("name", "strength", "level"),
+    [
+        ("one black under room light", 0.05, 0.0),
+        ("one white brighter", 0.1, 1.0),
+        ("a hand before one white", 1.0, 1.0),
+    ],
+)
+def test_a_white_or_black_that_is_odd_is_named_and_no_other(shot, spoilt_by, name, strength, level):
+    (found,) = spoilt_by(name, strength)
+    assert found.photos == (shot.middle_of(level),)
+
+
+@pytest.mark.parametrize("pixels", [0.4, 2.0])
+def test_photos_of_a_camera_that_was_elsewhere_are_named(shot, spoilt_by, pixels):
+    found, *_ = spoilt_by("camera moved for a while, pixels", pixels)
+    assert found.photo == pytest.approx(shot.half // 2, abs=3)
+    assert found.until == pytest.approx(shot.half, abs=3)
 
 
 def test_photos_that_are_swapped_explain_each_other(shot, spoilt_by):

@@ -104,6 +104,32 @@ def test_a_camera_moves_everywhere_and_a_part_of_the_scene_does_not():
         assert moved.pixels == pytest.approx(0.5)
 
 
+def stay(photo, until, size=1.0):
+    return np.where((np.arange(PHOTOS) >= photo) & (np.arange(PHOTOS) < until), size, 0.0)
+
+
+@pytest.mark.parametrize(("photo", "until"), [(24, 31), (30, 60), (5, 9), (60, 80)])
+def test_a_camera_that_moved_and_was_back_is_found_with_both_moments(photo, until):
+    sizes = stay(photo, until, 0.4)
+    (fault,) = found(DOWN, sizes)
+    assert fault == Moved("camera", photo, None, until)
+    assert f"shoot photos {photo} to {until - 1} again" in str(fault)
+
+
+def test_a_camera_that_stays_where_it_moved_is_not_back():
+    for photo in (20, 44, 70):
+        (fault,) = found(DOWN, step(photo, 0.5))
+        assert fault.until is None
+
+
+def test_a_motion_there_and_back_that_whites_do_not_show_is_none():
+    # Whites tell of one motion, other photos of another: what they share is told.
+    sizes = stay(23, 32, 0.3)
+    sizes[WHITES] = np.where(WHITES < 60, -0.5, 0.5)
+    assert found(DOWN, stay(23, 32, 0.3))[0].until == 32
+    assert all(fault.until is None for fault in found(DOWN, sizes))
+
+
 def test_light_below_one_percent_is_no_change():
     few = np.isin(np.arange(PHOTOS), [5, 50])
     (fault,) = found(GAIN, np.where(few, 0.02, 0.0), information=1e7)

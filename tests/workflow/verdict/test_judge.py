@@ -69,6 +69,32 @@ def test_what_limits_bad_pictures_is_named(decibels, grade):
 
 
 @pytest.mark.parametrize(
+    ("decibels", "unmeasured", "planned", "causes"),
+    [
+        (27, 0.99, (39.0, 47.0), ("below-plan",)),
+        # As planned, or nearly; or good enough for most.
+        (27, 0.99, (36.0, 44.0), ()),
+        (29, 0.99, (41.0, 49.0), ()),
+        # Noise allows no more, or nothing was planned.
+        (27, 0.5, (39.0, 47.0), ()),
+        (27, 0.99, None, ()),
+        # Told before what limits it, which may be a consequence.
+        (22, 0.99, (39.0, 47.0), ("below-plan",)),
+    ],
+)
+def test_pictures_far_below_the_plan_and_the_noise_are_doubtful(
+    decibels, unmeasured, planned, causes
+):
+    error = SIGNAL / 10 ** (decibels / 10)
+    light = at(decibels, noise=1e-12, unmeasured=unmeasured * error)
+    verdict = judge(HeldOut((light,)), [], planned_snr=planned)
+    assert (verdict.grade, verdict.causes) == ("doubtful" if causes else "good", causes)
+    assert verdict.planned_snr == planned
+    # What was found in the photos says more.
+    assert judge(HeldOut((light,)), [], [MOVED], planned_snr=planned).causes == ("moved",)
+
+
+@pytest.mark.parametrize(
     ("ratio", "expected"), [(9.0, ("good", ())), (11.0, ("doubtful", ("model",)))]
 )
 def test_fine_lights_may_be_off_by_more(ratio, expected):

@@ -1,19 +1,21 @@
 """Diagnosis of the photos of a capture, by all checks."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
+from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved, NotLinear, Spoilt
+from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
-from nearfar.workflow.diagnosis.bend_of_pairs import bend_of_pairs
+from nearfar.workflow.diagnosis.bend_of_pairs import Bend, bend_of_pairs
 from nearfar.workflow.diagnosis.compression import find_compression
+from nearfar.workflow.diagnosis.incomplete import find_incomplete
 from nearfar.workflow.diagnosis.inverse_pairs import (
     are_linear,
     find_motion_by_pairs,
@@ -28,7 +30,10 @@ from nearfar.workflow.diagnosis.misfit import (
     normal_equations,
     serves,
 )
+from nearfar.workflow.diagnosis.odd_references import find_odd_references
 from nearfar.workflow.diagnosis.sample import CameraSample, sample_camera
+from nearfar.workflow.diagnosis.sequence import find_other_order
+from nearfar.workflow.diagnosis.shifted_whites import find_shifted_whites
 from nearfar.workflow.diagnosis.single_photos import SWEEPS, SpoiltPhotos, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import (
     find_changes,
@@ -38,6 +43,8 @@ from nearfar.workflow.diagnosis.whole_capture import (
 
 # What a response that is not linear, or JPEG, looks like.
 OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
+# Bend of the response that the sums of all inverse photos show, at least, and over its deviation.
+LEAST_SHARED_BEND, SURE_DEVIATIONS = 0.02, 5.0
 
 
 def find_what_spoils(
@@ -84,6 +91,31 @@ def find_what_spoils(
         found = _what_spoils_pairs(transport, sample, compressed)
         progress(step, 1.0)
         return found
+    references = find_references(plan)
+    # These are certain without an estimate, which they spoil.
+    found = [
+        *find_other_order(sample.photos, plan),
+        *find_incomplete(sample.photos, references.blacks),
+        *find_shifted_whites(capture, references),
+    ]
+    if not found:
+        found = _what_does_not_fit(
+            transport, sample, compressed, lambda share: progress(step, share), suspected=suspected
+        )
+    progress(step, 1.0)
+    return found
+
+
+def _what_does_not_fit(
+    transport: StoredTransport,
+    sample: CameraSample,
+    compressed: Sequence[Spoilt],
+    progress: Callable[[float], None],
+    *,
+    suspected: bool | None,
+) -> list[Spoilt]:
+    """Find what spoils photos by reference, by how they fit the transport; the worst first."""
+    plan = sample.plan
     try:
         photos = sample.without_drift()
     except InputError:
@@ -91,31 +123,40 @@ def find_what_spoils(
         return []
     sampled = _estimate_of(transport, sample, photos)
     fits = fit_photos(photos, sampled)
-    progress(step, 3 / 4)
+    progress(3 / 4)
     single = find_spoilt_photos(fits, sampled.correspondence, suspected=suspected)
-    progress(step, 1.0)
     if single.certain:
         return [*single.certain, *single.probable]
     equations, misfit = normal_equations(sample, fits), fits.misfit
     if suspected is False:
         checks = serves(plan, "check")
         equations, misfit = equations.without(checks), np.where(checks, 1.0, misfit)
-    found = find_changes(
-        equations,
-        misfit,
-        photos.drift.references.whites,
-        inverse_photos(plan),
-        bend_of_pairs(fits),
-    )
-    if not found:
+    references, of_pairs = photos.drift.references, bend_of_pairs(fits)
+    found = find_changes(equations, misfit, references.whites, inverse_photos(plan), of_pairs)
+    # Others look spoilt because the drift is told by these, unless these moved with others.
+    odd = find_odd_references(sample.photos, references)
+    if odd and not any(isinstance(each, Moved) for each in found):
+        return odd
+    if not found and not _bends_all_pairs(of_pairs, found):
         return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.
     response = [*compressed, *find_clipped_black(sample)]
     if not response and (encoding := name_encoding(sample)):
         response = [NotLinear(encoding)]
+    elif not response and _bends_all_pairs(of_pairs, found):
+        response = [NotLinear("")]
     if response:
         found = [each for each in found if not isinstance(each, OF_RESPONSE)]
     return [*response, *found]
+
+
+def _bends_all_pairs(of_pairs: Bend | None, found: Sequence[Spoilt]) -> bool:
+    """Return whether what looks like exposure bends the sums of all inverse photos alike."""
+    return (
+        of_pairs is not None
+        and of_pairs.shared > max(LEAST_SHARED_BEND, SURE_DEVIATIONS * of_pairs.deviation)
+        and all(isinstance(each, OF_RESPONSE) for each in found)
+    )
 
 
 def _estimate_of(

@@ -130,8 +130,11 @@ def exposure_change(fits: PhotoFits, number: int) -> Explanation:
     rest = differences[0] - (solved * [1.0, mean_white(fits)]) @ effects
     misfit = float((weight * rest**2).mean())
     largest = float(np.abs(solved).max())
-    if largest < SMALLEST_CHANGE or any(
-        float(np.abs(of_sum).max()) < LEAST_IN_SUM * largest for of_sum in of_sums
+    # No exposure takes away more than all light.
+    if (
+        largest < SMALLEST_CHANGE
+        or solved[0] <= -1
+        or any(float(np.abs(of_sum).max()) < LEAST_IN_SUM * largest for of_sum in of_sums)
     ):
         misfit = np.inf
     return Explanation("exposure", misfit, gain=float(solved[0]), offset=float(solved[1]))

@@ -5,10 +5,8 @@ How much of the photos' misfits each of them explains is read off the normal equ
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers
 from nearfar.faults.of_photos import (
@@ -23,6 +21,14 @@ from nearfar.files import from_srgb
 from nearfar.photometry.drift import find_references
 from nearfar.plan.checks import check_lights
 from nearfar.workflow.diagnosis.bend_of_pairs import Bend
+from nearfar.workflow.diagnosis.changes import (
+    Stay,
+    Step,
+    best_stay,
+    best_step,
+    explained_by,
+    solved,
+)
 from nearfar.workflow.diagnosis.misfit import (
     ACROSS,
     BEND,
@@ -47,6 +53,8 @@ LEAST_SHARE = 0.05
 FROM_THE_ENDS = 4
 # One change has to explain this share of what effects of a size of their own in each photo do.
 LEAST_OF_EACH = 0.3
+# A motion there and back has to explain so many times what one change does.
+STAY_OVER_CHANGE = 2.0
 # Misfit of the photos of white that has to be explained where camera or scene moved.
 LEAST_OF_WHITE = 0.3
 # A bend of the response has to explain at least this, and this share of the misfits beyond 1.
@@ -75,24 +83,6 @@ DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
 NAMED_SHARE = 0.2
 # Share of camera pixels at which all photos of black read the lowest level.
 CLIPPED_SHARE = 0.2
-
-
-class Step(NamedTuple):
-    """A change between two photos.
-
-    Attributes
-    ----------
-    explained : float
-        Misfit, summed over photos.
-    photo : int
-        The first photo after it.
-    size : ndarray
-        Effects after it less those before.
-    """
-
-    explained: float
-    photo: int
-    size: NDArray[np.float64]
 
 
 def find_changes(
@@ -153,7 +143,13 @@ def find_changes(
         projector = projector._replace(explained=0.0)
         if _explained_of_white(equations, whites, [CAMERA_FOCUS]) < shift_of_white:
             focus = focus._replace(explained=0.0)
-    if projector.explained > max(least, in_regions, focus.explained):
+    stay = _stay(whole, whites)
+    # Whites that show a motion show this one, too.
+    shown = not of_white or bool(np.any((whites >= stay.photo) & (whites < stay.until)))
+    of_one_change = max(projector.explained, focus.explained, camera.explained, in_regions)
+    if shown and stay.explained > max(least, STAY_OVER_CHANGE * of_one_change):
+        found.append((stay.explained, Moved("camera", stay.photo, None, stay.until)))
+    elif projector.explained > max(least, in_regions, focus.explained):
         found.append((projector.explained, Moved("projector", projector.photo, None)))
     elif focus.explained > max(least, in_regions):
         found.append((focus.explained, Moved("camera's focus", focus.photo, None)))
@@ -195,13 +191,13 @@ def _explained_by_bend(whole: NormalEquations, of_pairs: Bend | None) -> float:
             and missing > SURE_DEVIATIONS * of_pairs.deviation
         ):
             return 0.0
-    return _explained(matrix, vector, [BEND]) / whole.values
+    return explained_by(matrix, vector, [BEND]) / whole.values
 
 
 def _explained_of_white(equations: NormalEquations, whites: Integers, causes: list[int]) -> float:
     """Return the misfit of the photos of white that one change of some causes explains."""
     steps = [
-        _best_step(
+        best_step(
             equations.matrix[whites, region][:, causes][:, :, causes],
             equations.vector[whites, region][:, causes],
             np.arange(1, len(whites)),
@@ -221,7 +217,7 @@ def _shift(equations: NormalEquations, photo: int, whites: Integers, region: int
     sizes = []
     for chosen in (whites[whites < photo], whites[whites >= photo]):
         matrix = equations.matrix[chosen, region].sum(axis=0)[np.ix_(causes, causes)]
-        sizes.append(_solved(matrix, equations.vector[chosen, region].sum(axis=0)[causes]))
+        sizes.append(solved(matrix, equations.vector[chosen, region].sum(axis=0)[causes]))
     return float(np.hypot(*(sizes[1] - sizes[0])))
 
 
@@ -240,11 +236,12 @@ def find_changes_of_light(
     causes = [GAIN, OFFSET]
     matrix = equations.matrix[:, 0][:, causes][:, :, causes]
     vector = equations.vector[:, 0][:, causes]
-    effects = _solved(matrix, vector)
+    effects = solved(matrix, vector)
     explained = np.einsum("np,np->n", vector, effects) / equations.values
     total = float(explained.sum())
     largest = np.abs(effects).max(axis=1)
-    is_change = largest > SMALLEST_CHANGE
+    # No exposure takes away more than all light.
+    is_change = (largest > SMALLEST_CHANGE) & (effects[:, 0] > -1)
     for one, other in inverses:
         # A gain g of both and offsets that sum to -g cancel: lit by a pattern and its inverse, a
         # camera pixel is lit by white.
@@ -281,51 +278,29 @@ def _step(
     last = len(matrix)
     candidates = np.arange(FROM_THE_ENDS, last - FROM_THE_ENDS)
     if whites is not None and len(whites) > 2:
-        place = _best_step(matrix[whites], vector[whites], np.arange(1, len(whites))).photo
+        place = best_step(matrix[whites], vector[whites], np.arange(1, len(whites))).photo
         candidates = np.arange(whites[place - 1] + 1, whites[place] + 1)
-    best = _best_step(matrix, vector, candidates)
-    in_each = float(np.sum(_solved(matrix, vector) * vector))
+    best = best_step(matrix, vector, candidates)
+    in_each = float(np.sum(solved(matrix, vector) * vector))
     if whites is None and best.explained < LEAST_OF_EACH * in_each:
         return best._replace(explained=0.0)
     return best._replace(explained=best.explained / equations.values)
 
 
-def _best_step(
-    matrix: NDArray[np.float64], vector: NDArray[np.float64], candidates: Integers
-) -> Step:
-    """Return the change that explains most, before one of some photos.
+def _stay(equations: NormalEquations, whites: Integers) -> Stay:
+    """Return the best motion of the camera there and back.
 
-    A constant effect is no change, so that the misfit it explains is subtracted: estimates that a
-    prior pulls towards 0 look out of focus in all photos.
+    The transport does not bend to whites, which show a motion in full where other photos show some
+    of it: they are left out.
     """
-    matrix, vector = matrix.cumsum(axis=0), vector.cumsum(axis=0)
-    unchanged = float(_solved(matrix[-1], vector[-1]) @ vector[-1])
-    before = vector[candidates - 1]
-    after = vector[-1] - before
-    of_before = _solved(matrix[candidates - 1], before)
-    of_after = _solved(matrix[-1] - matrix[candidates - 1], after)
-    explained = np.sum(of_before * before + of_after * after, axis=1)
-    best = int(np.argmax(explained))
-    return Step(
-        float(explained[best]) - unchanged,
-        int(candidates[best]),
-        of_after[best] - of_before[best],
-    )
-
-
-def _explained(
-    matrix: NDArray[np.float64], vector: NDArray[np.float64], causes: list[int]
-) -> float:
-    part = vector[causes]
-    return float(part @ _solved(matrix[np.ix_(causes, causes)], part))
-
-
-def _solved(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve normal equations, (..., n, n) and (..., n); causes without effect come out as 0."""
-    scale = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), 1e-300))
-    scaled = matrix / (scale[..., :, None] * scale[..., None, :])
-    inverse = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True)
-    return np.asarray(np.einsum("...ij,...j->...i", inverse, vector / scale) / scale)
+    causes = [DOWN, ACROSS]
+    matrix = equations.matrix[:, 0][:, causes][:, :, causes].copy()
+    vector = equations.vector[:, 0][:, causes].copy()
+    matrix[whites] = vector[whites] = 0.0
+    best = best_stay(matrix, vector)
+    in_each = float(np.sum(solved(matrix, vector) * vector))
+    share = best.explained / equations.values if best.explained > LEAST_OF_EACH * in_each else 0.0
+    return best._replace(explained=share)
 
 
 def find_clipped_black(sample: CameraSample) -> list[Spoilt]:

@@ -26,7 +26,8 @@ from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
 
 Cause = (
-    of_photos.Cause | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "unchecked"]
+    of_photos.Cause
+    | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "below-plan", "unchecked"]
 )
 
 # What a pattern and its inverse may show beyond white, as a share of white, and by how many
@@ -44,6 +45,11 @@ GOOD_DECIBELS = 40.0
 # Held-out SNR_b in dB below which a transport is doubtful, or wrong, whatever was expected.
 DOUBTFUL_DECIBELS = 25.0
 WRONG_DECIBELS = 15.0
+
+# A transport whose error bars hold is doubtful all the same if its held-out SNR_b lies so many dB
+# below both what was planned for and what noise allows, and below this: pictures are off by 4 %.
+MOST_BELOW_PLAN = 10.0
+FAIR_DECIBELS = 28.0
 
 # Above this, pictures and their inverses say surely that the response is not linear, unless the
 # half-screens show a quarter of it.
@@ -76,6 +82,11 @@ SENTENCES: Mapping[Cause, str] = {
     "model": "the scene has light that the model cannot represent, or something moved.",
     "noise": "the photos are noisy: expose longer, or average several.",
     "too-few-photos": "too little was measured: plan for more photos.",
+    "below-plan": (
+        "pictures are relit far worse than planned for, and noise is not why: the scene needs more "
+        "photos than most, or the camera changes its photos; turn off noise reduction and "
+        "sharpening, or plan for more photos."
+    ),
     "unchecked": (
         "nothing was checked: the plan has neither check photos, nor stripes or Gray code that "
         "serve as well."
@@ -177,9 +188,8 @@ def judge_reconstruction(
         ),
         repeats,
         _why_unchecked(transport, capture.plan),
+        None if (planned := capture.plan.expected_snr) is None else planned.pictures,
     )
-    if (planned := capture.plan.expected_snr) is not None:
-        verdict = replace(verdict, planned_snr=planned.pictures)
     if "model" not in verdict.causes:
         return verdict
     misfit = measure_misfit(transport, capture, progress)
@@ -206,6 +216,7 @@ def judge(
     spoilt: Sequence[Spoilt] = (),
     repeats: Repeats | None = None,
     unchecked: str = SENTENCES["unchecked"],
+    planned_snr: tuple[float, float] | None = None,
 ) -> Verdict:
     """Return the verdict on a transport.
 
@@ -221,6 +232,8 @@ def judge(
         Noise, drift and linearity of the capture, where nothing was checked.
     unchecked : str
         Why nothing was checked, if it was not.
+    planned_snr : tuple of float, optional
+        As `Verdict` has it.
     """
     if held_out is not None and _bends(held_out):
         # What bends the response makes pictures of other brightness than expected, too.
@@ -241,7 +254,8 @@ def judge(
         known = "" if repeats is None else f" Known is this: {repeats}"
         reasons.append(Reason("unchecked", unchecked + known))
         wrong = any(reason.cause in WRONG_PHOTOS for reason in reasons)
-        return Verdict("wrong" if wrong else "doubtful", None, tuple(reasons))
+        grade: Grade = "wrong" if wrong else "doubtful"
+        return Verdict(grade, None, tuple(reasons), planned_snr=planned_snr)
     if not spoilt:
         if _is_sure(held_out.nonlinear_excess, held_out.nonlinear_excess_deviation):
             add("not-linear")
@@ -252,16 +266,17 @@ def judge(
     )
     if surprises and not reasons:
         add("model")
-    if held_out.snr < DOUBTFUL_DECIBELS and not reasons:
+    if not reasons and _is_below_plan(held_out, planned_snr):
+        add("below-plan")
+    if not reasons and held_out.snr < DOUBTFUL_DECIBELS:
         add(_what_limits(held_out))
     wrong = (
         held_out.snr < WRONG_DECIBELS
         or _surprises(held_out, WRONG_ERROR_RATIO)
         or any(reason.cause in WRONG_PHOTOS for reason in reasons)
     )
-    return Verdict(
-        "wrong" if wrong else "doubtful" if reasons else "good", held_out, tuple(reasons)
-    )
+    grade = "wrong" if wrong else "doubtful" if reasons else "good"
+    return Verdict(grade, held_out, tuple(reasons), planned_snr=planned_snr)
 
 
 def _why_unchecked(transport: StoredTransport, plan: Plan) -> str:
@@ -280,6 +295,14 @@ def _is_sure(excess: float, deviation: float) -> bool:
 def _surprises(held_out: HeldOut, most: float) -> bool:
     """Return whether errors matter, and are larger than the error bars expect by so much."""
     return (held_out.error_ratio or 0.0) > most and held_out.snr < GOOD_DECIBELS
+
+
+def _is_below_plan(held_out: HeldOut, planned_snr: tuple[float, float] | None) -> bool:
+    """Return whether pictures are relit far worse than planned for, and than noise allows."""
+    allowed = held_out.noise_snr
+    if planned_snr is None or allowed is None or held_out.snr > FAIR_DECIBELS:
+        return False
+    return min(planned_snr[0], allowed) - held_out.snr > MOST_BELOW_PLAN
 
 
 def _what_limits(held_out: HeldOut) -> Cause:

@@ -137,6 +137,18 @@ def test_nothing_is_left_of_a_command_whose_rig_does_not_fit(job, wanted):
     assert not expected.exists()
 
 
+def test_photos_of_another_size_are_refused_before_a_light_is_computed(job, wanted, monkeypatch):
+    def computed(*_arguments, **_options):
+        raise AssertionError("a light was computed")
+
+    monkeypatch.setattr("nearfar.applications.compensate.compensate", computed)
+    # Built-in scenes have a camera as fine as the projector, and three channels.
+    ran = run_nearfar(
+        "compensate", job.transport, wanted, job.folder / "l.npy", "--refine", 1, "--rig", "wedge"
+    )
+    check_sentence(ran, "the rig's photos are 16x20x3", "8x9")
+
+
 def test_a_photo_may_be_wanted(job):
     transport = nearfar.load_transport(job.transport)
     photo = job.folder / "photo.npy"

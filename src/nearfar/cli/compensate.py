@@ -19,7 +19,7 @@ from nearfar.cli.options import (
     scene_names,
 )
 from nearfar.cli.other_projectors import OtherProjector, others_of
-from nearfar.cli.refining import MOST, check_refinement, refined
+from nearfar.cli.refining import MOST, check_refinement, check_simulated_rig, refined
 from nearfar.cli.saying import say
 from nearfar.errors import InputError
 from nearfar.progress import progress_bar
@@ -169,6 +169,8 @@ def compensate(
     with progress_bar("compensation", quiet=quiet) as report:
         opened = open_reconstructed(transport)
         picture = read_camera_picture(wanted, opened.camera, opened.channels, srgb=srgb)
+        if rig is not None:
+            check_simulated_rig(rig, opened)
         rows = opened.rows()
         black = _black_of(rows, transport) if as_photo else None
         found = found_by(rows, picture, given, black=black, progress=report)

@@ -13,6 +13,7 @@ from nearfar.progress import progress_bar
 if TYPE_CHECKING:
     from nearfar.applications.compensate import Compensation
     from nearfar.transport.model import Transport
+    from nearfar.transport.stored import StoredTransport
     from nearfar.workflow.refine import Refinement
 
 MOST = 3
@@ -30,6 +31,24 @@ def check_refinement(refine: int | None, rig: str | None) -> None:
         )
     if rig is not None:
         check_rig(rig)
+
+
+def check_simulated_rig(rig: str, opened: "StoredTransport") -> None:
+    """Refuse a simulated rig whose photos are not those of a transport, before a light is computed.
+
+    Real devices are opened once, when there is a light to show.
+    """
+    from nearfar.rigs.opening import open_rig
+    from nearfar.rigs.simulated.rig import SimulatedRig
+    from nearfar.rigs.tables import RealTable, read_rig_table
+    from nearfar.workflow.refine import require_photos_of
+
+    path = Path(rig)
+    if path.suffix.lower() == ".toml" and isinstance(read_rig_table(path), RealTable):
+        return
+    with open_rig(rig, opened.projector) as simulated:
+        if isinstance(simulated, SimulatedRig):
+            require_photos_of(opened, simulated)
 
 
 def refined(

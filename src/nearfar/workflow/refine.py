@@ -29,8 +29,10 @@ from nearfar.callbacks import Report, as_report
 from nearfar.checks import as_count, require_instance
 from nearfar.errors import InputError
 from nearfar.rigs.base import Rig
+from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.transport.colour import mixing_of
 from nearfar.transport.model import Transport
+from nearfar.transport.stored import StoredTransport
 
 MOST_CORRECTIONS = 3
 # Slope of the response before any is known: between 1, of a linear projector, and 2.2, which a
@@ -43,6 +45,17 @@ SLOPE_WIDTH = 1.5
 LEAST_CHANGE = 0.01
 # After a correction that made the photo worse, the next one is this share of a full step.
 BACK = 0.4
+
+
+def require_photos_of(transport: Transport | StoredTransport, rig: SimulatedRig) -> None:
+    """Refuse a simulated rig whose photos have another shape than those of a transport.
+
+    Raises
+    ------
+    InputError
+    """
+    dark = np.zeros((1, *transport.projector), dtype=np.float32)
+    _require_shape(rig.world.pictures(dark)[0], (*transport.camera, transport.channels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,17 +268,20 @@ def _shown(
     black = np.zeros(transport.projector, dtype=np.uint8)
     photos: list[NDArray[Any]] = list(rig.shoot([black, pattern], first))
     under_black, photo = (one.astype(np.float64) / rig.full_scale for one in photos)
-    if photo.shape != target.shape:
-        shape = "x".join(map(str, photo.shape))
-        wanted = "x".join(map(str, target.shape))
-        raise InputError(
-            f"the rig's photos are {shape}, those of the transport {wanted} (height x width x "
-            f"channels): give the rig that the transport was measured with."
-        )
+    _require_shape(photo, target.shape)
     seen = photo - under_black
     error = distance_from(target, counted)(seen, None)
     levels = pattern.astype(np.float64) / 255
     return _Shown(levels.reshape(*transport.projector, -1), target - seen, error)
+
+
+def _require_shape(photo: NDArray[Any], wanted: tuple[int, ...]) -> None:
+    if photo.shape != wanted:
+        raise InputError(
+            f"the rig's photos are {'x'.join(map(str, photo.shape))}, those of the transport "
+            f"{'x'.join(map(str, wanted))} (height x width x channels): give the rig that the "
+            f"transport was measured with."
+        )
 
 
 def _slope(change: Floats, seen: Floats) -> Floats:

@@ -160,6 +160,11 @@ def _(shot: Shot, gain: float) -> Photos:
     return shot.counts(shot.photos.astype(float) * gain)
 
 
+@spoil("saturated below full scale", ("saturated",), 0.8, 0.6)
+def _(shot: Shot, level: float) -> Photos:
+    return shot.counts(np.minimum(shot.photos, level * shot.full_scale))
+
+
 @spoil("camera moved, pixels", ("moved",), 0.05, 0.1, 0.3, 1.0, 3.0)
 def _(shot: Shot, pixels: float) -> Photos:
     photos = shot.photos.astype(float)

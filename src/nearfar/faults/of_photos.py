@@ -14,6 +14,7 @@ Cause = Literal[
     "focus",
     "not-linear",
     "compressed",
+    "saturated",
     "unknown",
 ]
 
@@ -245,6 +246,30 @@ class BlackClipped:
 
 
 @dataclass(frozen=True)
+class WhiteClipped:
+    """Bright values are cut off at one level below full scale.
+
+    Attributes
+    ----------
+    share : float
+        Of all camera pixels.
+    level : float
+        As a share of full scale.
+    """
+
+    share: float
+    level: float
+    cause: ClassVar[Cause] = "saturated"
+
+    def __str__(self) -> str:
+        return (
+            f"{self.share:.1%} of the camera pixels read the same level, {self.level:.1%} of full "
+            f"scale, in every photo of white: the camera is saturated there; expose less, or give "
+            f"that level as full scale."
+        )
+
+
+@dataclass(frozen=True)
 class NotLinear:
     """Photos that are not proportional to light.
 
@@ -318,6 +343,7 @@ Spoilt = (
     | LampFlickers
     | Moved
     | BlackClipped
+    | WhiteClipped
     | NotLinear
     | Compressed
     | PhotosIncomplete

@@ -14,6 +14,7 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.bend_of_pairs import Bend, bend_of_pairs
+from nearfar.workflow.diagnosis.clipped import find_clipped_black, find_clipped_white
 from nearfar.workflow.diagnosis.compression import find_compression
 from nearfar.workflow.diagnosis.incomplete import find_incomplete
 from nearfar.workflow.diagnosis.inverse_pairs import (
@@ -35,11 +36,7 @@ from nearfar.workflow.diagnosis.sample import CameraSample, sample_camera
 from nearfar.workflow.diagnosis.sequence import find_other_order
 from nearfar.workflow.diagnosis.shifted_whites import find_shifted_whites
 from nearfar.workflow.diagnosis.single_photos import SWEEPS, SpoiltPhotos, find_spoilt_photos
-from nearfar.workflow.diagnosis.whole_capture import (
-    find_changes,
-    find_clipped_black,
-    name_encoding,
-)
+from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
 
 # What a response that is not linear, or JPEG, looks like.
 OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
@@ -103,7 +100,8 @@ def find_what_spoils(
             transport, sample, compressed, lambda share: progress(step, share), suspected=suspected
         )
     progress(step, 1.0)
-    return found
+    # Whatever else there is, what is cut off is wrong.
+    return [*found, *find_clipped_white(sample)]
 
 
 def _what_does_not_fit(

@@ -10,7 +10,6 @@ import numpy as np
 
 from nearfar.arrays import Floats, Integers
 from nearfar.faults.of_photos import (
-    BlackClipped,
     ExposureChanged,
     LampFlickers,
     Moved,
@@ -81,8 +80,6 @@ DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
     ),
 }
 NAMED_SHARE = 0.2
-# Share of camera pixels at which all photos of black read the lowest level.
-CLIPPED_SHARE = 0.2
 
 
 def find_changes(
@@ -301,14 +298,6 @@ def _stay(equations: NormalEquations, whites: Integers) -> Stay:
     in_each = float(np.sum(solved(matrix, vector) * vector))
     share = best.explained / equations.values if best.explained > LEAST_OF_EACH * in_each else 0.0
     return best._replace(explained=share)
-
-
-def find_clipped_black(sample: CameraSample) -> list[Spoilt]:
-    """Find camera pixels that read the lowest level of all in every photo of black."""
-    blacks: Integers = find_references(sample.plan).blacks
-    lowest = float(sample.photos.min())
-    share = float(np.mean((sample.photos[blacks] <= lowest).all(axis=0)))
-    return [BlackClipped(share)] if share > CLIPPED_SHARE else []
 
 
 def name_encoding(sample: CameraSample) -> str:

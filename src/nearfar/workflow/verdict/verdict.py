@@ -26,8 +26,7 @@ from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
 
 Cause = (
-    of_photos.Cause
-    | Literal["lamp", "saturated", "model", "noise", "too-few-photos", "below-plan", "unchecked"]
+    of_photos.Cause | Literal["lamp", "model", "noise", "too-few-photos", "below-plan", "unchecked"]
 )
 
 # What a pattern and its inverse may show beyond white, as a share of white, and by how many

@@ -207,11 +207,16 @@ def sentences_in(text):
 TROUBLESHOOTING = DOCS / "howto" / "troubleshooting.md"
 A_FAULT = {
     faults_of_photos.Moved: [
-        {"what": what, "photo": 3, "pixels": 0.5}
+        {"what": what, "photo": 3, "pixels": pixels, "until": until}
         for what in ("camera", "scene", "projector", "camera's focus")
+        for pixels, until in ((0.5, None), (0.5, 9), (None, 9))
     ],
     faults_of_photos.ShowsOtherPattern: [
-        {"photos": (3, 4), "others": others} for others in ((4, 3), (2, 3), (9, 1))
+        *({"photos": (3, 4), "others": others} for others in ((4, 3), (2, 3), (9, 1))),
+        *(
+            {"photos": tuple(range(8)), "others": others}
+            for others in (tuple(range(8))[::-1], tuple(range(-3, 5)))
+        ),
     ],
     faults_of_photos.NotLinear: [{"encoding": encoding} for encoding in ("", "sRGB")],
 }

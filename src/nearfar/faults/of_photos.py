@@ -227,8 +227,9 @@ class Moved:
                 return f"the camera's focus changed {where}"
             case _:
                 what = "the camera" if self.what == "camera" else "part of the scene"
-                far = "" if self.pixels is None else f" by about {self.pixels:.2g} camera pixels"
-                return f"{what} moved{far} {where}"
+                if self.pixels is None:
+                    return f"{what} moved {where}"
+                return f"{what} moved by about {self.pixels:.2g} camera pixels {where}"
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,7 @@ def test_good_photos_are_not_accused(spoilt_by):
         ("camera moved for a while, pixels", 0.4),
         ("camera moved for a while, pixels", 2.0),
         ("camera moved far, pixels", 2.0),
+        ("saturated below full scale", 0.6),
         ("photos cut off", 1),
         ("all photos in reverse", 1),
         ("photos late from the middle on", 1),

@@ -100,8 +100,10 @@ def find_what_spoils(
             transport, sample, compressed, lambda share: progress(step, share), suspected=suspected
         )
     progress(step, 1.0)
-    # Whatever else there is, what is cut off is wrong.
-    return [*found, *find_clipped_white(sample)]
+    if clipped := find_clipped_white(sample):
+        # What is cut off is not linear.
+        found = [each for each in found if not isinstance(each, OF_RESPONSE)]
+    return [*clipped, *found]
 
 
 def _what_does_not_fit(

@@ -5,7 +5,7 @@ import pytest
 
 from nearfar import choose_plan
 from nearfar.arrays import Size
-from nearfar.workflow.diagnosis.sequence import find_other_order
+from nearfar.workflow.diagnosis.sequence import _brightness, find_other_order
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +28,11 @@ def test_the_order_of_the_plan_is_not_accused(plan, photos):
     assert find_other_order(np.ones_like(photos), plan) == []
     photos[[5, 30]] = photos[[30, 5]]
     assert find_other_order(photos, plan) == []
+
+
+def test_brightness_is_that_of_drawn_patterns(plan):
+    for number in range(len(plan.patterns)):
+        assert _brightness(plan, number) == pytest.approx(plan.draw(number).mean() / 255, abs=0.02)
 
 
 def test_reverse_is_told(plan, photos):

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
 from nearfar.faults.of_photos import ShowsOtherPattern
-from nearfar.plan import Plan
+from nearfar.illumination.frequencies import DC
+from nearfar.plan import Plan, Sinusoid
 
 # Photos by which others may be late or early.
 MOST_LATE = 3
@@ -56,7 +57,7 @@ def find_other_order(photos: Floats, plan: Plan) -> list[ShowsOtherPattern]:
         Empty, or one.
     """
     seen = photos.mean(axis=(1, 2, 3), dtype=np.float64)
-    shown = np.array([plan.draw(n).mean() / 255 for n in range(len(seen))])
+    shown = np.array([_brightness(plan, number) for number in range(len(seen))])
     # Whatever the order, the brightest photo is of the brightest pattern.
     line = np.polynomial.Polynomial.fit(np.sort(shown), np.sort(seen), 1).convert()
     if len(line.coef) < 2 or line.coef[1] <= 0:
@@ -67,6 +68,14 @@ def find_other_order(photos: Floats, plan: Plan) -> list[ShowsOtherPattern]:
     if as_planned - best.left < max(LEAST_EXPLAINED, LEAST_SHARE * as_planned):
         return []
     return [ShowsOtherPattern(best.photos, best.others)]
+
+
+def _brightness(plan: Plan, number: int) -> float:
+    """Return the mean of a pattern, from 0 to 1, without drawing what is known."""
+    pattern = plan.patterns[number]
+    if isinstance(pattern, Sinusoid):
+        return 0.5 if pattern.frequency != DC else float(not pattern.inverse)
+    return float(plan.draw(number).mean() / 255)
 
 
 def _orders(level: NDArray[np.float64], shown: NDArray[np.float64]) -> Iterator[Order]:

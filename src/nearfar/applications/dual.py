@@ -10,7 +10,7 @@ Measured far-range light is blurred on the projector's side: `nearfar.applicatio
 what sharpens it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -130,19 +130,18 @@ def _sent_back(
     reciprocity: Reciprocity | None,
 ) -> Floats:
     """Send an image back; see `sent_back_in_steps`."""
-    read = blocks_of(transport)
-
-    def blocks() -> Iterator[Transport]:
-        return (block.with_gains(**gains) if gains else block for block in read())
-
     total = np.zeros((*transport.projector, transport.channels))
-    for _ in sent_back_in_steps(blocks, image, reciprocity, total):
+    for _ in sent_back_in_steps(blocks_of(transport), image, gains, reciprocity, total):
         pass
     return total
 
 
 def sent_back_in_steps(
-    blocks: Blocks, image: Floats, reciprocity: Reciprocity | None, total: Floats
+    blocks: Blocks,
+    image: Floats,
+    gains: Mapping[str, float],
+    reciprocity: Reciprocity | None,
+    total: Floats,
 ) -> Iterator[None]:
     """Send an image back to the projector, one block of camera rows in each step.
 
@@ -151,16 +150,23 @@ def sent_back_in_steps(
     blocks : callable
         Yields the transport in blocks of camera rows; called a second time for reciprocity.
     image : ndarray, shape (Cy, Cx, channels)
+    gains : mapping of str to float
+        Gain of each part; 1 where left out.
     reciprocity : Reciprocity, optional
         Used if it holds.
     total : ndarray, shape (Py, Px, channels)
         Zeros, to which the view is added.
     """
+    changed = {part: gain for part, gain in gains.items() if gain != 1}
+
+    def weighed() -> Iterator[Transport]:
+        return (block.with_gains(**changed) if changed else block for block in blocks())
+
     sharper = None
     if reciprocity is not None and reciprocity.holds:
         sharper = ByReciprocity(reciprocity, total.shape[-1])
     first = 0
-    for block in blocks():
+    for block in weighed():
         lit = image[first : first + block.camera.height]
         if lit.any():
             total += block.adjoint(lit).reshape(total.shape)
@@ -169,7 +175,7 @@ def sent_back_in_steps(
         first += block.camera.height
         yield
     if sharper is not None:
-        for block in blocks():
+        for block in weighed():
             sharper.see(block)
             yield
         total += sharper.correction()

@@ -7,7 +7,6 @@ import numpy as np
 from nearfar.applications.dual import sent_back_in_steps
 from nearfar.arrays import Floats, Size, middles
 from nearfar.files import luminance
-from nearfar.transport.model import Transport
 from nearfar.viewer.interactive import (
     COLOUR,
     MAXIMUM_DISPLAYED_PIXELS,
@@ -52,15 +51,8 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
     picture = np.broadcast_to(picture.reshape(*camera, -1), (*camera, channels))
     total = np.zeros((*transport.projector, channels), dtype=np.float32)
     gains = header.gains.of_parts(transport.stored.parts)
-    is_direct = all(gain == 0 for part, gain in gains.items() if part != "direct")
-    reciprocity = None if header.coarse or is_direct else transport.reciprocity
-
-    as_it_is = all(gain == 1 for gain in gains.values())
-
-    def weighed() -> Iterator[Transport]:
-        return (b if as_it_is else b.with_gains(**gains) for b in transport.blocks())
-
-    yield from sent_back_in_steps(weighed, picture, reciprocity, total)
+    reciprocity = None if header.coarse else transport.reciprocity
+    yield from sent_back_in_steps(transport.blocks, picture, gains, reciprocity, total)
     most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
     scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
     # A projector pixel adds up the camera pixels that see its light.

@@ -66,5 +66,14 @@ def test_without_such_a_level_nothing_is_told(plan, bits):
     assert find_clipped_white(sampled(plan, slope, bits, noise=0.0005)) == []
 
 
+def test_a_few_that_read_the_highest_level_are_no_limit(plan):
+    # Such as stuck ones: no more of them than there are at any other level.
+    white = bright()
+    white.ravel()[:10] = 0.0
+    sample = sampled(plan, white, 8)
+    sample.photos.reshape(len(sample.photos), -1)[:, :10] = sample.photos.max()
+    assert find_clipped_white(sample) == []
+
+
 def test_what_is_at_full_scale_is_known_already(plan):
     assert find_clipped_white(sampled(plan, 1.5 * bright(), 12)) == []

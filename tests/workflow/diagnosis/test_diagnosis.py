@@ -9,7 +9,7 @@ from benchmarks.spoils import SPOILS, shoot
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
-from nearfar.faults.of_photos import ShowsOtherPattern
+from nearfar.faults.of_photos import NotLinear, ShowsOtherPattern
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.plan import Sinusoid
 from nearfar.plan.checks import is_reference
@@ -79,6 +79,17 @@ def test_good_photos_are_not_accused(spoilt_by):
 def test_what_spoils_photos_is_named(spoilt_by, name, strength):
     found = spoilt_by(name, strength)
     assert found[0].cause in SPOILS[name].causes, "; ".join(map(str, found))
+
+
+def test_highlights_that_are_compressed_bend_the_sums_of_all_check_photos(tmp_path):
+    # The estimate bends with them, and misfits look like exposure; pairs tell.
+    shot = shoot("cornell", Size(32, 32), 90)
+    photos = SPOILS["highlights compressed"].apply(shot, 0.6)
+    capture = write_capture(
+        shot.plan, tmp_path / "c.zarr", list(photos), full_scale=shot.full_scale
+    )
+    reconstruct_to_file(capture, tmp_path / "t.zarr")
+    assert find_what_spoils(open_transport(tmp_path / "t.zarr"), capture) == [NotLinear("")]
 
 
 @pytest.mark.parametrize("name", ["photos rotated", "photos doubled", "photos cut off"])

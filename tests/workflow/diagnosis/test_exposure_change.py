@@ -50,3 +50,10 @@ def test_photos_that_sum_to_white_were_not_exposed_otherwise():
         assert exposure_change(_fits(photos, relit), number).misfit == np.inf
     # Alone, the same photo is explained by an exposure.
     assert exposure_change(_fits(photos[:1], relit[:1]), 0).misfit == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("gain", "misfit"), [(-0.9, pytest.approx(1.0, abs=0.2)), (-1.5, np.inf)])
+def test_no_exposure_takes_away_more_than_all_light(gain, misfit):
+    # As of a photo of another pattern, bright where its own is dark.
+    relit = _relit()[:1]
+    assert exposure_change(_fits((1 + gain) * relit, relit), 0).misfit == misfit

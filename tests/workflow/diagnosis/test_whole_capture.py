@@ -78,6 +78,11 @@ def test_other_light_is_found_in_photos_with_an_inverse(effects):
     assert change.photos == tuple(effects)
 
 
+def test_no_exposure_takes_away_more_than_all_light():
+    assert _of_light({30: (-0.9, 0.0), 50: (-1.5, 0.0)}, [])[1].photos == (30,)
+    assert _of_light({50: (-1.5, 0.0)}, []) is None
+
+
 @pytest.mark.parametrize("cause", [PROJECTOR_DOWN, PROJECTOR_FOCUS])
 @pytest.mark.parametrize("photo", [20, 47, 80])
 def test_a_projector_that_changes_once_is_found_with_its_moment(cause, photo):

@@ -163,15 +163,17 @@ def test_gaps_between_camera_pixels_are_filled():
 
 
 @pytest.mark.parametrize("make", [world, blurred_world], ids=["single pixels", "hats"])
-def test_near_range_light_is_the_mean_of_both_sides(make):
+def test_near_range_light_away_from_q_is_what_the_camera_sees(make):
     transport = make()
     transport = replace(transport, far=np.zeros_like(transport.far))
+    next_to_q = transport.near_basis.is_next_to_q.reshape(transport.near_basis.shape)
+    away = replace(transport, near=np.where(next_to_q, np.float32(0), transport.near))
     camera, projector = transport.camera, transport.projector
     each = np.eye(camera.pixels)
     spread = np.stack([transport.factors.spread_directly(one).ravel() for one in each], axis=1)
     count = spread.sum(axis=1)
     picture = np.random.default_rng(3).uniform(0, 1, camera).astype(np.float32)
-    _, near, _ = transport.component_rows(slice(None))
+    _, near, _ = away.component_rows(slice(None))
     seen = np.einsum("cip,p->ci", near, spread @ picture.ravel())
     given = nearfar.Reciprocity(projector, np.zeros(5), 0.0, complete=False)
     change = nearfar.dual_view(transport, picture, reciprocity=given)
@@ -180,8 +182,39 @@ def test_near_range_light_is_the_mean_of_both_sides(make):
     assert surely.sum() > 50
     by = (spread @ seen)[surely] / count[surely, None]
     transposed = np.einsum("cip,c->pi", near, picture.ravel())[surely]
-    np.testing.assert_allclose(change[surely], (by - transposed) / 2, atol=2e-5)
+    np.testing.assert_allclose(change[surely], by - transposed, atol=2e-5)
     assert np.abs(by - transposed).max() > 1e-3
+
+
+def test_what_an_error_of_q_takes_from_direct_light_is_not_lost():
+    """T is the identity, in a window that makes up for errors of q."""
+    size = Size(16, 16)
+    places = np.moveaxis(np.indices(size), 0, -1)
+    off = np.random.default_rng(5).uniform(-0.2, 0.2, (*size, 2))
+    # At the border q is right: beyond it there is nothing.
+    inside = (places.min(axis=-1) > 1) & (places.max(axis=-1) < 14)
+    q = places + np.where(inside[..., None], off, 0.0)
+    base = model_transport(size, size, window=5, far=Size(3, 3))
+    nothing = replace(
+        base,
+        correspondence=q.astype(np.float32),
+        direct=np.ones_like(base.direct),
+        near=np.zeros_like(base.near),
+        far=np.zeros_like(base.far),
+    )
+    direct, _, _ = nothing.component_rows(slice(None))
+    near = np.zeros_like(base.near)
+    for number, row in enumerate(direct[:, 0]):
+        y, x = divmod(number, size.width)
+        missing = ((np.arange(size.pixels) == number) - row).reshape(size)
+        near[y, x] = np.pad(missing, 2)[y : y + 5, x : x + 5]
+    transport = replace(nothing, near=near)
+    picture = np.random.default_rng(6).uniform(0, 1, size).astype(np.float32)
+    np.testing.assert_allclose(transport @ picture, picture, atol=1e-5)
+    given = nearfar.Reciprocity(size, np.zeros(5), 0.0, complete=False)
+    np.testing.assert_allclose(
+        nearfar.dual_view(transport, picture, reciprocity=given), picture, atol=1e-5
+    )
 
 
 @pytest.mark.parametrize("make", [world, blurred_world], ids=["single pixels", "boxes"])

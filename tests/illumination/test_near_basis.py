@@ -70,3 +70,17 @@ def test_a_basis_is_known_by_the_shape_of_its_coefficients(basis):
 def test_a_shape_that_no_basis_has_is_refused(shape, pitch):
     with pytest.raises(ValueError, match="pitch"):
         basis_of(shape, pitch)
+
+
+@pytest.mark.parametrize(("basis", "count"), [(NearBasis(5), 9), (NearBasis(1), 1)])
+def test_single_pixels_next_to_q_are_three_by_three(basis, count):
+    assert basis.is_next_to_q.sum() == count
+    assert np.abs(basis.offsets[basis.is_next_to_q]).max() == (count > 1)
+
+
+@pytest.mark.parametrize("pitch", [2, 4, 16])
+def test_hats_next_to_q_are_the_finer_ones_and_the_one_at_q(pitch):
+    basis = NearBasis(9, pitch)
+    finer = basis.pitches < pitch
+    at_q = ~basis.offsets.any(axis=1)
+    np.testing.assert_array_equal(basis.is_next_to_q, finer | at_q)

@@ -47,8 +47,8 @@ def dual_view(
         That of the projector: the light of each of its pixels under white on an even surface. The
         view is divided by it over its mean.
     reciprocity : Reciprocity, optional
-        Of a measured transport, by `nearfar.find_reciprocity`: far-range light and half of
-        near-range light follow from it, if it holds, as sharp as in a relit picture.
+        Of a measured transport, by `nearfar.find_reciprocity`: if it holds, far-range light and
+        near-range light away from q follow from it, as sharp as in a relit picture.
 
     Returns
     -------

@@ -9,8 +9,9 @@ camera pixel with q(c') = p, and p' = q(c). Then
 
 with one smooth function r for the vignetting of both lenses. So F^T by a picture is found in three
 steps: the picture is spread over the projector at q, far-range light is relit under that, and each
-projector pixel takes the mean of the camera pixels c'. Near-range light is the mean of this and of
-N^T.
+projector pixel takes the mean of the camera pixels c'. Near-range light follows in the same way,
+but for its functions next to q: what an error of q takes from direct light, they have, and D^T and
+theirs make up for each other only if both are transposed.
 
 log r is a polynomial of second degree, fitted to F between cells of the projector. If the two
 directions disagree at measured frequencies, as with gloss, glass or mirrors, F^T is kept.
@@ -19,7 +20,7 @@ Index convention: i and j run over cells of projector pixels, m over real respon
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, uniform_filter
@@ -39,8 +40,6 @@ BLUR_CELLS = 2.0
 # Far-range light by reciprocity differs from F^T by less than this share at measured frequencies:
 # 0.08 to 0.15 in six scenes; 0.30 to 0.56 on shelves, a hand of wax, caustics, glass and hair.
 LARGEST_DISAGREEMENT = 0.2
-# Share of near-range light that is seen by the camera; the rest is N^T.
-NEAR_SHARE = 0.5
 # Of a light that both sides are compared under, as a share of the projector's sides.
 DISC_RADIUS = 0.25
 # A projector pixel is seen where at least this share of the usual number of camera pixels sees it,
@@ -106,19 +105,19 @@ class ByReciprocity:
 
     def send(self, block: Transport, picture: Floats) -> None:
         """Send the light of the camera pixels of a block, (rows, Cx, channels), back."""
-        flat, factors = picture.reshape(-1, picture.shape[-1]), block.factors
+        flat, factors = picture.reshape(-1, picture.shape[-1]), _away_from_q(block).factors
         for i in range(flat.shape[1]):
             if flat[:, i].any():
                 self._transposed[..., i] += factors.far_back(flat[:, i], i)
-                self._transposed[..., i] += NEAR_SHARE * factors.near_back(flat[:, i], i)
+                self._transposed[..., i] += factors.near_back(flat[:, i], i)
                 self._light[..., i] += factors.spread_directly(flat[:, i])
         self._count += factors.spread_directly(np.ones(len(flat)))
 
     def see(self, block: Transport) -> None:
         """Relight the camera pixels of a block by all the light that was sent, and add them up."""
         light = (self._light / self._ratio).astype(np.float32)
-        components = block.components(light if light.shape[-1] > 1 else light[..., 0])
-        seen = components.far + NEAR_SHARE * components.near
+        components = _away_from_q(block).components(light if light.shape[-1] > 1 else light[..., 0])
+        seen = components.far + components.near
         flat = np.reshape(seen, (block.camera.pixels, -1))
         for i in range(flat.shape[1]):
             self._seen[..., i] += block.factors.spread_directly(flat[:, i])
@@ -192,6 +191,14 @@ def blocks_of(transport: Transport | StoredTransport) -> Blocks:
     if isinstance(transport, StoredTransport):
         return transport.blocks
     return lambda: iter((transport,))
+
+
+def _away_from_q(block: Transport) -> Transport:
+    """Return a block without the functions of near-range light next to q."""
+    if 0 in block.near.shape:
+        return block
+    away = ~block.near_basis.is_next_to_q.reshape(block.near_basis.shape)
+    return replace(block, near=np.where(away, block.near, np.float32(0.0)))
 
 
 def _powers(size: Size) -> Floats:

@@ -80,6 +80,15 @@ class NearBasis:
         return np.concatenate([np.full(self.window**2, self.pitch), finer])
 
     @property
+    def is_next_to_q(self) -> NDArray[np.bool_]:
+        """Whether each hat belongs to what direct light leaves at q, shape (J,).
+
+        These are the hat at q and those of finer pitches; of single pixels, the 3 x 3 about q.
+        """
+        reach = max(1, self.pitch // 2)
+        return np.asarray(np.abs(self.offsets).max(axis=1) <= reach)
+
+    @property
     def count(self) -> int:
         """Number of functions J."""
         return self.window**2 + len(AROUND_Q) * len(self.finer_pitches)

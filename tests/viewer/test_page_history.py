@@ -101,6 +101,35 @@ def test_pixels_views_gains_and_what_plays_are_undone(open_page, address):
     assert page.is_disabled("#undo")
 
 
+def test_a_press_does_not_part_what_plays_into_steps(open_page, address):
+    page = open_page(address)
+    before = seen(page, "light")
+
+    def moves_on():
+        shown = seen(page, "light")
+        wait_until(lambda: not np.array_equal(seen(page, "light"), shown))
+
+    page.click("#play")
+    moves_on()
+    # It plays until the button is let go.
+    page.hover("#play")
+    page.mouse.down()
+    moves_on()
+    moves_on()
+    page.mouse.up()
+    settled(page)
+    stopped = seen(page, "light")
+    # What plays once more is a step of its own.
+    page.click("#play")
+    moves_on()
+    page.click("#play")
+    settled(page)
+    for light in (stopped, before):
+        _press(page, "Control+z")
+        wait_until(lambda light=light: np.array_equal(seen(page, "light"), light))
+    assert page.is_disabled("#undo")
+
+
 def test_keys_of_a_text_field_are_its_own(open_page, address):
     page = open_page(address)
     page.click("[data-kind=white]")

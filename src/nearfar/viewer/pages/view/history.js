@@ -28,7 +28,7 @@ export class History {
   // What one press of a pointer or of a key changes until it is let go is one step, as is what plays.
   #gesture = 0;
   #isHeld = false;
-  #last = { gesture: -1, time: 0, names: '' };
+  #last = { gesture: -1, time: 0, names: '', isOfPlaying: false };
 
   // isPlaying(): whether the light moves by itself; onTravel(changes): a state of before is there again.
   constructor({ store, isPlaying, onTravel }) {
@@ -57,6 +57,7 @@ export class History {
     const begins = isHeld => () => {
       this.#gesture += 1;
       this.#isHeld = isHeld;
+      if (!this.#isPlaying()) this.#last.isOfPlaying = false;
     };
     addEventListener('pointerdown', begins(true), true);
     addEventListener('keydown', event => { if (!event.repeat) begins(false)(); }, true);
@@ -66,14 +67,17 @@ export class History {
   #changed(before, after) {
     const names = Object.keys(between(before, after)).join();
     if (!names || this.#isQuiet) return;
-    const { gesture, time, names: lastNames } = this.#last, now = performance.now();
-    const isSoon = now - time < ONE_STEP_MILLISECONDS && names === lastNames;
-    if (gesture !== this.#gesture || !(this.#isHeld || isSoon || this.#isPlaying())) {
+    const { gesture, time, names: lastNames, isOfPlaying } = this.#last, now = performance.now();
+    const isOfSame = names === lastNames, isPlaying = this.#isPlaying();
+    const isSoon = isOfSame && now - time < ONE_STEP_MILLISECONDS;
+    // The press that stops what plays begins while it still does.
+    const playsOn = isOfSame && isOfPlaying && isPlaying;
+    if (!playsOn && (gesture !== this.#gesture || !(this.#isHeld || isSoon || isPlaying))) {
       this.#past.push(before);
       if (this.#past.length > MAXIMUM_STEPS) this.#past.shift();
     }
     this.#future = [];
-    this.#last = { gesture: this.#gesture, time: now, names };
+    this.#last = { gesture: this.#gesture, time: now, names, isOfPlaying: isPlaying };
     this.#show();
   }
 
@@ -82,7 +86,7 @@ export class History {
     if (!target) return;
     const changes = between(this.#store.state, target);
     to.push(this.#store.state);
-    this.#last = { gesture: -1, time: 0, names: '' };
+    this.#last = { gesture: -1, time: 0, names: '', isOfPlaying: false };
     this.quietly(() => this.#store.update(changes));
     this.#onTravel(changes);
     this.#show();

@@ -85,7 +85,9 @@ def test_a_capture_is_good_after_calibration_and_bent_before(rig, calibrated, tm
     found = {}
     for name, path in (("before", alone), ("after", rig)):
         capture, transport = tmp_path / f"{name}.zarr", tmp_path / f"{name}-t.zarr"
-        assert run_nearfar("acquire", tmp_path / "plan.json", capture, "--rig", path).status == 0
+        acquired = run_nearfar("acquire", tmp_path / "plan.json", capture, "--rig", path)
+        # A bent response raises alarms.
+        assert acquired.status == 0, acquired.err
         ran = run_nearfar("reconstruct", capture, transport, "--json")
         found[name] = json.loads(ran.out)
         assert open_capture(capture).rig.get("calibration") == (

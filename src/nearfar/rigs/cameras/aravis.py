@@ -29,6 +29,7 @@ NAME = "aravis"
 CONTINUOUS_ACQUISITION = 0
 STATUS_SUCCESS = 0  # ARV_BUFFER_STATUS_SUCCESS
 REASON_OF_STATUS = {
+    1: "nothing of it came",
     2: "it did not come in time",
     3: "packets were lost",
     4: "packets were out of order",

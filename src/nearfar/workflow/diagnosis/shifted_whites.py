@@ -25,6 +25,10 @@ MOST_SIDE = 1024
 # Camera pixels of the least shift that is told, and of the least one that stays: regressions tell
 # the moment of smaller ones better.
 LEAST_SHIFT, LEAST_THAT_STAYS = 0.15, 0.7
+# Two photos of an even wall correlate by chance, with a peak of up to 7.5 standard deviations.
+# Shifted pictures were seen to peak at 12 and more, and with few pixels at 0.78 of the highest that
+# there is.
+LEAST_PEAK_DEVIATIONS, LEAST_PEAK = 10.0, 0.6
 # Gauss-Newton steps from the peak of the correlation, which is some tenths of a pixel off.
 REFINEMENTS = 4
 # A shift leaves at most this share of the squared difference of two whites.
@@ -65,8 +69,12 @@ def find_shifted_whites(capture: Capture, references: References) -> list[Moved]
         If photos are damaged.
     """
     whites: Integers = references.whites
-    black = _middle_of(capture, int(references.blacks[0]))
-    pictures = [_middle_of(capture, int(white)) - black for white in whites]
+    # Not the same black of both: its noise would be theirs alike, and not be shifted.
+    first_black, black = (_middle_of(capture, int(references.blacks[end])) for end in (0, -1))
+    pictures = [
+        _middle_of(capture, int(white)) - (black if number else first_black)
+        for number, white in enumerate(whites)
+    ]
     shifts = [shift_between(pictures[0], picture) for picture in pictures[1:]]
     moved = np.array([False, *(shift is not None for shift in shifts)])
     if not moved.any():
@@ -97,8 +105,10 @@ def shift_between(one: Floats, other: Floats) -> Shift | None:
         None if they are not shifted, or by less than `LEAST_SHIFT`, or differ otherwise.
     """
     found = _peak_of_correlation(one, other)
+    if found is None:
+        return None
     margin = int(np.ceil(np.abs(found).max())) + 1
-    if np.hypot(*found) < LEAST_SHIFT / 3 or 4 * margin > min(one.shape):
+    if 4 * margin > min(one.shape):
         return None
     # One may be brighter than the other.
     scaled = one * (np.vdot(one, other) / max(float(np.vdot(one, one)), 1e-300))
@@ -106,6 +116,8 @@ def shift_between(one: Floats, other: Floats) -> Shift | None:
     unshifted = (other - scaled)[inner]
     shifted = unshifted
     for _ in range(REFINEMENTS):
+        if np.hypot(*found) < LEAST_SHIFT / 3:
+            return None
         moved = ndimage.shift(scaled, found, order=3, mode="nearest")
         shifted = (other - moved)[inner]
         slopes = np.stack([-slope[inner].ravel() for slope in np.gradient(moved)], axis=1)
@@ -124,13 +136,15 @@ def _middle_of(capture: Capture, number: int) -> Floats:
     return np.asarray(photo[:, left : left + MOST_SIDE].mean(axis=-1))
 
 
-def _peak_of_correlation(one: Floats, other: Floats) -> NDArray[np.float64]:
-    """Return the place of the phase correlation's peak, between pixels, (2,)."""
+def _peak_of_correlation(one: Floats, other: Floats) -> NDArray[np.float64] | None:
+    """Return the place of the phase correlation's peak, between pixels, (2,); None by chance."""
     window = np.hanning(one.shape[0])[:, None] * np.hanning(one.shape[1])
     first, second = (fft.rfft2((each - each.mean()) * window) for each in (one, other))
     spectrum = first.conj() * second
     spectrum /= np.abs(spectrum) + 1e-12 * np.abs(spectrum).max() + np.finfo(np.float32).tiny
     found = fft.irfft2(spectrum, one.shape)
+    if found.max() < min(LEAST_PEAK_DEVIATIONS / np.sqrt(found.size), LEAST_PEAK):
+        return None
     peak = np.unravel_index(int(found.argmax()), found.shape)
     place = np.empty(2)
     for axis, at in enumerate(peak):

@@ -10,8 +10,8 @@ camera pixel with q(c') = p, and p' = q(c). Then
 with one smooth function r for the vignetting of both lenses. So F^T by a picture is found in three
 steps: the picture is spread over the projector at q, far-range light is relit under that, and each
 projector pixel takes the mean of the camera pixels c'. Near-range light follows in the same way,
-but for its functions next to q: what an error of q takes from direct light, they have, and D^T and
-theirs make up for each other only if both are transposed.
+but for its functions next to q. These make up for what an error of q takes from direct light, so
+they are transposed, as direct light is.
 
 log r is a polynomial of second degree, fitted to F between cells of the projector. If the two
 directions disagree at measured frequencies, as with gloss, glass or mirrors, F^T is kept.

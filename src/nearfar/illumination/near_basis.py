@@ -81,9 +81,9 @@ class NearBasis:
 
     @property
     def is_next_to_q(self) -> NDArray[np.bool_]:
-        """Whether each hat belongs to what direct light leaves at q, shape (J,).
+        """Whether each hat makes up for what an error of q takes from direct light, shape (J,).
 
-        These are the hat at q and those of finer pitches; of single pixels, the 3 x 3 about q.
+        The hat at q and those of finer pitches do; of single pixels, the 3 x 3 about q.
         """
         reach = max(1, self.pitch // 2)
         return np.asarray(np.abs(self.offsets).max(axis=1) <= reach)

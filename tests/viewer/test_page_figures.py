@@ -198,7 +198,7 @@ def test_the_error_bars_of_the_picture_are_a_map(open_page, address, transport):
     page = open_page(address, {"kind": "white", "far": 0.5})
     page.focus("[data-tool=error-bars]")
     page.keyboard.press("Enter")
-    wait_until(lambda: pictures(page)["stage"] is True)
+    wait_until(lambda: pictures(page).get("stage") is True)
     assert page.inner_text("#stage-label") == "error bars of the relit picture"
     bars = ErrorBars(transport)
     sigma = bars.picture(WHITE, far=0.5).mean(axis=-1)
@@ -224,7 +224,7 @@ def test_the_error_bars_of_the_picture_are_a_map(open_page, address, transport):
     page.keyboard.press("5")
     page.keyboard.press("1")
     settled(page)
-    wait_until(lambda: pictures(page)["stage"] is True)
+    wait_until(lambda: pictures(page).get("stage") is True)
     assert page.inner_text("#stage-label").endswith("as a share of its light")
     assert _ticks(page, "#error-bars-figure")[-1].endswith(" %")
     page.click("[data-tool=relit]")
@@ -237,7 +237,7 @@ def test_a_share_of_the_light_is_the_error_bar_over_the_light(open_page, address
         address,
         {"kind": "white", "tool": "error-bars", "errorBars": "relative", "ranges": ranges},
     )
-    wait_until(lambda: pictures(page)["stage"] is True)
+    wait_until(lambda: pictures(page).get("stage") is True)
     sigma = ErrorBars(transport).picture(WHITE).mean(axis=-1)
     light = (transport @ WHITE).mean(axis=-1)
     assert _close(seen(page), false_colour(100 * sigma / light, 0, 5))

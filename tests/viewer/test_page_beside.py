@@ -89,7 +89,8 @@ def test_numbers_and_clicks_are_those_of_the_first(open_page, two, transport, se
     page.mouse.click(*at)
     page.wait_for_selector("#mark:not([hidden])")
     wait_until(lambda: page.inner_text("#pixel") == "row 12, column 33")
-    # Pointing at the second picture is pointing at the same camera pixel.
+    # Pointing at the second picture is pointing at the same camera pixel. Sigma comes last.
+    page.wait_for_selector("#readout:has-text('±')")
     before = page.inner_text("#readout")
     page.mouse.move(2, 2)
     beside = _box(page, "#before")

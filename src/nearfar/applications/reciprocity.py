@@ -116,11 +116,12 @@ class ByReciprocity:
     def see(self, block: Transport) -> None:
         """Relight the camera pixels of a block by all the light that was sent, and add them up."""
         light = (self._light / self._ratio).astype(np.float32)
-        components = _away_from_q(block).components(light if light.shape[-1] > 1 else light[..., 0])
+        away = _away_from_q(block)
+        components = away.components(light if light.shape[-1] > 1 else light[..., 0])
         seen = components.far + components.near
         flat = np.reshape(seen, (block.camera.pixels, -1))
         for i in range(flat.shape[1]):
-            self._seen[..., i] += block.factors.spread_directly(flat[:, i])
+            self._seen[..., i] += away.factors.spread_directly(flat[:, i])
 
     def correction(self) -> Floats:
         """Return the correction of the transposed view, shape (Py, Px, channels).

@@ -85,3 +85,22 @@ def test_a_part_that_moved_is_no_motion_of_the_camera():
     # Something else altogether, and nothing at all.
     assert shift_between(one, textured(camera, seed=5)) is None
     assert shift_between(np.zeros(camera), np.zeros(camera)) is None
+
+
+def test_an_even_wall_is_left_at_once(monkeypatch):
+    """What whites of an even wall have alike is chance: nothing is shifted for it."""
+    camera = Size(300, 280)
+
+    def read(numbers, _rows):
+        (number,) = numbers
+        is_white = number in WHITES
+        generator = np.random.default_rng(number)
+        # Shot noise: that of black is the least.
+        noise = NOISE * (4 if is_white else 1) * generator.standard_normal((1, *camera, 1))
+        return (0.8 if is_white else BLACK) + noise
+
+    wall = SimpleNamespace(camera=camera, read=read)
+    tried = []
+    monkeypatch.setattr(ndimage, "shift", lambda *given, **_: tried.append(given))
+    assert find_shifted_whites(wall, References(WHITES, np.array([0, PHOTOS - 1]))) == []
+    assert tried == []

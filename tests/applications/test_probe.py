@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import nearfar
+from nearfar.applications import run_loops
 from nearfar.applications.probe import probe_stored
 from nearfar.arrays import Size
 from nearfar.errors import InputError
@@ -87,11 +88,52 @@ def test_far_range_light_summed_some_functions_at_a_time_is_the_same(monkeypatch
     """As at projectors whose sums along rows do not fit into memory."""
     transport, light = world(), a_light(2)
     whole = nearfar.probe(transport, light, MASK.ring(2, 5))
-    monkeypatch.setattr("nearfar.applications.by_runs.FUNCTIONS_TOGETHER", 3)
-    monkeypatch.setattr("nearfar.applications.by_runs.TABLE_BYTES", 12 * 18 * 25 * 7)
+    monkeypatch.setattr("nearfar.applications.summed_light.FUNCTIONS_TOGETHER", 3)
+    monkeypatch.setattr("nearfar.applications.summed_light.TABLE_BYTES", 12 * 18 * 25 * 7)
     monkeypatch.setattr("nearfar.applications.by_runs.BATCH_PIXELS", 10)
     found = nearfar.probe(transport, light, MASK.ring(2, 5))
     np.testing.assert_allclose(found, whole, atol=1e-6)
+
+
+def fine_world(*, hats):
+    """A transport of so many pixels that sums over large discs are interpolated."""
+    projector, camera = Size(80, 100), Size(66, 76)
+    transport = model_transport(
+        projector, camera, window=7, far=Size(5, 5), channels=2, fractional=True
+    )
+    generator = np.random.default_rng(8)
+    q = transport.correspondence + generator.uniform(-0.4, 0.4, (*camera, 2))
+    q = np.clip(q, 0, np.array(projector) - 1).astype(np.float32)
+    q[2:4, 3:6] = np.nan
+    direct, near = transport.direct.copy(), transport.near.copy()
+    changes = {}
+    if hats:
+        near = generator.uniform(0, 0.01, (*camera, 2, 49 + 16)).astype(np.float32)
+        footprint = np.tile(np.array([1.7, 2.2, 0.3, -0.4], np.float32), (*camera, 1))
+        changes = {"pitch": 4, "footprint": footprint}
+    direct[2:4, 3:6], near[2:4, 3:6] = 0, 0
+    return replace(transport, correspondence=q, direct=direct, near=near, **changes)
+
+
+@pytest.mark.parametrize("hats", [False, True])
+@pytest.mark.parametrize(("inner", "outer"), [(0, 33), (33, 50), (10, 300)])
+def test_large_discs_are_interpolated_between_few_places(hats, inner, outer, monkeypatch):
+    """Far-range light's discs are blurred about their edges, and all else is exact."""
+    transport = fine_world(hats=hats)
+    light = np.random.default_rng(3).uniform(0, 1, (*transport.projector, 2)).astype(np.float32)
+    asked = []
+    interpolate = run_loops.add_between
+    monkeypatch.setattr(run_loops, "add_between", lambda *a: asked.append(interpolate(*a)))
+    found = nearfar.probe(transport, light, MASK.ring(inner, outer))
+    assert asked
+    rest = nearfar.probe(transport, light, MASK.beyond(outer))
+    within = nearfar.probe(transport, light, MASK.within(outer))
+    np.testing.assert_allclose(rest + within, transport @ light, atol=3e-6)
+    assert not found[~transport.lit].any()
+    monkeypatch.setattr("nearfar.applications.by_runs.MOST_PLACES_OF_PIXEL", 0.0)
+    exact = nearfar.probe(transport, light, MASK.ring(inner, outer))
+    error = np.sqrt(np.mean((found - exact) ** 2) / np.mean((transport @ light) ** 2))
+    assert error < 10 ** (-65 / 20)
 
 
 @pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
@@ -177,9 +219,12 @@ def test_an_exact_transport_is_probed_as_a_measured_one():
     np.testing.assert_allclose(found, nearfar.probe(transport, light, mask), atol=3e-6)
 
 
+@pytest.mark.parametrize("table_bytes", [0, 2**27])
 @pytest.mark.parametrize("make", WORLDS.values(), ids=WORLDS)
-def test_blocks_of_a_stored_transport_give_the_same(make, tmp_path, monkeypatch):
+def test_blocks_of_a_stored_transport_give_the_same(make, table_bytes, tmp_path, monkeypatch):
+    """Also where sums along rows are made for the rows that a block needs."""
     transport, light = make(), a_light()
+    monkeypatch.setattr("nearfar.applications.summed_light.TABLE_BYTES", table_bytes)
     save_transport(transport, tmp_path / "t.zarr")
     stored = open_transport(tmp_path / "t.zarr")
     monkeypatch.setattr("nearfar.transport.stored.StoredTransport.blocks", three_rows)

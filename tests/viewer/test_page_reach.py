@@ -9,7 +9,6 @@ import time
 import numpy as np
 import pytest
 
-from nearfar.applications.probe import probe
 from nearfar.arrays import middles
 from nearfar.files import from_srgb
 from nearfar.viewer.interactive import InteractiveTransport
@@ -213,10 +212,11 @@ def test_the_server_stops_once_nobody_waits(stored, monkeypatch):
             second.set()
         if len(steps) > 2:
             time.sleep(0.25)
-        return probe(*given)
+        return picture(*given)
 
+    picture = reach.ProbedLight.picture
     monkeypatch.setattr(reach, "STEP_ENTRIES", 1)
-    monkeypatch.setattr(reach, "probe", counted)
+    monkeypatch.setattr(reach.ProbedLight, "picture", counted)
     with served_view(InteractiveTransport(stored)) as address:
         host, port = address.removeprefix("http://").split(":")
         body = message(WHITE, outer=3)

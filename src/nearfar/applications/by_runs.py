@@ -3,136 +3,33 @@
 Direct light is summed pixel by pixel and near-range light over the part of its window, or of its
 hats, that the runs hold. Far-range light is f times sums of light times each of its functions; over
 a run such a sum is the difference of two sums along a projector row, so that rows of T are not
-drawn.
+drawn. Sums over discs that are large beside the distances between camera pixels are taken at a grid
+of places, and interpolated at each q.
 
 Index convention: c runs over camera pixels, m over functions of far-range light.
 """
 
-from collections.abc import Iterator
+import math
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from nearfar.applications import run_loops
 from nearfar.applications.shapes import Band, Disc, Runs
-from nearfar.arrays import Floats, Size, blocks
-from nearfar.illumination.real_basis import RealBasis
+from nearfar.applications.summed_light import SummedLight, Table, grid_of_places
+from nearfar.arrays import Floats, Integers, Size, blocks
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.parallel import side_by_side
 from nearfar.transport.boxes import halves
 from nearfar.transport.factors import Factors
 
-# Bytes of sums along rows that are kept at once. Those of `FUNCTIONS_TOGETHER` are kept at least,
-# 1.6 GB for a projector of 1080x1920; with fewer, each block of camera pixels would sum again.
-TABLE_BYTES = 2**27
-# Functions whose sums lie side by side: few enough for those of a disc to stay in a cache.
-FUNCTIONS_TOGETHER = 192
-BATCH_PIXELS = 2048
-# Of float32 in a cache line.
-FLOATS_OF_LINE = 16
-# Projector rows that a thread sums at a time.
-LINES_AT_ONCE = 8
-
-
-class _Table(NamedTuple):
-    """Sums along rows of light times some functions of far-range light.
-
-    Attributes
-    ----------
-    functions : slice
-    sums : ndarray, shape (Py, Px + 1, m or more), float32
-        Before each column; the last axis is padded.
-    """
-
-    functions: slice
-    sums: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class SummedLight:
-    """A light summed along projector rows, for the camera pixels of a transport.
-
-    Attributes
-    ----------
-    light : ndarray, shape (Py, Px), float32
-    basis : RealBasis
-        Of far-range light.
-    """
-
-    light: Floats
-    basis: RealBasis
-
-    @cached_property
-    def moments(self) -> tuple[Floats, Floats]:
-        """Sums of the light, and of the light times column, before each column, (Py, Px + 1)."""
-        found = []
-        for values in (self.light, self.light * np.arange(self.light.shape[1])):
-            sums = np.zeros((len(values), values.shape[1] + 1))
-            np.cumsum(values, axis=1, out=sums[:, 1:])
-            found.append(sums)
-        return found[0], found[1]
-
-    def tables(self) -> Iterator[list[_Table]]:
-        """Yield sums of all functions of far-range light, as many at a time as memory allows."""
-        bytes_each = 4 * (self.light.size + len(self.light))
-        at_once = max(1, TABLE_BYTES // (bytes_each * FUNCTIONS_TOGETHER)) * FUNCTIONS_TOGETHER
-        if self.basis.count <= at_once:
-            yield self._all_tables
-            return
-        for some in blocks(self.basis.count, at_once):
-            yield self._tables_of(some)
-
-    @cached_property
-    def _all_tables(self) -> list[_Table]:
-        return self._tables_of(slice(0, self.basis.count))
-
-    def _tables_of(self, functions: slice) -> list[_Table]:
-        parts = blocks(functions.stop - functions.start, FUNCTIONS_TOGETHER)
-        moved = [slice(functions.start + p.start, functions.start + p.stop) for p in parts]
-        return [_Table(one, self._summed(one)) for one in moved]
-
-    def _summed(self, functions: slice) -> Floats:
-        height, width = self.light.shape
-        cycles = self.basis.cycles[self.basis.index[functions]]
-        waves = [
-            np.exp(2j * np.pi * (np.arange(side)[:, None] * along % 1.0)).astype(np.complex64)
-            for side, along in zip(self.light.shape, cycles.T, strict=True)
-        ]
-        # cos(a + b) = cos a cos b - sin a sin b, and sin(a + b) = cos a sin b + sin a cos b.
-        sine = self.basis.is_sine[functions]
-        y, x = (np.stack([wave.real, wave.imag]) for wave in waves)
-        y *= self.basis.weights[functions].astype(np.float32)
-        down = (y[0], np.where(sine, y[1], -y[1]))
-        across = (np.where(sine, x[1], x[0]), np.where(sine, x[0], x[1]))
-        table = _aligned((height, width + 1, len(sine)))
-
-        def work(lines: slice) -> None:
-            run_loops.sum_along_rows(self.light[lines], down, across, lines.start, table[lines])
-
-        side_by_side(work, blocks(height, LINES_AT_ONCE))
-        return table
-
-
-def _aligned(shape: tuple[int, int, int]) -> Floats:
-    """Return an array whose last axis is longer, so that each of its rows starts a cache line.
-
-    Sums over such rows take three quarters of the time.
-    """
-    high, wide, count = shape
-    padded = -(-count // FLOATS_OF_LINE) * FLOATS_OF_LINE
-    length = high * wide * padded
-    flat = np.empty(length + FLOATS_OF_LINE, dtype=np.float32)
-    first = -flat.ctypes.data // flat.itemsize % FLOATS_OF_LINE
-    return flat[first : first + length].reshape(high, wide, padded)
-
-
-def summed_lights(flat: Floats, basis: RealBasis) -> list[SummedLight]:
-    """Prepare a light (1, P) for all channels, or (channels, P): one of each."""
-    return [
-        SummedLight(np.ascontiguousarray(one.reshape(basis.projector), dtype=np.float32), basis)
-        for one in flat
-    ]
+# Camera pixels of a batch, whose sums stay in a cache.
+BATCH_PIXELS = 1024
+# Sums over a disc are interpolated where that takes at most this many places for a camera pixel,
+# and where its radius is at least this, in projector pixels: of the few pixels at the edge of a
+# smaller disc each matters.
+MOST_PLACES_OF_PIXEL = 0.5
+LEAST_INTERPOLATED_RADIUS = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,13 +52,22 @@ class RunsOfCamera:
     camera: Size
     projector: Size
 
-    def of(self, batch: slice) -> list[tuple[int, Runs]]:
-        """Return the runs of some of the camera pixels, with the signs of their shapes."""
+    def of(self, shape: Disc | Band, batch: slice) -> Runs:
+        """Return the runs of a shape, of some of these camera pixels."""
         pixels = slice(self.start + batch.start, self.start + batch.stop)
-        return [
-            (sign, shape.runs(pixels, self.q[batch], self.camera, self.projector))
-            for sign, shape in self.shapes
-        ]
+        return shape.runs(pixels, self.q[batch], self.camera, self.projector)
+
+    def lines(self, shapes: list[Disc | Band]) -> slice:
+        """Return the projector rows in which shapes have runs, and perhaps some more."""
+        found = [shape.lines(self.q, self.projector) for shape in shapes]
+        return slice(min(one.start for one in found), max(one.stop for one in found))
+
+    def is_interpolated(self, disc: Disc) -> bool:
+        """Whether sums over a disc are taken at few places, and interpolated at each q."""
+        if disc.radius < LEAST_INTERPOLATED_RADIUS:
+            return False
+        _, places = grid_of_places(disc.radius, self.projector)
+        return places.pixels <= MOST_PLACES_OF_PIXEL * self.camera.pixels
 
 
 def picture_by_runs(factors: Factors, lights: list[SummedLight], runs: RunsOfCamera) -> Floats:
@@ -185,26 +91,62 @@ def picture_by_runs(factors: Factors, lights: list[SummedLight], runs: RunsOfCam
 
 
 def _add_all(factors: Factors, light: SummedLight, runs: RunsOfCamera, out: Floats) -> None:
-    add_about_q = _add_single_pixels if factors.of_single_pixels else _add_hats
-    for number, tables in enumerate(light.tables()):
+    by_rows, interpolated = _by_size(runs)
+    discs = [(sign, light.of_disc(disc)) for sign, disc in interpolated]
 
-        def work(
-            batch: slice, tables: list[_Table] = tables, with_about_q: bool = number == 0
-        ) -> None:
-            far = [_floats(factors.far[batch, :, functions]) for functions, _ in tables]
-            for sign, found in runs.of(batch):
-                part = np.zeros_like(out[batch])
-                if with_about_q:
-                    add_about_q(factors, light, batch, found, part)
-                for own, (_, sums) in zip(far, tables, strict=True):
-                    run_loops.add_far(sums, own, *found, part)
-                out[batch] += sign * part
+    def first(batch: slice) -> None:
+        _add_about_q(factors, light, runs, batch, out[batch])
+        if not discs:
+            return
+        far = _floats(factors.far[batch])
+        sums = np.zeros((len(far), far.shape[2]), dtype=np.float32)
+        for sign, disc in discs:
+            run_loops.add_between(*disc, sign, runs.q[batch], sums)
+        run_loops.add_products(far, sums, out[batch])
+
+    side_by_side(first, blocks(len(out), BATCH_PIXELS))
+    for table in light.tables(runs.lines([shape for _, shape in by_rows])) if by_rows else ():
+
+        def work(batch: slice, table: Table = table) -> None:
+            far = _floats(factors.far[batch, :, table.functions])
+            sums = np.zeros((len(far), far.shape[2]), dtype=np.float32)
+            for sign, shape in by_rows:
+                first, starts, stops = runs.of(shape, batch)
+                run_loops.add_runs(table.sums, sign, first - table.first, starts, stops, sums)
+            run_loops.add_products(far, sums, out[batch])
 
         side_by_side(work, blocks(len(out), BATCH_PIXELS))
 
 
+def _add_about_q(
+    factors: Factors, light: SummedLight, runs: RunsOfCamera, batch: slice, out: Floats
+) -> None:
+    """Add direct and near-range light."""
+    add = _add_single_pixels if factors.of_single_pixels else _add_hats
+    for sign, shape in runs.shapes:
+        part = np.zeros_like(out)
+        add(factors, light, batch, shape, runs.of(shape, batch), part)
+        out += sign * part
+
+
+def _by_size(runs: RunsOfCamera) -> tuple[list[tuple[int, Disc | Band]], list[tuple[int, Disc]]]:
+    """Return the shapes that are summed row by row, and the discs that are interpolated."""
+    by_rows, interpolated = [], []
+    for sign, shape in runs.shapes:
+        if isinstance(shape, Disc) and runs.is_interpolated(shape):
+            interpolated.append((sign, shape))
+        else:
+            by_rows.append((sign, shape))
+    return by_rows, interpolated
+
+
 def _add_single_pixels(
-    factors: Factors, light: SummedLight, batch: slice, runs: Runs, out: Floats
+    factors: Factors,
+    light: SummedLight,
+    batch: slice,
+    _shape: Disc | Band,
+    runs: Runs,
+    out: Floats,
 ) -> None:
     """Add direct and near-range light where this is of single projector pixels."""
     side, where = factors.near_basis.window, factors.footprint
@@ -215,20 +157,47 @@ def _add_single_pixels(
     run_loops.add_window(light.light, window, factors.centres[batch], *runs, out)
 
 
-def _add_hats(factors: Factors, light: SummedLight, batch: slice, runs: Runs, out: Floats) -> None:
+def _add_hats(
+    factors: Factors,
+    light: SummedLight,
+    batch: slice,
+    shape: Disc | Band,
+    runs: Runs,
+    out: Floats,
+) -> None:
     """Add direct light of boxes, and near-range light of hats."""
-    basis = factors.near_basis
-    direct, near = _floats(factors.direct[batch]), _floats(factors.near[batch])
+    basis, lit = factors.near_basis, np.isfinite(factors.q[batch]).all(axis=1, keepdims=True)
     middles, sides = halves(factors.q[batch], factors.boxes[batch])
-    run_loops.add_boxes(light.light, direct, middles, sides, *runs, out)
+    run_loops.add_boxes(light.light, _floats(factors.direct[batch]), middles, sides, *runs, out)
+    centres = factors.centres[batch]
+    places = light.pyramid.places(centres)[:, None]
     for pitch in basis.rising_pitches:
-        hats = near[..., basis.pitches == pitch]
-        if pitch != basis.pitch:
-            # No hat of a finer pitch stands at q itself.
-            hats = np.insert(hats, hats.shape[2] // 2, 0.0, axis=2)
-        side = round(np.sqrt(hats.shape[2]))
-        grid = np.ascontiguousarray(hats).reshape(*direct.shape, side, side)
-        run_loops.add_hats(light.moments, grid, pitch, factors.centres[batch], *runs, out)
+        chosen = np.flatnonzero(basis.pitches == pitch)
+        if _holds_hats(shape, basis, pitch):
+            seen = light.levels[places + light.pyramid.steps[chosen]] * lit
+        else:
+            seen = _summed_hats(light, pitch, len(chosen), centres, runs)
+        near = factors.near[batch, :, chosen[0] : chosen[-1] + 1]
+        run_loops.add_products(_floats(near), _floats(seen), out)
+
+
+def _summed_hats(
+    light: SummedLight, pitch: int, count: int, centres: Integers, runs: Runs
+) -> Floats:
+    """Return sums of light times `count` hats of one pitch, over runs, (n, count)."""
+    side = math.isqrt(count - 1) + 1
+    found = np.empty((len(centres), side, side), dtype=np.float32)
+    run_loops.sum_hats(light.moments, pitch, centres, *runs, found)
+    flat = found.reshape(len(centres), side**2)
+    # No hat of a finer pitch stands at q itself.
+    return flat if count == side**2 else np.delete(flat, side**2 // 2, axis=1)
+
+
+def _holds_hats(shape: Disc | Band, basis: NearBasis, pitch: int) -> bool:
+    """Whether all hats of one pitch are in a disc wherever q is."""
+    # From the rounded q to the farthest pixel of a hat, along each axis.
+    reach = np.abs(basis.offsets[basis.pitches == pitch]).max() + pitch - 1
+    return isinstance(shape, Disc) and bool(np.hypot(reach + 0.5, reach + 0.5) < shape.radius)
 
 
 def _floats(values: Floats) -> Floats:

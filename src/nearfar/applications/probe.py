@@ -7,18 +7,15 @@ structured light transport", CVPR 2014. They mask T optically; with T in hand it
 Index convention: c runs over camera pixels, row by row.
 """
 
+from dataclasses import dataclass, replace
 from math import inf, isinf
 
 import numpy as np
 
-from nearfar.applications.by_runs import (
-    RunsOfCamera,
-    SummedLight,
-    picture_by_runs,
-    summed_lights,
-)
+from nearfar.applications.by_runs import RunsOfCamera, picture_by_runs
 from nearfar.applications.masks import Given, ProbingMask, SameForAll, Shape, Whole
 from nearfar.applications.shapes import Band, Disc
+from nearfar.applications.summed_light import SummedLight, summed_lights
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.checks import as_light, require_instance
 from nearfar.transport.exact import ExactTransport
@@ -60,51 +57,79 @@ def probe(transport: AnyTransport, light: Floats, mask: ProbingMask) -> Floats:
     (8, 8)
     """
     require_instance(mask, ProbingMask, "mask", "nearfar.ProbingMask.within")
-    checked = as_light(light, transport.projector, transport.channels)
-    sums = _summed(transport, checked)
-    return _probed(transport, checked, sums, mask.on(transport.projector), 0, transport.camera)
+    return probed_light(transport, light, mask, transport.camera).picture(transport, 0)
 
 
 def probe_stored(stored: StoredTransport, light: Floats, mask: ProbingMask) -> Floats:
     """Probe a transport that is in a file, some rows of the camera at a time; see `probe`."""
-    checked = as_light(light, stored.projector, stored.channels)
-    mask, first, parts = mask.on(stored.projector), 0, []
-    sums: list[SummedLight] | None = None
+    first, parts = 0, []
+    probed: ProbedLight | None = None
     for rows in stored.blocks():
-        sums = sums or _summed(rows, checked)
-        parts.append(_probed(rows, checked, sums, mask, first, stored.camera))
+        probed = probed or probed_light(rows, light, mask, stored.camera)
+        parts.append(probed.picture(rows, first))
         first += rows.camera.pixels
     return np.concatenate(parts)
 
 
-def _summed(transport: AnyTransport, light: Floats) -> list[SummedLight] | None:
-    """Return a light summed along projector rows; None if rows of T are to be drawn."""
-    if not isinstance(transport, Transport) or "free" in transport.parts:
-        return None
-    return summed_lights(transport.lights(light), transport.far_basis)
+@dataclass(frozen=True, eq=False)
+class ProbedLight:
+    """A light and a mask, prepared for one block after another of a transport's camera pixels.
+
+    Attributes
+    ----------
+    light : ndarray, shape (Py, Px) or (Py, Px, channels)
+    mask : ProbingMask
+    camera : Size
+        Of the whole transport.
+    sums : list of SummedLight, or None
+        None if rows of T are to be drawn.
+    """
+
+    light: Floats
+    mask: ProbingMask
+    camera: Size
+    sums: list[SummedLight] | None
+
+    def by(self, mask: ProbingMask) -> "ProbedLight":
+        """Return the same light, prepared for another mask."""
+        return replace(self, mask=mask)
+
+    def picture(self, block: AnyTransport, first: int) -> Floats:
+        """Probe a block, whose first camera pixel has the number `first` in the whole transport.
+
+        Returns
+        -------
+        ndarray, shape (y, x) or (y, x, channels), float32
+        """
+        total = np.zeros((*block.camera, block.channels), dtype=np.float32)
+        in_runs: list[tuple[int, Disc | Band]] = []
+        for sign, shape in self.mask.terms:
+            match shape:
+                case Disc() | Band() if self.sums is not None and shape != Disc(inf):
+                    in_runs.append((sign, shape))
+                case _:
+                    found = _by_shape(block, self.light, shape, first, self.camera)
+                    total += sign * found.reshape(total.shape)
+        if in_runs and self.sums is not None and isinstance(block, Transport):
+            total += _by_runs(block, self.sums, in_runs, first, self.camera).reshape(total.shape)
+        return np.asarray(total[..., 0] if block.channels == 1 else total)
 
 
-def _probed(
-    transport: AnyTransport,
-    light: Floats,
-    sums: list[SummedLight] | None,
-    mask: ProbingMask,
-    first: int,
-    camera: Size,
-) -> Floats:
-    """Probe camera pixels from `first` on, of a whole camera."""
-    total = np.zeros((*transport.camera, transport.channels), dtype=np.float32)
-    in_runs: list[tuple[int, Disc | Band]] = []
-    for sign, shape in mask.terms:
-        match shape:
-            case Disc() | Band() if sums is not None and shape != Disc(inf):
-                in_runs.append((sign, shape))
-            case _:
-                found = _by_shape(transport, light, shape, first, camera)
-                total += sign * found.reshape(total.shape)
-    if in_runs and sums is not None and isinstance(transport, Transport):
-        total += _by_runs(transport, sums, in_runs, first, camera).reshape(total.shape)
-    return np.asarray(total[..., 0] if transport.channels == 1 else total)
+def probed_light(
+    block: AnyTransport, light: Floats, mask: ProbingMask, camera: Size
+) -> ProbedLight:
+    """Prepare a light and a mask for the blocks of a transport, of which `block` is any.
+
+    Raises
+    ------
+    InputError
+        If the light or the mask do not fit the transport.
+    """
+    checked = as_light(light, block.projector, block.channels)
+    sums: list[SummedLight] | None = None
+    if isinstance(block, Transport) and "free" not in block.parts:
+        sums = summed_lights(block.lights(checked), block.factors)
+    return ProbedLight(checked, mask.on(block.projector), camera, sums)
 
 
 def _by_shape(

@@ -73,16 +73,14 @@ def sum_along_rows(
     light: Floats,
     down: tuple[Floats, Floats],
     across: tuple[Floats, Floats],
-    first: int,
     table: Floats,
 ) -> None:
-    """Sum light times functions of far-range light along projector rows from `first` on.
+    """Sum light times functions of far-range light along projector rows.
 
     Parameters
     ----------
     light : ndarray, shape (n, Px), float32
-        Of these rows.
-    down, across : tuple of ndarray, shapes (Py, M) and (Px, M), float32
+    down, across : tuple of ndarray, shapes (n, M) and (Px, M), float32
         A function is the sum of two products of one of `down` and one of `across`.
     table : ndarray, shape (n, Px + 1, M or more), float32
         Gets the sum of all pixels before each column, in the first M of its last axis.
@@ -92,7 +90,7 @@ def sum_along_rows(
     for y in range(len(light)):
         sums[:] = 0.0
         table[y, 0] = 0.0
-        one, two = down[0][first + y], down[1][first + y]
+        one, two = down[0][y], down[1][y]
         for x in range(light.shape[1]):
             value, here = light[y, x], table[y, x + 1]
             one_across, two_across = across[0][x], across[1][x]
@@ -103,13 +101,22 @@ def sum_along_rows(
 
 
 @compiled
-def add_far(
-    table: Floats, far: Floats, first: Integers, starts: Integers, stops: Integers, out: Floats
+def add_runs(
+    table: Floats, sign: int, first: Integers, starts: Integers, stops: Integers, out: Floats
 ) -> None:
-    """Add far-range light, (n, channels, M), of a table that `sum_along_rows` made."""
-    count, rows = far.shape[2], starts.shape[1]
+    """Add sums over runs, of a table that `sum_along_rows` made.
+
+    Parameters
+    ----------
+    table : ndarray
+    sign : int
+        1, or -1 to subtract them.
+    out : ndarray, shape (n, m)
+        Of the first m functions of the table.
+    """
+    count, rows = out.shape[1], starts.shape[1]
     sums = np.empty(count, dtype=np.float32)
-    for c in range(len(far)):
+    for c in range(len(out)):
         sums[:] = 0.0
         # Two rows at once, so that the sums are read and written half as often.
         for r in range(0, rows, 2):
@@ -124,10 +131,58 @@ def add_far(
             more, less = table[first[c] + s, stops[c, s]], table[first[c] + s, starts[c, s]]
             for m in range(count):
                 sums[m] += (upper[m] - lower[m]) + (more[m] - less[m])
-        for i in range(far.shape[1]):
-            factors, total = far[c, i], np.float32(0.0)
-            for m in range(count):
-                total += factors[m] * sums[m]
+        for m in range(count):
+            out[c, m] += sign * sums[m]
+
+
+@compiled
+def add_between(
+    grid: Floats, first: float, spacing: float, sign: int, q: Floats, out: Floats
+) -> None:
+    """Add sums at a grid of places, interpolated at q, (n, 2): out, (n, M).
+
+    By cubic convolution (Keys 1981), between the sixteen places about q. Nothing is added where q
+    is NaN.
+
+    Parameters
+    ----------
+    grid : ndarray, shape (rows, columns, M), float32
+    first, spacing : float
+        Place of the grid's first row and column, and the distance between two; projector pixels.
+    sign : int
+        1, or -1 to subtract them.
+    """
+    weights = np.empty((2, 4))
+    for c in range(len(out)):
+        if np.isnan(q[c, 0]) or np.isnan(q[c, 1]):
+            continue
+        y, x = (q[c, 0] - first) / spacing, (q[c, 1] - first) / spacing
+        above, left = int(np.floor(y)), int(np.floor(x))
+        for axis, t in ((0, y - above), (1, x - left)):
+            weights[axis, 0] = 0.5 * t * (t * (2 - t) - 1)
+            weights[axis, 1] = 0.5 * (t * t * (3 * t - 5) + 2)
+            weights[axis, 2] = 0.5 * t * (t * (4 - 3 * t) + 1)
+            weights[axis, 3] = 0.5 * t * t * (t - 1)
+        for i in range(4):
+            line, of_line = grid[above - 1 + i], sign * weights[0, i]
+            one, two = np.float32(of_line * weights[1, 0]), np.float32(of_line * weights[1, 1])
+            three, four = np.float32(of_line * weights[1, 2]), np.float32(of_line * weights[1, 3])
+            first_sums, second = line[left - 1], line[left]
+            third, fourth = line[left + 1], line[left + 2]
+            for m in range(out.shape[1]):
+                out[c, m] += (one * first_sums[m] + two * second[m]) + (
+                    three * third[m] + four * fourth[m]
+                )
+
+
+@compiled
+def add_products(coefficients: Floats, sums: Floats, out: Floats) -> None:
+    """Add coefficients of functions, (n, channels, M), times sums of light times these, (n, M)."""
+    for c in range(len(sums)):
+        for i in range(coefficients.shape[1]):
+            total = np.float32(0.0)
+            for m in range(coefficients.shape[2]):
+                total += coefficients[c, i, m] * sums[c, m]
             out[c, i] += total
 
 
@@ -162,9 +217,8 @@ def add_window(
 
 
 @compiled
-def add_hats(
+def sum_hats(
     sums: tuple[Floats, Floats],
-    grid: Floats,
     pitch: int,
     centres: Integers,
     first: Integers,
@@ -172,48 +226,62 @@ def add_hats(
     stops: Integers,
     out: Floats,
 ) -> None:
-    """Add near-range light of the hats of one pitch about centres (n, 2).
-
-    In a projector row it is a polygon between the hats' middles.
+    """Sum light times each hat of one pitch, about centres (n, 2), over runs.
 
     Parameters
     ----------
     sums : tuple of ndarray, shape (Py, Px + 1), float64
-        Of light, and of light times column, along rows, before each column.
-    grid : ndarray, shape (n, channels, side, side), float32
-        Coefficients of the hats.
+        Of light, and of light times column, along projector rows, before each column.
+    pitch : int
+    out : ndarray, shape (n, side, side), float32
+        Gets the sums, of side x side hats.
     """
     plain, moments = sums
-    side, half = grid.shape[2], grid.shape[2] // 2
-    for c in range(len(grid)):
+    side, half = out.shape[1], out.shape[1] // 2
+    # With a rim of hats that there are none of, so that segments beside the outer hats have two.
+    hats = np.empty((side + 2, side + 2))
+    # Of light times a ramp down and up along each segment between two hats of a projector row: over
+    # the rows between two rows of hats, and the same times the share of the lower row.
+    down, up, down_lower, up_lower = np.empty((4, side + 1))
+    for c in range(len(out)):
         top, left = centres[c, 0] - half * pitch, centres[c, 1] - half * pitch
-        for r in range(starts.shape[1]):
-            start, stop = starts[c, r], stops[c, r]
-            down = first[c] + r - top
-            if stop <= start or down <= -pitch or down >= side * pitch:
-                continue
-            y = first[c] + r
-            above = down // pitch
-            part = (down - above * pitch) / pitch
-            # Segments between the middles of two hats; before the first and after the last it is 0.
-            begin = max((start - left) // pitch, -1)
-            end = min((stop - 1 - left) // pitch, side - 1)
-            for segment in range(begin, end + 1):
-                origin = left + segment * pitch
-                low, high = max(start, origin), min(stop, origin + pitch)
-                lit = plain[y, high] - plain[y, low]
-                ramp = (moments[y, high] - moments[y, low] - origin * lit) / pitch
-                for i in range(grid.shape[1]):
-                    value = 0.0
-                    for step, row_share in ((0, 1.0 - part), (1, part)):
-                        row = above + step
-                        if row < 0 or row >= side:
-                            continue
-                        if segment >= 0:
-                            value += row_share * grid[c, i, row, segment] * (lit - ramp)
-                        if segment + 1 < side:
-                            value += row_share * grid[c, i, row, segment + 1] * ramp
-                    out[c, i] += value / (pitch * pitch)
+        hats[:] = 0.0
+        r = max(0, top - pitch + 1 - first[c])
+        last = min(starts.shape[1], top + side * pitch - first[c])
+        while r < last:
+            above = (first[c] + r - top) // pitch
+            next_hats = min(last, top + (above + 1) * pitch - first[c])
+            down[:], up[:], down_lower[:], up_lower[:] = 0.0, 0.0, 0.0, 0.0
+            while r < next_hats:
+                y = first[c] + r
+                share = (y - top - above * pitch) / pitch
+                low = max(starts[c, r], left - pitch)
+                stop = min(stops[c, r], left + side * pitch)
+                r += 1
+                if stop <= low:
+                    continue
+                segment = (low - left) // pitch
+                before, moment_before = plain[y, low], moments[y, low]
+                while low < stop:
+                    origin = left + segment * pitch
+                    low = min(stop, origin + pitch)
+                    until, moment_until = plain[y, low], moments[y, low]
+                    lit = until - before
+                    rising = (moment_until - moment_before - origin * lit) / pitch
+                    segment += 1
+                    down[segment] += lit - rising
+                    up[segment] += rising
+                    down_lower[segment] += share * (lit - rising)
+                    up_lower[segment] += share * rising
+                    before, moment_before = until, moment_until
+            for k in range(side + 1):
+                hats[above + 1, k] += down[k] - down_lower[k]
+                hats[above + 1, k + 1] += up[k] - up_lower[k]
+                hats[above + 2, k] += down_lower[k]
+                hats[above + 2, k + 1] += up_lower[k]
+        for i in range(side):
+            for k in range(side):
+                out[c, i, k] = hats[i + 1, k + 1] / (pitch * pitch)
 
 
 @compiled

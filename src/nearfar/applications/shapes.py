@@ -61,13 +61,28 @@ class Disc:
             Of these camera pixels.
         camera, projector : Size
         """
-        # No more rows than a projector has.
-        reach = int(np.ceil(min(self.radius, float(projector.height))))
-        rows = min(2 * reach + 1, projector.height)
+        rows = self._rows(projector)
         first = np.empty(len(q), dtype=np.int32)
         starts, stops = (np.empty((len(q), rows), dtype=np.int32) for _ in range(2))
         runs_of_discs(q, self.radius, (projector.height, projector.width), first, starts, stops)
         return Runs(first, starts, stops)
+
+    def lines(self, q: Floats, projector: Size) -> slice:
+        """Return the projector rows of the runs of all camera pixels, q (n, 2)."""
+        rows, down = self._rows(projector), q[np.isfinite(q).all(axis=1), 0].astype(np.float64)
+        if not len(down):
+            return slice(0, rows)
+        reach = min(self.radius, 2.0 * projector.height)
+        first, last = (
+            int(np.clip(np.floor(end - reach), 0, projector.height - rows))
+            for end in (down.min(), down.max())
+        )
+        return slice(first, last + rows)
+
+    def _rows(self, projector: Size) -> int:
+        # No more rows than a projector has.
+        reach = int(np.ceil(min(self.radius, float(projector.height))))
+        return min(2 * reach + 1, projector.height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,3 +106,7 @@ class Band:
         starts, stops = (np.empty((len(x), projector.height), dtype=np.int32) for _ in range(2))
         runs_of_bands(lines, self.width, (projector.height, projector.width), starts, stops)
         return Runs(np.zeros(len(x), dtype=np.int32), starts, stops)
+
+    def lines(self, _q: Floats, projector: Size) -> slice:
+        """Return the projector rows of the runs: all."""
+        return slice(0, projector.height)

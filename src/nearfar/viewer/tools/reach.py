@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from nearfar.applications.masks import ProbingMask
-from nearfar.applications.probe import probe
+from nearfar.applications.probe import ProbedLight, probed_light
 from nearfar.arrays import Floats, blocks
 from nearfar.errors import InputError
 from nearfar.transport.model import Transport
@@ -21,6 +21,8 @@ from nearfar.viewer.tools.few_pixels import few_pixels
 
 # Entries of the transport that are masked in one step: some tenths of a second.
 STEP_ENTRIES = 2**24
+# Entries that a camera pixel counts as where rows of the transport are not drawn.
+ENTRIES_BY_RUNS = 2**9
 # The same of a whole picture while the light or the reach moves; it has no fewer camera pixels
 # than these.
 COARSE_ENTRIES = 2**23
@@ -76,7 +78,13 @@ def by_reach(transport: InteractiveTransport, message: bytes) -> Iterator[bytes 
     else:
         stride = transport.display_stride
         parts = thinned_blocks(transport.blocks(), transport.stored.camera.height, stride)
-    picture = yield from _probed(parts, levels, mask)
+    pictures: list[Floats] = []
+    probed: ProbedLight | None = None
+    for part in parts:
+        probed = probed or probed_light(part, levels, mask, transport.stored.camera)
+        first = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
+        pictures.append((yield from _probed(part, probed, first)))
+    picture = np.concatenate(pictures)
     scale, halves = to_float16(transport.to_colours(picture))
     yield pack({"scale": scale, "coarse": header.coarse}, halves)
 
@@ -94,8 +102,9 @@ def by_distance(transport: InteractiveTransport, message: bytes) -> Iterator[byt
     levels, coarse = transport.for_channels(light.as_array()), _coarse(transport)
     # Rings are differences of discs, each of which is probed once.
     discs = [np.zeros((*coarse.camera, coarse.channels), dtype=np.float32)]
+    probed = probed_light(coarse, levels, ProbingMask.beyond(1), transport.stored.camera)
     for edge in header.edges:
-        disc = yield from _probed([coarse], levels, _mask(0.0, edge))
+        disc = yield from _probed(coarse, probed.by(ProbingMask.within(edge)))
         discs.append(disc)
     discs.append((coarse @ levels).reshape(discs[0].shape))
     rings = np.diff(np.stack(discs), axis=0)
@@ -124,15 +133,16 @@ def _coarse(transport: InteractiveTransport) -> Transport:
     return few_pixels(transport, max(COARSE_ENTRIES // entries, LEAST_PIXELS))
 
 
-def _probed(
-    parts: Iterable[Transport], light: Floats, mask: ProbingMask
-) -> Generator[None, None, Floats]:
-    """Probe parts of a camera, some rows in each step; return the picture, (y, x, channels)."""
-    found = []
-    for part in parts:
-        entries = part.camera.width * part.projector.pixels * part.channels
-        for rows in blocks(part.camera.height, max(1, STEP_ENTRIES // entries)):
-            picture = probe(of_rows(part, rows), light, mask)
-            found.append(picture.reshape(*picture.shape[:2], part.channels))
-            yield
-    return np.concatenate(found)
+def _probed(part: Transport, probed: ProbedLight, first: int = 0) -> Generator[None, None, Floats]:
+    """Probe a part of a camera, some rows in each step; return the picture, (y, x, channels).
+
+    Its first camera pixel has the number `first`.
+    """
+    picture = np.empty((*part.camera, part.channels), dtype=np.float32)
+    entries = ENTRIES_BY_RUNS if probed.sums else part.projector.pixels
+    of_row = part.camera.width * part.channels * entries
+    for rows in blocks(part.camera.height, max(1, STEP_ENTRIES // of_row)):
+        found = probed.picture(of_rows(part, rows), first + rows.start * part.camera.width)
+        picture[rows] = found.reshape(picture[rows].shape)
+        yield
+    return picture

@@ -1,5 +1,10 @@
 """The viewer's page in a real browser: the scene as the projector sees it, lit from the camera."""
 
+import os
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -8,10 +13,11 @@ from nearfar.arrays import Size
 from nearfar.transport.store import save_transport
 from nearfar.viewer import interactive
 from nearfar.viewer.interactive import InteractiveTransport
+from tests.cli.conftest import run_nearfar
 from tests.viewer.asking import CAMERA, PROJECTOR, ask, message, refused, unpack
 from tests.viewer.browsing import pictures, seen, settled, tone
 from tests.viewer.conftest import served_view
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_WAIT, wait_until
 from tests.worlds import model_transport
 
 pytestmark = pytest.mark.slow
@@ -136,3 +142,48 @@ def test_a_camera_of_another_shape_and_a_transport_on_the_disk(
     with served_view(InteractiveTransport(tmp_path / "grey.zarr")) as address:
         _, (halves,) = unpack(ask(address, "/tool/dual", message(np.ones((8, 9, 3)))))
         assert halves.shape == (12, 10, 1)
+
+
+def test_flat_fields_are_divided_out(stored, transport, tmp_path):
+    generator = np.random.default_rng(3)
+    flats = {
+        "camera": generator.uniform(0.5, 1, CAMERA).astype("f4"),
+        "projector": generator.uniform(0.5, 1, PROJECTOR).astype("f4"),
+    }
+    options = []
+    for side, flat in flats.items():
+        np.save(tmp_path / f"{side}.npy", flat)
+        options += [f"--{side}-flat", tmp_path / f"{side}.npy"]
+    command = [sys.executable, "-m", "nearfar", "view", stored, "--and", stored, *options]
+    command += ["--port", "0", "--no-browser", "--quiet"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as running:
+        address = running.stdout.readline().decode().split(" at ")[1].split(",")[0]
+        light = generator.random(CAMERA).astype(np.float32)
+        found = [
+            unpack(ask(address, f"{path}/tool/dual", message(light)))
+            for path in ("", "/projector/1")
+        ]
+        os.kill(running.pid, signal.SIGINT)
+        running.communicate(timeout=LONGEST_WAIT)
+    reciprocity = nearfar.find_reciprocity(transport)
+    # The camera is the same for both; the flat field is of the first projector.
+    for (header, (halves,)), of_projector in zip(found, (flats["projector"], None), strict=True):
+        expected = nearfar.dual_view(
+            transport,
+            light,
+            camera_flat=flats["camera"],
+            projector_flat=of_projector,
+            reciprocity=reciprocity,
+        )
+        np.testing.assert_allclose(halves / header["scale"], expected, rtol=2e-3, atol=1e-2)
+
+
+def test_a_flat_field_that_is_none_gets_a_sentence(stored, tmp_path):
+    for values, words in (
+        (np.zeros(CAMERA), "black somewhere"),
+        (np.ones((3, 4)), f"give a picture of {CAMERA}"),
+    ):
+        np.save(tmp_path / "flat.npy", values.astype("f4"))
+        ran = run_nearfar("view", stored, "--camera-flat", tmp_path / "flat.npy", "--no-browser")
+        assert ran.status == 1
+        assert words in ran.err

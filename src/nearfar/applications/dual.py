@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from nearfar.applications.flat_fields import flat_fields
 from nearfar.applications.reciprocity import Blocks, ByReciprocity, Reciprocity, blocks_of
 from nearfar.arrays import Floats, Size
 from nearfar.checks import as_light
@@ -76,8 +77,8 @@ def dual_view(
     True
     """
     camera, projector, channels = transport.camera, transport.projector, transport.channels
-    image = _image(picture, camera, channels) / _flat(camera_flat, camera, channels, "camera")
-    flat = _flat(projector_flat, projector, channels, "projector")
+    flats = flat_fields(camera_flat, projector_flat, camera, projector, channels)
+    image = _image(picture, camera, channels) / flats.camera
     if reciprocity is None:
         seen = np.reshape(transport.adjoint(image), (*projector, channels))
     elif isinstance(transport, Transport):
@@ -87,7 +88,7 @@ def dual_view(
             "reciprocity sharpens the far-range light of a measured transport, and this one is "
             "known: leave reciprocity out."
         )
-    return _shaped(seen / flat)
+    return _shaped(seen / flats.projector)
 
 
 def dual_view_of_stored(
@@ -117,10 +118,10 @@ def dual_view_of_stored(
         As `dual_view`; if the transport does not have a part.
     """
     require_parts(stored.parts, gains)
-    image = _image(picture, stored.camera, stored.channels)
-    image = image / _flat(camera_flat, stored.camera, stored.channels, "camera")
-    flat = _flat(projector_flat, stored.projector, stored.channels, "projector")
-    return _shaped(_sent_back(stored, image, gains, reciprocity) / flat)
+    camera, projector, channels = stored.camera, stored.projector, stored.channels
+    flats = flat_fields(camera_flat, projector_flat, camera, projector, channels)
+    image = _image(picture, camera, channels) / flats.camera
+    return _shaped(_sent_back(stored, image, gains, reciprocity) / flats.projector)
 
 
 def _sent_back(
@@ -187,20 +188,6 @@ def _image(picture: Floats | None, camera: Size, channels: int) -> Floats:
         return np.ones((*camera, channels), dtype=np.float32)
     image = as_light(picture, camera, channels, name="picture", side="camera")
     return np.broadcast_to(image.reshape(*camera, -1), (*camera, channels))
-
-
-def _flat(flat: Floats | None, size: Size, channels: int, side: str) -> Floats:
-    """Return a flat field over its mean, (y, x, 1 or channels)."""
-    if flat is None:
-        return np.ones((1, 1, 1), dtype=np.float32)
-    name = f"flat field of the {side}"
-    field = as_light(flat, size, channels, name=name, side=side).reshape(*size, -1)
-    if field.min() <= 0:
-        raise InputError(
-            f"the {name} has values of 0 or below, by which nothing can be divided: give one that "
-            f"is bright everywhere."
-        )
-    return np.asarray(field / field.mean(axis=(0, 1)), dtype=np.float32)
 
 
 def _shaped(dual: Floats) -> Floats:

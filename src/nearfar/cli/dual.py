@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nearfar.arrays import Size
+from nearfar.cli.flat_fields import CameraFlat, ProjectorFlat, read_flat
 from nearfar.cli.gains import MODEL, gains_of
-from nearfar.cli.lights import Srgb, read_camera_picture, read_grey, require_light
+from nearfar.cli.lights import Srgb, read_camera_picture, require_light
 from nearfar.cli.opening import open_reconstructed
 from nearfar.cli.options import Force, Quiet, TransportPath, keep_input
 from nearfar.cli.saying import say
-from nearfar.errors import InputError
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
     from nearfar.applications.reciprocity import Reciprocity
-    from nearfar.arrays import Floats
 
 
 def dual(
@@ -37,18 +35,8 @@ def dual(
             metavar="NAME=VALUE",
         ),
     ] = None,
-    camera_flat: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PICTURE", help="Flat field of the camera, which is divided out; linear."
-        ),
-    ] = None,
-    projector_flat: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PICTURE", help="Flat field of the projector, which is divided out; linear."
-        ),
-    ] = None,
+    camera_flat: CameraFlat = None,
+    projector_flat: ProjectorFlat = None,
     transpose: Annotated[
         bool,
         typer.Option(
@@ -78,8 +66,8 @@ def dual(
         camera, channels = opened.camera, opened.channels
         sent = None if light is None else read_camera_picture(light, camera, channels, srgb=srgb)
         flats = {
-            "camera_flat": _flat(camera_flat, camera),
-            "projector_flat": _flat(projector_flat, opened.projector),
+            "camera_flat": read_flat(camera_flat, camera),
+            "projector_flat": read_flat(projector_flat, opened.projector),
         }
         is_direct = all(gains.get(part, 1.0) == 0 for part in ("near", "far"))
         found = None if transpose or is_direct else find_reciprocity(opened)
@@ -99,16 +87,3 @@ def _told(reciprocity: "Reciprocity | None") -> str:
             f"; far-range light is by reciprocity, which differs by {share} from what was measured"
         )
     return f"; far-range light is smooth, as measured: by reciprocity it would differ by {share}"
-
-
-def _flat(path: Path | None, size: Size) -> "Floats | None":
-    """Read a flat field of a size; None if none is given."""
-    if path is None:
-        return None
-    flat = read_grey(path, size)
-    if flat.min() <= 0:
-        raise InputError(
-            f"{path} is black somewhere, so that it is no flat field: give one that is bright "
-            f"everywhere."
-        )
-    return flat

@@ -1,15 +1,17 @@
 """``nearfar view``."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nearfar.arrays import parse_bytes
+from nearfar.cli.flat_fields import CameraFlat, ProjectorFlat, read_flat
 from nearfar.cli.options import Browser, Port, Quiet, TransportPath, require_reconstructed
 from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
@@ -49,6 +51,8 @@ def view(
             metavar="CAPTURE.zarr",
         ),
     ] = None,
+    camera_flat: CameraFlat = None,
+    projector_flat: ProjectorFlat = None,
     port: Port = 8628,
     host: Annotated[
         str,
@@ -102,6 +106,7 @@ def view(
         ]
         stored = [each.stored for each in (interactive, *others)]
         require_same_camera(stored, [str(path) for path in paths])
+        _divide_out([interactive, *others], camera_flat, projector_flat)
         if beside is not None:
             second = open_beside(
                 beside,
@@ -132,6 +137,20 @@ def view(
             others=others,
         )
     say("view ended", quiet=quiet)
+
+
+def _divide_out(
+    transports: Sequence["InteractiveTransport"],
+    camera_flat: Path | None,
+    projector_flat: Path | None,
+) -> None:
+    """Divide flat fields out of dual views: the camera's for all, the projector's for the first."""
+    from nearfar.applications.flat_fields import flat_fields
+
+    of_camera = read_flat(camera_flat, transports[0].stored.camera)
+    for each, path in zip_longest(transports, [projector_flat]):
+        sizes = (each.stored.camera, each.stored.projector, each.stored.channels)
+        each.flat_fields = flat_fields(of_camera, read_flat(path, each.projector), *sizes)
 
 
 def _photos_of(

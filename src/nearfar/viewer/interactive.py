@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nearfar.applications.flat_fields import flat_fields
 from nearfar.applications.reciprocity import Reciprocity, find_reciprocity
 from nearfar.arrays import AnyPath, Floats, Size, middles
 from nearfar.errors import InputError, NearfarError
@@ -92,6 +93,8 @@ class InteractiveTransport:
     ----------
     light_block : int
         Side, in projector pixels, of the blocks that lights are made of while they move.
+    flat_fields : FlatFields
+        What dual views are divided by; none unless it is set.
 
     Parameters
     ----------
@@ -120,6 +123,9 @@ class InteractiveTransport:
         report = progress or (lambda _share: None)
         size = self.stored.nbytes
         camera = self.stored.camera
+        self.flat_fields = flat_fields(
+            None, None, camera, self.stored.projector, self.stored.channels
+        )
         self.display_stride = int(np.ceil(np.sqrt(camera.pixels / MAXIMUM_DISPLAYED_PIXELS)))
         stride = int(np.ceil(np.sqrt(size / MAXIMUM_COARSE_BYTES)))
         self.coarse_stride = max(stride, self.display_stride)

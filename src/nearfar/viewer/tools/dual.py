@@ -35,7 +35,7 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
     """Make the dual view of a light at the camera, in steps of a block of camera rows.
 
     Components have the gains of the header. Far-range light of a light at rest is by reciprocity,
-    where it holds.
+    where it holds. Flat fields of the transport are divided out.
 
     Raises
     ------
@@ -48,11 +48,13 @@ def seen_from_projector(transport: InteractiveTransport, message: bytes) -> Iter
     picture: Floats = light.as_array().astype(np.float32)
     if picture.ndim == 3 and channels != COLOUR:
         picture = luminance(picture)
-    picture = np.broadcast_to(picture.reshape(*camera, -1), (*camera, channels))
+    flats = transport.flat_fields
+    picture = np.broadcast_to(picture.reshape(*camera, -1) / flats.camera, (*camera, channels))
     total = np.zeros((*transport.projector, channels), dtype=np.float32)
     gains = header.gains.of_parts(transport.stored.parts)
     reciprocity = None if header.coarse else transport.reciprocity
     yield from sent_back_in_steps(transport.blocks, picture, gains, reciprocity, total)
+    total /= flats.projector
     most = MAXIMUM_MOVING_PIXELS if header.coarse else MAXIMUM_DISPLAYED_PIXELS
     scale, halves = to_float16(transport.to_colours(_at_most(total, most)))
     # A projector pixel adds up the camera pixels that see its light.

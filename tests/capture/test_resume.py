@@ -2,19 +2,15 @@
 
 import errno
 import json
-import random
-import shutil
-import signal
-import time
 from dataclasses import replace
-from itertools import chain, count, islice
+from itertools import islice
 
 import numpy as np
 import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture import CaptureWriter, open_capture, white_and_black, write_capture
-from nearfar.capture.unfinished import LOG_NAME, count_photos
+from nearfar.capture.unfinished import LOG_NAME
 from nearfar.errors import (
     ExistingOutputError,
     InputError,
@@ -25,17 +21,15 @@ from nearfar.errors import (
     UselessPhotosError,
 )
 from nearfar.files import output, stores
-from nearfar.plan import choose_plan, paper_plan
+from nearfar.plan import choose_plan
 from nearfar.plan.checks import with_checks
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.workflow.acquire import acquire
-from tests.cli.conftest import check_done, check_sentence, run_nearfar
-from tests.killing import killed_at
+from tests.capture.same import check_same
 from tests.metadata import change_attributes
 from tests.observers import EndsWhere
-from tests.processes import run_command, start
 from tests.worlds import model_transport
 
 PROJECTOR = Size(16, 20)
@@ -72,23 +66,6 @@ def _counting(told):
     return lambda _what, share: told.append(round(share * COUNT))
 
 
-def _check_same(capture, other):
-    assert capture.plan == other.plan
-    assert capture.rig == other.rig
-    assert capture.full_scale == other.full_scale
-    np.testing.assert_array_equal(capture.photos[:], other.photos[:])
-    np.testing.assert_array_equal(capture.saturated, other.saturated)
-    assert (np.diff(capture.times) >= 0).all()
-    folder = capture.path
-    assert {path.name for path in folder.iterdir()} == {
-        "photos",
-        "saturated",
-        "time",
-        "zarr.json",
-    }
-    assert list(folder.parent.iterdir()) == [folder]
-
-
 @pytest.mark.parametrize("stops", [(2,), (15,), (16,), (17, 18, 40), (COUNT - 1,), (COUNT,)])
 def test_it_is_as_if_it_had_not_been_stopped(rig, undisturbed, tmp_path, stops):
     for i, stop in enumerate(stops):
@@ -98,7 +75,7 @@ def test_it_is_as_if_it_had_not_been_stopped(rig, undisturbed, tmp_path, stops):
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
     # No photo was taken twice.
     assert told == list(range(stops[-1] + 1, COUNT + 1))
-    _check_same(capture, undisturbed)
+    check_same(capture, undisturbed)
 
 
 class _Odd:
@@ -135,7 +112,7 @@ def test_a_photo_that_was_not_noted_is_taken_again(rig, undisturbed, tmp_path):
     told = []
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
     assert told[0] == 20
-    _check_same(capture, undisturbed)
+    check_same(capture, undisturbed)
 
 
 def test_every_photo_is_told_to_who_decides(rig, tmp_path):
@@ -184,7 +161,7 @@ def test_a_capture_does_not_end_before_the_photos_that_are_there(rig, tmp_path):
 def test_an_odd_photo_is_named_and_taken_again(rig, undisturbed, tmp_path, odd, word):
     with pytest.raises(InputError, match=rf"photo 40 .*{word}.*; 40 of {COUNT} photos are kept"):
         acquire(PLAN, tmp_path / "c.zarr", _Odd(rig, 40, odd))
-    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+    check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 
 def test_a_rig_that_ends_too_soon_keeps_its_photos(rig, undisturbed, tmp_path):
@@ -194,7 +171,7 @@ def test_a_rig_that_ends_too_soon_keeps_its_photos(rig, undisturbed, tmp_path):
 
     with pytest.raises(InputError, match=f"only 30 photos for the {COUNT} .*; 30 of .* are kept"):
         acquire(PLAN, tmp_path / "c.zarr", Short(rig, 0, None))
-    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+    check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 
 def test_a_dark_projector_keeps_nothing(rig, tmp_path):
@@ -215,7 +192,7 @@ def test_a_capture_that_replaces_another_is_gone_on_with(rig, undisturbed, tmp_p
     told = []
     acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, force=True, progress=_counting(told))
     assert told[0] == 21
-    _check_same(open_capture(tmp_path / "c.zarr"), undisturbed)
+    check_same(open_capture(tmp_path / "c.zarr"), undisturbed)
 
 
 def test_the_same_plan_with_other_options_is_named(rig, tmp_path):
@@ -260,7 +237,7 @@ def test_what_was_whole_but_for_its_name_is_not_shot_again(
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, resume=True, progress=_counting(told))
     assert told == []
     if early is None:
-        _check_same(capture, undisturbed)
+        check_same(capture, undisturbed)
     else:
         assert capture.plan == PLAN.first(early)
         np.testing.assert_array_equal(capture.photos[:], undisturbed.photos[:early])
@@ -278,7 +255,7 @@ def test_a_full_disk_costs_no_photo(rig, undisturbed, tmp_path, monkeypatch):
         patch.setattr(stores, "_write_durably", full)
         with pytest.raises(StorageError, match=r"disk is full.*; 25 of .* are kept.*`resume=True`"):
             acquire(PLAN, tmp_path / "c.zarr", rig)
-    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+    check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 
 def test_a_capture_that_an_earlier_nearfar_began_is_gone_on_with(rig, undisturbed, tmp_path):
@@ -301,7 +278,7 @@ def test_another_plan_or_rig_is_refused_and_nothing_is_lost(rig, undisturbed, tm
     for changed in (replace(rig, seed=4), replace(rig, exposure=0.9)):
         with pytest.raises(InputError, match=r"another rig \((seed|transport_exposure)\)"):
             acquire(PLAN, tmp_path / "c.zarr", changed, resume=True)
-    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+    check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 
 def test_another_full_scale_is_refused(rig, undisturbed, tmp_path):
@@ -312,7 +289,7 @@ def test_another_full_scale_is_refused(rig, undisturbed, tmp_path):
     with pytest.raises(InputError, match=said):
         CaptureWriter.resume(folder, PLAN, full_scale=4095, rig=about)
     assert CaptureWriter.resume(folder, PLAN, rig=about).taken == 12
-    _check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
+    check_same(acquire(PLAN, tmp_path / "c.zarr", rig, resume=True), undisturbed)
 
 
 def test_what_is_there_is_replaced_by_force_alone(rig, undisturbed, tmp_path):
@@ -324,7 +301,7 @@ def test_what_is_there_is_replaced_by_force_alone(rig, undisturbed, tmp_path):
     told = []
     capture = acquire(PLAN, tmp_path / "c.zarr", rig, force=True, progress=_counting(told))
     assert told[0] == 1
-    _check_same(capture, undisturbed)
+    check_same(capture, undisturbed)
     with pytest.raises(MissingFileError, match="nothing to go on with"):
         acquire(PLAN, tmp_path / "d.zarr", rig, resume=True)
 
@@ -349,7 +326,7 @@ def test_two_at_once_are_refused(rig, undisturbed, tmp_path):
         refused.append(number)
         return False
 
-    _check_same(acquire(PLAN, path, rig, resume=True, observers=[EndsWhere(also)]), undisturbed)
+    check_same(acquire(PLAN, path, rig, resume=True, observers=[EndsWhere(also)]), undisturbed)
     assert len(refused) == COUNT
 
 
@@ -382,93 +359,7 @@ def test_a_torn_line_does_not_spoil_the_next(rig, undisturbed, tmp_path):
     taken = []
     acquire(PLAN, path, rig, resume=True, progress=_counting(taken))
     assert taken[0] > 39
-    _check_same(open_capture(path), undisturbed)
-
-
-def _noted(log):
-    """Photos that a log notes; 0 where it is not there, or no more."""
-    try:
-        return log.read_bytes().count(b"\n")
-    except FileNotFoundError:
-        return 0
-
-
-def _check_same_photos(path, other):
-    one, undisturbed = open_capture(path), open_capture(other)
-    np.testing.assert_array_equal(one.photos[:], undisturbed.photos[:])
-    assert one.plan == undisturbed.plan
-
-
-@pytest.mark.slow
-def test_kill_9_at_twenty_moments_costs_nothing(tmp_path):
-    generator = random.Random(0)
-    plan, scene = tmp_path / "plan.json", tmp_path / "T.npy"
-    plan.write_text(paper_plan(PROJECTOR, 13, Size(5, 5)).to_json())
-    np.save(scene, np.random.default_rng(0).random((8, 9, 16, 20), dtype=np.float32) / 400)
-    shoot = ("acquire", plan, "--rig", scene, "-q")
-    whole, killed = tmp_path / "whole.zarr", tmp_path / "k" / "killed.zarr"
-    check_done(run_nearfar(*shoot, whole))
-    (tmp_path / "k").mkdir()
-    log = tmp_path / "k" / "killed.zarr.unfinished" / LOG_NAME
-    resume: list[str] = []
-    kills = 0
-    # On a busy machine a capture may end before it is killed; the next one is begun anew.
-    for _ in range(60):
-        process = start(run_command, *shoot, killed, *resume)
-        # At work on its first few photos, of some hundreds in all.
-        before = _noted(log)
-        while process.exitcode is None and (not log.exists() or _noted(log) < before + kills % 3):
-            time.sleep(0.001)
-        time.sleep(generator.uniform(0, 0.01))
-        process.kill()
-        process.join()
-        assert process.exitcode in {0, -signal.SIGKILL}
-        kills += process.exitcode != 0
-        resume = ["--resume"]
-        if kills == 20:
-            break
-        if killed.exists():
-            _check_same_photos(killed, whole)
-            shutil.rmtree(killed)
-            resume = []
-    assert kills == 20
-    if not killed.exists():
-        check_done(run_nearfar(*shoot, killed, *resume))
-    _check_same_photos(killed, whole)
-    assert list((tmp_path / "k").iterdir()) == [killed]
-    assert not list(killed.rglob("*.partial"))
-
-
-@pytest.mark.slow
-def test_killed_at_any_step_it_is_resumed_or_begun_anew_by_the_same_command(tmp_path):
-    plan, scene = tmp_path / "plan.json", tmp_path / "T.npy"
-    made = paper_plan(Size(4, 4), 1, Size(1, 1), offset="reference", correspondence="none")
-    plan.write_text(made.to_json())
-    np.save(scene, np.random.default_rng(0).random((3, 4, 4, 4), dtype=np.float32) / 40)
-    whole = ("acquire", plan, tmp_path / "whole.zarr", "--rig", scene, "-q")
-    check_done(run_nearfar(*whole))
-    undisturbed = open_capture(tmp_path / "whole.zarr")
-    kept = []
-    # Every step until the first photos are noted; every other from the last photo to the end.
-    for step in chain(range(25), count(52, 2)):
-        folder = tmp_path / f"{step}"
-        folder.mkdir()
-        path = folder / "c.zarr"
-        shoot = ("acquire", plan, path, "--rig", scene, "-q")
-        # Where a file was being written, it is empty half of the times.
-        if not killed_at(step, folder, run_command, *shoot, torn=bool(step & 2)):
-            break
-        photos = count_photos(folder / "c.zarr.unfinished")
-        if path.exists():
-            check_sentence(run_nearfar(*shoot), path, "exists already")
-        else:
-            # Begun anew by either where no photo was noted, if there is a folder to go on with.
-            by_resume = photos or (step % 2 and (folder / "c.zarr.unfinished").exists())
-            check_done(run_nearfar(*shoot, *(["--resume"] if by_resume else [])))
-        kept.append(photos)
-        _check_same(open_capture(path), undisturbed)
-    assert kept.count(0) >= 5
-    assert max(kept) == len(made.patterns)
+    check_same(open_capture(path), undisturbed)
 
 
 @pytest.mark.parametrize("options", [{}, {"resume": True}])

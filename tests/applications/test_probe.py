@@ -8,9 +8,11 @@ import pytest
 import nearfar
 from nearfar.applications import run_loops
 from nearfar.applications.probe import probe_stored
+from nearfar.applications.summed_light import SPACING_OF_RADIUS, grid_of_places, summed_lights
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.transport.half import in_half
+from nearfar.transport.rows import of_rows
 from nearfar.transport.store import save_transport
 from nearfar.transport.stored import open_transport
 from tests.worlds import model_transport
@@ -273,3 +275,49 @@ def test_a_mask_that_cannot_be_is_refused(make, words):
 def test_what_does_not_fit_is_refused(light, mask, words):
     with pytest.raises(InputError, match=words):
         nearfar.probe(world(), light, mask)
+
+
+def test_q_at_the_very_edge_is_between_places():
+    """Rounding may put it just beyond them."""
+    projector = Size(294, 20)
+    for radius in (32.66666666666667, 33.0, 57.3):
+        first, places = grid_of_places(radius, projector)
+        spacing = radius * SPACING_OF_RADIUS
+        y, x = (first + spacing * np.arange(count) for count in places)
+        # Cubic convolution is exact for planes.
+        grid = np.ascontiguousarray((y[:, None] + 2 * x)[..., None].astype(np.float32))
+        q = np.array([[-0.5, -0.5], [293.5, 19.5], [293.5, -0.5], [100.2, 7.9], [np.nan, 3.0]])
+        found = np.zeros((len(q), 1), dtype=np.float32)
+        run_loops.add_between(grid, first, spacing, 1, q.astype(np.float32), found)
+        expected = np.nan_to_num(q[:, 0] + 2 * q[:, 1], nan=0.0)
+        np.testing.assert_allclose(found[:, 0], expected, atol=1e-3)
+
+
+def test_q_beside_the_projector_is_summed_exactly():
+    transport = fine_world(hats=False)
+    q = transport.correspondence.copy()
+    q[10, 10] = (-30.0, 150.0)
+    transport = replace(transport, correspondence=q)
+    found = nearfar.probe(transport, nearfar.white(transport.projector), MASK.within(40))
+    alone = of_rows(transport, slice(10, 11))
+    expected = nearfar.probe(alone, nearfar.white(transport.projector), MASK.within(40))
+    np.testing.assert_allclose(found[10], expected[0], atol=1e-6)
+
+
+def test_tables_serve_again_for_rows_that_they_have(monkeypatch):
+    """Blocks of camera rows one after the other ask for projector rows that overlap."""
+    transport = world()
+    monkeypatch.setattr("nearfar.applications.summed_light.TABLE_BYTES", 12 * 25 * 25 * 4)
+    (light,) = summed_lights(transport.lights(a_light()), transport.factors)
+    asked = [slice(0, 7), slice(2, 9), slice(3, 8), slice(10, 18), slice(0, 18), slice(5, 6)]
+    tables = [next(iter(light.tables(lines))) for lines in asked]
+    for table, lines in zip(tables, asked, strict=True):
+        assert table.has(lines)
+        rows = slice(lines.start - table.first, lines.stop - table.first)
+        whole = next(iter(light.tables(slice(0, 18))))
+        np.testing.assert_array_equal(table.sums[rows, :, :25], whole.sums[lines, :, :25])
+    assert tables[0] is tables[1] is tables[2]
+    assert tables[3] is not tables[2]
+    # Most of the rows: all are made.
+    assert tables[4] is tables[5]
+    assert len(tables[4].sums) == 18

@@ -16,7 +16,7 @@ import numpy as np
 
 from nearfar.applications import run_loops
 from nearfar.applications.shapes import Band, Disc, Runs
-from nearfar.applications.summed_light import SummedLight, Table, grid_of_places
+from nearfar.applications.summed_light import HatSums, SummedLight, Table, grid_of_places
 from nearfar.arrays import Floats, Integers, Size, blocks
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.parallel import side_by_side
@@ -42,8 +42,9 @@ class RunsOfCamera:
     q : ndarray, shape (C, 2)
     start : int
         First of these pixels among those of the whole camera.
-    camera, projector : Size
-        Of the whole camera.
+    camera : Size
+        Of the whole camera, or of as much of it as is probed.
+    projector : Size
     """
 
     shapes: list[tuple[int, Disc | Band]]
@@ -67,7 +68,10 @@ class RunsOfCamera:
         if disc.radius < LEAST_INTERPOLATED_RADIUS:
             return False
         _, places = grid_of_places(disc.radius, self.projector)
-        return places.pixels <= MOST_PLACES_OF_PIXEL * self.camera.pixels
+        if places.pixels > MOST_PLACES_OF_PIXEL * self.camera.pixels:
+            return False
+        edges = np.array(self.projector) - 0.5
+        return not bool(((self.q < -0.5) | (self.q > edges)).any())
 
 
 def picture_by_runs(factors: Factors, lights: list[SummedLight], runs: RunsOfCamera) -> Floats:
@@ -91,11 +95,12 @@ def picture_by_runs(factors: Factors, lights: list[SummedLight], runs: RunsOfCam
 
 
 def _add_all(factors: Factors, light: SummedLight, runs: RunsOfCamera, out: Floats) -> None:
-    by_rows, interpolated = _by_size(runs)
+    by_rows, interpolated = _by_size(runs, light)
+    hats = light.hats
     discs = [(sign, light.of_disc(disc)) for sign, disc in interpolated]
 
     def first(batch: slice) -> None:
-        _add_about_q(factors, light, runs, batch, out[batch])
+        _add_about_q(factors, light.light, hats, runs, batch, out[batch])
         if not discs:
             return
         far = _floats(factors.far[batch])
@@ -119,21 +124,31 @@ def _add_all(factors: Factors, light: SummedLight, runs: RunsOfCamera, out: Floa
 
 
 def _add_about_q(
-    factors: Factors, light: SummedLight, runs: RunsOfCamera, batch: slice, out: Floats
+    factors: Factors,
+    light: Floats,
+    hats: HatSums | None,
+    runs: RunsOfCamera,
+    batch: slice,
+    out: Floats,
 ) -> None:
     """Add direct and near-range light."""
-    add = _add_single_pixels if factors.of_single_pixels else _add_hats
     for sign, shape in runs.shapes:
-        part = np.zeros_like(out)
-        add(factors, light, batch, shape, runs.of(shape, batch), part)
+        part, own = np.zeros_like(out), runs.of(shape, batch)
+        if hats is None:
+            _add_single_pixels(factors, light, batch, own, part)
+        else:
+            _add_boxes(factors, light, batch, own, part)
+            _add_hats(factors, hats, batch, shape, own, part)
         out += sign * part
 
 
-def _by_size(runs: RunsOfCamera) -> tuple[list[tuple[int, Disc | Band]], list[tuple[int, Disc]]]:
+def _by_size(
+    runs: RunsOfCamera, light: SummedLight
+) -> tuple[list[tuple[int, Disc | Band]], list[tuple[int, Disc]]]:
     """Return the shapes that are summed row by row, and the discs that are interpolated."""
     by_rows, interpolated = [], []
     for sign, shape in runs.shapes:
-        if isinstance(shape, Disc) and runs.is_interpolated(shape):
+        if isinstance(shape, Disc) and light.takes_places(shape) and runs.is_interpolated(shape):
             interpolated.append((sign, shape))
         else:
             by_rows.append((sign, shape))
@@ -141,53 +156,47 @@ def _by_size(runs: RunsOfCamera) -> tuple[list[tuple[int, Disc | Band]], list[tu
 
 
 def _add_single_pixels(
-    factors: Factors,
-    light: SummedLight,
-    batch: slice,
-    _shape: Disc | Band,
-    runs: Runs,
-    out: Floats,
+    factors: Factors, light: Floats, batch: slice, runs: Runs, out: Floats
 ) -> None:
     """Add direct and near-range light where this is of single projector pixels."""
     side, where = factors.near_basis.window, factors.footprint
     direct, near = _floats(factors.direct[batch]), _floats(factors.near[batch])
     corners = (where.pixels[batch], where.weights[batch])
-    run_loops.add_corners(light.light, direct, *corners, *runs, out)
+    run_loops.add_corners(light, direct, *corners, *runs, out)
     window = near.reshape(*direct.shape, side, side)
-    run_loops.add_window(light.light, window, factors.centres[batch], *runs, out)
+    run_loops.add_window(light, window, factors.centres[batch], *runs, out)
+
+
+def _add_boxes(factors: Factors, light: Floats, batch: slice, runs: Runs, out: Floats) -> None:
+    """Add direct light of boxes."""
+    middles, sides = halves(factors.q[batch], factors.boxes[batch])
+    run_loops.add_boxes(light, _floats(factors.direct[batch]), middles, sides, *runs, out)
 
 
 def _add_hats(
-    factors: Factors,
-    light: SummedLight,
-    batch: slice,
-    shape: Disc | Band,
-    runs: Runs,
-    out: Floats,
+    factors: Factors, hats: HatSums, batch: slice, shape: Disc | Band, runs: Runs, out: Floats
 ) -> None:
-    """Add direct light of boxes, and near-range light of hats."""
-    basis, lit = factors.near_basis, np.isfinite(factors.q[batch]).all(axis=1, keepdims=True)
-    middles, sides = halves(factors.q[batch], factors.boxes[batch])
-    run_loops.add_boxes(light.light, _floats(factors.direct[batch]), middles, sides, *runs, out)
-    centres = factors.centres[batch]
-    places = light.pyramid.places(centres)[:, None]
+    """Add near-range light of hats."""
+    basis, centres = factors.near_basis, factors.centres[batch]
+    lit = np.isfinite(factors.q[batch]).all(axis=1, keepdims=True)
+    places = hats.pyramid.places(centres)[:, None]
     for pitch in basis.rising_pitches:
         chosen = np.flatnonzero(basis.pitches == pitch)
+        if not len(chosen):
+            continue
         if _holds_hats(shape, basis, pitch):
-            seen = light.levels[places + light.pyramid.steps[chosen]] * lit
+            seen = hats.levels[places + hats.pyramid.steps[chosen]] * lit
         else:
-            seen = _summed_hats(light, pitch, len(chosen), centres, runs)
+            seen = _summed_hats(hats, pitch, len(chosen), centres, runs)
         near = factors.near[batch, :, chosen[0] : chosen[-1] + 1]
         run_loops.add_products(_floats(near), _floats(seen), out)
 
 
-def _summed_hats(
-    light: SummedLight, pitch: int, count: int, centres: Integers, runs: Runs
-) -> Floats:
+def _summed_hats(hats: HatSums, pitch: int, count: int, centres: Integers, runs: Runs) -> Floats:
     """Return sums of light times `count` hats of one pitch, over runs, (n, count)."""
     side = math.isqrt(count - 1) + 1
     found = np.empty((len(centres), side, side), dtype=np.float32)
-    run_loops.sum_hats(light.moments, pitch, centres, *runs, found)
+    run_loops.sum_hats(hats.moments, pitch, centres, *runs, found)
     flat = found.reshape(len(centres), side**2)
     # No hat of a finer pitch stands at q itself.
     return flat if count == side**2 else np.delete(flat, side**2 // 2, axis=1)

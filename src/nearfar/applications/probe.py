@@ -80,7 +80,7 @@ class ProbedLight:
     light : ndarray, shape (Py, Px) or (Py, Px, channels)
     mask : ProbingMask
     camera : Size
-        Of the whole transport.
+        Of the whole transport, or of as much of it as is probed.
     sums : list of SummedLight, or None
         None if rows of T are to be drawn.
     """
@@ -92,7 +92,7 @@ class ProbedLight:
 
     def by(self, mask: ProbingMask) -> "ProbedLight":
         """Return the same light, prepared for another mask."""
-        return replace(self, mask=mask)
+        return replace(self, mask=mask.on(Size(*self.light.shape[:2])))
 
     def picture(self, block: AnyTransport, first: int) -> Floats:
         """Probe a block, whose first camera pixel has the number `first` in the whole transport.

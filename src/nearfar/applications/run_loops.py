@@ -1,7 +1,8 @@
 """Sums of transport times light over runs of projector pixels, in compiled loops.
 
-All add to pictures `out`, (n, channels). A run of camera pixel c in projector row ``first[c] + r``
-is from column ``starts[c, r]`` up to the one before ``stops[c, r]``; see `Runs`.
+Loops named `add` add to their last parameter, the others fill it. A run of camera pixel c in
+projector row ``first[c] + r`` is from column ``starts[c, r]`` up to the one before ``stops[c, r]``;
+see `Runs`.
 
 Index convention: c runs over camera pixels, i over channels, r over rows of runs, m over functions
 of far-range light.
@@ -141,8 +142,8 @@ def add_between(
 ) -> None:
     """Add sums at a grid of places, interpolated at q, (n, 2): out, (n, M).
 
-    By cubic convolution (Keys 1981), between the sixteen places about q. Nothing is added where q
-    is NaN.
+    By cubic convolution (Keys 1981), between the sixteen places about q, which is on the
+    projector. Nothing is added where q is NaN.
 
     Parameters
     ----------
@@ -157,7 +158,9 @@ def add_between(
         if np.isnan(q[c, 0]) or np.isnan(q[c, 1]):
             continue
         y, x = (q[c, 0] - first) / spacing, (q[c, 1] - first) / spacing
-        above, left = int(np.floor(y)), int(np.floor(x))
+        # A q on the very edge may be rounded to beyond the places next to it.
+        above = min(max(int(np.floor(y)), 1), grid.shape[0] - 3)
+        left = min(max(int(np.floor(x)), 1), grid.shape[1] - 3)
         for axis, t in ((0, y - above), (1, x - left)):
             weights[axis, 0] = 0.5 * t * (t * (2 - t) - 1)
             weights[axis, 1] = 0.5 * (t * t * (3 * t - 5) + 2)

@@ -19,7 +19,8 @@ from nearfar.parallel import side_by_side
 from nearfar.transport.factors import Factors
 from nearfar.transport.pyramid import Pyramid
 
-# Bytes of sums along rows up to which those of all functions are kept for the next camera pixels.
+# Bytes of a table up to which it has more projector rows than are asked for, for the next camera
+# pixels.
 TABLE_BYTES = 2**27
 # Functions whose sums lie side by side: few enough for those of a disc to stay in a cache.
 FUNCTIONS_TOGETHER = 192
@@ -27,9 +28,11 @@ FUNCTIONS_TOGETHER = 192
 FLOATS_OF_LINE = 16
 # Projector rows that a thread sums at a time.
 LINES_AT_ONCE = 8
-# Distances between places at which sums over a disc are taken, in its radius. The disc's edge is
-# blurred by about as much.
+# Distance between neighbouring places at which sums over a disc are taken, as a share of its
+# radius. The edge of the disc is blurred by about this distance.
 SPACING_OF_RADIUS = 1 / 16
+# Bytes of the sums at all places up to which they are taken.
+PLACES_BYTES = 2**27
 # Places summed at a time.
 BATCH_PLACES = 512
 
@@ -50,6 +53,10 @@ class Table(NamedTuple):
     first: int
     sums: Floats
 
+    def has(self, lines: slice) -> bool:
+        """Whether it has some projector rows."""
+        return bool(self.first <= lines.start and lines.stop <= self.first + len(self.sums))
+
 
 class SumsOfDisc(NamedTuple):
     """Sums over a disc of light times each function, at a grid of places of its middle.
@@ -66,13 +73,32 @@ class SumsOfDisc(NamedTuple):
     spacing: float
 
 
+class HatSums(NamedTuple):
+    """What hats read of a light.
+
+    Attributes
+    ----------
+    moments : tuple of ndarray, shape (Py, Px + 1), float64
+        Sums of the light, and of the light times column, along projector rows before each column.
+    pyramid : Pyramid
+        Where they read the light that is blurred by them.
+    levels : ndarray
+        The light blurred by the hat of each pitch, flat; see `Pyramid`.
+    """
+
+    moments: tuple[Floats, Floats]
+    pyramid: Pyramid
+    levels: Floats
+
+
 def grid_of_places(radius: float, projector: Size) -> tuple[float, Size]:
     """Return the first place of a disc's middle along each axis, and how many there are.
 
-    They reach from two before the projector's edge to two after it, for cubic convolution.
+    The first lies one place before the projector's edge, and the last two or three after the other
+    edge, for cubic convolution.
     """
     spacing = radius * SPACING_OF_RADIUS
-    rows, columns = (int(side / spacing) + 4 for side in projector)
+    rows, columns = (int(side / spacing) + 5 for side in projector)
     return -0.5 - spacing, Size(rows, columns)
 
 
@@ -91,41 +117,58 @@ class SummedLight:
     light: Floats
     basis: RealBasis
     near_basis: NearBasis
-    _of_discs: dict[float, "SumsOfDisc"] = field(default_factory=dict, init=False, repr=False)
+    _of_discs: dict[float, SumsOfDisc] = field(default_factory=dict, init=False, repr=False)
+    _kept: list[Table] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
-    def pyramid(self) -> Pyramid:
-        """Where hats read the light that is blurred by them."""
-        return Pyramid(self.near_basis, self.basis.projector)
-
-    @cached_property
-    def levels(self) -> Floats:
-        """The light blurred by the hat of each pitch, flat; see `Pyramid`."""
-        return self.pyramid.levels(self.light)
-
-    @cached_property
-    def moments(self) -> tuple[Floats, Floats]:
-        """Sums of the light, and of the light times column, before each column, (Py, Px + 1)."""
-        found = []
+    def hats(self) -> HatSums | None:
+        """What hats read of the light; None where near-range light is of single pixels."""
+        if self.near_basis.pitch == 1:
+            return None
+        moments = []
         for values in (self.light, self.light * np.arange(self.light.shape[1])):
             sums = np.zeros((len(values), values.shape[1] + 1))
             np.cumsum(values, axis=1, out=sums[:, 1:])
-            found.append(sums)
-        return found[0], found[1]
+            moments.append(sums)
+        pyramid = Pyramid(self.near_basis, self.basis.projector)
+        return HatSums((moments[0], moments[1]), pyramid, pyramid.levels(self.light))
 
     def tables(self, lines: slice) -> Iterator[Table]:
-        """Yield sums of some functions at a time, until all were there.
+        """Yield sums along projector rows of some functions at a time, until all were there.
+
+        The last ones are kept where one table holds all functions, or all are small. They serve
+        again for rows that they have.
 
         Parameters
         ----------
         lines : slice
-            Projector rows that are needed; tables have more of them where all fit into memory.
+            Projector rows that are needed.
         """
-        if self._bytes_of_function * self.basis.count <= TABLE_BYTES:
-            yield from self._whole_tables
+        if self._kept and self._kept[0].has(lines):
+            yield from self._kept
             return
-        for functions in blocks(self.basis.count, FUNCTIONS_TOGETHER):
-            yield self._table(functions, lines)
+        lines = self._with_more(lines)
+        bytes_of_lines = (lines.stop - lines.start) * self._bytes_of_line
+        made = (self._table(some, lines) for some in blocks(self.basis.count, FUNCTIONS_TOGETHER))
+        if self.basis.count > FUNCTIONS_TOGETHER and bytes_of_lines > TABLE_BYTES:
+            yield from made
+            return
+        self._kept.clear()
+        self._kept.extend(list(made))
+        yield from self._kept
+
+    def _with_more(self, lines: slice) -> slice:
+        """Return rows about those needed: all if most are, else as many as `TABLE_BYTES` hold."""
+        height, count = len(self.light), lines.stop - lines.start
+        if 2 * count > height or height * self._bytes_of_line <= TABLE_BYTES:
+            return slice(0, height)
+        more = max(0, TABLE_BYTES // self._bytes_of_line - count) // 2
+        return slice(max(0, lines.start - more), min(height, lines.stop + more))
+
+    def takes_places(self, disc: Disc) -> bool:
+        """Whether the sums over a disc at its places are few enough to be kept."""
+        _, places = grid_of_places(disc.radius, self.basis.projector)
+        return 4 * self.basis.count * places.pixels <= PLACES_BYTES
 
     def of_disc(self, disc: Disc) -> SumsOfDisc:
         """Return the sums over a disc about a grid of places; they are kept."""
@@ -139,8 +182,9 @@ class SummedLight:
         spacing = disc.radius * SPACING_OF_RADIUS
         q = first + spacing * np.moveaxis(np.indices(places), 0, -1).reshape(-1, 2)
         sums = np.zeros((len(q), self.basis.count), dtype=np.float32)
-        lines_of_functions = max(1, TABLE_BYTES // (self._bytes_of_function * FLOATS_OF_LINE))
-        at_once = min(lines_of_functions * FLOATS_OF_LINE, FUNCTIONS_TOGETHER)
+        bytes_of_function = 4 * (self.light.size + len(self.light))
+        cache_lines = max(1, TABLE_BYTES // (bytes_of_function * FLOATS_OF_LINE))
+        at_once = min(cache_lines * FLOATS_OF_LINE, FUNCTIONS_TOGETHER)
         for functions in blocks(self.basis.count, at_once):
             table = self._table(functions, slice(0, projector.height))
 
@@ -152,14 +196,9 @@ class SummedLight:
         return SumsOfDisc(sums.reshape(*places, -1), first, spacing)
 
     @property
-    def _bytes_of_function(self) -> int:
-        """Bytes of the sums of one function along all projector rows."""
-        return 4 * (self.light.size + len(self.light))
-
-    @cached_property
-    def _whole_tables(self) -> list[Table]:
-        lines = slice(0, len(self.light))
-        return [self._table(some, lines) for some in blocks(self.basis.count, FUNCTIONS_TOGETHER)]
+    def _bytes_of_line(self) -> int:
+        """Bytes of the sums of all functions along a projector row."""
+        return 4 * self.basis.count * int(self.light.shape[1] + 1)
 
     def _table(self, functions: slice, lines: slice) -> Table:
         light, width = self.light[lines], self.light.shape[1]

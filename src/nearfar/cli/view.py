@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,8 +16,10 @@ from nearfar.cli.saying import say
 from nearfar.progress import progress_bar
 
 if TYPE_CHECKING:
+    from nearfar.applications.flat_fields import FlatFields
     from nearfar.progress import Report
     from nearfar.report.maps import Map
+    from nearfar.transport.stored import StoredTransport
     from nearfar.viewer.beside import Beside
     from nearfar.viewer.interactive import InteractiveTransport
     from nearfar.viewer.photo_series import PhotoSeries
@@ -75,13 +76,15 @@ def view(
     """Relight the scene in the browser: drag a light, and see its direct, near and far parts.
 
     With --beside a second transport is shown next to it, with their signed difference and SNR. With
-    --and further projectors light the scene, and the page shows the sum.
+    --and further projectors light the scene, and the page shows the sum. --projector-flat is of the
+    first projector.
 
     Example: nearfar view transport.zarr --beside truth.zarr
     """
     import webbrowser
 
     from nearfar.applications.several_projectors import require_same_camera
+    from nearfar.transport.stored import open_transport
     from nearfar.viewer.beside import open_beside
     from nearfar.viewer.interactive import InteractiveTransport
     from nearfar.viewer.server import ListeningAddress
@@ -91,6 +94,9 @@ def view(
     paths = [transport, *(other or ())]
     for path in paths:
         require_reconstructed(path)
+    stored = [open_transport(path) for path in paths]
+    require_same_camera(stored, [str(path) for path in paths])
+    flat_fields = _flat_fields_of(stored, camera_flat, projector_flat)
     second: Beside | None = None
     maps: Mapping[str, Map] = {}
     series: PhotoSeries | None = None
@@ -104,9 +110,8 @@ def view(
             )
             for path in paths[1:]
         ]
-        stored = [each.stored for each in (interactive, *others)]
-        require_same_camera(stored, [str(path) for path in paths])
-        _divide_out([interactive, *others], camera_flat, projector_flat)
+        for each, flats in zip((interactive, *others), flat_fields, strict=True):
+            each.flat_fields = flats
         if beside is not None:
             second = open_beside(
                 beside,
@@ -139,18 +144,24 @@ def view(
     say("view ended", quiet=quiet)
 
 
-def _divide_out(
-    transports: Sequence["InteractiveTransport"],
-    camera_flat: Path | None,
-    projector_flat: Path | None,
-) -> None:
-    """Divide flat fields out of dual views: the camera's for all, the projector's for the first."""
+def _flat_fields_of(
+    stored: Sequence["StoredTransport"], camera_flat: Path | None, projector_flat: Path | None
+) -> "list[FlatFields]":
+    """Read flat fields: the camera's for all transports, the projector's for the first."""
     from nearfar.applications.flat_fields import flat_fields
 
-    of_camera = read_flat(camera_flat, transports[0].stored.camera)
-    for each, path in zip_longest(transports, [projector_flat]):
-        sizes = (each.stored.camera, each.stored.projector, each.stored.channels)
-        each.flat_fields = flat_fields(of_camera, read_flat(path, each.projector), *sizes)
+    of_camera = read_flat(camera_flat, stored[0].camera)
+    of_projector = read_flat(projector_flat, stored[0].projector)
+    return [
+        flat_fields(
+            of_camera,
+            None if number else of_projector,
+            each.camera,
+            each.projector,
+            each.channels,
+        )
+        for number, each in enumerate(stored)
+    ]
 
 
 def _photos_of(

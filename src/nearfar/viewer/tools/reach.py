@@ -73,15 +73,17 @@ def by_reach(transport: InteractiveTransport, message: bytes) -> Iterator[bytes 
     header, light = unpack_levels(ReachHeader, message, transport.projector)
     _require_places(transport)
     levels, mask = transport.for_channels(light.as_array()), _mask(header.inner, header.outer)
+    camera = transport.stored.camera
     if header.coarse:
-        parts: Iterable[Transport] = [_coarse(transport)]
+        parts: Iterable[Transport] = [coarse := _coarse(transport)]
+        camera = coarse.camera
     else:
         stride = transport.display_stride
         parts = thinned_blocks(transport.blocks(), transport.stored.camera.height, stride)
     pictures: list[Floats] = []
     probed: ProbedLight | None = None
     for part in parts:
-        probed = probed or probed_light(part, levels, mask, transport.stored.camera)
+        probed = probed or probed_light(part, levels, mask, camera)
         first = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
         pictures.append((yield from _probed(part, probed, first)))
     picture = np.concatenate(pictures)
@@ -102,7 +104,7 @@ def by_distance(transport: InteractiveTransport, message: bytes) -> Iterator[byt
     levels, coarse = transport.for_channels(light.as_array()), _coarse(transport)
     # Rings are differences of discs, each of which is probed once.
     discs = [np.zeros((*coarse.camera, coarse.channels), dtype=np.float32)]
-    probed = probed_light(coarse, levels, ProbingMask.beyond(1), transport.stored.camera)
+    probed = probed_light(coarse, levels, ProbingMask.beyond(1), coarse.camera)
     for edge in header.edges:
         disc = yield from _probed(coarse, probed.by(ProbingMask.within(edge)))
         discs.append(disc)

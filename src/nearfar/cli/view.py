@@ -95,7 +95,7 @@ def view(
     for path in paths:
         require_reconstructed(path)
     stored = [open_transport(path) for path in paths]
-    require_same_camera(stored, [str(path) for path in paths])
+    require_same_camera(stored, list(map(str, paths)))
     flat_fields = _flat_fields_of(stored, camera_flat, projector_flat)
     second: Beside | None = None
     maps: Mapping[str, Map] = {}
@@ -105,10 +105,8 @@ def view(
             transport, memory=available, progress=lambda share: report("reading", share)
         )
         others = [
-            InteractiveTransport(
-                path, memory=available, progress=partial(report, f"reading {path}")
-            )
-            for path in paths[1:]
+            InteractiveTransport(one, memory=available, progress=partial(report, f"reading {one}"))
+            for one in paths[1:]
         ]
         for each, flats in zip((interactive, *others), flat_fields, strict=True):
             each.flat_fields = flats

@@ -280,12 +280,14 @@ def test_what_does_not_fit_is_refused(light, mask, words):
 def test_q_at_the_very_edge_is_between_places():
     """Rounding may put it just beyond them."""
     projector = Size(294, 20)
-    for radius in (32.66666666666667, 33.0, 57.3):
+    for radius in (32.66666666666667, *np.arange(32, 100, 0.1)):
         first, places = grid_of_places(radius, projector)
         spacing = radius * SPACING_OF_RADIUS
         y, x = (first + spacing * np.arange(count) for count in places)
         # Cubic convolution is exact for planes.
         grid = np.ascontiguousarray((y[:, None] + 2 * x)[..., None].astype(np.float32))
+        # No q reads the last column, unless an index below the first counts from there.
+        grid[:, -1] = np.inf
         q = np.array([[-0.5, -0.5], [293.5, 19.5], [293.5, -0.5], [100.2, 7.9], [np.nan, 3.0]])
         found = np.zeros((len(q), 1), dtype=np.float32)
         run_loops.add_between(grid, first, spacing, 1, q.astype(np.float32), found)

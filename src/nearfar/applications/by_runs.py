@@ -95,11 +95,12 @@ def picture_by_runs(factors: Factors, lights: list[SummedLight], runs: RunsOfCam
 
 
 def _add_all(factors: Factors, light: SummedLight, runs: RunsOfCamera, out: Floats) -> None:
+    """Add all light: about q and of interpolated discs first, then far-range light row by row."""
     by_rows, interpolated = _by_size(runs, light)
     hats = light.hats
     discs = [(sign, light.of_disc(disc)) for sign, disc in interpolated]
 
-    def first(batch: slice) -> None:
+    def but_row_by_row(batch: slice) -> None:
         _add_about_q(factors, light.light, hats, runs, batch, out[batch])
         if not discs:
             return
@@ -109,7 +110,7 @@ def _add_all(factors: Factors, light: SummedLight, runs: RunsOfCamera, out: Floa
             run_loops.add_between(*disc, sign, runs.q[batch], sums)
         run_loops.add_products(far, sums, out[batch])
 
-    side_by_side(first, blocks(len(out), BATCH_PIXELS))
+    side_by_side(but_row_by_row, blocks(len(out), BATCH_PIXELS))
     for table in light.tables(runs.lines([shape for _, shape in by_rows])) if by_rows else ():
 
         def work(batch: slice, table: Table = table) -> None:

@@ -21,12 +21,12 @@ from nearfar.viewer.tools.few_pixels import few_pixels
 
 # Entries of the transport that are masked in one step: some tenths of a second.
 STEP_ENTRIES = 2**24
-# Entries that a camera pixel counts as where rows of the transport are not drawn.
-ENTRIES_BY_RUNS = 2**9
 # The same of a whole picture while the light or the reach moves; it has no fewer camera pixels
 # than these.
 COARSE_ENTRIES = 2**23
 LEAST_PIXELS = 1024
+# Entries that a camera pixel counts as in a step where rows of the transport are not drawn.
+ENTRIES_BY_RUNS = 2**9
 MAXIMUM_EDGES = 12
 
 # In projector pixels.

@@ -14,6 +14,7 @@ from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from tests.absent import said_without
+from tests.estimate.joint.test_second_places import estimated, rows_of, surfaces
 from tests.worlds import model_transport
 
 PROJECTOR, CAMERA, WINDOW = Size(16, 20), Size(16, 20), 5
@@ -68,6 +69,16 @@ def test_the_estimate_is_numpys(shoot, devices, by, offset, between):
     ours, shaken = (by(given, q, plan, "cpu") for given in (measurements, again))
     for device in devices:
         _check_as_good(by(measurements, q, plan, device), ours, shaken)
+
+
+def test_second_places_are_numpys(devices):
+    ours = estimated(rows_of(surfaces()), surfaces())
+    assert np.isfinite(ours.second_place).any()
+    for device in devices:
+        theirs = estimated(rows_of(surfaces()), surfaces(), device=device)
+        assert theirs.second_place.dtype == ours.second_place.dtype
+        np.testing.assert_allclose(theirs.second_place, ours.second_place, atol=1e-5)
+        np.testing.assert_allclose(theirs.second_direct, ours.second_direct, atol=1e-5)
 
 
 def _check_as_good(theirs, ours, shaken):

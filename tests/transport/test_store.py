@@ -272,7 +272,7 @@ def test_a_verdict_of_an_earlier_nearfar_is_read(stored):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 9}, "version 9, this nearfar reads versions 1 to 3"),
+        ({"version": 9}, "version 9, this nearfar reads versions 1 to 4"),
         ({"format": "nearfar capture"}, "not a nearfar transport but a nearfar capture"),
         ({"projector": None}, "does not describe a transport"),
         ({"projector": [3]}, "does not describe a transport"),

@@ -164,6 +164,12 @@ def _add_single_pixels(
     direct, near = _floats(factors.direct[batch]), _floats(factors.near[batch])
     corners = (where.pixels[batch], where.weights[batch])
     run_loops.add_corners(light, direct, *corners, *runs, out)
+    if factors.second is not None:
+        second = factors.second.of(batch, len(factors.q))
+        its = Runs(*(values[second.pixels] for values in runs))
+        found = np.zeros((len(second.pixels), direct.shape[1]), dtype=np.float32)
+        run_loops.add_corners(light, _floats(second.direct), *second.where, *its, found)
+        out[second.pixels] += found
     window = near.reshape(*direct.shape, side, side)
     run_loops.add_window(light, window, factors.centres[batch], *runs, out)
 

@@ -124,10 +124,10 @@ def recolour(transport: Transport, component: str, colour: ArrayLike) -> Transpo
             f"{', '.join([*transport.parts, SUBSURFACE])}."
         )
     name = ("direct", "near", "far")[PLACES[chosen[0]]]
-    factor = getattr(transport, name)
-    flat = factor.reshape(transport.camera.pixels, transport.channels, -1)
-    mixed = _float32(np.einsum("ij,cjw->ciw", matrix, flat))
-    return _edited(transport, edit, **{name: mixed.reshape(factor.shape)})
+    changed = {name: _mixed(getattr(transport, name), matrix)}
+    if name == "direct" and transport.second_direct is not None:
+        changed["second_direct"] = _mixed(transport.second_direct, matrix)
+    return _edited(transport, edit, **changed)
 
 
 def recoloured_under_surfaces(split: PhysicalSplit, matrix: Floats) -> Transport:
@@ -137,6 +137,12 @@ def recoloured_under_surfaces(split: PhysicalSplit, matrix: Floats) -> Transport
     near = transport.near + change.reshape(transport.near.shape)
     edit = {"recolour": SUBSURFACE, "matrix": matrix.tolist()}
     return _edited(transport, edit, near=_float32(near))
+
+
+def _mixed(factor: Floats, matrix: Floats) -> Floats:
+    """Return a factor (Cy, Cx, channels, ...) whose channels are sums of all, float32."""
+    flat = factor.reshape(*factor.shape[:3], -1)
+    return _float32(np.einsum("ij,yxjw->yxiw", matrix, flat)).reshape(factor.shape)
 
 
 class Cut(NamedTuple):

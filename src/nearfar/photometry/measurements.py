@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Size
+from nearfar.arrays import Floats, Integers, Size
 from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.real_basis import RealBasis
 
@@ -98,7 +98,7 @@ class Measurements:
         """Return the indices of the responses to `frequencies`, cosine before sine."""
         return self.basis.response_indices(frequencies)
 
-    def of_pixels(self, camera: Size, pixels: slice) -> "Measurements":
+    def of_pixels(self, camera: Size, pixels: slice | Integers) -> "Measurements":
         """Return the measurements of some camera pixels, as a camera of size `camera`."""
         return replace(
             self,

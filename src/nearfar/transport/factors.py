@@ -21,6 +21,7 @@ from nearfar.transport.boxes import BoxAxes, box_axes, boxes_adjoint
 from nearfar.transport.components import Components
 from nearfar.transport.pictures import direct_pictures, far_pictures, near_pictures
 from nearfar.transport.pyramid import Pyramid
+from nearfar.transport.second_light import SecondLight
 
 # Camera pixels of a batch: their windows take some tens of megabytes at W = 19.
 BATCH_PIXELS = 8192
@@ -43,6 +44,8 @@ class Factors:
     boxes : ndarray, shape (C, 4)
         Footprints of direct light, where functions of near-range light are of several projector
         pixels.
+    second : SecondLight or None
+        Direct light from second places, where functions are of single pixels.
     """
 
     projector: Size
@@ -53,6 +56,7 @@ class Factors:
     far_basis: RealBasis
     near_basis: NearBasis
     boxes: Floats
+    second: SecondLight | None = None
 
     @property
     def of_single_pixels(self) -> bool:
@@ -83,7 +87,11 @@ class Factors:
         """Return the factors of one channel."""
         one = slice(channel, channel + 1)
         return replace(
-            self, direct=self.direct[:, one], near=self.near[:, one], far=self.far[:, one]
+            self,
+            direct=self.direct[:, one],
+            near=self.near[:, one],
+            far=self.far[:, one],
+            second=None if self.second is None else self.second.of_channel(channel),
         )
 
     def analyse(self, light: Floats) -> AnalysedLight:
@@ -96,7 +104,7 @@ class Factors:
         (of_far,) = far_pictures(self.far, light.overlaps[None])
         if self.of_single_pixels:
             lights = light.flat[None]
-            (of_direct,) = direct_pictures(self.direct, self.footprint, lights)
+            (of_direct,) = self._direct_pictures(lights)
             (of_near,) = near_pictures(self.near, self.centres, self.projector, lights)
         else:
             of_direct, of_near = blurred_pictures(
@@ -110,10 +118,17 @@ class Factors:
             pictures = [self.relit(self.analyse(light)) for light in lights]
             return Components(*(np.stack(parts) for parts in zip(*pictures, strict=True)))
         return Components(
-            direct_pictures(self.direct, self.footprint, lights),
+            self._direct_pictures(lights),
             near_pictures(self.near, self.centres, self.projector, lights),
             far_pictures(self.far, overlaps_of(lights, self.far_basis)),
         )
+
+    def _direct_pictures(self, lights: Floats) -> Floats:
+        """Return pictures (L, C, channels) of direct light, of single pixels."""
+        found = direct_pictures(self.direct, self.footprint, lights)
+        if self.second is not None:
+            self.second.add_pictures(lights, found)
+        return found
 
     def back(self, image: Floats, channel: int) -> Floats:
         """Send one channel of an image (C,) back to the projector, (Py, Px)."""
@@ -121,7 +136,10 @@ class Factors:
         if not self.of_single_pixels:
             n = self.near[:, channel]
             return of_far + blurred_adjoint(d, n, image, self.pyramid, self.centres, self.box_axes)
-        return self.spread_directly(d * image) + of_far + self.near_back(image, channel)
+        of_direct = self.spread_directly(d * image)
+        if self.second is not None:
+            of_direct = of_direct + self.second.back(image, channel, self.projector)
+        return of_direct + of_far + self.near_back(image, channel)
 
     def far_back(self, image: Floats, channel: int) -> Floats:
         """Send one channel of an image (C,) back by f alone, (Py, Px)."""
@@ -166,4 +184,6 @@ class Factors:
             # Corners may coincide at the border: add each on its own.
             np.add.at(d[:, i], (number, corners), weights * direct[:, i, None])
             n[number, i, flat] = near[:, i]
+        if self.second is not None:
+            self.second.of(pixels, len(self.q)).add_rows(d)
         return Components(d, n[..., :beyond], f)

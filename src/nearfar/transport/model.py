@@ -35,6 +35,7 @@ from nearfar.transport.plots import Plots
 from nearfar.transport.posterior import AnyPosterior
 from nearfar.transport.pyramid import Pyramid
 from nearfar.transport.quality import Quality
+from nearfar.transport.second_light import SecondLight, second_light
 from nearfar.transport.summary_card import summary_card
 from nearfar.transport.verdict import KeptVerdict
 
@@ -71,6 +72,11 @@ class Transport(NoArray):
     footprint : ndarray, shape (Cy, Cx, 4), float32, or None
         Where `pitch` is over 1, the two boxes of projector pixels about q over which d is spread:
         height and width of each, and how far down and across their middles are from q.
+    second_place : ndarray, shape (Cy, Cx, 2), float32, or None
+        Where a camera pixel at an outline sees a second surface beyond its window, the place (y, x)
+        that lights it there; NaN at all others. None where the estimate looks for none.
+    second_direct : ndarray, shape (Cy, Cx, channels), float32, or None
+        Direct light from the second place, over the 2 x 2 projector pixels around it; a part of D.
     black : ndarray, shape (Cy, Cx, channels), float32
         The photo under black: ambient light and black level.
     noise : ndarray, shape (Cy, Cx, channels), float32
@@ -115,6 +121,8 @@ class Transport(NoArray):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     pitch: int = 1
     footprint: Floats | None = None
+    second_place: Floats | None = None
+    second_direct: Floats | None = None
     posterior: AnyPosterior | None = None
     quality: Quality | None = None
     verdict: KeptVerdict | None = None
@@ -156,7 +164,15 @@ class Transport(NoArray):
             far_basis=self.far_basis,
             near_basis=self.near_basis,
             boxes=self.boxes,
+            second=self._second,
         )
+
+    @property
+    def _second(self) -> SecondLight | None:
+        if self.second_place is None or self.second_direct is None:
+            return None
+        found = second_light(self.second_place, self.second_direct, self.projector)
+        return found if len(found.pixels) else None
 
     @property
     def pyramid(self) -> Pyramid:
@@ -314,6 +330,7 @@ class Transport(NoArray):
             posterior=None,
             verdict=None,
             direct=self.direct * np.float32(gains.direct),
+            second_direct=_times(self.second_direct, gains.direct),
             near=self.near * np.float32(gains.near),
             far=self.far * np.float32(gains.far),
         )
@@ -454,3 +471,7 @@ class Transport(NoArray):
         """Shape values (C, channels) as a picture: (Cy, Cx), or (Cy, Cx, channels)."""
         picture = flat.reshape(*self.camera, self.channels)
         return picture[..., 0] if self.channels == 1 else picture
+
+
+def _times(values: Floats | None, gain: float) -> Floats | None:
+    return None if values is None else values * np.float32(gain)

@@ -9,8 +9,9 @@ Index convention: c runs over camera pixels, i over channels, l over lights, w o
 lights are (P + 1, L, 1 or channels), whose last projector pixel is dark.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from array_api_compat import device as device_of
@@ -33,6 +34,24 @@ from nearfar.transport.pyramid import Pyramid
 GATHERED_VALUES: dict[Device, int] = {"cpu": 2**19, "torch": 2**19, "cuda": 2**26}
 # A rounding error of less than this share of the noise is negligible.
 NEGLIGIBLE_ROUNDING = 0.25
+
+
+class PreparedSecondLight(NamedTuple):
+    """Direct light from second places on a device.
+
+    Attributes
+    ----------
+    pixels : array of int, shape (n,)
+        Camera pixels.
+    direct : array, shape (n, channels)
+    corners, shares : array, shape (n, 4)
+        Projector pixels that it comes from, and their weights.
+    """
+
+    pixels: Integers
+    direct: Floats
+    corners: Integers
+    shares: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +81,7 @@ class PreparedTransport(NoArray):
         and summed on the processor first; `entries` are places in flat levels.
     held : int
         How many values are gathered at once.
+    second : PreparedSecondLight or None
     """
 
     _instead: ClassVar[str] = "multiply it with a light"
@@ -80,6 +100,7 @@ class PreparedTransport(NoArray):
     patterns: Floats | None
     pyramid: Pyramid | None
     held: int
+    second: PreparedSecondLight | None
 
     @property
     def nbytes(self) -> int:
@@ -135,6 +156,12 @@ class PreparedTransport(NoArray):
             part = part + near * _weighted_sums(self.near[batch], padded[self._entries(batch)])
             part = part + far * _weighted_sums(self.far[batch], overlaps)
             found[batch] = part
+        if self.second is not None:
+            pixels, light, corners, shares = self.second
+            at_place = xp.sum(at_direct[corners] * shares[..., None, None], axis=1)
+            found[pixels] = found[pixels] + direct * light[..., None] * xp.permute_dims(
+                at_place, (0, 2, 1)
+            )
         return xp.permute_dims(found, (2, 0, 1)).reshape((count, *self.camera, self.channels))
 
     def _entries(self, batch: slice) -> Integers:
@@ -248,7 +275,19 @@ def prepare_transport(
         patterns=patterns,
         pyramid=pyramid,
         held=GATHERED_VALUES[device],
+        second=_prepared_second(transport, move),
     )
+
+
+def _prepared_second(
+    transport: Transport, move: Callable[[Any], Any]
+) -> PreparedSecondLight | None:
+    """Put direct light from second places onto a device."""
+    second = transport.factors.second
+    if second is None:
+        return None
+    where = second.where.pixels.astype(np.int32), second.where.weights
+    return PreparedSecondLight(*map(move, (second.pixels, second.direct, *where)))
 
 
 def _places(transport: Transport) -> tuple[Integers, Floats, Integers, Pyramid | None]:

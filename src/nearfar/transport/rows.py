@@ -14,7 +14,7 @@ from nearfar.transport.quality import Quality
 # Attributes of a transport with a value for each camera pixel.
 FACTORS = ("correspondence", "direct", "near", "far", "black", "noise")
 # The same, of transports whose functions of near-range light are of several projector pixels.
-OPTIONAL_FACTORS = ("footprint",)
+OPTIONAL_FACTORS = ("footprint", "second_place", "second_direct")
 POSTERIOR_FIELDS = (
     "prior_component",
     "prior_scale",

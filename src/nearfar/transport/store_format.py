@@ -10,10 +10,16 @@ from nearfar.transport.rows import FACTORS
 KIND = "nearfar transport"
 # Version 2 added functions of near-range light that are of several projector pixels, and
 # footprints. Version 3 added transports without direct, near- or far-range light, and posteriors of
-# estimates from any patterns and of free rows. Other transports of single pixels are still written
+# estimates from any patterns and of free rows. Version 4 added direct light from second places.
+# Other transports of single pixels are still written
 # as version 1, which older versions of nearfar read.
-VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS = 1, 2, 3
-READABLE_VERSIONS = (VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS)
+VERSION_OF_PIXELS, VERSION_OF_HATS, VERSION_OF_OTHERS, VERSION_OF_SECOND_PLACES = 1, 2, 3, 4
+READABLE_VERSIONS = (
+    VERSION_OF_PIXELS,
+    VERSION_OF_HATS,
+    VERSION_OF_OTHERS,
+    VERSION_OF_SECOND_PLACES,
+)
 
 # Of a projector or a camera in a file, in pixels.
 LARGEST_SIDE = 2**20
@@ -23,6 +29,8 @@ MAXIMUM_REASON = 200
 
 # Attribute of the verdict on a transport, which is not there where none was passed.
 VERDICT = "verdict"
+# Whether camera pixels have direct light from second places; not there where none has.
+SECOND = "second_places"
 # That of the parts of a transport that has not the usual ones.
 PARTS_OF_T = "parts"
 

@@ -22,11 +22,13 @@ from nearfar.transport.store_format import (
     PARTS_OF_T,
     POSTERIOR,
     QUALITY,
+    SECOND,
     STORED_PARTS,
     VERDICT,
     VERSION_OF_HATS,
     VERSION_OF_OTHERS,
     VERSION_OF_PIXELS,
+    VERSION_OF_SECOND_PLACES,
     factors_of,
 )
 from nearfar.transport.verdict import KeptVerdict, verdict_to_json
@@ -102,6 +104,8 @@ def write_rows(folder: Path, part: Transport, first: int, *, rows: int, height: 
 
 
 def _version(transport: Transport) -> int:
+    if transport.second_place is not None:
+        return VERSION_OF_SECOND_PLACES
     of_other_patterns = not isinstance(transport.posterior, Posterior | None)
     if of_other_patterns or transport.parts != USUAL_PARTS:
         return VERSION_OF_OTHERS
@@ -131,6 +135,8 @@ def _attributes(transport: Transport) -> dict[str, Any]:
     }
     if transport.pitch > 1:
         attributes["pitch"] = transport.pitch
+    if transport.second_place is not None:
+        attributes[SECOND] = True
     if transport.posterior is not None:
         attributes[POSTERIOR] = described(transport.posterior)
     if transport.quality is not None:

@@ -20,7 +20,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS, Parts, parts_from_json
 from nearfar.transport.posterior_store import SharedPosterior, listed, shared_posterior
 from nearfar.transport.quality import Quality
-from nearfar.transport.rows import OPTIONAL_FACTORS, QUALITY_FIELDS, stacked, thinned_blocks
+from nearfar.transport.rows import QUALITY_FIELDS, stacked, thinned_blocks
 from nearfar.transport.store_format import (
     KIND,
     MAXIMUM_REASON,
@@ -28,6 +28,7 @@ from nearfar.transport.store_format import (
     POSTERIOR,
     QUALITY,
     READABLE_VERSIONS,
+    SECOND,
     VERDICT,
     factors_of,
     mapped,
@@ -177,9 +178,14 @@ def open_transport(path: AnyPath) -> StoredTransport:
         "black": each,
         "noise": each,
     }
-    if near_basis.pitch > 1:
-        arrays |= {name: open_array(group, name) for name in OPTIONAL_FACTORS}
-        shapes |= dict.fromkeys(OPTIONAL_FACTORS, (*each[:2], 4))
+    optional = {
+        "footprint": (*each[:2], 4) if near_basis.pitch > 1 else None,
+        "second_place": (*each[:2], 2) if SECOND in group.attrs else None,
+        "second_direct": each if SECOND in group.attrs else None,
+    }
+    there = {name: shape for name, shape in optional.items() if shape is not None}
+    arrays |= {name: open_array(group, name) for name in there}
+    shapes |= there
     _require_shapes(path, arrays, shapes)
     if posterior is not None:
         names = posterior.arrays(POSTERIOR)

@@ -10,8 +10,13 @@ from nearfar.errors import InputError
 from nearfar.estimate import error_bars
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.fit import fit_model
+from nearfar.estimate.joint import error_bars as error_bars_of_joint
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.joint.nuisance import SHIFT_DEVIATION, common_precision
+from nearfar.estimate.joint.nuisance import (
+    DIRECT_PRIOR_DEVIATION,
+    SHIFT_DEVIATION,
+    common_precision,
+)
 from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.pictures import standard_lights
@@ -26,6 +31,7 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
+from nearfar.transport.direct import footprint
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
@@ -330,6 +336,57 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     variance += s**2 * unseen.sum() / PROJECTOR.pixels**2
     found = ErrorBars(transport).picture(light)[0, 0]
     assert found == pytest.approx(np.sqrt(variance), rel=2e-3)
+
+
+def test_a_second_place_is_as_uncertain_as_dense_algebra_says():
+    second, of_light = (2.4, 13.7), 0.2
+    transport = _transport(np.array([[6, 8]]))
+    transport = replace(
+        transport,
+        second_place=np.array([[second]], np.float32),
+        second_direct=np.full((1, 1, 1), of_light, np.float32),
+    )
+    posterior = transport.posterior
+    basis = real_basis(posterior.frequencies, PROJECTOR)
+
+    def at_second(values):
+        """Return values (P, m) at the second place, and half of their changes by half a pixel."""
+
+        def at(y, x):
+            where = footprint(np.array([(y, x)]), PROJECTOR)
+            return where.weights[0] @ values[where.pixels[0]]
+
+        (y, x), step = second, error_bars_of_joint.HALF_STEP
+        down, across = at(y + step, x) - at(y - step, x), at(y, x + step) - at(y, x - step)
+        return np.stack([at(y, x), down / (2 * step), across / (2 * step)])
+
+    direct = basis.patterns[:, 6 * PROJECTOR.width + 8]
+    on_window = basis.patterns_at(window_offsets(WINDOW) + np.array([6, 8]))
+    own = np.column_stack([np.ones(basis.count), direct, at_second(basis.patterns.T).T])
+    responses = np.concatenate([own, on_window, np.eye(basis.count)], axis=1).astype(float)
+    end = own.shape[1] + WINDOW**2
+    s = SCALE * WHITE
+    prior = np.zeros((responses.shape[1], responses.shape[1]))
+    shift = error_bars_of_joint.SECOND_SHIFT * of_light
+    prior[:5, :5] = np.diag(
+        [*_prior_variance()[:2], (DIRECT_PRIOR_DEVIATION * WHITE) ** 2, shift**2, shift**2]
+    )
+    prior[5:end, 5:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR)
+    prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
+    noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
+    gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
+    posterior = prior - gain @ responses @ prior
+    light = _held_light(transport)
+    weights = _weights(transport, 0, light)
+    of_second = at_second(light.reshape(-1, 1))[:, 0]
+    of_second[0] -= light.mean()
+    # White's own error stands apart: nothing else tells of it.
+    ask = np.concatenate([weights[[0, 2]], of_second, weights[3:]])
+    own_of_white = LIGHT**2 - (SHARE * OFFSET) ** 2
+    expected = np.sqrt(ask @ posterior @ ask + light.mean() ** 2 * own_of_white)
+    found = ErrorBars(transport).picture(light)[0, 0]
+    assert found == pytest.approx(expected, rel=2e-3)
+    assert found > 1.05 * ErrorBars(_transport(np.array([[6, 8]]))).picture(light)[0, 0]
 
 
 def test_nothing_is_known_of_saturated_camera_pixels():

@@ -10,6 +10,7 @@ from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namesp
 from nearfar.estimate.joint.batch import dc_index
 from nearfar.estimate.joint.positive import make_positive
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
+from nearfar.estimate.joint.second_places import SecondPlaces
 from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.joint.spikes import around_q
 from nearfar.illumination.centred_basis import centred_basis
@@ -30,7 +31,9 @@ BATCH_PIXELS = 2048
 LEFT_OUT_SHARE = 0.5
 
 
-def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
+def assemble(
+    problem: Problem, rows: EstimatedRows, far: Size, second: SecondPlaces | None = None
+) -> Transport:
     """Return the transport, which at a pitch over 1 takes over the arrays of the rows.
 
     f is kept at the measured frequencies of the far band, and at those others that lie on the DFT
@@ -54,6 +57,8 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     rows = _without_negative_direct(problem, rows)
     direct = rows.amplitudes[..., 1] * pixels.lit[:, None]
     rest = white - share * rows.amplitudes[..., 0] - _under_white(problem, direct, rows.near)
+    if second is not None and len(second.pixels):
+        rest[beside(second.pixels, rest)] -= beside(second.direct, rest)
     far_range = _far_range(rest, rows.far, far_indices)
     of_far = centred_basis(basis, problem.near_basis)
     of_far = of_far.put(lambda one: beside(one, rows.near))
@@ -71,6 +76,7 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
     footprint = None
     if problem.near_basis.pitch > 1:
         footprint = fetch(pixels.footprint).reshape(*measurements.camera, 4)
+    place, direct_there = _of_camera(second, measurements)
     return Transport(
         projector=measurements.projector,
         correspondence=fetch(pixels.correspondence)
@@ -82,6 +88,8 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
         far_basis=basis,
         pitch=problem.near_basis.pitch,
         footprint=footprint,
+        second_place=place,
+        second_direct=direct_there,
         black=measurements.black.reshape(shape),
         noise=measurements.noise.reshape(shape),
         posterior=Posterior(
@@ -99,6 +107,19 @@ def assemble(problem: Problem, rows: EstimatedRows, far: Size) -> Transport:
             noise_share=fetch(1.0 - LEFT_OUT_SHARE * (1.0 - rows.noise_left)).reshape(shape),
         ),
     )
+
+
+def _of_camera(
+    second: SecondPlaces | None, measurements: Measurements
+) -> tuple[Floats | None, Floats | None]:
+    """Return second places and their direct light as a transport has them."""
+    if second is None:
+        return None, None
+    camera, channels = measurements.camera, measurements.channels
+    places = np.full((camera.pixels, 2), np.nan, dtype=np.float32)
+    direct = np.zeros((camera.pixels, channels), dtype=np.float32)
+    places[second.pixels], direct[second.pixels] = second.places, second.direct
+    return places.reshape(*camera, 2), direct.reshape(*camera, channels)
 
 
 def _far_range(rest: Floats, far: Floats, kept: Integers) -> Floats:

@@ -10,7 +10,7 @@ runs over real responses, w over window entries, i over eigenvectors, g over o, 
 
 from collections.abc import Callable
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from nearfar.estimate.joint.posterior_variance import (
     PixelState,
     posterior_variance,
 )
+from nearfar.estimate.joint.second_places import responses_of
 from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.truncated import truncated_variance
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
@@ -40,9 +41,15 @@ from nearfar.priors.responses import ResponsePrior, response_prior
 from nearfar.transport import near
 from nearfar.transport.blurred import BlurredLight, blurred_light
 from nearfar.transport.boxes import box_axes
+from nearfar.transport.direct import footprint, look_up
 from nearfar.transport.gains import Gains
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
+
+# Standard deviation of a second place, in projector pixels.
+SECOND_SHIFT = 0.15
+# Half a step of a second place, in projector pixels, of numerical derivatives by it.
+HALF_STEP = 0.25
 
 
 class _Light(NamedTuple):
@@ -57,12 +64,15 @@ class _Light(NamedTuple):
         With the responses that the transport holds, times the gain of far-range light.
     truncated : ndarray, shape (components,)
         See `Functionals`.
+    at_second : callable
+        Responses of unit direct light from second places, and their derivatives, (n, 3).
     """
 
     mean: float
     seen: Callable[[slice], tuple[Floats, Floats]]
     overlap: Floats
     truncated: Floats
+    at_second: Callable[[slice], Floats]
 
 
 class JointVariances:
@@ -83,6 +93,9 @@ class JointVariances:
         basis = self._centred.basis
         self._priors: dict[int, ResponsePrior] = {}
         self._centres = near.centre(transport.correspondence, transport.projector)
+        places = transport.second_place
+        has_second = transport.factors.second is not None and places is not None
+        self._second = places.reshape(-1, 2) if has_second and places is not None else None
         kept = set(transport.far_basis.frequencies)
         self._is_held = np.array([basis.frequencies[i] in kept for i in basis.index])
 
@@ -96,7 +109,8 @@ class JointVariances:
             blurred = blurred_light(light.astype(np.float32), transport.pyramid)
         seen = partial(self._seen, light=light, blurred=blurred)
         overlap = gains.far * self._centred.basis.analyse(light) * self._is_held
-        shown = _Light(float(light.mean()), seen, overlap.astype(np.float32), truncated)
+        at_second = partial(self._at_second, light[None])
+        shown = _Light(float(light.mean()), seen, overlap.astype(np.float32), truncated, at_second)
         return lambda batch: self._variance(batch, self._of_light(batch, shown, gains))
 
     def of_direct(self, batch: slice) -> Floats:
@@ -104,7 +118,7 @@ class JointVariances:
         number = len(self._centres[batch])
         functionals = Functionals(
             np.zeros(number),
-            np.broadcast_to([1.0, 0.0, 0.0], (number, 3)),
+            self._of_amplitudes([1.0, 0.0, 0.0], np.zeros((number, 3))),
             np.zeros((number, self._transport.near_basis.count), dtype=np.float32),
             np.zeros((number, self._centred.basis.count), dtype=np.float32),
             np.zeros(len(self._posterior.prior_components)),
@@ -115,7 +129,7 @@ class JointVariances:
         """Return those of sums of one camera pixel's near-range functions, (m, channels)."""
         functionals = Functionals(
             np.zeros(len(values)),
-            np.zeros((len(values), 3)),
+            self._of_amplitudes([0.0, 0.0, 0.0], np.zeros((len(values), 3))),
             values,
             np.zeros((len(values), self._centred.basis.count), dtype=np.float32),
             np.zeros(len(self._posterior.prior_components)),
@@ -137,7 +151,10 @@ class JointVariances:
         centre = np.broadcast_to(self._centres[one], (number, 2))
         return Functionals(
             np.full(number, 1.0 / total),
-            np.broadcast_to([-lit / total, 0.0, 0.0], (number, 3)),
+            self._of_amplitudes(
+                [-lit / total, 0.0, 0.0],
+                np.broadcast_to(self._has_second(one) * [-1.0 / total, 0.0, 0.0], (number, 3)),
+            ),
             (-lit / total * inside[None]).astype(np.float32),
             centred.recentre(patterns[:, None], centre)[:, 0],
             np.zeros(len(self._posterior.prior_components)),
@@ -154,9 +171,11 @@ class JointVariances:
         lit = transport.lit.ravel()[batch]
         direct = gains.direct * direct
         direct[:, 0] -= mean * lit
+        second = gains.direct * light.at_second(batch)
+        second[:, 0] -= mean * self._has_second(batch)[:, 0]
         return Functionals(
             np.full(len(centres), mean),
-            direct,
+            self._of_amplitudes(direct, second),
             (lit[:, None] * (gains.near * in_window - mean * inside)).astype(np.float32),
             centred.recentre(overlaps, centres)[:, 0],
             light.truncated,
@@ -192,6 +211,28 @@ class JointVariances:
             np.stack([at(q), *derivatives], axis=-1),
         )
 
+    def _of_amplitudes(self, direct: Any, second: Floats) -> Floats:
+        """Return functionals of direct light, (n, 3), with those of second places, if any."""
+        own = np.broadcast_to(np.asarray(direct, dtype=np.float64), second.shape)
+        return own if self._second is None else np.concatenate([own, second], axis=1)
+
+    def _has_second(self, batch: slice) -> Floats:
+        """Return 1 for each camera pixel that sees a second place, else 0, (n, 1)."""
+        if self._second is None:
+            return np.zeros((len(self._centres[batch]), 1))
+        return np.isfinite(self._second[batch, :1]).astype(np.float64)
+
+    def _at_second(self, lights: Floats, batch: slice) -> Floats:
+        """Return responses of unit direct light from second places, and derivatives, (n, 3)."""
+        projector = self._transport.projector
+        if self._second is None:
+            return np.zeros((len(self._centres[batch]), 3))
+
+        def seen(places: Floats) -> Floats:
+            return look_up(lights, footprint(places, projector)).T
+
+        return _with_derivatives(self._second[batch], seen, len(lights))[..., 0]
+
     def _inside(self, batch: slice) -> Floats:
         """Return the share of each near-range function that lies on the projector, (n, J)."""
         transport, centres = self._transport, self._centres[batch]
@@ -216,17 +257,39 @@ class JointVariances:
         light_noise = posterior.light_noise.reshape(-1, channels)[batch]
         noise_share = posterior.noise_share.reshape(-1, channels)[batch]
         noise = transport.noise.reshape(-1, channels)[batch] * np.sqrt(noise_share)
+        precision = nuisance.common_precision(
+            white, offset_noise, nuisance.shift_deviation(transport.near_basis)
+        )
+        if self._second is not None:
+            direct = np.concatenate([direct, self._second_responses(batch)], axis=1)
+            precision = np.concatenate([precision, self._second_precision(batch, white)], axis=2)
         return PixelState(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
-            nuisance.common_precision(
-                white, offset_noise, nuisance.shift_deviation(transport.near_basis)
-            ),
+            precision,
             np.maximum(noise, RELATIVE_NOISE_FLOOR * white),
             posterior.prior_scale.ravel()[batch, None] * white,
             np.maximum(light_noise**2 - (share_of_white * offset_noise) ** 2, 0.0),
             share_of_white,
             posterior.prior_component.ravel()[batch].astype(np.int64),
         )
+
+    def _second_responses(self, batch: slice) -> Floats:
+        """Return the same to the measured patterns, re-centred, (n, 3, R)."""
+        assert self._second is not None
+        basis = self._centred.basis
+        of_place = partial(responses_of, basis=basis)
+        found = _with_derivatives(self._second[batch], of_place, basis.count)
+        return self._centred.recentre(found, self._centres[batch])
+
+    def _second_precision(self, batch: slice, white: Floats) -> Floats:
+        """Return the prior precision of light from second places and its shifts."""
+        second = self._transport.second_direct
+        assert second is not None
+        direct = second.reshape(-1, white.shape[1])[batch]
+        floor = RELATIVE_NOISE_FLOOR * white.astype(np.float64)
+        shift = 1.0 / np.maximum(SECOND_SHIFT * direct, floor) ** 2
+        light = 1.0 / (nuisance.DIRECT_PRIOR_DEVIATION * white.astype(np.float64)) ** 2
+        return np.stack([light, shift, shift], axis=-1)
 
     def _variance(self, batch: slice, functionals: Functionals) -> Floats:
         """Return posterior variances, (n, channels), of each pixel's or of one pixel's many."""
@@ -304,3 +367,17 @@ def _prior_of(
 ) -> ResponsePrior:
     centred = _centred_on(frequencies, projector, near_basis)
     return response_prior(prior_component, centred, np.array(multiplicity, dtype=np.float32))
+
+
+def _with_derivatives(places: Floats, at: Callable[[Floats], Floats], count: int) -> Floats:
+    """Return values (n, `count`) at places, and their derivatives by these: (n, 3, `count`).
+
+    0 where a place is NaN.
+    """
+    found = np.zeros((len(places), 3, count), dtype=np.float32)
+    has = np.flatnonzero(np.isfinite(places[:, 0]))
+    found[has, 0] = at(places[has])
+    for axis, step in enumerate(HALF_STEP * np.eye(2)):
+        difference = at(places[has] + step) - at(places[has] - step)
+        found[has, 1 + axis] = difference / (2 * HALF_STEP)
+    return found

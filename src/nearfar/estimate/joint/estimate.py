@@ -10,7 +10,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size, beside, fetch, namespace
+from nearfar.arrays import Floats, Integers, Size, beside, fetch, namespace
 from nearfar.devices import Device
 from nearfar.errors import InputError
 from nearfar.estimate.joint.assemble import assemble
@@ -21,6 +21,11 @@ from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.quantisation import subtract_quantisation
+from nearfar.estimate.joint.second_places import (
+    SecondPlaces,
+    find_second_places,
+    without_second_places,
+)
 from nearfar.estimate.joint.seen import box_centres, seen_of_projector
 from nearfar.estimate.joint.shifts import moved_q, with_unshifted_light
 from nearfar.estimate.joint.sweep import sweep_once
@@ -96,7 +101,8 @@ def estimate_jointly(
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     rows = rows or slice(0, measurements.camera.height)
-    return assemble(*_sweep(problem, rows, sweeps, chosen, report), far)
+    problem, found, second = _sweep(problem, rows, sweeps, chosen, report)
+    return assemble(problem, found, far, second)
 
 
 def choose_components(
@@ -120,7 +126,7 @@ def choose_components(
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     every = slice(0, measurements.camera.height)
-    _, found = _sweep(problem, every, SWEEPS, NO_CHOICES, report)
+    _, found, _ = _sweep(problem, every, SWEEPS, NO_CHOICES, report)
     return found.choices
 
 
@@ -148,9 +154,10 @@ def _sweep(
     sweeps: int,
     chosen: Choices,
     progress: Callable[[float], None],
-) -> tuple[Problem, EstimatedRows]:
+) -> tuple[Problem, EstimatedRows, SecondPlaces | None]:
     """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each."""
     found, held = None, slice(0, problem.measurements.camera.height)
+    second: SecondPlaces | None = None
     halves = problem.near_basis.pitch > 1
     # Where each is of half of the camera pixels, one alone would leave out the others.
     sweeps = max(2, 2 * sweeps - 1) if halves else sweeps
@@ -168,6 +175,8 @@ def _sweep(
             found = sweep_once(problem, found, report, mine)
         else:
             found = sweep_half(problem, found, report, mine, part)
+        if number == 0 and not halves and sweeps > 1:
+            problem, found, second = _with_second_places(problem, found, mine)
         if number == 0 and chosen.of_error_bars is not None:
             found = _with_bars_of(found, chosen.of_error_bars.of(_pixels(problem, held)))
         is_last = number >= sweeps - (2 if halves else 1)
@@ -191,7 +200,44 @@ def _sweep(
         found = found._replace(choices=found.choices._replace(of_error_bars=bars))
     problem, found = _of_rows(problem, found, held, wanted)
     assert found is not None
-    return problem, found
+    return problem, found, second and second.within(_pixels(problem, wanted))
+
+
+def _with_second_places(
+    problem: Problem, found: EstimatedRows, chosen: ComponentChoice | None
+) -> tuple[Problem, EstimatedRows, SecondPlaces]:
+    """Return a problem without light from second places, first rows of it, and that light.
+
+    Camera pixels that have some are estimated anew. Where the photos then show no direct light at
+    q, there is but one place, and all stays as it was.
+    """
+    second = find_second_places(problem, found)
+    if not len(second.pixels):
+        return problem, found, second
+    some = _of_pixels(without_second_places(problem, second), second.pixels)
+    here = beside(second.pixels, problem.pixels.responses)
+    anew = sweep_once(some, None, lambda _share: None, chosen and chosen.of(here))
+    is_lit = fetch(anew.choices.sweeps[-1].prior_component) < len(LIT_COMPONENTS)
+    (kept,) = np.nonzero(is_lit)
+    second = second.of(kept)
+    here, kept = beside(second.pixels, here), beside(kept, here)
+    for values, own in zip(found[:-1], anew[:-1], strict=True):
+        values[here] = own[kept]
+    own_choice = anew.choices.sweeps[-1].of(kept)
+    for choice in (found.choices.sweeps[-1], found.choices.of_error_bars):
+        if choice is not None:
+            choice.prior_component[here] = own_choice.prior_component
+            choice.prior_scale[here] = own_choice.prior_scale
+    return without_second_places(problem, second), found, second
+
+
+def _of_pixels(problem: Problem, numbers: Integers) -> Problem:
+    """Return the problem of some camera pixels, side by side in one row."""
+    pixels = beside(numbers, problem.pixels.responses)
+    return problem._replace(
+        measurements=problem.measurements.of_pixels(Size(1, len(numbers)), numbers),
+        pixels=AllPixels._make(values[pixels] for values in problem.pixels),
+    )
 
 
 def _with_bars_of(found: EstimatedRows, given: ComponentChoice) -> EstimatedRows:

@@ -43,8 +43,8 @@ class JointEstimator(Estimator):
 
     @property
     def halo(self) -> int:
-        """Each sweep but the first reads the neighbours, and the first reads their q."""
-        return SWEEPS
+        """Each sweep but the first reads the neighbours; second places, theirs; the first, q."""
+        return SWEEPS + 1
 
     def rows_beside(self, plan: Plan) -> int:
         """Return the halo; at a pitch of several pixels, neighbours also vote for footprints."""

@@ -23,8 +23,9 @@ class Functionals(NamedTuple):
     ----------
     white : ndarray, shape (n,)
         Weight h of white.
-    direct : ndarray, shape (n, 3)
-        h of d, and of d times what q is off down and across.
+    direct : ndarray, shape (n, 3) or (n, 6)
+        h of d, and of d times what q is off down and across; then the same of direct light from a
+        second place, if any camera pixel has some.
     near : ndarray, shape (n, W^2) or (1, W^2)
         One for all of them where they are of one camera pixel.
     far : ndarray, shape (n, R)
@@ -44,8 +45,8 @@ class Functionals(NamedTuple):
 class PixelState(NamedTuple):
     """The posterior's state at camera pixels, the transport's own units."""
 
-    amplitude_responses: Floats  # (n, R, 4), to unit o, d and shifts
-    precision: Floats  # (n, channels, 4), of the same before any photo
+    amplitude_responses: Floats  # (n, R, 4 or 7), to unit o, d and shifts
+    precision: Floats  # (n, channels, 4 or 7), of the same before any photo
     noise: Floats  # (n, channels)
     scale: Floats  # prior scale s in photo units, (n, channels)
     white_variance: Floats  # of white's error given o, (n, channels)
@@ -97,9 +98,9 @@ def add_amplitudes(
     ----------
     given : ndarray, shape (n, channels), float64
         Variances of the functionals if o, d and q were known.
-    normal : ndarray, shape (n or 1, channels, 4, 4), float64
+    normal : ndarray, shape (n or 1, channels, 4 or 7, 4 or 7), float64
         What photos tell of the amplitudes: their Fisher information.
-    through_rows : ndarray, shape (n, channels, 4), float64
+    through_rows : ndarray, shape (n, channels, 4 or 7), float64
         Derivatives of the means of h_n.n + h_f.f by the amplitudes, negative.
     """
     # Weights of o through white's error, of d and the shifts through direct light.
@@ -107,14 +108,14 @@ def add_amplitudes(
     own = np.stack(
         [
             -state.share_of_white * functionals.white[:, None],
-            *(np.broadcast_to(functionals.direct[:, None, part], shape) for part in range(3)),
+            *(np.broadcast_to(own[:, None], shape) for own in functionals.direct.T),
         ],
         axis=-1,
     )
     # Less those through n and f, whose means depend on o, d and q.
     gradient = own - through_rows
     solved = nuisance.solve(
-        np.broadcast_to(normal, (*gradient.shape, nuisance.COMMON_AMPLITUDES)),
+        np.broadcast_to(normal, (*gradient.shape, gradient.shape[-1])),
         gradient,
         np.broadcast_to(state.precision, gradient.shape),
     )

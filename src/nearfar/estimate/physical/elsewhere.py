@@ -54,6 +54,14 @@ class Elsewhere(NamedTuple):
         return Elsewhere(*(np.concatenate(both) for both in zip(mine, others, strict=True)))
 
 
+def at_second_places(transport: Transport) -> Elsewhere:
+    """Return what a transport has from second places."""
+    second, places = transport.factors.second, transport.second_place
+    if second is None or places is None:
+        return nowhere(transport.channels)
+    return Elsewhere(second.pixels, places.reshape(-1, 2)[second.pixels], second.direct)
+
+
 def nowhere(channels: int) -> Elsewhere:
     """Return no direct light at all."""
     return Elsewhere(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty((0, channels)))

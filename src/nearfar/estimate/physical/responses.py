@@ -96,6 +96,7 @@ def unit_direct(factors: Factors) -> Factors:
     pixels = len(factors.q)
     return replace(
         factors,
+        second=None,
         direct=np.ones((pixels, 1), dtype=np.float32),
         near=np.zeros((pixels, 1, factors.near.shape[2]), dtype=np.float32),
         far=np.zeros((pixels, 1, factors.far.shape[2]), dtype=np.float32),
@@ -125,6 +126,7 @@ def responses(transport: Transport, pixels: Integers, places: Integers, waves: W
         near=whole.near[pixels],
         far=whole.far[pixels],
         boxes=whole.boxes[pixels],
+        second=None,
     )
     unit = unit_direct(total)
     height, width = transport.projector

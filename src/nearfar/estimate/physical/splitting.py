@@ -6,6 +6,7 @@ from nearfar.checks import require_instance
 from nearfar.errors import InputError
 from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
 from nearfar.estimate.physical.creases import settled
+from nearfar.estimate.physical.elsewhere import at_second_places
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
 from nearfar.estimate.physical.medium import Media, is_deep, is_even, media_of
@@ -65,7 +66,10 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         opaque.ravel()[one.pixels] = False
     creases = settled(transport, opaque)
     direct[creases.pixels] = 0.0
-    split = PhysicalSplit(transport, direct.reshape(transport.direct.shape), tuple(bodies), creases)
+    elsewhere = at_second_places(transport).and_also(creases)
+    split = PhysicalSplit(
+        transport, direct.reshape(transport.direct.shape), tuple(bodies), elsewhere
+    )
     return without_holes(without_specks(with_outlines(split)))
 
 

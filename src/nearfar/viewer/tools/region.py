@@ -164,7 +164,15 @@ def _flat(picture: Floats, part: Transport) -> Floats:
 def _without_rows(part: Transport) -> Transport:
     """Return a part of a transport without its rows, which are as large as the region."""
     empty = np.zeros((*part.camera, part.channels, 0), dtype=np.float32)
-    return replace(part, near=empty[..., None], far=empty, posterior=None, footprint=None)
+    return replace(
+        part,
+        near=empty[..., None],
+        far=empty,
+        posterior=None,
+        footprint=None,
+        second_place=None,
+        second_direct=None,
+    )
 
 
 def _rows(part: Transport) -> Floats:

@@ -1,0 +1,128 @@
+"""Direct light of second surfaces beyond the window."""
+
+import numpy as np
+import pytest
+
+from nearfar import ErrorBars
+from nearfar.arrays import Size
+from nearfar.estimate.joint import choose_components, estimate_jointly
+from nearfar.transport.direct import footprint
+from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
+
+CAMERA = Size(10, 9)
+# The last column of camera pixels of the left surface, which also see the right one.
+OUTLINE = 4
+SECOND_LIGHT = 0.25
+
+
+def surfaces():
+    """Return q of two surfaces, ten projector pixels apart."""
+    y, x = np.meshgrid(np.arange(10.0), np.arange(9.0), indexing="ij")
+    return np.stack([y + 3.3, np.where(x <= OUTLINE, x, x + 8) + 1.7], axis=-1)
+
+
+def places():
+    """Return the second places of the outline: between those of the next column, and beside."""
+    beside = surfaces()[:, OUTLINE + 1]
+    return beside + np.array([0.25, -0.5])
+
+
+def rows_of(q, second=SECOND_LIGHT, seed=1):
+    """Return dense rows, (C, 1, P): direct light at q, that of the outline, and smooth light."""
+    generator = np.random.default_rng(seed)
+    rows = np.zeros((CAMERA.pixels, 1, PROJECTOR.pixels))
+    where = footprint(q.reshape(-1, 2), PROJECTOR)
+    np.put_along_axis(rows[:, 0], where.pixels, 0.5 * where.weights, axis=1)
+    where = footprint(places(), PROJECTOR)
+    outline = np.arange(CAMERA.height) * CAMERA.width + OUTLINE
+    for number, pixels, weights in zip(outline, where.pixels, where.weights, strict=True):
+        rows[number, 0, pixels] += second * weights
+    y, x = np.meshgrid(*(np.arange(side) for side in PROJECTOR), indexing="ij")
+    for c, (up, across) in enumerate(generator.uniform(0, 6, (CAMERA.pixels, 2))):
+        wave = 1 + 0.3 * np.cos(2 * np.pi * y / 16 + up) * np.cos(2 * np.pi * x / 20 + across)
+        rows[c, 0] += 1e-3 * wave.ravel()
+    return rows
+
+
+def estimated(seen, q, noise=1e-3, **options):
+    measurements = measured(seen, chosen_frequencies(70), noise=noise, camera=CAMERA)
+    return estimate_jointly(measurements, q.astype(np.float32), WINDOW, FAR, pitch=1, **options)
+
+
+def has_second(transport):
+    return np.isfinite(transport.second_place).all(axis=-1)
+
+
+@pytest.fixture(scope="module")
+def found():
+    q = surfaces()
+    return estimated(rows_of(q), q)
+
+
+def test_second_places_and_their_light_are_found(found):
+    expected = np.zeros(CAMERA, dtype=bool)
+    expected[:, OUTLINE] = True
+    np.testing.assert_array_equal(has_second(found), expected)
+    np.testing.assert_allclose(found.second_place[:, OUTLINE], places(), atol=0.15)
+    np.testing.assert_allclose(found.second_direct[:, OUTLINE, 0], SECOND_LIGHT, atol=0.01)
+    assert not found.second_direct[~expected].any()
+    np.testing.assert_allclose(found.direct[:, OUTLINE, 0], 0.5, atol=0.02)
+
+
+def test_the_outline_relights_as_well_as_the_rest(found):
+    rows = rows_of(surfaces())[:, 0]
+    lights = np.random.default_rng(5).random((20, PROJECTOR.pixels))
+    pictures = found.pictures(lights.reshape(20, *PROJECTOR).astype(np.float32)).reshape(20, -1)
+    error = np.sqrt(np.mean((pictures - lights @ rows.T) ** 2, axis=0)).reshape(CAMERA)
+    at_outline = np.sqrt(np.mean(error[:, OUTLINE] ** 2))
+    assert at_outline < 3 * np.median(error)
+    assert at_outline < 0.05 * SECOND_LIGHT
+
+
+def test_where_there_is_none_none_is_found():
+    q = surfaces()
+    assert not has_second(estimated(rows_of(q, second=0.0), q)).any()
+
+
+def test_light_that_photos_do_not_tell_from_noise_is_left_alone():
+    q = surfaces()
+    assert not has_second(estimated(rows_of(q, second=0.002), q, noise=3e-3)).any()
+
+
+def test_light_within_the_window_is_the_windows():
+    q = surfaces()
+    q[:, OUTLINE + 1 :, 1] -= 8.0
+    assert not has_second(estimated(rows_of(surfaces()), q)).any()
+
+
+def test_a_camera_pixel_without_direct_light_at_q_has_none_elsewhere():
+    q = surfaces()
+    q[4, OUTLINE] = np.nan
+    assert not has_second(estimated(rows_of(surfaces()), q))[4, OUTLINE]
+
+
+def test_some_rows_of_the_camera_are_estimated_as_among_all(found):
+    q = surfaces()
+    some = estimated(rows_of(q), q, rows=slice(3, 7))
+    for name in ("second_place", "second_direct", "direct", "near"):
+        np.testing.assert_allclose(getattr(some, name), getattr(found, name)[3:7], atol=1e-5)
+
+
+def test_choices_by_the_same_photos_change_nothing(found):
+    q = surfaces()
+    measurements = measured(rows_of(q), chosen_frequencies(70), noise=1e-3, camera=CAMERA)
+    given = (measurements, q.astype(np.float32), WINDOW)
+    chosen = choose_components(*given, pitch=1)
+    again = estimate_jointly(*given, FAR, pitch=1, chosen=chosen)
+    np.testing.assert_array_equal(has_second(again), has_second(found))
+    np.testing.assert_allclose(again.second_direct, found.second_direct, atol=1e-3)
+
+
+def test_error_bars_know_that_it_may_be_elsewhere_and_more_or_less(found):
+    rows = rows_of(surfaces())[:, 0]
+    generator = np.random.default_rng(7)
+    bars, within = ErrorBars(found), []
+    for light in generator.random((40, *PROJECTOR)).astype(np.float32):
+        error = np.abs((found @ light).ravel() - rows @ light.ravel()).reshape(CAMERA)
+        within.append((error < bars.picture(light))[:, OUTLINE])
+    assert 0.5 < np.mean(within) < 0.9

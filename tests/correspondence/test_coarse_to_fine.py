@@ -143,6 +143,26 @@ def test_places_that_were_searched_for_wrongly_are_mended_by_neighbours(monkeypa
     assert np.all(np.abs(q - world.q).max(axis=-1)[at] > 3)
 
 
+@pytest.mark.parametrize("photos", [29, 33])
+def test_few_photos_leave_no_camera_pixel_a_period_away(photos):
+    # Alone, two thirds of the camera pixels are; two rounds of asking leave up to one in seven.
+    projector, camera = Size(128, 128), Size(96, 96)
+    plan, _ = choose_plan(projector, photos)
+    shown = representatives(p.frequency for p in plan.patterns if isinstance(p, Sinusoid))
+    y, x = np.indices(camera)
+    world = lit_surface(
+        projector,
+        camera,
+        q=np.stack([y + 10.0, x + 20.0], axis=-1),
+        shadow=np.zeros(camera, dtype=bool),
+        frequencies=shown,
+        footprint=(0.05, 0.1),
+    )
+    found = correspond_by_phase(world.measurements, pitch=plan.pitch)
+    assert np.nanmax(_off(found, world)) < 1
+    assert np.mean(found.lit) > 0.99
+
+
 def test_periods_that_photos_hardly_tell_apart_are_told_by_neighbours(monkeypatch):
     monkeypatch.setattr(phase, "require_settled", lambda basis, pitch: None)
     world = _close_up(Size(48, 32), frequencies=_ambiguous(FULL_HD), footprint=(0.5, 0.6))

@@ -32,8 +32,8 @@ from nearfar.correspondence.background import (
 )
 from nearfar.correspondence.coarse_to_fine import (
     LEAST_LARGE_EXCESS,
-    ROWS_BESIDE,
     correspond_coarse_to_fine,
+    rows_beside,
 )
 from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.neighbours import REACH
@@ -48,11 +48,13 @@ from nearfar.correspondence.weighing import (
     weigh,
     without_dc,
 )
+from nearfar.illumination.frequencies import DC, representatives
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import Photos
 from nearfar.plan import Plan
+from nearfar.plan.patterns import Sinusoid
 
 # Values of the score that are in memory at once.
 SCORES_AT_ONCE = 2**22
@@ -291,7 +293,10 @@ def _find(
 
 def _rows_beside(plan: Plan) -> int:
     """Return the rows of neighbours that tell places, sidelobes, and whether q is mirrored."""
-    return (ROWS_BESIDE if is_coarse_to_fine(plan.projector, plan.pitch) else REACH) + 1
+    if not is_coarse_to_fine(plan.projector, plan.pitch):
+        return REACH + 1
+    shown = representatives(p.frequency for p in plan.patterns if isinstance(p, Sinusoid))
+    return rows_beside(len(set(shown) - {DC})) + 1
 
 
 # Every plan has sinusoids; whether they determine q is checked when they are measured.

@@ -385,7 +385,7 @@ def test_a_second_place_is_as_uncertain_as_dense_algebra_says():
     own_of_white = LIGHT**2 - (SHARE * OFFSET) ** 2
     expected = np.sqrt(ask @ posterior @ ask + light.mean() ** 2 * own_of_white)
     found = ErrorBars(transport).picture(light)[0, 0]
-    assert found == pytest.approx(expected, rel=2e-3)
+    assert found == pytest.approx(error_bars_of_joint.SECOND_WIDENING * expected, rel=2e-3)
     assert found > 1.05 * ErrorBars(_transport(np.array([[6, 8]]))).picture(light)[0, 0]
 
 

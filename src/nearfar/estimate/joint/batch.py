@@ -14,6 +14,7 @@ from nearfar.arrays import Booleans, Floats, Size, namespace
 from nearfar.estimate.joint.footprint import footprint_weights
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
 from nearfar.transport.direct import footprint, look_up
@@ -24,6 +25,10 @@ WHITE_FLOOR = 1e-3
 DIFFERENCE_STEP = 0.02
 # Least noise of measurements, as a share of a camera pixel's white.
 RELATIVE_NOISE_FLOOR = 1e-6
+# The same where functions of near-range light are of several projector pixels. These hold no row
+# exactly. What they leave of responses that are taken to be more exact is explained by far-range
+# light, which is then wrong at all frequencies that were not measured (0097).
+RELATIVE_NOISE_FLOOR_AT_PITCH = 4e-3
 
 
 class PixelBatch(NamedTuple):
@@ -84,6 +89,11 @@ def white_scale(measurements: Measurements) -> Floats:
     brightest = measurements.brightest or float(np.abs(white).max(initial=0.0))
     least = max(WHITE_FLOOR * brightest, float(np.finfo(np.float32).tiny))
     return np.asarray(np.maximum(white, np.float32(least)))
+
+
+def noise_floor(near_basis: NearBasis) -> float:
+    """Return the least noise of measurements, as a share of a camera pixel's white."""
+    return RELATIVE_NOISE_FLOOR if near_basis.pitch == 1 else RELATIVE_NOISE_FLOOR_AT_PITCH
 
 
 def offset_noise(measurements: Measurements) -> Floats:

@@ -13,8 +13,8 @@ from nearfar.arrays import Floats, Integers, Size, blocks, namespace
 from nearfar.devices import Device, mover
 from nearfar.errors import InputError
 from nearfar.estimate.joint.batch import (
-    RELATIVE_NOISE_FLOOR,
     AllPixels,
+    noise_floor,
     offset_noise,
     white_scale,
 )
@@ -249,7 +249,7 @@ def lay_out(
         correspondence=correspondence.reshape(-1, 2),
         centres=near.centre(correspondence, measurements.projector),
         lit=lit,
-        noise=np.maximum(measurements.noise, RELATIVE_NOISE_FLOOR * white),
+        noise=np.maximum(measurements.noise, np.float32(noise_floor(near_basis)) * white),
         offset_noise=offset_noise(measurements),
         white=white,
         spike_expected=expected_spikes(correspondence, near_basis),

@@ -1,5 +1,6 @@
 """Looks: first estimates of scenes, from few photos, by which to plan for more photos."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -84,7 +85,9 @@ def look_at(transport: "Transport") -> Look:
         If it was not estimated jointly.
     """
     typical = typical_of(transport)
-    free = [_is_free(component) for component, _ in typical.prior_components]
+    # Second places are found: the model holds there.
+    found = typical_of(replace(transport, second_place=None, second_direct=None))
+    free = [_is_free(component) for component, _ in found.prior_components]
     reach = _reach(transport)
     wanted = 0 if reach is None else 2 * round((WINDOW_OVER_REACH * reach - 1) / 2) + 1
     # All odd; a look tells little of what lies far beyond its own window.
@@ -96,7 +99,7 @@ def look_at(transport: "Transport") -> Look:
         window=transport.window,
         reach=reach,
         wanted_window=max(transport.window, min(wanted, largest)),
-        free_share=float(typical.shares[0] @ free),
+        free_share=float(found.shares[0] @ free),
     )
 
 

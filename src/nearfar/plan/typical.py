@@ -3,9 +3,12 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from nearfar.arrays import Floats
 from nearfar.errors import InputError
-from nearfar.priors.fitted import PRIOR_SCALES
+from nearfar.priors.covariance import spectral_density
+from nearfar.priors.fitted import LIGHT_FROM_ANYWHERE, LIT_COMPONENTS, PRIOR_SCALES
 from nearfar.priors.typical import TypicalScenes
 from nearfar.transport.posterior import Posterior
 
@@ -30,7 +33,8 @@ def typical_of(transport: "Transport") -> TypicalScenes:
     Returns
     -------
     TypicalScenes
-        One scene. Camera pixels count by their squared light under white.
+        One scene. Camera pixels count by their squared light under white. Where they see a second
+        place, it may be anywhere for a plan, which is made before it is found.
 
     Raises
     ------
@@ -39,9 +43,8 @@ def typical_of(transport: "Transport") -> TypicalScenes:
     """
     posterior = _posterior_of(transport)
     energy = np.mean(posterior.white.astype(np.float64) ** 2, axis=-1).ravel()
-    scale = posterior.prior_scale.ravel()
+    number, scale = _with_second_places(transport, posterior)
     octave = np.rint(np.log2(scale / PRIOR_SCALES[0])).astype(np.int64)
-    number = posterior.prior_component.ravel().astype(np.int64)
     group = number * len(PRIOR_SCALES) + octave // OCTAVES_TOGETHER
     found, member = np.unique(group, return_inverse=True)
     shares = np.bincount(member, energy)
@@ -55,6 +58,24 @@ def typical_of(transport: "Transport") -> TypicalScenes:
         for i in kept
     )
     return TypicalScenes(prior_components, (shares[kept] / shares[kept].sum())[None], np.ones(1))
+
+
+def _with_second_places(
+    transport: "Transport", posterior: Posterior
+) -> tuple[NDArray[np.int64], Floats]:
+    """Return prior components and scales of camera pixels, (C,), second places among them."""
+    number = posterior.prior_component.ravel().astype(np.int64)
+    scale = posterior.prior_scale.ravel().astype(np.float64)
+    if transport.second_direct is None:
+        return number, scale
+    seen = transport.second_direct.max(axis=-1).ravel() > 0
+    share = np.mean(transport.second_direct / posterior.white, axis=-1).ravel()[seen]
+    (anywhere,) = (n for n, one in enumerate(LIT_COMPONENTS) if one == LIGHT_FROM_ANYWHERE)
+    # Light from one place responds to all frequencies alike.
+    deviation = np.sqrt(spectral_density(np.zeros(1), LIGHT_FROM_ANYWHERE)[0])
+    number[seen] = anywhere
+    scale[seen] = np.clip(share / deviation, PRIOR_SCALES[0], PRIOR_SCALES[-1])
+    return number, scale
 
 
 def noise_of(transport: "Transport") -> float:

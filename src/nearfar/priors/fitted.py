@@ -9,6 +9,7 @@ from nearfar.priors.typical import typical_scenes
 # Decay, in cycles, of light of which nothing is known: all frequencies, and all projector pixels,
 # are alike.
 FREE = 1e6
+LIGHT_FROM_ANYWHERE = PriorComponent(0.0, 64.0, FREE)
 # Components of camera pixels with direct light. All but the last five were chosen one by one out
 # of 240 (near reach 0.8 to 6 pixels, far decay 0.7 to 8 cycles, six far deviations, with and
 # without spread of direct light), each time the one that raised the evidence of camera pixels of
@@ -42,7 +43,7 @@ LIT_COMPONENTS = (
     # Direct light and, anywhere on the projector, light of which nothing is known, added by hand
     # for scenes that are not direct + near + far (docs/decisions/0037). One more, of reach 2.2 and
     # far deviation 4, cost the box 0.15 dB under a random light.
-    PriorComponent(0.0, 64.0, FREE),
+    LIGHT_FROM_ANYWHERE,
     PriorComponent(2.2, 16.0, FREE, 3.0),
 )
 # Components of camera pixels without direct light: far-range light alone, the last of them light of
@@ -50,7 +51,7 @@ LIT_COMPONENTS = (
 UNLIT_COMPONENTS = (
     *(PriorComponent(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0, 24.0)),
     PriorComponent(0.0, 64.0, FREE, far_power=1.5),
-    PriorComponent(0.0, 64.0, FREE),
+    LIGHT_FROM_ANYWHERE,
 )
 # Where functions of near-range light are of several projector pixels: indices of the lit components
 # that the first sweep chooses from, and the later ones for differences from neighbours. All 25 take

@@ -1,11 +1,16 @@
 """Direct light of second surfaces beyond the window."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from nearfar import ErrorBars
 from nearfar.arrays import Size
 from nearfar.estimate.joint import choose_components, estimate_jointly
+from nearfar.plan.look import look_at
+from nearfar.plan.typical import typical_of
+from nearfar.priors.fitted import LIGHT_FROM_ANYWHERE
 from nearfar.transport.direct import footprint
 from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
 
@@ -126,3 +131,17 @@ def test_error_bars_know_that_it_may_be_elsewhere_and_more_or_less(found):
         error = np.abs((found @ light).ravel() - rows @ light.ravel()).reshape(CAMERA)
         within.append((error < bars.picture(light))[:, OUTLINE])
     assert 0.5 < np.mean(within) < 0.9
+
+
+def test_a_plan_after_a_look_expects_light_from_anywhere(found):
+    plain = replace(found, second_place=None, second_direct=None)
+
+    def from_anywhere(transport):
+        typical = typical_of(transport)
+        chosen = [component == LIGHT_FROM_ANYWHERE for component, _ in typical.prior_components]
+        return float(typical.shares[0] @ chosen)
+
+    # One camera pixel in nine, and brighter than the others.
+    assert from_anywhere(found) > from_anywhere(plain) + 1 / 9
+    # The model holds there all the same.
+    assert look_at(found).free_share == look_at(plain).free_share

@@ -49,9 +49,9 @@ from nearfar.transport.posterior import Posterior
 
 # Standard deviation of a second place, in projector pixels.
 SECOND_SHIFT = 0.15
-# By how much more than its posterior says a camera pixel with a second place is unsure: the place
-# is the likeliest of many, and there may be a third. On glass, and on a scene of posts, one standard
-# deviation held 56 to 58 % of the errors without.
+# How much larger errors are at a camera pixel with a second place than its posterior says: the
+# place is the likeliest of many, and there may be a third. On glass, and on a scene of posts, one
+# standard deviation held 56 to 58 % of the errors without it.
 SECOND_WIDENING = 1.25
 # Half a step of a second place, in projector pixels, of numerical derivatives by it.
 HALF_STEP = 0.25

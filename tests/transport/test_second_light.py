@@ -7,6 +7,8 @@ import pytest
 
 import nearfar
 from nearfar.arrays import Size
+from nearfar.errors import InputError
+from nearfar.report.contents import describe
 from nearfar.transport.rows import of_rows, stacked
 from nearfar.transport.store import load_transport, save_transport
 from nearfar.transport.stored import open_transport
@@ -53,6 +55,7 @@ def test_all_ways_to_relight_agree(transport, light):
     np.testing.assert_allclose(transport @ light, expected, atol=1e-5)
     np.testing.assert_allclose(transport.pictures(light[None])[0], expected, atol=1e-5)
     prepared = nearfar.prepare_transport(transport)
+    assert prepared.nbytes > nearfar.prepare_transport(without(transport)).nbytes
     np.testing.assert_allclose(prepared @ light, expected, atol=1e-5)
     direct = transport.components(light).direct - without(transport).components(light).direct
     np.testing.assert_allclose(direct, expected - (without(transport) @ light), atol=1e-5)
@@ -100,10 +103,26 @@ def test_blocks_and_files_keep_it(transport, tmp_path):
     np.testing.assert_array_equal(stacked(parts) @ light, transport @ light)
     save_transport(transport, tmp_path / "t.zarr")
     np.testing.assert_array_equal(load_transport(tmp_path / "t.zarr") @ light, transport @ light)
+    nothing = of_rows(transport, slice(0, 0))
+    assert (nothing @ light).shape == (0, CAMERA.width, 2)
     rows = open_transport(tmp_path / "t.zarr").rows(slice(2, 4))
     np.testing.assert_array_equal(rows @ light, (transport @ light)[2:4])
     save_transport(without(transport), tmp_path / "plain.zarr")
     assert load_transport(tmp_path / "plain.zarr").second_place is None
+
+
+def test_parts_of_which_some_have_none_are_refused(transport):
+    parts = [of_rows(transport, slice(0, 4)), of_rows(without(transport), slice(4, 9))]
+    for some in (parts, parts[::-1]):
+        with pytest.raises(InputError, match="have second places or footprints, and others"):
+            stacked(some)
+
+
+def test_what_a_file_holds_is_told(transport, tmp_path):
+    save_transport(transport, tmp_path / "t.zarr")
+    save_transport(without(transport), tmp_path / "plain.zarr")
+    assert "directly lit, 6.3% from a second place, too" in describe(tmp_path / "t.zarr")
+    assert "second place" not in describe(tmp_path / "plain.zarr")
 
 
 def test_a_physical_split_has_it_as_direct_light(transport):

@@ -250,11 +250,24 @@ class ErrorBars:
             np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
             pixels, values = self._window_pixels(c, first, last)
             n[:, pixels - first] = np.sqrt(self._variances.of_window(c, values)).T
+        self._add_second(c, first, d)
         for some in blocks(lines.stop - lines.start, max(1, ENTRIES_AT_ONCE // width)):
             on_grid = slice(lines.start + some.start, lines.start + some.stop)
             variance = self._variances.of_far(c, on_grid)
             f[:, some.start * width : some.stop * width] = np.sqrt(variance).T
         return Components(*(np.float32(self._widening) * part for part in (d, n, f)))
+
+    def _add_second(self, c: int, first: int, d: Floats) -> None:
+        """Add one camera pixel's standard deviations of direct light from a second place to d."""
+        transport = self._transport
+        if transport.second_place is None or not isinstance(self._variances, JointVariances):
+            return
+        place = transport.second_place.reshape(-1, 2)[c]
+        if np.isfinite(place).all():
+            deviation = np.sqrt(self._variances.of_second(slice(c, c + 1)))[0]
+            (corners,), (weights,) = footprint(place[None], transport.projector)
+            here = (corners >= first) & (corners < first + d.shape[1])
+            np.add.at(d.T, corners[here] - first, weights[here, None] * deviation)
 
     def _direct_pixels(self, c: int) -> tuple[Integers, Floats]:
         """Return the projector pixels of one camera pixel's footprint, and their shares."""

@@ -150,16 +150,24 @@ def _describe_transport(path: Path) -> str:
             _verdict_of(transport),
             f"{TRANSPORT_KIND}: projector {transport.projector}, camera {transport.camera}, "
             f"{_channels(transport.channels)}, {_model_of(transport)}",
-            *(
-                [f"{transport.lit.mean():.1%} of the camera pixels directly lit"]
-                if "direct" in transport.parts
-                else []
-            ),
+            *_directly_lit(transport),
             *_gains_of(transport),
             f"floodlit: {shares or 'black'}",
             f"provenance: {json.dumps(dict(transport.provenance))}",
         ]
     )
+
+
+def _directly_lit(transport: Transport) -> list[str]:
+    """Return how many camera pixels have direct light, and how many of two surfaces."""
+    if "direct" not in transport.parts:
+        return []
+    said = f"{transport.lit.mean():.1%} of the camera pixels directly lit"
+    second = transport.factors.second
+    if second is not None:
+        share = len(second.pixels) / transport.camera.pixels
+        said += f", {share:.1%} from a second place, too"
+    return [said]
 
 
 def _gains_of(transport: Transport) -> list[str]:

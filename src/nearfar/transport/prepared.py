@@ -106,8 +106,8 @@ class PreparedTransport(NoArray):
     def nbytes(self) -> int:
         """Bytes that the prepared transport takes on its device."""
         arrays = (self.direct, self.corners, self.shares, self.near, self.entries, self.far)
-        optional = [part for part in (self.patterns, self.steps) if part is not None]
-        return sum(int(a.nbytes) for a in (*arrays, *optional))
+        optional = [self.patterns, self.steps, *(self.second or ())]
+        return sum(int(a.nbytes) for a in (*arrays, *optional) if a is not None)
 
     def pictures(
         self, lights: Any, *, direct: float = 1.0, near: float = 1.0, far: float = 1.0

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from nearfar.arrays import Integers, middles
+from nearfar.errors import InputError
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import FreePosterior, PatternPosterior, Posterior
 from nearfar.transport.quality import Quality
@@ -83,14 +84,26 @@ def _present(transport: Transport) -> list[str]:
 
 
 def stacked(parts: Sequence[Transport]) -> Transport:
-    """Join transports of blocks of camera rows, in order; the provenance is that of the last."""
+    """Join transports of blocks of camera rows, in order; the provenance is that of the last.
+
+    Raises
+    ------
+    InputError
+        If some have arrays that others lack.
+    """
     if len(parts) == 1:
         return parts[0]
 
     def joined(owners: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:
         return {name: np.concatenate([getattr(one, name) for one in owners]) for name in names}
 
-    changes = joined(parts, (*FACTORS, *_present(parts[-1])))
+    present = _present(parts[-1])
+    if any(_present(part) != present for part in parts):
+        raise InputError(
+            "some of the transports have second places or footprints, and others have none: join "
+            "parts of one reconstruction."
+        )
+    changes = joined(parts, (*FACTORS, *present))
     for name in OPTIONAL_PARTS:
         owners: list[Any] = [getattr(part, name) for part in parts]
         if owners[-1] is not None:

@@ -73,4 +73,4 @@ def second_light(places: Floats, direct: Floats, projector: Size) -> SecondLight
     flat = places.reshape(-1, 2)
     pixels = np.flatnonzero(np.isfinite(flat).all(axis=1))
     where = footprints.footprint(flat[pixels], projector)
-    return SecondLight(pixels, direct.reshape(len(flat), -1)[pixels], where)
+    return SecondLight(pixels, direct.reshape(len(flat), direct.shape[-1])[pixels], where)

@@ -29,7 +29,7 @@ MAXIMUM_REASON = 200
 
 # Attribute of the verdict on a transport, which is not there where none was passed.
 VERDICT = "verdict"
-# Whether camera pixels have direct light from second places; not there where none has.
+# Whether there are arrays of second places, as from every joint estimate at a pitch of 1.
 SECOND = "second_places"
 # That of the parts of a transport that has not the usual ones.
 PARTS_OF_T = "parts"

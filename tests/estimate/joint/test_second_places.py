@@ -133,6 +133,20 @@ def test_error_bars_know_that_it_may_be_elsewhere_and_more_or_less(found):
     assert 0.5 < np.mean(within) < 0.9
 
 
+def test_single_entries_have_error_bars_at_second_places(found):
+    pixel = 5 * CAMERA.width + OUTLINE
+    bars = ErrorBars(found).component_rows(slice(pixel, pixel + 1)).direct[0, 0]
+    where = footprint(found.second_place[5, OUTLINE][None], PROJECTOR)
+    at_place = bars[where.pixels[0]]
+    # About as unsure as direct light at q, and known far better than its own size.
+    assert np.all(at_place[where.weights[0] > 0.1] > 0)
+    assert at_place.sum() == pytest.approx(bars.sum() - at_place.sum(), rel=0.5)
+    assert at_place.sum() < 0.1 * SECOND_LIGHT
+    line = int(where.pixels[0][0] // PROJECTOR.width)
+    along = ErrorBars(found).along(pixel, line).direct[0]
+    np.testing.assert_allclose(along, bars.reshape(PROJECTOR)[line], rtol=1e-6)
+
+
 def test_a_plan_after_a_look_expects_light_from_anywhere(found):
     plain = replace(found, second_place=None, second_direct=None)
 

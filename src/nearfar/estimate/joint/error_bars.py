@@ -121,9 +121,23 @@ class JointVariances:
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
         number = len(self._centres[batch])
+        return self._of_light_from(
+            batch, self._of_amplitudes([1.0, 0.0, 0.0], np.zeros((number, 3)))
+        )
+
+    def of_second(self, batch: slice) -> Floats:
+        """Return the variances of light from second places, (n, channels); 0 where none is."""
+        second = self._has_second(batch) * [1.0, 0.0, 0.0]
+        return self._has_second(batch) * self._of_light_from(
+            batch, self._of_amplitudes([0.0, 0.0, 0.0], second)
+        )
+
+    def _of_light_from(self, batch: slice, amplitudes: Floats) -> Floats:
+        """Return the variances of sums of the amplitudes of direct light, (n, channels)."""
+        number = len(amplitudes)
         functionals = Functionals(
             np.zeros(number),
-            self._of_amplitudes([1.0, 0.0, 0.0], np.zeros((number, 3))),
+            amplitudes,
             np.zeros((number, self._transport.near_basis.count), dtype=np.float32),
             np.zeros((number, self._centred.basis.count), dtype=np.float32),
             np.zeros(len(self._posterior.prior_components)),

@@ -161,6 +161,16 @@ def test_few_photos_leave_no_camera_pixel_a_period_away(photos):
     found = correspond_by_phase(world.measurements, pitch=plan.pitch)
     assert np.nanmax(_off(found, world)) < 1
     assert np.mean(found.lit) > 0.99
+    # Neighbours so far away as eight rounds reach have a say, and no others.
+    beside = method_named("phase").rows_needed(plan)
+    assert beside == 17
+    tile = slice(40, 44)
+    around = slice(tile.start - beside, tile.stop + beside)
+    rows = world.measurements.of_pixels(
+        Size(4 + 2 * beside, 96), slice(96 * around.start, 96 * around.stop)
+    )
+    part = correspond_by_phase(rows, pitch=plan.pitch).q[beside : beside + 4]
+    np.testing.assert_allclose(part, found.q[tile], atol=1e-3)
 
 
 def test_periods_that_photos_hardly_tell_apart_are_told_by_neighbours(monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 from nearfar import ErrorBars
 from nearfar.arrays import Size
 from nearfar.estimate.joint import choose_components, estimate_jointly
+from nearfar.estimate.joint.estimator import JointEstimator
 from nearfar.plan.look import look_at
 from nearfar.plan.typical import typical_of
 from nearfar.priors.fitted import LIGHT_FROM_ANYWHERE
@@ -20,30 +21,30 @@ OUTLINE = 4
 SECOND_LIGHT = 0.25
 
 
-def surfaces():
-    """Return q of two surfaces, ten projector pixels apart."""
-    y, x = np.meshgrid(np.arange(10.0), np.arange(9.0), indexing="ij")
+def surfaces(rows=CAMERA.height):
+    """Return q of two surfaces, ten projector pixels apart, both ten pixels high."""
+    y, x = np.meshgrid(np.arange(rows) * 10 / rows, np.arange(9.0), indexing="ij")
     return np.stack([y + 3.3, np.where(x <= OUTLINE, x, x + 8) + 1.7], axis=-1)
 
 
-def places():
+def places(q):
     """Return the second places of the outline: between those of the next column, and beside."""
-    beside = surfaces()[:, OUTLINE + 1]
+    beside = q[:, OUTLINE + 1]
     return beside + np.array([0.25, -0.5])
 
 
 def rows_of(q, second=SECOND_LIGHT, seed=1):
     """Return dense rows, (C, 1, P): direct light at q, that of the outline, and smooth light."""
-    generator = np.random.default_rng(seed)
-    rows = np.zeros((CAMERA.pixels, 1, PROJECTOR.pixels))
+    generator, camera = np.random.default_rng(seed), Size(*q.shape[:2])
+    rows = np.zeros((camera.pixels, 1, PROJECTOR.pixels))
     where = footprint(q.reshape(-1, 2), PROJECTOR)
     np.put_along_axis(rows[:, 0], where.pixels, 0.5 * where.weights, axis=1)
-    where = footprint(places(), PROJECTOR)
-    outline = np.arange(CAMERA.height) * CAMERA.width + OUTLINE
+    where = footprint(places(q), PROJECTOR)
+    outline = np.arange(camera.height) * camera.width + OUTLINE
     for number, pixels, weights in zip(outline, where.pixels, where.weights, strict=True):
         rows[number, 0, pixels] += second * weights
     y, x = np.meshgrid(*(np.arange(side) for side in PROJECTOR), indexing="ij")
-    for c, (up, across) in enumerate(generator.uniform(0, 6, (CAMERA.pixels, 2))):
+    for c, (up, across) in enumerate(generator.uniform(0, 6, (camera.pixels, 2))):
         wave = 1 + 0.3 * np.cos(2 * np.pi * y / 16 + up) * np.cos(2 * np.pi * x / 20 + across)
         rows[c, 0] += 1e-3 * wave.ravel()
     return rows
@@ -68,7 +69,7 @@ def test_second_places_and_their_light_are_found(found):
     expected = np.zeros(CAMERA, dtype=bool)
     expected[:, OUTLINE] = True
     np.testing.assert_array_equal(has_second(found), expected)
-    np.testing.assert_allclose(found.second_place[:, OUTLINE], places(), atol=0.15)
+    np.testing.assert_allclose(found.second_place[:, OUTLINE], places(surfaces()), atol=0.15)
     np.testing.assert_allclose(found.second_direct[:, OUTLINE, 0], SECOND_LIGHT, atol=0.01)
     assert not found.second_direct[~expected].any()
     np.testing.assert_allclose(found.direct[:, OUTLINE, 0], 0.5, atol=0.02)
@@ -111,6 +112,26 @@ def test_some_rows_of_the_camera_are_estimated_as_among_all(found):
     some = estimated(rows_of(q), q, rows=slice(3, 7))
     for name in ("second_place", "second_direct", "direct", "near"):
         np.testing.assert_allclose(getattr(some, name), getattr(found, name)[3:7], atol=1e-5)
+
+
+def test_a_tile_with_its_halo_is_estimated_as_the_whole():
+    q, halo, photos = surfaces(24), JointEstimator().halo, chosen_frequencies(40)
+    # With so much noise, neighbours have a say.
+    seen = rows_of(q, second=0.1)
+    whole_camera = Size(24, CAMERA.width)
+    measurements = measured(seen, photos, noise=5e-3, camera=whole_camera)
+    whole = estimate_jointly(measurements, q.astype(np.float32), WINDOW, FAR, pitch=1)
+    for row in (9, 12):
+        around = slice(row - halo, row + halo + 1)
+        width = CAMERA.width
+        part = measurements.of_pixels(
+            Size(2 * halo + 1, width), slice(width * around.start, width * around.stop)
+        )
+        found = estimate_jointly(part, q[around].astype(np.float32), WINDOW, FAR, pitch=1)
+        assert has_second(found)[halo].any()
+        for name in ("second_place", "second_direct", "direct", "near", "far"):
+            one, other = getattr(found, name)[halo], getattr(whole, name)[row]
+            np.testing.assert_allclose(one, other, atol=2e-6, err_msg=name)
 
 
 def test_choices_by_the_same_photos_change_nothing(found):

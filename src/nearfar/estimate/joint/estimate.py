@@ -175,6 +175,7 @@ def _sweep(
             found = sweep_once(problem, found, report, mine)
         else:
             found = sweep_half(problem, found, report, mine, part)
+        # They are read off neighbours, which the first sweep alone leaves out.
         if number == 0 and not halves and sweeps > 1:
             problem, found, second = _with_second_places(problem, found, mine)
         if number == 0 and chosen.of_error_bars is not None:
@@ -214,8 +215,8 @@ def _with_second_places(
     second = find_second_places(problem, found)
     if not len(second.pixels):
         return problem, found, second
-    some = _of_pixels(without_second_places(problem, second), second.pixels)
-    here = beside(second.pixels, problem.pixels.responses)
+    here, row = beside(second.pixels, problem.pixels.responses), Size(1, len(second.pixels))
+    some = _of_pixels(without_second_places(problem, second), row, here)
     anew = sweep_once(some, None, lambda _share: None, chosen and chosen.of(here))
     is_lit = fetch(anew.choices.sweeps[-1].prior_component) < len(LIT_COMPONENTS)
     (kept,) = np.nonzero(is_lit)
@@ -231,11 +232,11 @@ def _with_second_places(
     return without_second_places(problem, second), found, second
 
 
-def _of_pixels(problem: Problem, numbers: Integers) -> Problem:
-    """Return the problem of some camera pixels, side by side in one row."""
-    pixels = beside(numbers, problem.pixels.responses)
+def _of_pixels(problem: Problem, camera: Size, pixels: slice | Integers) -> Problem:
+    """Return the problem of some camera pixels, as a camera of size `camera`."""
+    measured = pixels if isinstance(pixels, slice) else fetch(pixels)
     return problem._replace(
-        measurements=problem.measurements.of_pixels(Size(1, len(numbers)), numbers),
+        measurements=problem.measurements.of_pixels(camera, measured),
         pixels=AllPixels._make(values[pixels] for values in problem.pixels),
     )
 
@@ -270,13 +271,9 @@ def _of_rows(
     """Return some camera rows of a problem that holds more, and of what was found."""
     if rows == held:
         return problem, found
-    measurements = problem.measurements
-    camera = Size(rows.stop - rows.start, measurements.camera.width)
+    camera = Size(rows.stop - rows.start, problem.measurements.camera.width)
     some = _pixels(problem, slice(rows.start - held.start, rows.stop - held.start))
-    problem = problem._replace(
-        measurements=measurements.of_pixels(camera, some),
-        pixels=AllPixels._make(values[some] for values in problem.pixels),
-    )
+    problem = _of_pixels(problem, camera, some)
     if found is not None:
         found = EstimatedRows(
             amplitudes=found.amplitudes[some],

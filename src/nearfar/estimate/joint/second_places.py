@@ -28,7 +28,7 @@ from nearfar.priors.responses import ResponsePrior
 from nearfar.transport.direct import footprint
 
 # Log evidence by which photos must be more probable with a second place than without. A camera
-# pixel has up to eight neighbours with nine places each.
+# pixel has up to eight neighbours with five places each.
 LEAST_GAIN = 20.0
 # Places about a neighbour's q that are tried, projector pixels down and across; and those about the
 # likeliest of them.

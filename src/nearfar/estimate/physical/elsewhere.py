@@ -55,7 +55,7 @@ class Elsewhere(NamedTuple):
 
 
 def at_second_places(transport: Transport) -> Elsewhere:
-    """Return what a transport has from second places."""
+    """Return the direct light of a transport that comes from second places."""
     second, places = transport.factors.second, transport.second_place
     if second is None or places is None:
         return nowhere(transport.channels)

@@ -6,7 +6,7 @@ share, what it adds at q is taken from direct light, and all the rest is inter-r
 is the transport as it was.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -148,16 +148,17 @@ class PhysicalSplit:
         """
         transport = self.transport
         model = transport.components(light)
-        at_q = replace(transport, second_place=None, second_direct=None)
-        of_q = model.direct if transport.factors.second is None else at_q.components(light).direct
         flat = np.asarray(transport.lights(light), dtype=np.float64)
         subsurface = np.zeros((transport.camera.pixels, transport.channels))
+        of_second = np.zeros_like(subsurface)
+        if (second := transport.factors.second) is not None:
+            second.add_pictures(flat[None], of_second[None])
         for body in self.bodies:
             subsurface[body.pixels] = body.amplitude * body.under(flat, transport.projector)
         # A part of D is moved, of the same footprint.
         with np.errstate(divide="ignore", invalid="ignore"):
             kept = np.where(transport.direct != 0, self.direct / transport.direct, 0.0)
-        direct = of_q * transport.picture(kept)
+        direct = (model.direct - transport.picture(of_second)) * transport.picture(kept)
         elsewhere = np.zeros_like(subsurface)
         elsewhere[self.elsewhere.pixels] = self.elsewhere.under(flat, transport.projector)
         direct = direct + transport.picture(elsewhere)

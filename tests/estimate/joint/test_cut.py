@@ -16,7 +16,6 @@ from nearfar.estimate.joint.cut import (
 )
 from nearfar.estimate.joint.footprint import footprint_boxes, footprint_weights
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
-from nearfar.estimate.joint.seen import box_centres, seen_of_projector
 from nearfar.estimate.joint.shares import share_on_projector
 from nearfar.estimate.joint.solve import variance_ratio
 from nearfar.estimate.joint.solve_hats import leading_count, solve_hats
@@ -29,6 +28,7 @@ from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import covariance_of_coefficients, far_variance
 from nearfar.priors.responses import response_prior
 from nearfar.transport.boxes import box_overlaps
+from nearfar.transport.seen import box_centres, seen_of_projector
 
 PROJECTOR = Size(70, 90)
 BASIS = NearBasis(5, 4)

@@ -26,7 +26,6 @@ from nearfar.estimate.joint.second_places import (
     find_second_places,
     without_second_places,
 )
-from nearfar.estimate.joint.seen import box_centres, seen_of_projector
 from nearfar.estimate.joint.shifts import moved_q, with_unshifted_light
 from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.near_basis import NearBasis
@@ -34,6 +33,7 @@ from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.transport import near
 from nearfar.transport.model import Transport
+from nearfar.transport.seen import box_centres, seen_of_projector
 
 NO_CHOICES = Choices()
 # Sweeps: one by each camera pixel's own photos alone, the rest with its neighbours.

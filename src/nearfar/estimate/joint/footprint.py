@@ -21,7 +21,6 @@ from nearfar.estimate.joint.box_waves import (
     put_with_derivatives,
     wave_table,
 )
-from nearfar.estimate.joint.seen import SEEN_ROWS, reach_of
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
@@ -29,6 +28,7 @@ from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
 from nearfar.transport.direct import direct_weights
+from nearfar.transport.seen import SEEN_ROWS, reach_of
 
 # Least frequency, in cycles per cell of the coarsest pitch: near-range light has faded there. With
 # 0.45, footprints at 512x512 come out too wide, and a random light loses 5.7 dB.

@@ -12,11 +12,11 @@ from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.estimate.joint.box_waves import WaveTable, wave_table
 from nearfar.estimate.joint.footprint import BATCH_PIXELS, HighResponses, high_responses
 from nearfar.estimate.joint.footprint_search import best_shapes, descend
-from nearfar.estimate.joint.seen import reach_of
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
+from nearfar.transport.seen import reach_of
 
 # Unexplained power of a response, in units of its noise, above which a footprint is searched for.
 LEAST_MISFIT = 3.0

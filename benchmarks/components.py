@@ -1,15 +1,16 @@
 """Components of floodlit pictures beside physical truth, on the exact scenes.
 
-Run ``python benchmarks/components.py [--photos N] [SCENE ...]``. The camera is that of
-benchmarks/accuracy.py, the plan one of N photos (117) that were chosen for it, correspondence
-included. For the model's split and the physical one it prints, in dB under white, how far direct
-light, light under surfaces and inter-reflection are from those of the scene; then the share of the
-light that is taken for subsurface light, mean and standard deviation of direct light at
-translucent surfaces over the true ones, and the share of errors within one standard deviation of
-the error bars, at translucent surfaces and at others. The model's near-range light stands beside
-subsurface light, its far-range light beside inter-reflection. Last come direct and global light, by
-the physical split and by the checkerboards of Nayar et al. (2006) that take no more photos, black
-included.
+Run ``python benchmarks/components.py [--photos N] [--side PIXELS] [SCENE ...]``. The camera is that
+of benchmarks/accuracy.py, the plan one of N photos (117) that were chosen for it, correspondence
+included. With ``--side``, projector and camera have so many pixels on each side, in place of those
+that a scene has by default. For the model's split and the physical one it prints, in dB under
+white, how far direct light, light under surfaces and inter-reflection are from those of the scene;
+then the share of the light that is taken for subsurface light, mean and standard deviation of
+direct light at translucent surfaces over the true ones, and the share of errors within one standard
+deviation of the error bars, at translucent surfaces and at others. The model's near-range light
+stands beside subsurface light, its far-range light beside inter-reflection. Last come direct and
+global light, by the physical split and by the checkerboards of Nayar et al. (2006) that take no
+more photos, black included.
 alcove, shelf, hand and marble took no part in any choice that the split made.
 """
 
@@ -21,7 +22,7 @@ import numpy as np
 import separation
 from accuracy import shoot
 from fewer_photos import jointly
-from nearfar import ExactTransport, PhysicalErrorBars, choose_plan, snr, split_physically
+from nearfar import ExactTransport, PhysicalErrorBars, Size, choose_plan, snr, split_physically
 from nearfar.arrays import Booleans, Floats
 from nearfar.baselines.separation_methods import by_checkerboards
 from nearfar.baselines.separation_photos import separate
@@ -52,10 +53,13 @@ def line(found: Mapping[str, float], names: Sequence[str]) -> str:
     return " ".join(f"{known[name]:6.2f}" if name in known else "     -" for name in names)
 
 
-def run(name: str, photos: int) -> None:
+def run(name: str, photos: int, pixels: int | None) -> None:
     """Measure one scene."""
-    scene = cached_scene(name)
-    plan, _ = choose_plan(scene.projector, photos, window=WINDOWS[name])
+    if pixels is None:
+        scene, window = cached_scene(name), WINDOWS[name]
+    else:
+        scene, window = cached_scene(name, Size(pixels, pixels), Size(pixels, pixels)), None
+    plan, _ = choose_plan(scene.projector, photos, window=window)
     transport = jointly(plan, shoot(plan, scene, SimulatedCamera()))
     white = np.ones(scene.projector, dtype=np.float32)
     truth = scene.component_pictures(white)
@@ -124,7 +128,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", default=list(WINDOWS))
     parser.add_argument("--photos", type=int, default=117)
+    parser.add_argument("--side", type=int)
     chosen = parser.parse_args()
     np.set_printoptions(precision=3)
     for scene_name in chosen.scenes:
-        run(scene_name, chosen.photos)
+        run(scene_name, chosen.photos, chosen.side)

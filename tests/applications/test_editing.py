@@ -126,7 +126,7 @@ def test_light_under_a_surface_in_functions_of_near_light_is_its_kernel(pitch, s
         np.full((144, 1), 2.0),
         np.ones(144),
     )
-    split = PhysicalSplit(transport, transport.direct, (body,), nowhere(1))
+    split = PhysicalSplit(transport, transport.direct, (body,), nowhere(1), transport.footprint)
     found = near_functions_of(split)
     # A camera pixel in the middle, whose window lies on the projector.
     pixel = 5 * 12 + 5

@@ -123,6 +123,7 @@ def _of_pixels(split: PhysicalSplit, rows: Integers, columns: Integers) -> Physi
         split.direct[np.ix_(rows, columns)],
         tuple(_body_of(body, places.ravel()) for body in split.bodies),
         _elsewhere_of(split.elsewhere, places.ravel()),
+        None if split.footprint is None else split.footprint[np.ix_(rows, columns)],
     )
 
 

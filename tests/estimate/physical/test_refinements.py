@@ -50,7 +50,7 @@ def transport_of(direct, interreflection, q, near=None):
 
 
 def split_of(transport, *bodies):
-    return PhysicalSplit(transport, transport.direct, bodies, nowhere(1))
+    return PhysicalSplit(transport, transport.direct, bodies, nowhere(1), transport.footprint)
 
 
 OF_BODY = 0.6

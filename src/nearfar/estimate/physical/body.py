@@ -1,10 +1,9 @@
 """Where light falls on a translucent body, and how its camera pixels respond to waves.
 
-Lengths are in cells: squares of projector pixels, a quarter as wide as the coarsest functions of
-near-range light are apart; single pixels where these are.
+Lengths are in cells (`nearfar.estimate.physical.cells`).
 
-Index convention: c runs over the body's camera pixels, o over `kernel_offsets`, k over waves, r
-over real responses.
+Index convention: c runs over the body's camera pixels, o over offsets of cells, g over groups of
+them, k over waves, r over real responses.
 """
 
 from collections.abc import Iterator
@@ -15,17 +14,23 @@ import numpy as np
 from scipy import ndimage
 
 from nearfar.arrays import Booleans, Complexes, Floats, Integers, Size, blocks
+from nearfar.estimate.physical.cells import (
+    REACH,
+    SINGLE_REACH,
+    camera_pixels_to_a_cell,
+    cell_side,
+    covered,
+    offsets,
+    summed,
+)
 from nearfar.estimate.physical.kernels import Slope, enlarged, kernel
 from nearfar.estimate.physical.responses import Responses, Waves, responses
-from nearfar.illumination.near_basis import window_offsets
 from nearfar.parallel import side_by_side
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import footprint, spread
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
 
-# Cells from q up to which light under a surface is compared with responses.
-REACH = 8
 # A projector pixel lights the body if more than this share of it does.
 LEAST_COVERAGE = 0.5
 # What the outline's pixels, of which the body covers a part, are worth at least.
@@ -35,16 +40,6 @@ SQUARE = np.ones((3, 3), dtype=bool)
 CELL_SAMPLES = 3
 # Camera pixels of a batch.
 BATCH_PIXELS = 4096
-
-
-def cell_side(transport: Transport) -> int:
-    """Return the projector pixels along each side of a cell."""
-    return max(1, transport.pitch // 4)
-
-
-def kernel_offsets() -> Integers:
-    """Return the offsets (y, x) of cells from q, shape (O, 2)."""
-    return window_offsets(2 * REACH + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +55,11 @@ class Body:
         Those that see nothing else.
     coverage : ndarray, shape (Py, Px)
         Share of each projector pixel that lights it.
-    covered : ndarray, shape (n, O)
-        Mean of the same in the cells at `kernel_offsets`; 0 beyond the projector's border.
+    covered : ndarray, shape (n, G)
+        Mean of the same in groups of cells; 0 beyond the projector's border.
     waves : Waves
     at_offsets : ndarray, shape (O, K), complex
-        Waves at `kernel_offsets`.
+        Waves at the offsets of cells.
     of_footprint : ndarray, shape (n, K), complex
         Responses to unit direct light.
     responses : ndarray, shape (n, channels, R)
@@ -108,11 +103,12 @@ class Body:
         at_offsets = flat[:, None] * self.at_offsets
         if self.cell_side > 1:
             at_offsets *= self._of_pixels(source, slope) / (flat @ self.at_offsets)
+        of_groups = summed(at_offsets)
         found = np.empty((len(chosen), len(self.frequency)))
 
         def work(batch: slice) -> None:
             some = chosen[batch]
-            at_q = (self.covered[some] @ at_offsets.view(np.float64)).view(np.complex128)
+            at_q = (self.covered[some] @ of_groups.view(np.float64)).view(np.complex128)
             found[batch] = self.waves.real(np.asarray(at_q * self.of_footprint[some]))
 
         if len(chosen) <= BATCH_PIXELS:
@@ -125,16 +121,21 @@ class Body:
     def _of_pixels(self, source: Dipole, slope: Slope) -> Complexes:
         """Return the responses to a kernel over single projector pixels, shape (K,)."""
         down, across = self._along_axes
-        single = kernel(enlarged(source, self.cell_side), len(down) // 2, slope, CELL_SAMPLES)
-        by_rows = (single @ across.view(np.float64)).view(np.complex128)
+        radius, near = len(down) // 2, SINGLE_REACH * self.cell_side
+        single = enlarged(source, self.cell_side)
+        # Far from q a kernel is even within a projector pixel.
+        drawn = kernel(single, radius, slope, 1)
+        middle = slice(radius - near, radius + near + 1)
+        drawn[middle, middle] = kernel(single, near, slope, CELL_SAMPLES)
+        by_rows = (drawn @ across.view(np.float64)).view(np.complex128)
         return np.asarray(np.sum(down * by_rows, axis=0))
 
     @cached_property
     def _along_axes(self) -> tuple[Complexes, Complexes]:
         """Waves at offsets of single projector pixels down and across, (n, K) each."""
         radius = REACH * self.cell_side + self.cell_side // 2
-        offsets = np.arange(-radius, radius + 1)
-        down, across = (np.exp(2j * np.pi * np.outer(offsets, k)) for k in self.waves.cycles.T)
+        pixels = np.arange(-radius, radius + 1)
+        down, across = (np.exp(2j * np.pi * np.outer(pixels, k)) for k in self.waves.cycles.T)
         return down, across
 
     @cached_property
@@ -176,7 +177,7 @@ def coverage_of(transport: Transport, seen: Booleans) -> Floats:
     return np.asarray(share[tuple(nearest)])
 
 
-def bodies_at(transport: Transport, seen: Booleans, waves: Waves) -> Iterator[Body]:
+def bodies_at(transport: Transport, seen: Booleans, boxes: Floats, waves: Waves) -> Iterator[Body]:
     """Yield the bodies that camera pixels see, which do not touch, with their responses.
 
     Parameters
@@ -184,15 +185,15 @@ def bodies_at(transport: Transport, seen: Booleans, waves: Waves) -> Iterator[Bo
     transport : Transport
     seen : ndarray of bool, shape (Cy, Cx)
         Camera pixels that see a body, with direct light.
+    boxes : ndarray, shape (C, 4)
+        Footprints of direct light, as `Transport.boxes` has them.
     waves : Waves
     """
-    lit, side = transport.lit, cell_side(transport)
+    lit = transport.lit
     labels, count = ndimage.label(seen, SQUARE)
     if not count:
         return
-    places = transport.correspondence[lit]
-    extent = np.prod(np.ptp(places, axis=0) / side + 1.0)
-    finer = max(1, int(np.ceil(np.sqrt(lit.sum() / extent) - 0.25)))
+    finer = camera_pixels_to_a_cell(transport)
 
     def grown(mask: Booleans) -> Booleans:
         # Outlines cross camera pixels as large as a cell.
@@ -200,7 +201,7 @@ def bodies_at(transport: Transport, seen: Booleans, waves: Waves) -> Iterator[Bo
 
     pixels = np.flatnonzero(grown(seen))
     rounded = centre(transport.correspondence, transport.projector)[pixels]
-    shown = responses(transport, pixels, rounded, waves)
+    shown = responses(transport, pixels, rounded, waves, boxes[pixels])
     for number in range(1, count + 1):
         mine = labels == number
         with_outline = grown(mine)
@@ -228,9 +229,9 @@ def _body(
         pixels=pixels,
         inner=seen.ravel()[pixels],
         coverage=coverage,
-        covered=_covered(coverage, rounded, side),
+        covered=covered(coverage, rounded, side),
         waves=waves,
-        at_offsets=waves.at(side * kernel_offsets()),
+        at_offsets=waves.at(side * offsets()),
         of_footprint=shown.to_direct,
         responses=shown.total,
         cell_side=side,
@@ -244,29 +245,8 @@ def with_wider_cells(body: Body, transport: Transport) -> Body:
     rounded = centre(transport.correspondence, transport.projector)[body.pixels]
     return replace(
         body,
-        covered=_covered(body.coverage, rounded, side),
-        at_offsets=body.waves.at(side * kernel_offsets()),
+        covered=covered(body.coverage, rounded, side),
+        at_offsets=body.waves.at(side * offsets()),
         cell_side=side,
         reach=2 * body.reach,
     )
-
-
-def _covered(coverage: Floats, rounded: Integers, side: int) -> Floats:
-    """Return mean coverage in the cells about rounded q, (n, O); 0 beyond the border."""
-    of_cells = _means(coverage, side)
-    # Cells at the border may reach beyond it.
-    around = rounded[:, None] + side * kernel_offsets()
-    inside = np.all((around >= 0) & (around < np.array(coverage.shape)), axis=-1)
-    down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
-    return np.asarray(of_cells[down, across] * inside)
-
-
-def _means(picture: Floats, side: int) -> Floats:
-    """Return means over cells; at the border, over as much of a cell as there is."""
-    height, width = (-(-length // side) for length in picture.shape)
-    down, across = (
-        np.arange(length) // side == np.arange(cells)[:, None]
-        for length, cells in zip(picture.shape, (height, width), strict=True)
-    )
-    sums = down @ picture @ across.T
-    return np.asarray(sums / np.outer(down.sum(axis=1), across.sum(axis=1)))

@@ -53,7 +53,7 @@ def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
     off = np.abs(transport.correspondence - told).max(axis=-1)
     # Comparisons with NaN are false: where no side tells anything.
     chosen = opaque & (off > OFF[0]) & (off < OFF[1]) & (disagreement < AGREEMENT * off)
-    chosen &= sees_single_pixels(transport)
+    chosen &= sees_single_pixels(transport.footprint, transport.camera)
     pixels = np.flatnonzero(chosen)
     last = np.array(transport.projector) - 1
     places = np.clip(told.reshape(-1, 2)[pixels], 0, last)

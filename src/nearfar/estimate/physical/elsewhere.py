@@ -67,8 +67,15 @@ def nowhere(channels: int) -> Elsewhere:
     return Elsewhere(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty((0, channels)))
 
 
-def sees_single_pixels(transport: Transport) -> Booleans:
-    """Return whether direct light's footprint is of one projector pixel, shape (Cy, Cx)."""
-    if transport.footprint is None:
-        return np.ones(transport.camera, dtype=bool)
-    return np.asarray(np.all(transport.footprint[..., :2] < SINGLE_PIXEL, axis=-1))
+def sees_single_pixels(footprint: Floats | None, camera: Size) -> Booleans:
+    """Return whether direct light's footprint is of one projector pixel, shape (Cy, Cx).
+
+    Parameters
+    ----------
+    footprint : ndarray, shape (Cy, Cx, 4), or None
+        As `Transport.footprint`.
+    camera : Size
+    """
+    if footprint is None:
+        return np.ones(camera, dtype=bool)
+    return np.asarray(np.all(footprint[..., :2] < SINGLE_PIXEL, axis=-1))

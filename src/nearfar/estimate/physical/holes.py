@@ -39,7 +39,7 @@ def without_holes(split: PhysicalSplit) -> PhysicalSplit:
     direct = np.reshape(split.components(white).direct, shape)
     about, channels = steps(1), transport.channels
     lit = np.stack([moved(transport.lit, step, False) for step in about])
-    pixels = np.flatnonzero(lit.all(axis=0) & sees_single_pixels(transport))
+    pixels = np.flatnonzero(lit.all(axis=0) & sees_single_pixels(split.footprint, transport.camera))
     of_total, of_direct, of_places = (
         np.stack([moved(picture, step, 0.0).reshape(-1, size)[pixels] for step in about])
         for picture, size in ((total, channels), (direct, channels), (transport.correspondence, 2))

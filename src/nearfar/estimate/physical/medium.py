@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
 from nearfar.arrays import Floats, Integers, blocks
-from nearfar.estimate.physical.body import BATCH_PIXELS, REACH, Body
+from nearfar.estimate.physical.body import BATCH_PIXELS, Body
 from nearfar.estimate.physical.kernels import slopes, source_at
 from nearfar.parallel import side_by_side
 from nearfar.transport.dipole import Dipole
@@ -27,7 +27,7 @@ DEPTHS = (0.5, 1.0, 2.0)
 PRODUCTS = (0.1, 0.4, 1.0)
 # Least and largest: depths that responses can tell, and products sqrt(3 (1 - a')) of media that
 # scatter.
-RANGES = ((0.2, REACH / 2), (0.01, 1.7))
+RANGES = ((0.2, 4.0), (0.01, 1.7))
 # Depth of a source in cells beyond which light that is compared is too near to it to tell how it
 # fades.
 DEEP = 2.0

@@ -92,7 +92,7 @@ def with_outlines(split: PhysicalSplit) -> PhysicalSplit:
         body_of[body.pixels], explained[body.pixels] = number, body.explained
     good = (explained >= LEAST_EXPLAINED).reshape(camera)
     doubted = ndimage.binary_dilation(good, SQUARE) | (body_of >= 0).reshape(camera)
-    doubted &= transport.lit & ~good & sees_single_pixels(transport)
+    doubted &= transport.lit & ~good & sees_single_pixels(split.footprint, camera)
     pixels = np.flatnonzero(doubted)
     white = np.ones(transport.projector, dtype=np.float32)
     parts = np.stack([np.reshape(p, (-1, channels)) for p in split.components(white)], axis=1)

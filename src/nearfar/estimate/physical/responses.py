@@ -103,7 +103,9 @@ def unit_direct(factors: Factors) -> Factors:
     )
 
 
-def responses(transport: Transport, pixels: Integers, places: Integers, waves: Waves) -> Responses:
+def responses(
+    transport: Transport, pixels: Integers, places: Integers, waves: Waves, boxes: Floats
+) -> Responses:
     """Return responses of chosen camera pixels.
 
     Parameters
@@ -113,6 +115,8 @@ def responses(transport: Transport, pixels: Integers, places: Integers, waves: W
     places : ndarray of int, shape (n, 2)
         Projector pixels whose phase is taken out of them.
     waves : Waves
+    boxes : ndarray, shape (n, 4)
+        Footprints of unit direct light, as `Transport.boxes` has them.
 
     Returns
     -------
@@ -128,7 +132,7 @@ def responses(transport: Transport, pixels: Integers, places: Integers, waves: W
         boxes=whole.boxes[pixels],
         second=None,
     )
-    unit = unit_direct(total)
+    unit = replace(unit_direct(total), boxes=boxes)
     height, width = transport.projector
     down, across = (
         np.exp(2j * np.pi * np.outer(along, np.arange(side)))

@@ -13,7 +13,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import neighbours
-from nearfar.estimate.physical.body import cell_side
+from nearfar.estimate.physical.cells import cell_side
 from nearfar.estimate.physical.rows_about import of_rows_about_q, offsets
 from nearfar.estimate.physical.split import PhysicalSplit
 from nearfar.transport.model import Transport

@@ -18,6 +18,7 @@ from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.kernels import SAMPLES, kernel
 from nearfar.estimate.physical.medium import SLOPES
 from nearfar.markup import card
+from nearfar.transport.boxes import box_axes, summed_area
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import Footprint, footprint, look_up
 from nearfar.transport.model import Transport
@@ -114,6 +115,9 @@ class PhysicalSplit:
         Empty where nothing is translucent.
     elsewhere : Elsewhere
         Direct light from other places than q.
+    footprint : ndarray, shape (Cy, Cx, 4), or None
+        Direct light's footprint, as `Transport.footprint`; at translucent surfaces without what an
+        estimate takes for blur of the projector, and is light under the surface.
 
     Examples
     --------
@@ -128,6 +132,7 @@ class PhysicalSplit:
     direct: Floats
     bodies: tuple[Translucent, ...]
     elsewhere: Elsewhere
+    footprint: Floats | None
 
     def components(self, light: Floats) -> PhysicalComponents:
         """Relight each component by itself.
@@ -161,10 +166,25 @@ class PhysicalSplit:
         direct = (model.direct - transport.picture(of_second)) * transport.picture(kept)
         elsewhere = np.zeros_like(subsurface)
         elsewhere[self.elsewhere.pixels] = self.elsewhere.under(flat, transport.projector)
-        direct = direct + transport.picture(elsewhere)
+        direct = self._through_footprints(direct, flat) + transport.picture(elsewhere)
         under = transport.picture(subsurface)
         rest = model.direct + model.near + model.far - direct - under
         return PhysicalComponents(direct, under, rest)
+
+    def _through_footprints(self, direct: Floats, lights: Floats) -> Floats:
+        """Return direct light's picture, relit anew where its footprint is not the transport's."""
+        transport = self.transport
+        if self.footprint is None or transport.footprint is None:
+            return direct
+        others = np.flatnonzero((self.footprint != transport.footprint).any(axis=-1))
+        q, boxes = transport.correspondence.reshape(-1, 2), self.footprint.reshape(-1, 4)
+        where = box_axes(q[others], boxes[others], transport.projector)
+        flat, d = (v.reshape(transport.camera.pixels, -1).copy() for v in (direct, self.direct))
+        for channel in range(transport.channels):
+            light = lights[min(channel, len(lights) - 1)].reshape(transport.projector)
+            unit = where.means(summed_area(light), transport.projector)
+            flat[others, channel] = d[others, channel] * unit
+        return transport.picture(flat)
 
     def _repr_html_(self) -> str:
         """Show the split in a notebook: the scene floodlit, and its physical components."""

@@ -7,6 +7,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
 from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.elsewhere import at_second_places
+from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
 from nearfar.estimate.physical.medium import Media, is_deep, is_even, media_of
@@ -50,17 +51,20 @@ def split_physically(transport: Transport) -> PhysicalSplit:
             "with near-range light, from patterns of a projector."
         )
     direct = transport.direct.reshape(-1, transport.channels).copy()
+    seen = translucent(transport)
+    narrow, boxes = footprints(transport, seen), transport.boxes.copy()
     bodies = []
-    for seen in bodies_at(transport, translucent(transport), waves_of(transport)):
-        body, media = _fitted(seen, transport)
+    for found in bodies_at(transport, seen, narrow, waves_of(transport)):
+        body, media = _fitted(found, transport)
         if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or is_even(media):
             continue
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]
-        found = media.slope[kept], media.amplitude[kept], media.explained[kept]
+        boxes[body.pixels[kept]] = narrow[body.pixels[kept]]
+        of_pixels = media.slope[kept], media.amplitude[kept], media.explained[kept]
         sources = tuple(enlarged(source, body.cell_side) for source in media.sources)
         places = transport.correspondence.reshape(-1, 2)[body.pixels[kept]]
-        bodies.append(Translucent(body.pixels[kept], places, body.coverage, sources, *found))
+        bodies.append(Translucent(body.pixels[kept], places, body.coverage, sources, *of_pixels))
     opaque = transport.lit.copy()
     for one in bodies:
         opaque.ravel()[one.pixels] = False
@@ -68,7 +72,11 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     direct[creases.pixels] = 0.0
     elsewhere = at_second_places(transport).and_also(creases)
     split = PhysicalSplit(
-        transport, direct.reshape(transport.direct.shape), tuple(bodies), elsewhere
+        transport,
+        direct.reshape(transport.direct.shape),
+        tuple(bodies),
+        elsewhere,
+        None if transport.footprint is None else boxes.reshape(transport.footprint.shape),
     )
     return without_holes(without_specks(with_outlines(split)))
 

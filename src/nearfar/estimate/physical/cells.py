@@ -1,0 +1,95 @@
+"""Cells of the projector about q, in which light under a surface is compared.
+
+A cell is a square of projector pixels: a quarter as wide as the coarsest functions of near-range
+light are apart, a single pixel where these are. Farther from q, where kernels are smooth, several
+cells count as one.
+
+Index convention: c runs over camera pixels, o over `offsets`, g over groups of cells.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from nearfar.arrays import Complexes, Floats, Integers
+from nearfar.illumination.near_basis import window_offsets
+from nearfar.transport.model import Transport
+
+# Cells from q up to which light under a surface is compared with responses.
+REACH = 12
+# Cells from q up to which each counts by itself.
+SINGLE_REACH = 4
+# Cells of a group along an axis: beyond those that count by themselves, and beside them.
+FAR_SIDE, BESIDE_SIDE = 2, 3
+
+
+def cell_side(transport: Transport) -> int:
+    """Return the projector pixels along each side of a cell."""
+    return max(1, transport.pitch // 4)
+
+
+def camera_pixels_to_a_cell(transport: Transport) -> int:
+    """Return how many camera pixels see a cell along each side, at least 1."""
+    lit = transport.lit
+    extent = np.prod(np.ptp(transport.correspondence[lit], axis=0) / cell_side(transport) + 1.0)
+    return max(1, int(np.ceil(np.sqrt(lit.sum() / extent) - 0.25)))
+
+
+def offsets() -> Integers:
+    """Return the offsets (y, x) of cells from q, shape (O, 2)."""
+    return window_offsets(2 * REACH + 1)
+
+
+@lru_cache(maxsize=1)
+def groups() -> Integers:
+    """Return the group of each cell at `offsets`, shape (O,), from 0 without a gap."""
+    along = np.arange(-REACH, REACH + 1)
+    far = np.sign(along) * (2 + (np.abs(along) - SINGLE_REACH - 1) // FAR_SIDE)
+    beside = (along + SINGLE_REACH) // BESIDE_SIDE - 1
+    part = np.where(np.abs(along) > SINGLE_REACH, far, beside)
+    down, across = offsets().T
+    is_single = np.maximum(np.abs(down), np.abs(across)) <= SINGLE_REACH
+    of_several = len(along) * part[down + REACH] + part[across + REACH]
+    numbers = np.where(is_single, np.arange(len(down)), -len(down) + of_several)
+    return np.unique(numbers, return_inverse=True)[1].ravel()
+
+
+def summed(values: Complexes) -> Complexes:
+    """Return sums over the groups of values (O, K), shape (G, K)."""
+    order = np.argsort(groups(), kind="stable")
+    first = np.flatnonzero(np.diff(groups()[order], prepend=-1))
+    return np.asarray(np.add.reduceat(values[order], first, axis=0))
+
+
+def covered(coverage: Floats, rounded: Integers, side: int) -> Floats:
+    """Return the mean coverage of groups of cells about rounded q, shape (n, G).
+
+    Parameters
+    ----------
+    coverage : ndarray, shape (Py, Px)
+        Share of each projector pixel that lights a body; what lies beyond the border lights none.
+    rounded : ndarray of int, shape (n, 2)
+    side : int
+        Projector pixels along each side of a cell.
+    """
+    of_cells = _means(coverage, side)
+    count = groups().max() + 1
+    found = np.empty((len(rounded), count))
+    for group in range(count):
+        around = rounded[:, None] + side * offsets()[groups() == group]
+        # Cells at the border may reach beyond it.
+        inside = np.all((around >= 0) & (around < np.array(coverage.shape)), axis=-1)
+        down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
+        found[:, group] = (of_cells[down, across] * inside).mean(axis=1)
+    return found
+
+
+def _means(picture: Floats, side: int) -> Floats:
+    """Return means over cells; at the border, over as much of a cell as there is."""
+    height, width = (-(-length // side) for length in picture.shape)
+    down, across = (
+        np.arange(length) // side == np.arange(cells)[:, None]
+        for length, cells in zip(picture.shape, (height, width), strict=True)
+    )
+    sums = down @ picture @ across.T
+    return np.asarray(sums / np.outer(down.sum(axis=1), across.sum(axis=1)))

@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nearfar import Size, Transport, split_physically
+from nearfar import Size, Transport, save_transport, split_physically
 from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.kernels import kernel, source_at
 from nearfar.illumination.frequencies import grid, representatives
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.transport.boxes import box_axes
+from nearfar.viewer.interactive import InteractiveTransport
+from nearfar.viewer.physical import PhysicalRelighting
 
 SIDE, RADIUS, PITCH = 48, 13, 4
 PROJECTOR = Size(SIDE, SIDE)
@@ -101,6 +103,27 @@ def test_footprints_at_wax_are_blurred_as_what_stands_beside_it(wax):
         found = footprints(transport, inside).reshape(*PROJECTOR, 4)
         np.testing.assert_allclose(found[inside], squares(blurred(wanted))[inside], atol=1e-5)
         assert np.array_equal(found[0], footprint[0])
+
+
+def test_a_camera_pixel_that_sees_less_than_those_about_it_keeps_its_footprint(wax):
+    inside = disc()
+    footprint = squares(np.where(inside, blurred(BLUR), 1.0))
+    footprint[SIDE // 2, SIDE // 2] = 0.4, 1.0, 0.1, 0.0
+    found = footprints(replace(wax, footprint=footprint), inside).reshape(*PROJECTOR, 4)
+    narrow = footprint[SIDE // 2, SIDE // 2].copy()
+    np.testing.assert_array_equal(found[SIDE // 2, SIDE // 2], narrow)
+    np.testing.assert_allclose(found[SIDE // 2, SIDE // 2 + 1], [1, 1, 0, 0], atol=1e-5)
+
+
+def test_the_viewer_relights_some_camera_pixels_through_their_footprints(wax, tmp_path):
+    save_transport(wax, tmp_path / "wax.zarr")
+    physical = PhysicalRelighting(InteractiveTransport(tmp_path / "wax.zarr"))
+    physical.prepare()
+    rows, columns = np.arange(20, 31, 2), np.arange(17, 29, 3)
+    light = np.random.default_rng(3).uniform(0, 1, PROJECTOR).astype(np.float32)
+    some = physical.pixels(rows, columns).components(light)
+    for part, whole in zip(some, split_physically(wax).components(light), strict=True):
+        np.testing.assert_allclose(part, whole[np.ix_(rows, columns)], atol=1e-5)
 
 
 def test_where_nothing_stands_beside_wax_footprints_stay(wax):

@@ -13,13 +13,15 @@ import numpy as np
 
 from nearfar.arrays import Complexes, Floats, Integers
 from nearfar.illumination.near_basis import window_offsets
+from nearfar.transport.boxes import summed_area
 from nearfar.transport.model import Transport
 
 # Cells from q up to which light under a surface is compared with responses.
 REACH = 12
 # Cells from q up to which each counts by itself.
 SINGLE_REACH = 4
-# Cells of a group along an axis: beyond those that count by themselves, and beside them.
+# Cells along each side of a group: along an axis on which it lies farther from q than those, and
+# along one on which it does not. The latter divides 2 SINGLE_REACH + 1.
 FAR_SIDE, BESIDE_SIDE = 2, 3
 
 
@@ -44,14 +46,18 @@ def offsets() -> Integers:
 def groups() -> Integers:
     """Return the group of each cell at `offsets`, shape (O,), from 0 without a gap."""
     along = np.arange(-REACH, REACH + 1)
-    far = np.sign(along) * (2 + (np.abs(along) - SINGLE_REACH - 1) // FAR_SIDE)
-    beside = (along + SINGLE_REACH) // BESIDE_SIDE - 1
+    # Parts of an axis, from -1 to 1 beside q and on from there on either side.
+    beside = (along + SINGLE_REACH) // BESIDE_SIDE - SINGLE_REACH // BESIDE_SIDE
+    last = (2 * SINGLE_REACH) // BESIDE_SIDE - SINGLE_REACH // BESIDE_SIDE
+    far = np.sign(along) * (last + 1 + (np.abs(along) - SINGLE_REACH - 1) // FAR_SIDE)
     part = np.where(np.abs(along) > SINGLE_REACH, far, beside)
     down, across = offsets().T
     is_single = np.maximum(np.abs(down), np.abs(across)) <= SINGLE_REACH
     of_several = len(along) * part[down + REACH] + part[across + REACH]
     numbers = np.where(is_single, np.arange(len(down)), -len(down) + of_several)
-    return np.unique(numbers, return_inverse=True)[1].ravel()
+    found = np.unique(numbers, return_inverse=True)[1].ravel()
+    found.flags.writeable = False
+    return found
 
 
 def summed(values: Complexes) -> Complexes:
@@ -62,7 +68,7 @@ def summed(values: Complexes) -> Complexes:
 
 
 def covered(coverage: Floats, rounded: Integers, side: int) -> Floats:
-    """Return the mean coverage of groups of cells about rounded q, shape (n, G).
+    """Return the mean coverage of groups of cells about rounded q, shape (n, G), float64.
 
     Parameters
     ----------
@@ -72,15 +78,18 @@ def covered(coverage: Floats, rounded: Integers, side: int) -> Floats:
     side : int
         Projector pixels along each side of a cell.
     """
-    of_cells = _means(coverage, side)
+    of_cells = np.pad(_means(coverage, side), REACH)
+    table = summed_area(of_cells).reshape(np.array(of_cells.shape) + 1)
+    cell = rounded // side + REACH
     count = groups().max() + 1
     found = np.empty((len(rounded), count))
     for group in range(count):
-        around = rounded[:, None] + side * offsets()[groups() == group]
-        # Cells at the border may reach beyond it.
-        inside = np.all((around >= 0) & (around < np.array(coverage.shape)), axis=-1)
-        down, across = np.moveaxis(np.where(inside[..., None], around // side, 0), -1, 0)
-        found[:, group] = (of_cells[down, across] * inside).mean(axis=1)
+        mine = offsets()[groups() == group]
+        # Groups are rectangles.
+        top, left = (cell + mine.min(axis=0)).T
+        bottom, right = (cell + mine.max(axis=0) + 1).T
+        total = table[bottom, right] - table[top, right] - table[bottom, left] + table[top, left]
+        found[:, group] = total / len(mine)
     return found
 
 

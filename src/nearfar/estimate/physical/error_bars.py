@@ -5,6 +5,8 @@ direct light and the picture err. At translucent ones the kernels decide. What t
 responses, as a share, says how good they are; the errors of components go with the root of it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from nearfar.arrays import Floats
@@ -127,6 +129,8 @@ class PhysicalErrorBars:
             of_direct[body.pixels] = known
             of_under[body.pixels] = OF_SUBSURFACE * left * under[body.pixels]
         factors = unit_direct(transport.factors)
+        if self._split.footprint is not None:
+            factors = replace(factors, boxes=self._split.footprint.reshape(-1, 4))
         lights = [factors.analyse(one[None]) for one in transport.lights(light)]
         lit = np.concatenate([factors.relit(one).direct for one in lights], axis=1)
         of_direct = of_direct * np.abs(lit)

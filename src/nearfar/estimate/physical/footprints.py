@@ -15,15 +15,18 @@ from nearfar.estimate.physical.cells import camera_pixels_to_a_cell
 from nearfar.transport.model import Transport
 from nearfar.transport.seen import seen_of_projector
 
-# Camera pixels closer to a body than so many cells may see a part of it; those farther away than so
-# many tell nothing of it.
+# Camera pixels closer to a body may see a part of it; those farther away tell nothing of it. In
+# cells, or in camera pixels where these are larger.
 OUTLINE_REACH, BESIDE_REACH = 3, 13
 # Fewer camera pixels do not tell the blur.
 LEAST_BESIDE = 12
 
 
 def footprints(transport: Transport, seen: Booleans) -> Floats:
-    """Return direct light's footprints, those at translucent surfaces as opaque ones have them.
+    """Return direct light's footprints, at translucent surfaces no wider than without them.
+
+    Where a camera pixel sees a body, or may see a part of it, its footprint is at most as wide as q
+    and the blur of the opaque camera pixels beside the body have it.
 
     Parameters
     ----------
@@ -53,8 +56,15 @@ def footprints(transport: Transport, seen: Booleans) -> Floats:
         told = blur[beside & (bodies_nearby == number)]
         if len(told) < LEAST_BESIDE:
             continue
-        least = max(0.0, float(np.median(told)))
+        most = max(0.0, float(np.median(told)))
+        widest = unblurred + 0.0
+        widest[:, :2] = np.hypot(unblurred[:, :2], np.sqrt(most))
         here = ((bodies == number) & transport.lit).ravel()
-        squares = unblurred[here, :2] ** 2 + np.clip(blur.ravel()[here], 0.0, least)[:, None]
-        found[here] = np.concatenate([np.sqrt(squares), unblurred[here, 2:]], axis=1)
+        wide = here & np.any(_spread(boxes) > _spread(widest), axis=1)
+        found[wide] = widest[wide]
     return found
+
+
+def _spread(boxes: Floats) -> Floats:
+    """Return the variance of footprints along each axis, projector pixels squared, (C, 2)."""
+    return boxes[:, :2] ** 2 / 12 + boxes[:, 2:] ** 2

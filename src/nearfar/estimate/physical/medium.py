@@ -25,8 +25,8 @@ from nearfar.transport.dipole import Dipole
 # First guesses of the source's depth in cells, and of attenuation times depth.
 DEPTHS = (0.5, 1.0, 2.0)
 PRODUCTS = (0.1, 0.4, 1.0)
-# Least and largest: depths that responses can tell, and products sqrt(3 (1 - a')) of media that
-# scatter.
+# Least and largest: depths in cells that responses can tell, and products sqrt(3 (1 - a')) of media
+# that scatter.
 RANGES = ((0.2, 4.0), (0.01, 1.7))
 # Depth of a source in cells beyond which light that is compared is too near to it to tell how it
 # fades.
@@ -132,7 +132,7 @@ def media_of(body: Body) -> Media:
 
 
 def is_even(media: Media) -> bool:
-    """Return whether light does not fade as far as kernels are compared, in any channel.
+    """Return whether light hardly fades as far as kernels are compared, in any channel.
 
     The source then ended at the greatest depth, or the attenuation at the least.
     """

@@ -116,8 +116,8 @@ class PhysicalSplit:
     elsewhere : Elsewhere
         Direct light from other places than q.
     footprint : ndarray, shape (Cy, Cx, 4), or None
-        Direct light's footprint, as `Transport.footprint`; at translucent surfaces without what an
-        estimate takes for blur of the projector, and is light under the surface.
+        Direct light's footprint, as `Transport.footprint`. At translucent surfaces it may be
+        narrower than the transport's, which takes light under the surface for blur.
 
     Examples
     --------
@@ -160,7 +160,7 @@ class PhysicalSplit:
             second.add_pictures(flat[None], of_second[None])
         for body in self.bodies:
             subsurface[body.pixels] = body.amplitude * body.under(flat, transport.projector)
-        # A part of D is moved, of the same footprint.
+        # Where its footprint is the transport's, direct light is a part of D.
         with np.errstate(divide="ignore", invalid="ignore"):
             kept = np.where(transport.direct != 0, self.direct / transport.direct, 0.0)
         direct = (model.direct - transport.picture(of_second)) * transport.picture(kept)

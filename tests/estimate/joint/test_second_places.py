@@ -101,6 +101,16 @@ def test_light_within_the_window_is_the_windows():
     assert not has_second(estimated(rows_of(surfaces()), q)).any()
 
 
+def test_no_second_place_has_a_projector_pixel_in_the_window():
+    q = surfaces()
+    # The next column's q lies beyond the window, the light at the outline half inside it.
+    q[:, OUTLINE + 1 :, 1] -= 6.0
+    found = estimated(rows_of(q), q)
+    has = has_second(found)
+    apart = np.abs(found.second_place - np.rint(found.correspondence)).max(axis=-1)
+    assert np.all(apart[has] >= WINDOW // 2 + 1)
+
+
 def test_a_camera_pixel_without_direct_light_at_q_has_none_elsewhere():
     q = surfaces()
     q[4, OUTLINE] = np.nan

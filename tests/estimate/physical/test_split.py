@@ -251,7 +251,7 @@ def test_where_functions_are_of_several_projector_pixels_media_are_the_same(
     rows = np.stack(
         [flat[side - y : 2 * side - y, side - x : 2 * side - x] for y, x in places.reshape(-1, 2)]
     )
-    far = rows.reshape(camera.pixels, -1) @ basis.patterns.T
+    far = basis.analyse(rows.reshape(camera.pixels, -1)) / basis.weights
     count = NearBasis(9, pitch).count
     transport = Transport(
         projector=projector,

@@ -4,14 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
-from nearfar import Size, Transport, save_transport, split_physically
+from nearfar import PhysicalErrorBars, Size, Transport, save_transport, split_physically
+from nearfar.estimate.physical.error_bars import OF_BOXES
 from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.kernels import kernel, source_at
 from nearfar.illumination.frequencies import grid, representatives
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
+from nearfar.priors.component import PriorComponent
 from nearfar.transport.boxes import box_axes
+from nearfar.transport.posterior import Posterior
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.physical import PhysicalRelighting
 
@@ -118,6 +122,33 @@ def test_a_camera_pixel_that_sees_less_than_those_about_it_keeps_its_footprint(w
     narrow = footprint[SIDE // 2, SIDE // 2].copy()
     np.testing.assert_array_equal(found[SIDE // 2, SIDE // 2], narrow)
     np.testing.assert_allclose(found[SIDE // 2, SIDE // 2 + 1], [1, 1, 0, 0], atol=1e-5)
+
+
+def test_error_bars_of_direct_light_go_with_the_light_on_the_splits_footprints(wax):
+    # One of every 17 frequencies, from slow to fast.
+    frequencies = tuple(representatives(grid(PROJECTOR, PROJECTOR))[1::17])
+    ones = np.ones((*PROJECTOR, 1), np.float32)
+    posterior = Posterior(
+        prior_components=(PriorComponent(0.8, 64.0, 1.5),),
+        frequencies=frequencies,
+        multiplicity=np.ones(real_basis(frequencies, PROJECTOR).count, np.float32),
+        prior_component=np.zeros(PROJECTOR, np.uint8),
+        prior_scale=np.full(PROJECTOR, 1e-3, np.float32),
+        white=ones,
+        offset_noise=1e-4 * ones,
+        light_noise=1e-4 * ones,
+        share_of_white=ones,
+        noise_share=ones,
+    )
+    bars = PhysicalErrorBars(split_physically(replace(wax, posterior=posterior)))
+    light = np.random.default_rng(5).uniform(0, 1, PROJECTOR).astype(np.float32)
+    inner = ndimage.binary_erosion(disc(), iterations=3)
+    white = bars.components(np.ones(PROJECTOR, np.float32))
+    found = bars.components(light).direct[inner]
+    np.testing.assert_allclose(found, (white.direct * light)[inner], rtol=1e-3)
+    # Of what direct light may have too much of, subsurface light has too little.
+    assert np.all(white.direct[inner] > 0.9 * OF_BOXES * DIRECT)
+    assert np.all(white.subsurface[inner] > 0.9 * OF_BOXES * DIRECT)
 
 
 def test_the_viewer_relights_some_camera_pixels_through_their_footprints(wax, split, tmp_path):

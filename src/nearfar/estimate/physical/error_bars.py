@@ -119,15 +119,21 @@ class PhysicalErrorBars:
         of_direct = self._bars.direct().reshape(shape).astype(np.float64)
         under = self._split.components(light).subsurface.reshape(shape)
         direct = self._split.direct.reshape(shape)
+        white = np.ones((1, transport.projector.pixels))
         of_under = np.zeros(shape)
         for body in self._split.bodies:
             left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
             peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
             known = np.hypot(OF_DIRECT * left, OF_KERNEL) * body.amplitude * peaks
-            if self._split.footprint is not None:
-                known = np.hypot(known, OF_BOXES * direct[body.pixels])
-            of_direct[body.pixels] = known
             of_under[body.pixels] = OF_SUBSURFACE * left * under[body.pixels]
+            if self._split.footprint is not None:
+                taken = OF_BOXES * direct[body.pixels]
+                known = np.hypot(known, taken)
+                # Subsurface light lacks what direct light has too much of.
+                whole = body.amplitude * body.under(white, transport.projector)
+                taken *= under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
+                of_under[body.pixels] = np.hypot(of_under[body.pixels], taken)
+            of_direct[body.pixels] = known
         factors = unit_direct(transport.factors)
         if self._split.footprint is not None:
             factors = replace(factors, boxes=self._split.footprint.reshape(-1, 4))

@@ -166,6 +166,13 @@ def box_places(correspondence: Floats, footprints: Floats, projector: Size) -> F
     return box_axes(correspondence, footprints, projector).places(projector)
 
 
+def blurred_boxes(footprints: Floats, width: Floats | float) -> Floats:
+    """Return footprints (C, 4) whose boxes are blurred by boxes of a width, or of widths (C, 1)."""
+    found = footprints.copy()
+    found[:, :2] = np.hypot(found[:, :2], width)
+    return found
+
+
 def halves(correspondence: Floats, footprints: Floats) -> tuple[Floats, Floats]:
     """Return the middles of both boxes of footprints, (2, C, 2), and their sides, (C, 2)."""
     q = np.asarray(correspondence, dtype=np.float64).reshape(-1, 2)

@@ -14,6 +14,7 @@ from nearfar.estimate.physical.specks import without_specks
 from nearfar.estimate.physical.split import PhysicalSplit, Translucent
 from nearfar.estimate.physical.told import told_by_lines, told_by_planes
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.pictures import random_pattern
 from nearfar.illumination.real_basis import real_basis
 
@@ -119,6 +120,19 @@ def test_an_outline_without_a_gap_stays_as_it_is():
     np.testing.assert_array_equal(found.direct, split.direct)
     assert not len(found.elsewhere.pixels)
     np.testing.assert_array_equal(found.bodies[0].pixels, split.bodies[0].pixels)
+
+
+@pytest.mark.parametrize(("side", "mixed"), [(1.0, CAMERA.height), (1.25, 0)])
+def test_outlines_are_mixtures_where_the_splits_footprints_are_of_single_pixels(side, mixed):
+    def squares(length):
+        return np.broadcast_to(np.float32([length, length, 0, 0]), (*CAMERA, 4))
+
+    before = wax_before_a_wall(gap=20)
+    near = np.zeros((*CAMERA, 1, NearBasis(9, 4).count), np.float32)
+    # What the estimate takes for footprints of several projector pixels may be light under wax.
+    transport = replace(before.transport, pitch=4, near=near, footprint=squares(1.25))
+    found = with_outlines(replace(before, transport=transport, footprint=squares(side)))
+    assert len(found.elsewhere.pixels) == mixed
 
 
 LOST = 0.1

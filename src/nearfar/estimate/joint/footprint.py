@@ -27,6 +27,7 @@ from nearfar.illumination.real_basis import real_basis
 from nearfar.parallel import side_by_side
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
+from nearfar.transport.boxes import blurred_boxes
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.seen import SEEN_ROWS, reach_of
 
@@ -139,7 +140,7 @@ def footprint_boxes(
         explained.reshape(*camera, -1), (VOTERS, VOTERS, 0), mode="nearest"
     ).reshape(number, -1)
     blur = blurs[np.argmax(voted, axis=1)]
-    return _blurred(seen, blur[:, None]) * lit[:, None]
+    return blurred_boxes(seen, blur[:, None]) * lit[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,10 +206,3 @@ def high_responses(measurements: Measurements, near_basis: NearBasis) -> HighRes
         return None
     centred = centred_basis(real_basis(high, measurements.projector), near_basis)
     return HighResponses(measurements, measurements.response_indices(high), centred)
-
-
-def _blurred(footprints: Floats, blur: Floats) -> Floats:
-    """Return footprints whose boxes are blurred by boxes of widths (C, 1)."""
-    found = footprints.copy()
-    found[:, :2] = np.hypot(found[:, :2], blur)
-    return found

@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.cells import camera_pixels_to_a_cell
+from nearfar.transport.boxes import blurred_boxes
 from nearfar.transport.model import Transport
 from nearfar.transport.seen import seen_of_projector
 
@@ -23,10 +24,10 @@ LEAST_BESIDE = 12
 
 
 def footprints(transport: Transport, seen: Booleans) -> Floats:
-    """Return direct light's footprints, at translucent surfaces no wider than without them.
+    """Return direct light's footprints, at translucent surfaces without light under them.
 
-    Where a camera pixel sees a body, or may see a part of it, its footprint is at most as wide as q
-    and the blur of the opaque camera pixels beside the body have it.
+    At a body and next to it, a footprint is at most what q says that the camera pixel sees, blurred
+    as the opaque camera pixels beside the body are.
 
     Parameters
     ----------
@@ -56,9 +57,7 @@ def footprints(transport: Transport, seen: Booleans) -> Floats:
         told = blur[beside & (bodies_nearby == number)]
         if len(told) < LEAST_BESIDE:
             continue
-        most = max(0.0, float(np.median(told)))
-        widest = unblurred + 0.0
-        widest[:, :2] = np.hypot(unblurred[:, :2], np.sqrt(most))
+        widest = blurred_boxes(unblurred, float(np.sqrt(max(0.0, np.median(told)))))
         here = ((bodies == number) & transport.lit).ravel()
         wide = here & np.any(_spread(boxes) > _spread(widest), axis=1)
         found[wide] = widest[wide]

@@ -30,11 +30,18 @@ WORLD_WINDOW = 3
 CHANNELS = 3
 
 
-def random_transport(projector: Size, window: int, far_band: Size) -> Transport:
-    """Draw a transport with direct, near and far light at every camera pixel."""
+def random_transport(
+    projector: Size, window: int, far_band: Size, camera: Size | None = None
+) -> Transport:
+    """Draw a transport with direct, near and far light at every camera pixel.
+
+    The camera has as many pixels as the projector unless it is given.
+    """
     generator = np.random.default_rng(0)
-    shape = (*projector, CHANNELS)
-    y, x = np.indices(projector, dtype=np.float32)
+    camera = camera or projector
+    shape = (*camera, CHANNELS)
+    sides = [np.linspace(0, p - 1, c).round() for p, c in zip(projector, camera, strict=True)]
+    y, x = np.meshgrid(*sides, indexing="ij")
     basis = real_basis(representatives(far_frequencies(far_band, projector)), projector)
     far = 0.002 * generator.normal(size=(*shape, basis.count))
     far[..., 0] += 0.1
@@ -42,7 +49,7 @@ def random_transport(projector: Size, window: int, far_band: Size) -> Transport:
     nothing = np.zeros(shape, dtype=np.float32)
     return Transport(
         projector=projector,
-        correspondence=np.stack([y, x], axis=-1),
+        correspondence=np.stack([y, x], axis=-1).astype(np.float32),
         direct=generator.uniform(0.1, 0.5, size=shape).astype(np.float32),
         near=window.astype(np.float32),
         far=far.astype(np.float32),

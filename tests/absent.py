@@ -4,11 +4,19 @@ import ctypes
 import subprocess
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
 PYTORCH_ABSENT = "PyTorch is not installed" if find_spec("torch") is None else ""
 NEEDS_PYTORCH = pytest.mark.skipif(bool(PYTORCH_ABSENT), reason=PYTORCH_ABSENT)
+# Devices by PyTorch: the processor, and an accelerator where the machine has one. Its driver's own
+# file says so at once, where PyTorch takes seconds to be imported.
+HAS_ACCELERATOR = Path("/dev/nvidiactl").exists()
+PYTORCH_DEVICES = [
+    pytest.param(device, marks=NEEDS_PYTORCH)
+    for device in (["torch", "cuda"] if HAS_ACCELERATOR else ["torch"])
+]
 
 
 def need_mitsuba() -> None:

@@ -1,10 +1,14 @@
 """Several threads give what one gives, to the bit."""
 
+import threading
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from nearfar import parallel
 from nearfar.arrays import Size
+from nearfar.devices import ACCELERATOR_BATCH
 from nearfar.plan import choose_plan, paper_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -64,3 +68,24 @@ def test_every_item_is_worked_at_once(threads):
     done = []
     parallel.side_by_side(done.append, range(100))
     assert sorted(done) == list(range(100))
+
+
+@pytest.mark.usefixtures("threads")
+def test_an_accelerator_gets_larger_batches_from_one_thread():
+    def batches_of(values):
+        found, workers = [], set()
+
+        def work(batch):
+            found.append((batch.start, batch.stop))
+            workers.add(threading.get_ident())
+
+        parallel.in_batches(work, 100, 3, values)
+        return sorted(found), workers
+
+    on_processor, _ = batches_of(np.zeros(1))
+    assert on_processor == [(n, min(n + 3, 100)) for n in range(0, 100, 3)]
+    # All that is asked of an array is where it lies.
+    on_accelerator, workers = batches_of(SimpleNamespace(device="cuda:0"))
+    length = 3 * ACCELERATOR_BATCH
+    assert on_accelerator == [(n, min(n + length, 100)) for n in range(0, 100, length)]
+    assert workers == {threading.get_ident()}

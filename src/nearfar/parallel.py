@@ -1,4 +1,4 @@
-"""Threads for NumPy's work: it releases the interpreter lock while it computes."""
+"""Threads for NumPy's work, which releases the interpreter lock; an accelerator's needs one."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
-from nearfar.arrays import processors
+from nearfar.arrays import blocks, processors
+from nearfar.devices import batch_length, is_on_accelerator
 
 Item = TypeVar("Item")
 Fetched = TypeVar("Fetched")
@@ -40,6 +41,36 @@ def side_by_side(work: Callable[[Item], None], items: Iterable[Item]) -> None:
             # Reading the results raises the errors of the threads.
             for _ in pool.map(work, everything):
                 pass
+
+
+def one_by_one(work: Callable[[Item], None], items: Iterable[Item]) -> None:
+    """Call `work` with every item, in this thread."""
+    for item in items:
+        work(item)
+
+
+def on_device_of(values: Any) -> Callable[[Callable[[Item], None], Iterable[Item]], None]:
+    """Return the function that shares out work on arrays of the device of `values`.
+
+    It is `side_by_side` on the processor, and `one_by_one` on an accelerator: its calls hold the
+    interpreter lock.
+    """
+    return one_by_one if is_on_accelerator(values) else side_by_side
+
+
+def in_batches(work: Callable[[slice], None], count: int, length: int, values: Any) -> None:
+    """Call `work` with slices of ``range(count)`` that suit the device of `values`.
+
+    Parameters
+    ----------
+    work : callable
+        No two slices may write the same data.
+    count : int
+    length : int
+        How many items the processor takes at once.
+    values : array
+    """
+    on_device_of(values)(work, blocks(count, batch_length(length, values)))
 
 
 def single_threaded_products() -> AbstractContextManager[Any]:

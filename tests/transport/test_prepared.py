@@ -10,10 +10,10 @@ from nearfar.devices import mover
 from nearfar.errors import InputError
 from nearfar.transport.half import in_half
 from nearfar.transport.prepared import prepare_transport
-from tests.absent import NEEDS_PYTORCH
+from tests.absent import PYTORCH_DEVICES
 from tests.transport.test_operators import CAMERA, PROJECTOR, _transport
 
-DEVICES = ["cpu", pytest.param("torch", marks=NEEDS_PYTORCH)]
+DEVICES = ["cpu", *PYTORCH_DEVICES]
 
 
 @pytest.fixture

@@ -21,7 +21,6 @@ from nearfar.arrays import (
     Floats,
     Size,
     beside,
-    blocks,
     fetch,
     namespace,
     product,
@@ -30,7 +29,7 @@ from nearfar.devices import Device, mover
 from nearfar.estimate.matrices import Matrices, build_matrices
 from nearfar.estimate.sparse import least_risk, solve
 from nearfar.illumination.centred_basis import FOOTPRINT_OFFSETS, CentredBasis
-from nearfar.parallel import side_by_side
+from nearfar.parallel import in_batches
 from nearfar.photometry.measurements import Measurements
 from nearfar.transport import near
 from nearfar.transport.direct import Footprint, footprint, look_up_each
@@ -125,7 +124,7 @@ def estimate(
         if progress is not None:
             progress(done[0])
 
-    side_by_side(work, blocks(number, max(1, BATCH_WINDOWS // channels)))
+    in_batches(work, number, max(1, BATCH_WINDOWS // channels), there.near_inverse)
     shape = (*measurements.camera, channels)
     return Transport(
         projector=measurements.projector,

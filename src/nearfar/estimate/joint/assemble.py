@@ -6,7 +6,7 @@ Index convention: arrays are (C, channels, ...); w runs over window entries.
 import numpy as np
 from array_api_compat import device
 
-from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace
+from nearfar.arrays import Floats, Integers, Size, beside, fetch, namespace
 from nearfar.estimate.joint.batch import dc_index
 from nearfar.estimate.joint.positive import make_positive
 from nearfar.estimate.joint.problem import EstimatedRows, Problem
@@ -16,7 +16,7 @@ from nearfar.estimate.joint.spikes import around_q
 from nearfar.illumination.centred_basis import centred_basis
 from nearfar.illumination.frequencies import DC, far_frequencies, is_on_grid
 from nearfar.illumination.real_basis import real_basis
-from nearfar.parallel import side_by_side
+from nearfar.parallel import in_batches
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS, UNLIT_COMPONENTS
 from nearfar.transport.boxes import share_of_boxes
@@ -132,7 +132,7 @@ def _far_range(rest: Floats, far: Floats, kept: Integers) -> Floats:
         found[batch, :, 0] = rest[batch]
         found[batch, :, 1:] = xp.take(far[batch], here, axis=2)
 
-    side_by_side(work, blocks(len(far), BATCH_PIXELS))
+    in_batches(work, len(far), BATCH_PIXELS, far)
     return found
 
 

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, namespace
-from nearfar.parallel import side_by_side
+from nearfar.arrays import Booleans, Floats, Integers, beside, namespace
+from nearfar.parallel import in_batches
 
 # Standard deviation, as a share of white, below which noise counts as this much.
 DEVIATION_FLOOR = 1e-6
@@ -77,7 +77,7 @@ def expect_each(
         gains = xp.mean(gain, axis=-1), xp.mean(gain**2, axis=-1)
         noise_left[rows] = _noise_left(weight[..., 0], total[..., 0], rows, len(values), gains)
 
-    side_by_side(work, _row_blocks(values))
+    in_batches(work, len(values), _rows_at_once(values), values)
     return found, noise_left
 
 
@@ -114,13 +114,13 @@ def expect_together(values: Floats, white: Floats, variance: Floats, lit: Boolea
         expected = (mean + gain * (some[1:-1, 1:-1] - mean)) * white[rows, ..., None]
         found[rows] = xp.where(lit[rows, :, None, None], expected, 0.0)
 
-    side_by_side(work, _row_blocks(values))
+    in_batches(work, len(values), _rows_at_once(values), values)
     return found
 
 
-def _row_blocks(values: Floats) -> list[slice]:
+def _rows_at_once(values: Floats) -> int:
     row = math.prod(values.shape[1:]) * 4
-    return list(blocks(len(values), BYTES_AT_ONCE // max(1, row)))
+    return max(1, BYTES_AT_ONCE // max(1, row))
 
 
 def _with_neighbours(values: Floats, rows: slice) -> Floats:

@@ -12,10 +12,10 @@ Index convention: arrays are (Cy, Cx, k), k over prior components and scales.
 import numpy as np
 from array_api_compat import device
 
-from nearfar.arrays import Floats, Integers, Size, beside, blocks, namespace
+from nearfar.arrays import Floats, Integers, Size, beside, namespace
 from nearfar.estimate.joint.evidence import PriorSet
 from nearfar.estimate.joint.problem import ComponentChoice, Model
-from nearfar.parallel import side_by_side
+from nearfar.parallel import in_batches
 from nearfar.priors.fitted import PRIOR_SCALES
 
 # Camera pixels on each side that have a say: fewer than the rows beside a tile.
@@ -94,7 +94,7 @@ def _most_probable(own: Floats) -> Integers:
         pooled = around**POWER
         found[rows] = xp.argmax(own[rows] * pooled, axis=2)
 
-    side_by_side(work, blocks(len(own), ROWS_AT_ONCE))
+    in_batches(work, len(own), ROWS_AT_ONCE, own)
     return found.reshape(-1)
 
 

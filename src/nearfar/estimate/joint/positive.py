@@ -16,11 +16,11 @@ Index convention: arrays are (n, channels, ...); r runs over real responses, w o
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, beside, blocks, fetch, namespace, product
+from nearfar.arrays import Booleans, Floats, Integers, beside, fetch, namespace, product
 from nearfar.estimate.joint.problem import ComponentChoice, Problem
 from nearfar.estimate.joint.spikes import away_from_q
 from nearfar.illumination.centred_basis import CentredBasis
-from nearfar.parallel import side_by_side
+from nearfar.parallel import in_batches
 from nearfar.transport import near
 
 # Camera pixels of a batch.
@@ -87,7 +87,7 @@ def make_positive(
             far[batch] -= centred.uncentre(change, centres)
         raised[batch] = raise_to(values, least(far[batch], centres), mine)
 
-    side_by_side(work, blocks(len(windows), BATCH_PIXELS))
+    in_batches(work, len(windows), BATCH_PIXELS, windows)
     return raised, far
 
 

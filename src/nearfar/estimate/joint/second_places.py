@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace, product
+from nearfar.devices import batch_length
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem
@@ -85,7 +86,7 @@ def find_second_places(problem: Problem, rows: EstimatedRows) -> SecondPlaces:
     channels = problem.measurements.channels
     found = [
         _of_some(problem, rows, pixels[some], places[some])
-        for some in blocks(len(pixels), BATCH_PIXELS)
+        for some in blocks(len(pixels), batch_length(BATCH_PIXELS, rows.far))
     ]
     if not found:
         return SecondPlaces(pixels, np.empty((0, 2)), np.empty((0, channels), np.float32))

@@ -14,6 +14,7 @@ from array_api_compat import device
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, beside, blocks, fetch, namespace, product
+from nearfar.devices import batch_length
 from nearfar.estimate.joint.add_rows import add_rows
 from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.choose import choose
@@ -42,7 +43,7 @@ from nearfar.estimate.joint.spikes import (
     with_spike,
 )
 from nearfar.illumination.centred_basis import CentredBasis
-from nearfar.parallel import side_by_side
+from nearfar.parallel import on_device_of
 from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.priors.responses import ResponsePrior
 from nearfar.transport import near
@@ -84,6 +85,7 @@ def sweep_once(
         problem.model.priors,
     )
     done, parts = [0], list(_parts(problem))
+    share_out = on_device_of(problem.pixels.responses)
     count = sum(len(selected) for selected, _ in parts)
 
     def work(some: tuple[NDArray[np.int64], bool]) -> None:
@@ -92,7 +94,7 @@ def sweep_once(
         done[0] += len(some[0])
         report(done[0] / count)
 
-    side_by_side(work, parts)
+    share_out(work, parts)
     if before is None:
         of_error_bars = rows.choices.sweeps[-1]
         if pools:
@@ -127,7 +129,7 @@ def _calibrated(
                 of_some, prior, scale[alike], weights, problem.near_basis
             )
 
-    side_by_side(work, parts)
+    on_device_of(pixels.white)(work, parts)
     return calibrated(choice, errors, problem.measurements.camera)
 
 
@@ -222,12 +224,13 @@ def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
     """
     pixels, near_basis = problem.pixels, problem.near_basis
     projector = problem.measurements.projector
+    length = batch_length(BATCH_PIXELS, pixels.responses)
     clipped = fetch(pixels.lit & is_clipped(pixels.centres, near_basis, projector))
     (selected,) = np.nonzero(clipped)
     places = fetch(pixels.centres)[selected]
     ordered = selected[np.lexsort(places.T[::-1])]
     for some, clips in ((np.flatnonzero(~clipped), False), (ordered, True)):
-        for batch in blocks(len(some), BATCH_PIXELS):
+        for batch in blocks(len(some), length):
             yield some[batch], clips
 
 

@@ -21,6 +21,7 @@ from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
 from nearfar.estimate.joint.quantisation import subtract_quantisation
+from nearfar.estimate.joint.remainder import REMAINDER_ROWS, with_remainder
 from nearfar.estimate.joint.second_places import (
     SecondPlaces,
     find_second_places,
@@ -41,8 +42,9 @@ SWEEPS = 3
 # At a pitch over 1 each sweep but the last is two, of half of the camera pixels each.
 HALF_SWEEPS = 2 * SWEEPS - 1
 # Camera rows on either side of a row that its estimate depends on at a pitch over 1: neighbours in
-# sweeps, and those that vote for footprints before the first sweep and after the second.
-ROWS_BESIDE = HALF_SWEEPS - 2 + 2 * VOTING_ROWS
+# sweeps and after them, and those that vote for footprints before the first sweep and after the
+# second.
+ROWS_BESIDE = HALF_SWEEPS - 2 + 2 * VOTING_ROWS + REMAINDER_ROWS
 
 
 def estimate_jointly(
@@ -101,8 +103,10 @@ def estimate_jointly(
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     rows = rows or slice(0, measurements.camera.height)
-    problem, found, second = _sweep(problem, rows, sweeps, chosen, report)
-    return assemble(problem, found, far, second)
+    problem, swept, second, held = _sweep(problem, rows, sweeps, chosen, report)
+    problem, found = _of_rows(problem, with_remainder(problem, swept), held, rows)
+    assert found is not None
+    return assemble(problem, found, far, second and second.within(_pixels(problem, rows)))
 
 
 def choose_components(
@@ -126,7 +130,7 @@ def choose_components(
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     every = slice(0, measurements.camera.height)
-    _, found, _ = _sweep(problem, every, SWEEPS, NO_CHOICES, report)
+    _, found, _, _ = _sweep(problem, every, SWEEPS, NO_CHOICES, report)
     return found.choices
 
 
@@ -154,8 +158,12 @@ def _sweep(
     sweeps: int,
     chosen: Choices,
     progress: Callable[[float], None],
-) -> tuple[Problem, EstimatedRows, SecondPlaces | None]:
-    """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each."""
+) -> tuple[Problem, EstimatedRows, SecondPlaces | None, slice]:
+    """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each.
+
+    The last of what is returned is the camera rows that are held: the wanted ones, and those that
+    what neighbours have in common is read from.
+    """
     found, held = None, slice(0, problem.measurements.camera.height)
     second: SecondPlaces | None = None
     halves = problem.near_basis.pitch > 1
@@ -199,9 +207,7 @@ def _sweep(
         first = found.choices.sweeps[0]
         bars = every_choice(first, pixels.is_even, pixels.lit, camera)
         found = found._replace(choices=found.choices._replace(of_error_bars=bars))
-    problem, found = _of_rows(problem, found, held, wanted)
-    assert found is not None
-    return problem, found, second and second.within(_pixels(problem, wanted))
+    return problem, found, second, held
 
 
 def _with_second_places(
@@ -262,6 +268,7 @@ def _rows_around(problem: Problem, held: slice, wanted: slice, number: int, swee
     if problem.near_basis.pitch == 1 or held == wanted:
         return held
     beside = sweeps - 2 + VOTING_ROWS if number < 2 else sweeps - number
+    beside += REMAINDER_ROWS
     return slice(max(held.start, wanted.start - beside), min(held.stop, wanted.stop + beside))
 
 

@@ -13,6 +13,7 @@ from nearfar.estimate.joint.estimate import (
     estimate_jointly,
 )
 from nearfar.estimate.joint.problem import Choices
+from nearfar.estimate.joint.remainder import REMAINDER_ROWS
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measured_frequencies
 from nearfar.photometry.measurements import Measurements
@@ -43,8 +44,11 @@ class JointEstimator(Estimator):
 
     @property
     def halo(self) -> int:
-        """Each sweep but the first reads the neighbours; second places, theirs; the first, q."""
-        return SWEEPS + 1
+        """Each sweep but the first reads the neighbours; second places, theirs; the first, q.
+
+        What neighbours have in common after the sweeps reads some more.
+        """
+        return SWEEPS + 1 + REMAINDER_ROWS
 
     def rows_beside(self, plan: Plan) -> int:
         """Return the halo; at a pitch of several pixels, neighbours also vote for footprints."""

@@ -79,7 +79,7 @@ def sweep_once(
     sweep = _Sweep(
         problem,
         rows,
-        _of_quantisation(problem),
+        of_quantisation(problem),
         chosen,
         probability,
         problem.model.priors,
@@ -234,7 +234,7 @@ def _parts(problem: Problem) -> Iterator[tuple[NDArray[np.int64], bool]]:
             yield some[batch], clips
 
 
-def _of_quantisation(problem: Problem) -> Callable[[NDArray[np.int64]], Floats]:
+def of_quantisation(problem: Problem) -> Callable[[slice | NDArray[np.int64]], Floats]:
     """Return a function that gives responses (n, R) of unit direct light to quantisation errors."""
     errors = problem.quantisation_error
     if not len(errors):

@@ -1,0 +1,192 @@
+"""What neighbours' photos have in common beyond their estimates."""
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.estimate.joint import estimate as module
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint.problem import lay_out
+from nearfar.estimate.joint.remainder import with_remainder
+from nearfar.estimate.joint.sweep import _empty_rows
+from nearfar.illumination.frequencies import DC, far_frequencies, representatives
+from nearfar.illumination.near_basis import NearBasis
+from nearfar.illumination.real_basis import real_basis
+from nearfar.photometry.measurements import Measurements
+from nearfar.transport.boxes import box_axes
+from nearfar.transport.direct import footprint
+
+CAMERA = Size(12, 14)
+# W, pitch, projector and q's step: functions of single projector pixels, and of several.
+FINE, COARSE = (5, 1, Size(24, 26), 1.0), (5, 4, Size(70, 90), 3.0)
+FAR = Size(5, 5)
+NOISE = 4e-3
+# A ring about q, beyond the window of single pixels, that no prior component has.
+RING_RADIUS, RING_WIDTH, RING_LIGHT = 6.0, 0.7, 0.15
+
+
+def frequencies_of(projector):
+    band = far_frequencies(Size(9, 9), projector)
+    return [k for k in representatives(band) if k != DC]
+
+
+def places(step):
+    y, x = np.indices(CAMERA)
+    return np.stack([6 + step * y, 6 + step * x], axis=-1).astype(float)
+
+
+def albedo():
+    """Return how bright camera pixels are, (C,): from a fifth to all."""
+    return np.random.default_rng(4).uniform(0.2, 1.0, CAMERA.pixels)
+
+
+def rows_of(case, ring=RING_LIGHT):
+    """Return rows, (C, P): light from q, and a ring about it."""
+    _, pitch, projector, step = case
+    q = places(step)
+    rows = np.zeros((CAMERA.pixels, *projector))
+    if pitch == 1:
+        where = footprint(q.reshape(-1, 2), projector)
+        np.put_along_axis(rows.reshape(CAMERA.pixels, -1), where.pixels, where.weights, axis=1)
+    else:
+        axes = box_axes(q, np.tile([step, step, 0, 0], (CAMERA.pixels, 1)), projector)
+        for c in range(CAMERA.pixels):
+            sides, shares = axes.shares(c)
+            rows[c][sides] = shares
+    y, x = np.indices(projector)
+    for c, (down, across) in enumerate(q.reshape(-1, 2)):
+        distance = np.hypot(y - down, x - across) / step
+        light = np.exp(-0.5 * ((distance - RING_RADIUS) / RING_WIDTH) ** 2)
+        rows[c] = 0.5 * rows[c] + ring * light / light.sum()
+    return albedo()[:, None] * rows.reshape(CAMERA.pixels, -1)
+
+
+def measured(case, rows, noise=NOISE, channels=1, offset=0.0):
+    """Measure rows; `offset` is the deviation of the references' error."""
+    projector = case[2]
+    basis = real_basis([DC, *frequencies_of(projector)], projector)
+    exact = np.repeat((rows @ basis.patterns.T)[:, None], channels, axis=1)
+    generator = np.random.default_rng(0)
+    responses = exact + noise * generator.normal(size=exact.shape)
+    responses[..., 1:] += offset * generator.normal(size=(*exact.shape[:2], 1))
+    level = np.full(exact.shape[:2], noise, dtype=np.float32)
+    return Measurements(
+        camera=CAMERA,
+        basis=basis,
+        responses=responses.astype(np.float32),
+        noise=level,
+        black=np.zeros_like(level),
+        quantisation_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
+        white_noise=np.full_like(level, offset),
+    )
+
+
+def estimated(case, rows, q=None, **options):
+    window, pitch, _, step = case
+    q = (places(step) if q is None else q).astype(np.float32)
+    return estimate_jointly(measured(case, rows, **options), q, window, FAR, pitch=pitch)
+
+
+@pytest.fixture
+def without(monkeypatch):
+    """Return a function that estimates without the remainder."""
+
+    def estimate(*given, **options):
+        with monkeypatch.context() as patched:
+            patched.setattr(module, "with_remainder", lambda _problem, rows: rows)
+            return estimated(*given, **options)
+
+    return estimate
+
+
+def errors(case, found, rows, frequencies):
+    """Return errors of responses to frequencies, (C, R)."""
+    basis = real_basis(frequencies, case[2])
+    lights = basis.patterns.reshape(-1, *case[2])
+    mine = found.pictures(lights).reshape(len(lights), -1).T
+    return mine - rows @ basis.patterns.T
+
+
+@pytest.mark.parametrize("case", [FINE, COARSE])
+def test_what_neighbours_share_is_found_in_their_photos(case, without):
+    rows = rows_of(case)
+    measured_too = frequencies_of(case[2])
+    before, after = (
+        errors(case, one(case, rows), rows, measured_too) for one in (without, estimated)
+    )
+    inner = np.zeros(CAMERA, dtype=bool)
+    inner[3:-3, 3:-3] = True
+    power = [np.mean(each[inner.ravel()] ** 2) for each in (before, after)]
+    assert power[1] < 0.75 * power[0]
+
+
+@pytest.mark.parametrize("case", [FINE, COARSE])
+def test_no_other_response_changes(case, without):
+    rows, known = rows_of(case), set(far_frequencies(Size(9, 9), case[2]))
+    others = [k for k in representatives(far_frequencies(Size(15, 15), case[2])) if k not in known]
+    before, after = (errors(case, one(case, rows), rows, others) for one in (without, estimated))
+    np.testing.assert_allclose(after, before, atol=1e-5)
+    assert len(others) > 50
+
+
+@pytest.mark.parametrize(("channels", "offset"), [(1, 0.0), (3, 0.0), (1, 0.1)])
+def test_noise_alone_is_left_alone(channels, offset, without):
+    rows = rows_of(FINE, ring=0.0)
+    options = {"channels": channels, "noise": 1e-2, "offset": offset}
+    before, after = (one(FINE, rows, **options) for one in (without, estimated))
+    added = (after.far - before.far)[..., 1:]
+    # Averages of 25 camera pixels have a 25th of the variance, and most of that is not taken.
+    assert np.mean(added**2) < 0.3 * 1e-4 / 25
+    # What is added to a share of the responses is a matter of chance.
+    assert (added != 0).any()
+
+
+def test_camera_pixels_without_q_stay_as_they_are(without):
+    rows, q = rows_of(FINE), places(FINE[3])
+    dark = np.zeros(CAMERA, dtype=bool)
+    dark[4:7, 5:9] = True
+    q[dark] = np.nan
+    # Their light is nothing like that of the rest.
+    rows[dark.ravel()] = np.random.default_rng(2).uniform(0, 2e-2, (dark.sum(), rows.shape[1]))
+    before, after = (one(FINE, rows, q=q) for one in (without, estimated))
+    np.testing.assert_array_equal(after.far[dark], before.far[dark])
+
+
+def test_others_residuals_say_nothing_of_camera_pixels_with_q():
+    rows, q = rows_of(FINE), places(FINE[3])
+    dark = np.zeros(CAMERA, dtype=bool)
+    dark[4:7, 5:9] = True
+    q[dark] = np.nan
+    found = []
+    for factor in (1.0, 7.0):
+        seen = np.where(dark.ravel()[:, None], factor, 1.0) * rows
+        problem = lay_out(measured(FINE, seen, noise=1e-5), q, NearBasis(FINE[0], 1), "cpu")
+        nothing = _empty_rows(problem)
+        found.append(with_remainder(problem, nothing).far.reshape(*CAMERA, -1))
+    assert not found[0][dark].any()
+    assert found[0][~dark].any()
+    np.testing.assert_array_equal(found[0][~dark], found[1][~dark])
+
+
+def test_dark_camera_pixels_count_by_their_noise():
+    rows = rows_of(FINE)
+    dark = np.zeros(CAMERA, dtype=bool)
+    dark[::2, ::2] = True
+    rows[dark.ravel()] *= 1e-3 / rows[dark.ravel()].sum(axis=1, keepdims=True)
+    found = estimated(FINE, rows)
+    inner = np.zeros(CAMERA, dtype=bool)
+    inner[3:-3, 3:-3] = True
+    off = errors(FINE, found, rows, frequencies_of(FINE[2]))
+    bright, faint = (np.mean(off[(inner & one).ravel()] ** 2) for one in (~dark, dark))
+    assert faint < bright
+    assert bright < NOISE**2
+
+
+def test_some_rows_are_estimated_as_among_all():
+    for case in (FINE, COARSE):
+        rows, q = rows_of(case), places(case[3]).astype(np.float32)
+        given = measured(case, rows), q, case[0], FAR
+        whole, some = (
+            estimate_jointly(*given, pitch=case[1], rows=each) for each in (None, slice(5, 7))
+        )
+        np.testing.assert_allclose(some.far, whole.far[5:7], atol=2e-6)

@@ -41,12 +41,10 @@ PROJECTOR = Size(12, 16)
 WINDOW = 5
 COMPONENT = PriorComponent(1.5, 8.0, 2.0)
 NOISE, OFFSET, LIGHT, SHARE = 2e-3, 1e-3, 1.5e-3, 0.4
-# NOISE is what neighbours leave of that of the photos.
-NOISE_SHARE = 0.6
 SCALE, WHITE = 0.05, 0.8
 
 
-def _transport(centres, lit=True):
+def _transport(centres, lit=True, noise=NOISE, noise_share=1.0):
     """Build a transport of one prior component, all factors 0: error bars do not depend on them."""
     low = [k for k in far_frequencies(Size(3, 3), PROJECTOR) if k != DC]
     frequencies = [DC, *(k for i, k in enumerate(low) if -k not in low[:i])]
@@ -63,7 +61,7 @@ def _transport(centres, lit=True):
         far=np.zeros((*shape, basis.count), np.float32),
         far_basis=basis,
         black=np.zeros(shape, np.float32),
-        noise=np.full(shape, NOISE / NOISE_SHARE**0.5, np.float32),
+        noise=np.full(shape, noise, np.float32),
         posterior=Posterior(
             prior_components=(PriorComponent(0.0, 1.0, 1.0), COMPONENT),
             frequencies=measured,
@@ -74,7 +72,7 @@ def _transport(centres, lit=True):
             offset_noise=np.full(shape, OFFSET, np.float32),
             light_noise=np.full(shape, LIGHT, np.float32),
             share_of_white=np.full(shape, SHARE, np.float32),
-            noise_share=np.full(shape, NOISE_SHARE, np.float32),
+            noise_share=np.full(shape, noise_share, np.float32),
         ),
     )
 
@@ -139,6 +137,25 @@ def test_a_picture_is_as_uncertain_as_dense_algebra_says():
     found = ErrorBars(transport).picture(light)
     expected = [_dense(transport, c, _weights(transport, c, light)) for c in range(len(centres))]
     np.testing.assert_allclose(found[0], expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("place", [(6, 8), (1, 14)])
+def test_noise_that_neighbours_take_off_is_left_out_of_near_and_far_alone(place):
+    def bars_of(noise, share):
+        return ErrorBars(_transport(np.array([place]), noise=noise, noise_share=share))
+
+    light = _held_light(_transport(np.array([place])))
+    noise, share = 20 * NOISE, 0.5
+    of_all = noise, 1.0
+    of_less = noise, share
+    of_little = noise * share**0.5, 1.0
+    # Direct light is told by the camera pixel's own photos.
+    np.testing.assert_array_equal(bars_of(*of_less).direct(), bars_of(*of_all).direct())
+    most, left, least = (
+        bars_of(*each).picture(light)[0, 0] for each in (of_all, of_less, of_little)
+    )
+    # Direct light's own uncertainty is all that less noise would lower further.
+    assert least < left < most - 0.9 * (most - least)
 
 
 def _held_light(transport):

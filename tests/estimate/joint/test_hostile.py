@@ -6,7 +6,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.error_bars import ErrorBars
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate, estimate_jointly
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
@@ -103,7 +103,7 @@ def test_errors_of_lamps_with_an_edge_are_about_as_large_as_their_bars():
     assert 0.6 < np.mean(np.square(errors)) / np.mean(np.square(expected)) < 1.8
 
 
-def test_bars_leave_out_noise_that_neighbours_take_off_where_there_is_no_direct_light():
+def test_bars_leave_out_noise_that_neighbours_take_off_where_there_is_no_direct_light(monkeypatch):
     projector = Size(15, 15)
     truth, plan, measurements = shot("lamps", 158, 1 / 100, projector)
     nowhere = np.full((*CAMERA, 2), np.nan, dtype=np.float32)
@@ -122,4 +122,12 @@ def test_bars_leave_out_noise_that_neighbours_take_off_where_there_is_no_direct_
     q = correspond_by_phase(measurements, pitch=plan.pitch).q
     found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     assert found.lit.any()
+    # What their residuals have in common is little there, and is all that is left out.
+    shares = found.posterior.noise_share[found.lit]
+    assert 0.5 <= shares.min() <= shares.max() <= 1.0
+    assert shares.mean() > 0.9
+    monkeypatch.setattr(
+        estimate, "with_remainder", lambda problem, rows: (rows, np.ones_like(problem.pixels.white))
+    )
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
     assert np.all(found.posterior.noise_share[found.lit] == 1.0)

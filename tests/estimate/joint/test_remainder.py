@@ -87,13 +87,17 @@ def estimated(case, rows, q=None, **options):
     return estimate_jointly(measured(case, rows, **options), q, window, FAR, pitch=pitch)
 
 
+def untouched(problem, rows):
+    return rows, np.ones_like(problem.pixels.white)
+
+
 @pytest.fixture
 def without(monkeypatch):
     """Return a function that estimates without the remainder."""
 
     def estimate(*given, **options):
         with monkeypatch.context() as patched:
-            patched.setattr(module, "with_remainder", lambda _problem, rows: rows)
+            patched.setattr(module, "with_remainder", untouched)
             return estimated(*given, **options)
 
     return estimate
@@ -162,7 +166,10 @@ def test_others_residuals_say_nothing_of_camera_pixels_with_q():
         seen = np.where(dark.ravel()[:, None], factor, 1.0) * rows
         problem = lay_out(measured(FINE, seen, noise=1e-5), q, NearBasis(FINE[0], 1), "cpu")
         nothing = _empty_rows(problem)
-        found.append(with_remainder(problem, nothing).far.reshape(*CAMERA, -1))
+        choice = nothing.choices.sweeps[0]
+        nothing = nothing._replace(choices=nothing.choices._replace(of_error_bars=choice))
+        rows_found, _ = with_remainder(problem, nothing)
+        found.append(rows_found.far.reshape(*CAMERA, -1))
     assert not found[0][dark].any()
     assert found[0][~dark].any()
     np.testing.assert_array_equal(found[0][~dark], found[1][~dark])
@@ -190,3 +197,13 @@ def test_some_rows_are_estimated_as_among_all():
             estimate_jointly(*given, pitch=case[1], rows=each) for each in (None, slice(5, 7))
         )
         np.testing.assert_allclose(some.far, whole.far[5:7], atol=2e-6)
+
+
+@pytest.mark.parametrize("case", [FINE, COARSE])
+def test_error_bars_leave_out_what_neighbours_explain(case, without):
+    rows = rows_of(case)
+    found, plain = estimated(case, rows), estimated(case, rows_of(case, ring=0.0))
+    with_ring, alone = (np.mean(each.posterior.noise_share) for each in (found, plain))
+    assert with_ring < 0.9 < alone
+    assert np.all(without(case, rows).posterior.noise_share == 1.0)
+    assert found.posterior.noise_share.min() >= 0.5

@@ -32,9 +32,16 @@ LEFT_OUT_SHARE = 0.5
 
 
 def assemble(
-    problem: Problem, rows: EstimatedRows, far: Size, second: SecondPlaces | None = None
+    problem: Problem,
+    rows: EstimatedRows,
+    far: Size,
+    unexplained: Floats,
+    second: SecondPlaces | None = None,
 ) -> Transport:
     """Return the transport, which at a pitch over 1 takes over the arrays of the rows.
+
+    `unexplained` (C, channels) is the share of the posterior's variance that is left when
+    neighbours' residuals have been explained.
 
     f is kept at the measured frequencies of the far band, and at those others that lie on the DFT
     grid of the projector: there light is held that no window holds. Its DC is white less d and n.
@@ -104,7 +111,9 @@ def assemble(
             offset_noise=fetch(pixels.offset_noise).reshape(shape),
             light_noise=measurements.light_noise.reshape(shape),
             share_of_white=share_of_white.reshape(shape),
-            noise_share=fetch(1.0 - LEFT_OUT_SHARE * (1.0 - rows.noise_left)).reshape(shape),
+            noise_share=fetch(
+                unexplained * (1.0 - LEFT_OUT_SHARE * (1.0 - rows.noise_left))
+            ).reshape(shape),
         ),
     )
 

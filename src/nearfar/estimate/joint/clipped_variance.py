@@ -9,6 +9,8 @@ g over o, d and shifts of q; m over pairs of a camera pixel and a channel, k ove
 one camera pixel.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
@@ -50,15 +52,54 @@ def clipped_variance(
     each = far.shape[1]
     truncated = np.broadcast_to(functionals.truncated, count).reshape(pixels, each)
     amplitudes = state.amplitude_responses.transpose(0, 2, 1).astype(np.float64)
+    asked = near, far, truncated, amplitudes
+
+    def solve(variance: Floats) -> _Solved:
+        ratios = rounded_ratio(state.scale.astype(np.float64) ** 2 / variance)
+        return _solved(prior, ratios, asked, inside, centred, multiplicity)
+
+    variance, variance_left = (
+        noise.astype(np.float64) ** 2 for noise in (state.noise, state.noise_left)
+    )
+    # Own photos tell o, d and q; what follows for n and f, neighbours' as well.
+    by_own = by_all = solve(variance)
+    if np.any(variance_left != variance):
+        by_all = solve(variance_left)
+    given = by_all.given * variance_left[..., None]
+    return add_amplitudes(
+        given.transpose(0, 2, 1).reshape(count, channels),
+        by_own.told / variance[..., None, None],
+        by_all.through_rows.transpose(0, 2, 1, 3).reshape(count, channels, amplitudes.shape[1]),
+        state,
+        functionals,
+    )
+
+
+class _Solved(NamedTuple):
+    """Variances at unit noise, and what they depend on; see `add_amplitudes`."""
+
+    given: Floats  # (pixels, channels, k)
+    told: Floats  # (pixels, channels, G, G)
+    through_rows: Floats  # (pixels, channels, k, G)
+
+
+def _solved(
+    prior: ResponsePrior,
+    ratios: Floats,
+    asked: tuple[Floats, Floats, Floats, Floats],
+    inside: Booleans,
+    centred: CentredBasis,
+    multiplicity: Floats,
+) -> _Solved:
+    """Solve the windows of camera pixels at variance ratios (pixels, channels)."""
+    near, far, truncated, amplitudes = asked
     deviation = prior.factors.deviation
     patterns = centred.on_window.astype(np.float64) * deviation
-    noise_variance = state.noise.astype(np.float64) ** 2
-    ratios = rounded_ratio(state.scale.astype(np.float64) ** 2 / noise_variance)
     clippings = clippings_of(inside)
-    number = amplitudes.shape[1]
-    given = np.empty((pixels, channels, each))
-    normal = np.empty((pixels, channels, number, number))
-    through_rows = np.empty((pixels, channels, each, number))
+    each, number = far.shape[1], amplitudes.shape[1]
+    given = np.empty((*ratios.shape, each))
+    all_told = np.empty((*ratios.shape, number, number))
+    through_rows = np.empty((*ratios.shape, each, number))
     for ratio in np.unique(ratios):
         of, channel = np.nonzero(ratios == ratio)
         weight = 1.0 / (ratio * prior.far_variance + 1.0 / multiplicity)
@@ -69,17 +110,9 @@ def clipped_variance(
         solved = solve_windows(right, clippings, of, prior, float(ratio), weight, centred)
         of_u, of_amplitudes = solved[:, :each], solved[:, each:]
         before = far**2 @ (gain / multiplicity) + ratio * truncated
-        found = before[of] + np.sum(right[:, :each] * of_u, axis=-1)
+        given[of, channel] = before[of] + np.sum(right[:, :each] * of_u, axis=-1)
         told = (weighted @ amplitudes.transpose(0, 2, 1))[of]
-        told -= right[:, each:] @ of_amplitudes.transpose(0, 2, 1)
-        given[of, channel] = found * noise_variance[of, channel, None]
-        normal[of, channel] = told / noise_variance[of, channel, None, None]
+        all_told[of, channel] = told - right[:, each:] @ of_amplitudes.transpose(0, 2, 1)
         by_amplitudes = (far * gain) @ amplitudes.transpose(0, 2, 1)
         through_rows[of, channel] = by_amplitudes[of] + of_u @ right[:, each:].transpose(0, 2, 1)
-    return add_amplitudes(
-        given.transpose(0, 2, 1).reshape(count, channels),
-        normal,
-        through_rows.transpose(0, 2, 1, 3).reshape(count, channels, number),
-        state,
-        functionals,
-    )
+    return _Solved(given, all_told, through_rows)

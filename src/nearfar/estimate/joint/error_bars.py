@@ -275,7 +275,8 @@ class JointVariances:
         share_of_white = posterior.share_of_white.reshape(-1, channels)[batch]
         light_noise = posterior.light_noise.reshape(-1, channels)[batch]
         noise_share = posterior.noise_share.reshape(-1, channels)[batch]
-        noise = transport.noise.reshape(-1, channels)[batch] * np.sqrt(noise_share)
+        noise = transport.noise.reshape(-1, channels)[batch]
+        floor = noise_floor(transport.near_basis) * white
         precision = nuisance.common_precision(
             white, offset_noise, nuisance.shift_deviation(transport.near_basis)
         )
@@ -285,7 +286,8 @@ class JointVariances:
         return PixelState(
             np.concatenate([ones, direct], axis=1).transpose(0, 2, 1),
             precision,
-            np.maximum(noise, noise_floor(transport.near_basis) * white),
+            np.maximum(noise, floor),
+            np.maximum(noise * np.sqrt(noise_share), floor),
             posterior.prior_scale.ravel()[batch, None] * white,
             np.maximum(light_noise**2 - (share_of_white * offset_noise) ** 2, 0.0),
             share_of_white,

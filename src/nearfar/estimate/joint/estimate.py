@@ -104,9 +104,13 @@ def estimate_jointly(
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     rows = rows or slice(0, measurements.camera.height)
     problem, swept, second, held = _sweep(problem, rows, sweeps, chosen, report)
-    problem, found = _of_rows(problem, with_remainder(problem, swept), held, rows)
+    swept, unexplained = with_remainder(problem, swept)
+    wanted = slice(rows.start - held.start, rows.stop - held.start)
+    unexplained = unexplained[_pixels(problem, wanted)]
+    problem, found = _of_rows(problem, swept, held, rows)
     assert found is not None
-    return assemble(problem, found, far, second and second.within(_pixels(problem, rows)))
+    second = second and second.within(_pixels(problem, rows))
+    return assemble(problem, found, far, unexplained, second)
 
 
 def choose_components(

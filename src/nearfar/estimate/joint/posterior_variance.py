@@ -48,6 +48,7 @@ class PixelState(NamedTuple):
     amplitude_responses: Floats  # (n, R, 4 or 7), to unit o, d and shifts
     precision: Floats  # (n, channels, 4 or 7), of the same before any photo
     noise: Floats  # (n, channels)
+    noise_left: Floats  # by what neighbours have a say in: n and f, given o, d and q
     scale: Floats  # prior scale s in photo units, (n, channels)
     white_variance: Floats  # of white's error given o, (n, channels)
     share_of_white: Floats  # (n, channels)
@@ -64,7 +65,10 @@ def posterior_variance(prior: ResponsePrior, state: PixelState, functionals: Fun
     The state is of one camera pixel for each functional, or of one for all of them.
     """
     squared = (state.scale.astype(np.float64) ** 2)[..., None]
-    weight = 1.0 / (squared * prior.eigenvalues + state.noise.astype(np.float64)[..., None] ** 2)
+    weight, weight_left = (
+        1.0 / (squared * prior.eigenvalues + noise.astype(np.float64)[..., None] ** 2)
+        for noise in (state.noise, state.noise_left)
+    )
     # In double precision: with little noise, variances are small differences of these.
     near, far = functionals.near.astype(np.float64), functionals.far.astype(np.float64)
     covariance = near @ prior.to_near.T + far @ prior.to_far.T
@@ -75,13 +79,15 @@ def posterior_variance(prior: ResponsePrior, state: PixelState, functionals: Fun
         + far**2 @ prior.far_variance
         + functionals.truncated
     )
-    given = squared[..., 0] * (before[:, None] - np.sum(squared * weight * covariance**2, axis=-1))
+    told = np.sum(squared * weight_left * covariance**2, axis=-1)
+    given = squared[..., 0] * (before[:, None] - told)
     per_amplitude = np.matmul(state.amplitude_responses.transpose(0, 2, 1), prior.eigenvectors)[
         :, None
     ]
-    weighted = per_amplitude * weight[:, :, None]
+    # Own photos tell o, d and q; what follows for n and f, neighbours' as well.
+    weighted, weighted_left = (per_amplitude * one[:, :, None] for one in (weight, weight_left))
     normal = np.matmul(weighted, per_amplitude.transpose(0, 1, 3, 2))
-    through_rows = np.matmul(weighted, (squared * covariance)[..., None])[..., 0]
+    through_rows = np.matmul(weighted_left, (squared * covariance)[..., None])[..., 0]
     return add_amplitudes(given, normal, through_rows, state, functionals)
 
 

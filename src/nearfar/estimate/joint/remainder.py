@@ -9,16 +9,19 @@ Index convention: arrays are (C, channels, ...); r runs over real responses, re-
 """
 
 import numpy as np
+from scipy import stats
 
-from nearfar.arrays import Floats, Integers, Size, beside, blocks, namespace, product
+from nearfar.arrays import Floats, Integers, Size, beside, blocks, fetch, namespace, product
 from nearfar.estimate.joint.batch import RELATIVE_NOISE_FLOOR
 from nearfar.estimate.joint.cut import near_responses
 from nearfar.estimate.joint.footprint import unit_responses
 from nearfar.estimate.joint.pooled_choice import sum_of_neighbours
-from nearfar.estimate.joint.problem import EstimatedRows, Problem
+from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Problem
+from nearfar.estimate.joint.solve import response_gain
 from nearfar.estimate.joint.sweep import of_quantisation
 from nearfar.illumination.real_basis import RealBasis
 from nearfar.parallel import in_batches, on_device_of
+from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.transport.direct import direct_weights
 
 # Camera rows on either side, and columns, whose residuals are averaged.
@@ -26,11 +29,13 @@ REMAINDER_ROWS = 2
 # Camera pixels of a batch; and responses that are averaged at once, of which an even number keeps a
 # cosine and its sine together.
 BATCH_PIXELS = 2048
+# Share of the posterior's variance that is left at least: averages have errors, too.
+LEAST_UNEXPLAINED = 0.5
 RESPONSES_AT_ONCE = 16
 
 
-def with_remainder(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
-    """Return rows with what their neighbours' residuals have in common, as far-range light.
+def with_remainder(problem: Problem, rows: EstimatedRows) -> tuple[EstimatedRows, Floats]:
+    """Add what neighbours' residuals have in common to rows, as far-range light.
 
     Camera pixels without direct light have no q about which they are alike, and stay as they are.
 
@@ -40,6 +45,13 @@ def with_remainder(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
         After the last sweep; its responses are overwritten.
     rows : EstimatedRows
         Of the last sweep; their far-range light is overwritten.
+
+    Returns
+    -------
+    rows : EstimatedRows
+    unexplained : array, shape (C, channels), float32
+        Share of the posterior's variance of measured responses that is left: what was found is no
+        error any more.
     """
     pixels, centred = problem.pixels, problem.model.centred
     left = pixels.responses
@@ -64,17 +76,23 @@ def with_remainder(problem: Problem, rows: EstimatedRows) -> EstimatedRows:
         left[batch] = residual
 
     in_batches(subtract, len(left), BATCH_PIXELS, left)
-    _average(problem)
+    by_noise = _average(problem)
 
     def add(batch: slice) -> None:
         rows.far[batch] += centred.uncentre(left[batch], pixels.centres[batch])
 
     in_batches(add, len(left), BATCH_PIXELS, left)
-    return rows
+    return rows, _unexplained(problem, rows.choices.of_error_bars, by_noise)
 
 
-def _average(problem: Problem) -> None:
-    """Replace residuals by those that their neighbours have in common."""
+def _average(problem: Problem) -> Floats:
+    """Replace residuals by those that their neighbours have in common.
+
+    Returns
+    -------
+    array, shape (C, channels)
+        Variance that noise gives a mean of residuals that were measured once.
+    """
     pixels, measurements, left = problem.pixels, problem.measurements, problem.pixels.responses
     xp, camera = namespace(left), measurements.camera
     relative = xp.clip(beside(measurements.noise, left) / pixels.white, min=RELATIVE_NOISE_FLOOR)
@@ -97,6 +115,40 @@ def _average(problem: Problem) -> None:
         left[..., part] = mean * pixels.white[..., None]
 
     on_device_of(left)(work, blocks(left.shape[2], RESPONSES_AT_ONCE))
+    of_mean: Floats = by_total * pixels.white**2
+    return of_mean
+
+
+def _unexplained(problem: Problem, choice: ComponentChoice | None, by_noise: Floats) -> Floats:
+    """Return the share of the posterior's variance that the averages leave, (C, channels)."""
+    pixels, model = problem.pixels, problem.model
+    assert choice is not None
+    by_noise = by_noise * _power_of_noise(problem.measurements.channels)
+    xp = namespace(pixels.white)
+    found: Floats = xp.ones_like(pixels.white)
+    for place in np.unique(fetch(choice.prior_component)).tolist():
+        if place >= len(LIT_COMPONENTS):
+            continue
+        (alike,) = xp.nonzero(choice.prior_component == place)
+        noise = pixels.noise[alike]
+        ratio = (choice.prior_scale[alike, None] * pixels.white[alike] / noise) ** 2
+        variance = noise**2 * response_gain(model.priors[place], ratio)
+        explained = xp.mean(pixels.responses[alike] ** 2 * model.multiplicity, axis=-1)
+        share = xp.clip(explained - by_noise[alike], min=0.0) / variance
+        found[alike] = xp.clip(1.0 - share, min=LEAST_UNEXPLAINED)
+    return found
+
+
+def _power_of_noise(channels: int) -> float:
+    """Return the power that is found in means of noise alone, over that of the means.
+
+    The mean of (1 - 1 / p)^2 p where p > 1, the mean of the squares of 2 x channels normal numbers.
+    """
+    freedom = 2 * channels
+    step = 0.01
+    power = np.arange(1.0 + 0.5 * step, 20.0, step)
+    density = stats.chi2.pdf(freedom * power, freedom) * freedom
+    return float(np.sum((power - 1.0) ** 2 / power * density) * step)
 
 
 def _sums(values: Floats, camera: Size) -> Floats:

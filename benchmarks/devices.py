@@ -53,7 +53,7 @@ def as_the_paper(measurements: Measurements, q: Floats, plan: Plan, device: Devi
 
 
 def timed(work: Callable[[], Transport]) -> tuple[Transport, float]:
-    """Return what was made and the seconds that it took."""
+    """Return the result of a function and its run time in seconds."""
     started = time.perf_counter()
     return work(), time.perf_counter() - started
 

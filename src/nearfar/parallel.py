@@ -1,4 +1,4 @@
-"""Threads for NumPy's work, which releases the interpreter lock; an accelerator's needs one."""
+"""Threads for NumPy, which releases the interpreter lock; one thread for an accelerator."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -50,9 +50,9 @@ def one_by_one(work: Callable[[Item], None], items: Iterable[Item]) -> None:
 
 
 def on_device_of(values: Any) -> Callable[[Callable[[Item], None], Iterable[Item]], None]:
-    """Return the function that shares out work on arrays of the device of `values`.
+    """Return the function that calls `work` with every item, for the device of `values`.
 
-    It is `side_by_side` on the processor, and `one_by_one` on an accelerator: its calls hold the
+    It is `side_by_side` on the processor, and `one_by_one` on an accelerator, whose calls hold the
     interpreter lock.
     """
     return one_by_one if is_on_accelerator(values) else side_by_side

@@ -37,8 +37,9 @@ class Posterior:
     share_of_white : ndarray, shape (Cy, Cx, channels), float32
         Mean share of the references' error that is the error of the response to white.
     noise_share : ndarray, shape (Cy, Cx, channels), float32
-        Variance of noise that error bars count in a measured response, as a share of the variance
-        that the transport's `noise` gives; below 1 where neighbours take noise off.
+        Variance of noise that error bars of near- and far-range light count in a measured response,
+        as a share of the variance that the transport's `noise` gives; below 1 where neighbours'
+        photos lower their errors. Direct light's error bars count all of it.
     """
 
     prior_components: tuple[PriorComponent, ...]

@@ -35,10 +35,12 @@ def centred_on_all(frequencies):
     return replace(plain, response_indices=np.arange(1, basis.count + 1))
 
 
-def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=None, offset=0.0):
+def measured(
+    rows, frequencies, *, noise=1e-4, seed=0, camera=None, offset=0.0, projector=PROJECTOR
+):
     """Measure dense rows (C, channels, P) with DC first; `offset` is the references' deviation."""
     generator = np.random.default_rng(seed)
-    basis = real_basis([DC, *frequencies], PROJECTOR)
+    basis = real_basis([DC, *frequencies], projector)
     count, channels = rows.shape[:2]
     responses = rows @ basis.patterns.T.astype(np.float64)
     responses = responses + noise * generator.normal(size=responses.shape)
@@ -50,7 +52,7 @@ def measured(rows, frequencies, *, noise=1e-4, seed=0, camera=None, channels=Non
         responses=responses.astype(np.float32),
         noise=level,
         black=np.zeros_like(level),
-        quantisation_error=np.zeros((basis.count, PROJECTOR.pixels), dtype=np.float32),
+        quantisation_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
         white_noise=np.full_like(level, offset),
     )
 

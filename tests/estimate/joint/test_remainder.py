@@ -5,16 +5,16 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate as module
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate_by_sweeps, estimate_jointly
 from nearfar.estimate.joint.problem import lay_out
 from nearfar.estimate.joint.remainder import with_remainder
 from nearfar.estimate.joint.sweep import _empty_rows
 from nearfar.illumination.frequencies import DC, far_frequencies, representatives
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
-from nearfar.photometry.measurements import Measurements
 from nearfar.transport.boxes import box_axes
 from nearfar.transport.direct import footprint
+from tests.estimate.joint.draws import measured
 
 CAMERA = Size(12, 14)
 # W, pitch, projector and q's step: functions of single projector pixels, and of several.
@@ -61,30 +61,16 @@ def rows_of(case, ring=RING_LIGHT):
     return albedo()[:, None] * rows.reshape(CAMERA.pixels, -1)
 
 
-def measured(case, rows, noise=NOISE, channels=1, offset=0.0):
-    """Measure rows; `offset` is the deviation of the references' error."""
-    projector = case[2]
-    basis = real_basis([DC, *frequencies_of(projector)], projector)
-    exact = np.repeat((rows @ basis.patterns.T)[:, None], channels, axis=1)
-    generator = np.random.default_rng(0)
-    responses = exact + noise * generator.normal(size=exact.shape)
-    responses[..., 1:] += offset * generator.normal(size=(*exact.shape[:2], 1))
-    level = np.full(exact.shape[:2], noise, dtype=np.float32)
-    return Measurements(
-        camera=CAMERA,
-        basis=basis,
-        responses=responses.astype(np.float32),
-        noise=level,
-        black=np.zeros_like(level),
-        quantisation_error=np.zeros((basis.count, projector.pixels), dtype=np.float32),
-        white_noise=np.full_like(level, offset),
-    )
+def measurements_of(case, rows, channels=1, **options):
+    dense = np.repeat(rows[:, None], channels, axis=1)
+    given = {"noise": NOISE, "camera": CAMERA, "projector": case[2], **options}
+    return measured(dense, frequencies_of(case[2]), **given)
 
 
 def estimated(case, rows, q=None, **options):
     window, pitch, _, step = case
     q = (places(step) if q is None else q).astype(np.float32)
-    return estimate_jointly(measured(case, rows, **options), q, window, FAR, pitch=pitch)
+    return estimate_jointly(measurements_of(case, rows, **options), q, window, FAR, pitch=pitch)
 
 
 def untouched(problem, rows):
@@ -164,7 +150,7 @@ def test_others_residuals_say_nothing_of_camera_pixels_with_q():
     found = []
     for factor in (1.0, 7.0):
         seen = np.where(dark.ravel()[:, None], factor, 1.0) * rows
-        problem = lay_out(measured(FINE, seen, noise=1e-5), q, NearBasis(FINE[0], 1), "cpu")
+        problem = lay_out(measurements_of(FINE, seen, noise=1e-5), q, NearBasis(FINE[0], 1), "cpu")
         nothing = _empty_rows(problem)
         choice = nothing.choices.sweeps[0]
         nothing = nothing._replace(choices=nothing.choices._replace(of_error_bars=choice))
@@ -192,7 +178,7 @@ def test_dark_camera_pixels_count_by_their_noise():
 def test_some_rows_are_estimated_as_among_all():
     for case in (FINE, COARSE):
         rows, q = rows_of(case), places(case[3]).astype(np.float32)
-        given = measured(case, rows), q, case[0], FAR
+        given = measurements_of(case, rows), q, case[0], FAR
         whole, some = (
             estimate_jointly(*given, pitch=case[1], rows=each) for each in (None, slice(5, 7))
         )
@@ -207,3 +193,22 @@ def test_error_bars_leave_out_what_neighbours_explain(case, without):
     assert with_ring < 0.9 < alone
     assert np.all(without(case, rows).posterior.noise_share == 1.0)
     assert found.posterior.noise_share.min() >= 0.5
+
+
+def test_photo_units_change_nothing():
+    rows = rows_of(FINE)
+    one = estimated(FINE, rows)
+    for scale in (1e-12, 1e6):
+        other = estimated(FINE, scale * rows, noise=scale * NOISE)
+        np.testing.assert_allclose(other.far / scale, one.far, atol=2e-5)
+        shares = one.posterior.noise_share
+        np.testing.assert_allclose(other.posterior.noise_share, shares, atol=1e-3)
+
+
+@pytest.mark.parametrize("case", [FINE, COARSE])
+def test_sweeps_alone_add_nothing(case, without):
+    rows, (window, pitch, _, step) = rows_of(case), case
+    given = measurements_of(case, rows), places(step).astype(np.float32), window, FAR
+    found = estimate_by_sweeps(*given, pitch=pitch)
+    np.testing.assert_array_equal(found.far, without(case, rows).far)
+    assert np.all(found.posterior.noise_share == 1.0)

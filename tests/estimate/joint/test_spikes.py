@@ -3,7 +3,7 @@
 import numpy as np
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.estimate.joint.spikes import expected_spikes
 from nearfar.illumination.near_basis import NearBasis
 from tests.estimate.joint.draws import (
@@ -23,7 +23,7 @@ def test_direct_light_of_a_second_surface_is_found():
     rows[second, 0, 6 * PROJECTOR.width + 12] += 0.2
     measurements = measured(rows, chosen_frequencies(140), noise=1e-3)
     q = centres.astype(np.float32)[None]
-    found = estimate_jointly(measurements, q, WINDOW, FAR, sweeps=1, pitch=1)
+    found = estimate_by_sweeps(measurements, q, WINDOW, FAR, sweeps=1, pitch=1)
     entry = found.near[0, :, 0, 0, 4]
     np.testing.assert_allclose(entry[second], 0.2, atol=0.01)
     assert np.abs(entry[~second]).max() < 0.01
@@ -60,7 +60,7 @@ def test_a_faint_second_surface_is_accepted_beside_its_edge_alone():
     left = (q[..., 1] == 7.0).ravel()
     rows[left, 0, 8 * PROJECTOR.width + 11] = faint
     measurements = measured(rows, chosen_frequencies(140), noise=0.06, camera=camera)
-    found = estimate_jointly(measurements, q, 9, FAR, sweeps=1, pitch=1)
+    found = estimate_by_sweeps(measurements, q, 9, FAR, sweeps=1, pitch=1)
     entry = found.near[:, :, 0, 4, 8]
     beside, inner = entry[:, 4], entry[:, :3]
     assert np.mean(beside > 0.5 * faint) > 0.7

@@ -92,6 +92,18 @@ def test_highlights_that_are_compressed_bend_the_sums_of_all_check_photos(tmp_pa
     assert find_what_spoils(open_transport(tmp_path / "t.zarr"), capture) == [NotLinear("")]
 
 
+def test_what_all_camera_pixels_see_alike_is_not_taken_for_light(tmp_path):
+    # A tenth of a projector pixel is little, and at this size the transport itself fits much of it.
+    shot = shoot("cornell", Size(64, 64), 117)
+    photos = SPOILS["projector moved, pixels"].apply(shot, 0.1)
+    capture = write_capture(
+        shot.plan, tmp_path / "c.zarr", list(photos), full_scale=shot.full_scale
+    )
+    reconstruct_to_file(capture, tmp_path / "t.zarr")
+    (found,) = find_what_spoils(open_transport(tmp_path / "t.zarr"), capture)
+    assert found.cause in SPOILS["projector moved, pixels"].causes
+
+
 @pytest.mark.parametrize("name", ["photos rotated", "photos doubled", "photos cut off"])
 def test_the_photo_is_named(shot, spoilt_by, name):
     (found,) = spoilt_by(name, 1)

@@ -1,6 +1,10 @@
 """The joint estimate of direct, near- and far-range transport (ours)."""
 
-from nearfar.estimate.joint.estimate import choose_components, estimate_jointly
+from nearfar.estimate.joint.estimate import (
+    choose_components,
+    estimate_by_sweeps,
+    estimate_jointly,
+)
 from nearfar.estimate.joint.problem import Choices
 
-__all__ = ["Choices", "choose_components", "estimate_jointly"]
+__all__ = ["Choices", "choose_components", "estimate_by_sweeps", "estimate_jointly"]

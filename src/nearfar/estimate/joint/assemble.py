@@ -40,8 +40,8 @@ def assemble(
 ) -> Transport:
     """Return the transport, which at a pitch over 1 takes over the arrays of the rows.
 
-    `unexplained` (C, channels) is the share of the posterior's variance that is left when
-    neighbours' residuals have been explained.
+    `unexplained` (C, channels) is the share of the posterior's variance that `with_remainder`
+    leaves.
 
     f is kept at the measured frequencies of the far band, and at those others that lie on the DFT
     grid of the projector: there light is held that no window holds. Its DC is white less d and n.

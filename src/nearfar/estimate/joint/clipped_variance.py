@@ -61,7 +61,7 @@ def clipped_variance(
     variance, variance_left = (
         noise.astype(np.float64) ** 2 for noise in (state.noise, state.noise_left)
     )
-    # Own photos tell o, d and q; what follows for n and f, neighbours' as well.
+    # Only the camera pixel's own photos tell o, d and q; neighbours' photos tell of n and f, too.
     by_own = by_all = solve(variance)
     if np.any(variance_left != variance):
         by_all = solve(variance_left)

@@ -2,7 +2,8 @@
 
 The first sweep chooses a prior component and scale for every camera pixel by its own photos, and
 returns the posterior mean. Later sweeps start from the expectation from its neighbours and
-estimate the difference.
+estimate the difference. What the residuals of neighbours have in common after the last one is
+added.
 """
 
 from collections.abc import Callable
@@ -55,7 +56,6 @@ def estimate_jointly(
     *,
     pitch: int,
     rows: slice | None = None,
-    sweeps: int = SWEEPS,
     chosen: Choices = NO_CHOICES,
     device: Device = "cpu",
     progress: Callable[[float], None] | None = None,
@@ -80,9 +80,6 @@ def estimate_jointly(
     rows : slice, optional
         Camera rows of the transport, by default all that were measured. The others lie beside them,
         and are estimated only as far as these depend on them.
-    sweeps : int
-        Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
-        At a pitch over 1 each but the last is two sweeps, of half of the camera pixels each.
     chosen : Choices
         Prior components and scales that `choose_components` chose by some of the photos.
     device : {"cpu", "cuda", "torch"}
@@ -103,7 +100,7 @@ def estimate_jointly(
     report = progress or (lambda _share: None)
     problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), device)
     rows = rows or slice(0, measurements.camera.height)
-    problem, swept, second, held = _sweep(problem, rows, sweeps, chosen, report)
+    problem, swept, second, held = _sweep(problem, rows, SWEEPS, chosen, report)
     swept, unexplained = with_remainder(problem, swept)
     wanted = slice(rows.start - held.start, rows.stop - held.start)
     unexplained = unexplained[_pixels(problem, wanted)]
@@ -111,6 +108,42 @@ def estimate_jointly(
     assert found is not None
     second = second and second.within(_pixels(problem, rows))
     return assemble(problem, found, far, unexplained, second)
+
+
+def estimate_by_sweeps(
+    measurements: Measurements,
+    correspondence: Floats,
+    window: int,
+    far: Size,
+    *,
+    pitch: int,
+    sweeps: int = SWEEPS,
+) -> Transport:
+    """Estimate D, N and F together, without what neighbours' residuals have in common.
+
+    What is wrong with a photo at all camera pixels is a part of that, and would fit such photos.
+
+    Parameters
+    ----------
+    measurements, correspondence, window, far, pitch
+        As `estimate_jointly` takes them.
+    sweeps : int
+        Number of sweeps: the first by each camera pixel's own photos, the others with neighbours.
+        At a pitch over 1 each but the last is two sweeps, of half of the camera pixels each.
+
+    Returns
+    -------
+    Transport
+
+    Raises
+    ------
+    InputError
+        As `estimate_jointly`.
+    """
+    problem = _laid_out(measurements, correspondence, NearBasis(window, pitch), "cpu")
+    every = slice(0, measurements.camera.height)
+    problem, found, second, _ = _sweep(problem, every, sweeps, NO_CHOICES, lambda _share: None)
+    return assemble(problem, found, far, np.ones_like(problem.pixels.white), second)
 
 
 def choose_components(
@@ -165,8 +198,8 @@ def _sweep(
 ) -> tuple[Problem, EstimatedRows, SecondPlaces | None, slice]:
     """Make the sweeps over the camera rows that the wanted ones depend on; shift q after each.
 
-    The last of what is returned is the camera rows that are held: the wanted ones, and those that
-    what neighbours have in common is read from.
+    Returns the problem and the rows of those camera rows that are held in the end, second places,
+    and which camera rows these are: the wanted ones, and some on either side.
     """
     found, held = None, slice(0, problem.measurements.camera.height)
     second: SecondPlaces | None = None

@@ -47,8 +47,8 @@ class PixelState(NamedTuple):
 
     amplitude_responses: Floats  # (n, R, 4 or 7), to unit o, d and shifts
     precision: Floats  # (n, channels, 4 or 7), of the same before any photo
-    noise: Floats  # (n, channels)
-    noise_left: Floats  # by what neighbours have a say in: n and f, given o, d and q
+    noise: Floats  # (n, channels), which counts for o, d and q
+    noise_left: Floats  # (n, channels), which counts for n and f given o, d and q
     scale: Floats  # prior scale s in photo units, (n, channels)
     white_variance: Floats  # of white's error given o, (n, channels)
     share_of_white: Floats  # (n, channels)
@@ -84,7 +84,7 @@ def posterior_variance(prior: ResponsePrior, state: PixelState, functionals: Fun
     per_amplitude = np.matmul(state.amplitude_responses.transpose(0, 2, 1), prior.eigenvectors)[
         :, None
     ]
-    # Own photos tell o, d and q; what follows for n and f, neighbours' as well.
+    # Only the camera pixel's own photos tell o, d and q; neighbours' photos tell of n and f, too.
     weighted, weighted_left = (per_amplitude * one[:, :, None] for one in (weight, weight_left))
     normal = np.matmul(weighted, per_amplitude.transpose(0, 1, 3, 2))
     through_rows = np.matmul(weighted_left, (squared * covariance)[..., None])[..., 0]

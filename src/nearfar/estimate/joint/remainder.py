@@ -20,17 +20,17 @@ from nearfar.estimate.joint.problem import ComponentChoice, EstimatedRows, Probl
 from nearfar.estimate.joint.solve import response_gain
 from nearfar.estimate.joint.sweep import of_quantisation
 from nearfar.illumination.real_basis import RealBasis
-from nearfar.parallel import in_batches, on_device_of
+from nearfar.parallel import in_batches, one_by_one
 from nearfar.priors.fitted import LIT_COMPONENTS
 from nearfar.transport.direct import direct_weights
 
 # Camera rows on either side, and columns, whose residuals are averaged.
 REMAINDER_ROWS = 2
+# Share of the posterior's variance that is left at least: averages have errors, too.
+LEAST_UNEXPLAINED = 0.5
 # Camera pixels of a batch; and responses that are averaged at once, of which an even number keeps a
 # cosine and its sine together.
 BATCH_PIXELS = 2048
-# Share of the posterior's variance that is left at least: averages have errors, too.
-LEAST_UNEXPLAINED = 0.5
 RESPONSES_AT_ONCE = 16
 
 
@@ -53,8 +53,7 @@ def with_remainder(problem: Problem, rows: EstimatedRows) -> tuple[EstimatedRows
         Share of the posterior's variance of measured responses that is left: what was found is no
         error any more.
     """
-    pixels, centred = problem.pixels, problem.model.centred
-    left = pixels.responses
+    pixels, centred, left = problem.pixels, problem.model.centred, problem.pixels.responses
     direct = rows.amplitudes[..., 1] * pixels.lit[:, None]
     of_errors = of_quantisation(problem)
 
@@ -76,37 +75,44 @@ def with_remainder(problem: Problem, rows: EstimatedRows) -> tuple[EstimatedRows
         left[batch] = residual
 
     in_batches(subtract, len(left), BATCH_PIXELS, left)
-    by_noise = _average(problem)
+    relative = _relative_noise(problem)
+    variance_of_mean = _average(problem, relative)
 
     def add(batch: slice) -> None:
         rows.far[batch] += centred.uncentre(left[batch], pixels.centres[batch])
 
     in_batches(add, len(left), BATCH_PIXELS, left)
-    return rows, _unexplained(problem, rows.choices.of_error_bars, by_noise)
+    return rows, _unexplained(problem, rows.choices.of_error_bars, variance_of_mean)
 
 
-def _average(problem: Problem) -> Floats:
+def _relative_noise(problem: Problem) -> Floats:
+    """Return the noise of a response that was measured once, as a share of white, (C, channels)."""
+    white = problem.pixels.white
+    noise = beside(problem.measurements.noise, white)
+    found: Floats = namespace(white).clip(noise / white, min=RELATIVE_NOISE_FLOOR)
+    return found
+
+
+def _average(problem: Problem, relative: Floats) -> Floats:
     """Replace residuals by those that their neighbours have in common.
 
     Returns
     -------
     array, shape (C, channels)
-        Variance that noise gives a mean of residuals that were measured once.
+        Variance of a mean of residuals that were measured once, by noise alone, over white squared.
     """
-    pixels, measurements, left = problem.pixels, problem.measurements, problem.pixels.responses
-    xp, camera = namespace(left), measurements.camera
-    relative = xp.clip(beside(measurements.noise, left) / pixels.white, min=RELATIVE_NOISE_FLOOR)
-    # Of residuals as shares of white; each is worth as much as its variance is low.
-    weight = pixels.lit[:, None] / relative**2
-    weight = xp.astype(weight, xp.float32)
+    pixels, left, camera = problem.pixels, problem.pixels.responses, problem.measurements.camera
+    xp = namespace(left)
+    # A residual counts by the inverse of its variance.
+    weight = xp.astype(pixels.lit[:, None] / relative**2, xp.float32)
     total = xp.clip(_sums(weight, camera), min=float(np.finfo(np.float32).tiny))
-    by_total = pixels.lit[:, None] / total
+    by_total: Floats = pixels.lit[:, None] / total
     partner = beside(_partners(problem.model.centred.basis), left)
 
     def work(part: slice) -> None:
         shares = left[..., part] * (weight / pixels.white)[..., None]
         mean = _sums(shares, camera) * by_total[..., None]
-        # Over the variance that noise alone gives it.
+        # Over its variance by noise alone.
         power = mean**2 * total[..., None] * problem.model.multiplicity[part]
         # All channels, and a cosine and its sine, together: one alone is too noisy.
         power = xp.mean(power, axis=1, keepdims=True)
@@ -114,35 +120,41 @@ def _average(problem: Problem) -> Floats:
         mean *= xp.clip(1.0 - 1.0 / xp.clip(power, min=1.0), min=0.0)
         left[..., part] = mean * pixels.white[..., None]
 
-    on_device_of(left)(work, blocks(left.shape[2], RESPONSES_AT_ONCE))
-    of_mean: Floats = by_total * pixels.white**2
-    return of_mean
+    # In this thread: temporary arrays hold some responses of all camera pixels.
+    one_by_one(work, blocks(left.shape[2], RESPONSES_AT_ONCE))
+    return by_total
 
 
-def _unexplained(problem: Problem, choice: ComponentChoice | None, by_noise: Floats) -> Floats:
+def _unexplained(
+    problem: Problem, choice: ComponentChoice | None, variance_of_mean: Floats
+) -> Floats:
     """Return the share of the posterior's variance that the averages leave, (C, channels)."""
     pixels, model = problem.pixels, problem.model
     assert choice is not None
-    by_noise = by_noise * _power_of_noise(problem.measurements.channels)
+    by_noise = _power_of_noise(problem.measurements.channels) * variance_of_mean
     xp = namespace(pixels.white)
     found: Floats = xp.ones_like(pixels.white)
     for place in np.unique(fetch(choice.prior_component)).tolist():
         if place >= len(LIT_COMPONENTS):
             continue
         (alike,) = xp.nonzero(choice.prior_component == place)
-        noise = pixels.noise[alike]
-        ratio = (choice.prior_scale[alike, None] * pixels.white[alike] / noise) ** 2
+        # All as shares of white, whose square may be too small a number.
+        white = pixels.white[alike]
+        noise = pixels.noise[alike] / white
+        ratio = (choice.prior_scale[alike, None] / noise) ** 2
         variance = noise**2 * response_gain(model.priors[place], ratio)
-        explained = xp.mean(pixels.responses[alike] ** 2 * model.multiplicity, axis=-1)
+        shares = pixels.responses[alike] / white[..., None]
+        explained = xp.mean(shares**2 * model.multiplicity, axis=-1)
         share = xp.clip(explained - by_noise[alike], min=0.0) / variance
         found[alike] = xp.clip(1.0 - share, min=LEAST_UNEXPLAINED)
     return found
 
 
 def _power_of_noise(channels: int) -> float:
-    """Return the power that is found in means of noise alone, over that of the means.
+    """Return how much power the gains let through of means of noise alone, as a share.
 
-    The mean of (1 - 1 / p)^2 p where p > 1, the mean of the squares of 2 x channels normal numbers.
+    The expectation of (1 - 1 / p)^2 p over p > 1, where 2 x channels times p is chi-squared with
+    as many degrees of freedom.
     """
     freedom = 2 * channels
     step = 0.01

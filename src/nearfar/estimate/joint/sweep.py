@@ -85,7 +85,6 @@ def sweep_once(
         problem.model.priors,
     )
     done, parts = [0], list(_parts(problem))
-    share_out = on_device_of(problem.pixels.responses)
     count = sum(len(selected) for selected, _ in parts)
 
     def work(some: tuple[NDArray[np.int64], bool]) -> None:
@@ -94,7 +93,7 @@ def sweep_once(
         done[0] += len(some[0])
         report(done[0] / count)
 
-    share_out(work, parts)
+    on_device_of(problem.pixels.responses)(work, parts)
     if before is None:
         of_error_bars = rows.choices.sweeps[-1]
         if pools:

@@ -6,7 +6,7 @@ import numpy as np
 
 from nearfar.capture import Capture
 from nearfar.errors import InputError
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved, NotLinear, Spoilt
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure
@@ -162,13 +162,13 @@ def _bends_all_pairs(of_pairs: Bend | None, found: Sequence[Spoilt]) -> bool:
 def _estimate_of(
     transport: StoredTransport, sample: CameraSample, photos: SteadyPhotos
 ) -> Transport:
-    """Return the joint estimate at the sampled camera pixels, made now if it is another's."""
-    sampled = sample.of_transport(transport)
-    if transport.provenance["method"] == "joint":
-        return sampled
-    # Other estimates differ from the photos by far more than noise.
-    plan, q = sample.plan, sampled.correspondence
-    return estimate_jointly(
+    """Return the joint estimate at the sampled camera pixels, by sweeps alone.
+
+    The transport itself holds a part of what is wrong with photos, and those of other estimates
+    differ from the photos by far more than noise.
+    """
+    plan, q = sample.plan, sample.of_transport(transport).correspondence
+    return estimate_by_sweeps(
         measure(photos), q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS
     )
 

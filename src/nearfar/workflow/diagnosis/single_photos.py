@@ -17,7 +17,7 @@ from nearfar.arrays import Booleans, Floats
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
 from nearfar.estimate.error_bars import ErrorBars
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.faults.of_photos import (
     ColoursSwapped,
     ExposureChanged,
@@ -217,7 +217,9 @@ def _estimate_without(
     except InputError:
         # The lowest frequencies, which place q, are among those that were left out.
         q = known
-    return estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS)
+    return estimate_by_sweeps(
+        measurements, q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS
+    )
 
 
 def _explain_all(

@@ -75,14 +75,20 @@ def with_remainder(problem: Problem, rows: EstimatedRows) -> tuple[EstimatedRows
         left[batch] = residual
 
     in_batches(subtract, len(left), BATCH_PIXELS, left)
-    relative = _relative_noise(problem)
-    variance_of_mean = _average(problem, relative)
+    variance_of_mean = _average(problem, _relative_noise(problem))
+    xp = namespace(left)
+    power: Floats = xp.empty_like(pixels.white)
 
     def add(batch: slice) -> None:
         rows.far[batch] += centred.uncentre(left[batch], pixels.centres[batch])
+        # All as shares of white, whose square may be too small a number.
+        shares = left[batch] / pixels.white[batch, :, None]
+        power[batch] = xp.mean(shares**2 * problem.model.multiplicity, axis=-1)
 
     in_batches(add, len(left), BATCH_PIXELS, left)
-    return rows, _unexplained(problem, rows.choices.of_error_bars, variance_of_mean)
+    by_noise = _power_of_noise(problem.measurements.channels) * variance_of_mean
+    explained = xp.clip(power - by_noise, min=0.0)
+    return rows, _unexplained(problem, rows.choices.of_error_bars, explained)
 
 
 def _relative_noise(problem: Problem) -> Floats:
@@ -125,28 +131,29 @@ def _average(problem: Problem, relative: Floats) -> Floats:
     return by_total
 
 
-def _unexplained(
-    problem: Problem, choice: ComponentChoice | None, variance_of_mean: Floats
-) -> Floats:
-    """Return the share of the posterior's variance that the averages leave, (C, channels)."""
+def _unexplained(problem: Problem, choice: ComponentChoice | None, explained: Floats) -> Floats:
+    """Return the share of the posterior's variance that is left, (C, channels).
+
+    Parameters
+    ----------
+    problem : Problem
+    choice : ComponentChoice
+        Whose posterior the error bars are.
+    explained : array, shape (C, channels)
+        Mean variance of measured responses that was explained, over white squared.
+    """
     pixels, model = problem.pixels, problem.model
     assert choice is not None
-    by_noise = _power_of_noise(problem.measurements.channels) * variance_of_mean
     xp = namespace(pixels.white)
     found: Floats = xp.ones_like(pixels.white)
     for place in np.unique(fetch(choice.prior_component)).tolist():
         if place >= len(LIT_COMPONENTS):
             continue
         (alike,) = xp.nonzero(choice.prior_component == place)
-        # All as shares of white, whose square may be too small a number.
-        white = pixels.white[alike]
-        noise = pixels.noise[alike] / white
+        noise = pixels.noise[alike] / pixels.white[alike]
         ratio = (choice.prior_scale[alike, None] / noise) ** 2
         variance = noise**2 * response_gain(model.priors[place], ratio)
-        shares = pixels.responses[alike] / white[..., None]
-        explained = xp.mean(shares**2 * model.multiplicity, axis=-1)
-        share = xp.clip(explained - by_noise[alike], min=0.0) / variance
-        found[alike] = xp.clip(1.0 - share, min=LEAST_UNEXPLAINED)
+        found[alike] = xp.clip(1.0 - explained[alike] / variance, min=LEAST_UNEXPLAINED)
     return found
 
 

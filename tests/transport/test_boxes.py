@@ -7,11 +7,12 @@ from nearfar.arrays import Size
 from nearfar.transport.boxes import (
     box_overlaps,
     box_places,
+    box_weights,
     share_of_boxes,
     spread_summed_area,
     summed_area,
 )
-from nearfar.transport.direct import look_up
+from nearfar.transport.direct import direct_weights, look_up
 
 PROJECTOR = Size(9, 14)
 
@@ -68,3 +69,34 @@ def test_the_mean_of_a_footprint_is_that_of_the_pixels_under_its_boxes(footprint
 def test_a_box_of_one_pixel_is_the_bilinear_footprint():
     overlaps = box_overlaps(np.array([-0.4, 0.0, 0.3]), np.ones(3), 1)
     np.testing.assert_allclose(overlaps, [[0.4, 0.6, 0], [0, 1, 0], [0, 0.7, 0.3]], atol=1e-12)
+
+
+def test_weights_of_the_nine_pixels_about_a_place_are_those_that_footprints_read():
+    draw = np.random.default_rng(4)
+    centres = np.stack([draw.integers(2, side - 2, 30) for side in PROJECTOR], axis=-1)
+    q = centres + draw.uniform(-0.4, 0.4, centres.shape)
+    footprints = np.column_stack(
+        [draw.uniform(0.2, 1.6, (30, 2)), draw.uniform(-0.2, 0.2, (30, 2))]
+    )
+    light = draw.random(PROJECTOR)
+    steps = np.arange(-1, 2)
+    around = light[
+        centres[:, 0, None, None] + steps[:, None], centres[:, 1, None, None] + steps
+    ].reshape(-1, 9)
+    found = box_weights(q, centres, footprints)
+    read = look_up(summed_area(light), box_places(q, footprints, PROJECTOR))
+    np.testing.assert_allclose((found * around).sum(axis=1), read, rtol=1e-9)
+
+
+def test_of_boxes_of_a_pixel_the_weights_are_bilinear():
+    draw = np.random.default_rng(5)
+    centres = draw.integers(0, 9, (30, 2))
+    q = (centres + draw.uniform(-0.5, 0.5, centres.shape)).astype(np.float32)
+    single = np.tile([1.0, 1.0, 0.0, 0.0], (30, 1))
+    bilinear = np.asarray(direct_weights(q, centres))[:, 0]
+    np.testing.assert_allclose(box_weights(q, centres, single), bilinear, atol=1e-6)
+
+
+def test_weights_beyond_the_nine_pixels_are_left_out():
+    wide = box_weights(np.zeros((1, 2)), np.zeros((1, 2), int), np.array([[6.0, 6.0, 0.0, 0.0]]))
+    assert wide.sum() == pytest.approx(9 / 36)

@@ -166,6 +166,32 @@ def box_places(correspondence: Floats, footprints: Floats, projector: Size) -> F
     return box_axes(correspondence, footprints, projector).places(projector)
 
 
+def box_weights(correspondence: Floats, centres: Integers, footprints: Floats) -> Floats:
+    """Return the shares that footprints have of the projector pixels about a place.
+
+    Parameters
+    ----------
+    correspondence : ndarray, shape (n, 2)
+        q.
+    centres : ndarray of int, shape (n, 2)
+        The places.
+    footprints : ndarray, shape (n, 4)
+        Some of a footprint may lie beyond these pixels.
+
+    Returns
+    -------
+    ndarray, shape (n, 9)
+        Of the 3 x 3 pixels about each place, row by row, as those of
+        `nearfar.transport.direct.direct_weights`.
+    """
+    middles, sides = halves(correspondence, footprints)
+    shares = np.zeros((len(sides), 3, 3))
+    for offsets in middles - centres:
+        down, across = (box_overlaps(offsets[:, i], sides[:, i], reach=1) for i in range(2))
+        shares += 0.5 * down[:, :, None] * across[:, None, :]
+    return shares.reshape(-1, 9)
+
+
 def blurred_boxes(footprints: Floats, width: Floats | float) -> Floats:
     """Return footprints (C, 4) whose boxes are blurred by boxes of a width, or of widths (C, 1)."""
     found = footprints.copy()

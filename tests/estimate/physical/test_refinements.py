@@ -12,7 +12,6 @@ from nearfar.estimate.physical.kernels import source_at
 from nearfar.estimate.physical.outlines import with_outlines
 from nearfar.estimate.physical.specks import without_specks
 from nearfar.estimate.physical.split import PhysicalSplit, Translucent
-from nearfar.estimate.physical.told import told_by_lines, told_by_planes
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.pictures import random_pattern
@@ -190,21 +189,6 @@ def test_a_camera_pixel_as_bright_as_all_around_it_sees_the_place_in_their_middl
         return
     assert parts == pytest.approx([0.5, 0.0, 0.1], rel=1e-3)
     np.testing.assert_allclose(split.elsewhere.places, [true], atol=1e-4)
-
-
-def test_planes_are_surer_than_lines_of_a_q_that_is_drawn_aside_among_noisy_ones():
-    drawn, column = 0.1, 6
-    rng = np.random.default_rng(5)
-    q = places() + rng.normal(0, 0.012, (*CAMERA, 2)).astype(np.float32)
-    q[:, column] += np.float32([0.0, drawn])
-    transport = transport_of(np.full(CAMERA, 0.5), np.full(CAMERA, 0.1), q)
-    inner = slice(3, -3)
-    surer = []
-    for tell in (told_by_lines, told_by_planes):
-        told, disagreement = (found[inner, column] for found in tell(transport))
-        assert np.abs(told - places()[inner, column]).max() < 0.5 * drawn
-        surer.append((disagreement < 0.2 * drawn).mean())
-    assert surer[1] > surer[0] + 0.3
 
 
 def test_of_two_places_of_a_camera_pixel_the_later_counts():

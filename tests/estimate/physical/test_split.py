@@ -12,34 +12,15 @@ from nearfar.estimate.physical import PhysicalErrorBars, split_physically
 from nearfar.estimate.physical.kernels import kernel, source_at
 from nearfar.estimate.physical.medium import SLOPES
 from nearfar.estimate.physical.split import Translucent
-from nearfar.illumination.frequencies import DC, grid, representatives
+from nearfar.illumination.frequencies import grid, representatives
 from nearfar.illumination.near_basis import NearBasis, window_offsets
 from nearfar.illumination.pictures import random_pattern
 from nearfar.illumination.real_basis import real_basis
 from nearfar.transport.dipole import diffuse_reflectance
+from tests.estimate.physical.synthetic import PROJECTOR, WINDOW, transport_of
 
-PROJECTOR = Size(32, 32)
-WINDOW = 13
 DEPTH, ATTENUATION = 1.1, 0.9
 AMPLITUDE = 2.5
-
-
-def transport_of(near, direct, *, shift=0.0):
-    """Return a transport of two channels without far-range light, q at each camera pixel."""
-    y, x = np.mgrid[: PROJECTOR.height, : PROJECTOR.width].astype(np.float32)
-    q = np.clip(np.stack([y + shift, x + shift], axis=-1), 0, PROJECTOR.height - 1)
-    basis = real_basis([DC], PROJECTOR)
-    shape = (*PROJECTOR, 2)
-    return Transport(
-        projector=PROJECTOR,
-        correspondence=q,
-        direct=direct.astype(np.float32),
-        near=near.astype(np.float32),
-        far=np.zeros((*shape, basis.count), np.float32),
-        far_basis=basis,
-        black=np.zeros(shape, np.float32),
-        noise=np.full(shape, 1e-3, np.float32),
-    )
 
 
 def window_light(coverage, *, attenuations):
@@ -131,52 +112,6 @@ def test_light_from_one_side_is_inter_reflection():
     parts = split.components(np.ones(PROJECTOR, np.float32))
     assert not parts.subsurface.any()
     np.testing.assert_allclose(parts.interreflection, near.sum(axis=(-2, -1)), atol=1e-4)
-
-
-CREASE_ROW = 16
-DRAWN = 0.12
-
-
-@pytest.fixture(scope="module")
-def crease():
-    """Return a transport at one row of which the other side of a crease has drawn q, and its q."""
-    near = np.zeros((*PROJECTOR, 2, WINDOW, WINDOW))
-    middle = WINDOW // 2
-    # Falls off to the sides of q and away from the crease; the first entry is not window light.
-    near[CREASE_ROW, :, :, middle - 1, middle - 1 : middle + 2] = [0.008, 0.0, 0.008]
-    near[CREASE_ROW, :, :, middle - 2, middle - 1 : middle + 2] = [0.004, 0.006, 0.004]
-    transport = transport_of(near, np.full((*PROJECTOR, 2), 0.4))
-    drawn = transport.correspondence.copy()
-    drawn[CREASE_ROW, :, 0] -= DRAWN
-    return replace(transport, correspondence=drawn), transport.correspondence
-
-
-def test_light_of_a_crease_that_drew_q_is_inter_reflection(crease):
-    transport, _ = crease
-    split = split_physically(transport)
-    inner = slice(2, -2)
-    lines = {row: np.zeros(PROJECTOR, np.float32) for row in (CREASE_ROW - 1, CREASE_ROW)}
-    for row, light in lines.items():
-        light[row] = 1.0
-        parts = split.components(light)
-        here = [part[CREASE_ROW, inner] for part in parts]
-        np.testing.assert_allclose(sum(parts), transport @ light, atol=1e-6)
-        if row == CREASE_ROW:
-            np.testing.assert_allclose(here[0], 0.4 * (1 - DRAWN), rtol=1e-3)
-        else:
-            assert not here[0].any()
-            assert here[2].min() > 0.4 * DRAWN
-    unlike = np.arange(PROJECTOR.height) != CREASE_ROW
-    np.testing.assert_array_equal(split.direct[unlike], transport.direct[unlike])
-
-
-@pytest.mark.parametrize("side", ["none", "both"])
-def test_a_place_between_projector_pixels_stays_where_no_crease_is(crease, side):
-    transport, _ = crease
-    near = transport.near.copy()
-    near = near * 0 if side == "none" else near + near[..., ::-1, :]
-    split = split_physically(replace(transport, near=near))
-    np.testing.assert_array_equal(split.direct, transport.direct)
 
 
 def test_a_body_whose_medium_the_window_cannot_tell_is_not_taken_for_translucent():

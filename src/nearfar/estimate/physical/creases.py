@@ -2,32 +2,39 @@
 
 Next to a crease the other side lights a camera pixel from the projector pixel next to q, and an
 estimate that has direct light between projector pixels may take that for direct light of a q that
-is off by some tenths of a pixel. Where the places about it agree on another q, and the light so
-taken falls off on that side as light of a crease does, it is inter-reflection.
+is off by some hundredths or tenths of a pixel. Where the places on one side of it tell another q,
+and the light so taken falls off as light of a crease does, it is inter-reflection.
 
 Index convention: c runs over camera pixels.
 """
 
 import numpy as np
+from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.physical.elsewhere import Elsewhere, sees_single_pixels
 from nearfar.estimate.physical.rows_about import REACH, of_rows_about_q
-from nearfar.estimate.physical.told import told_by_lines, told_by_planes
+from nearfar.estimate.physical.told import told_by_others
+from nearfar.transport.boxes import box_weights
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
+from nearfar.transport.seen import seen_of_projector
 
 # In projector pixels: how far a q is off, at least and at most.
-OFF = (0.03, 0.3)
-# Places about it differ among each other by less than this share of that.
-AGREEMENT = 0.3
+OFF = (0.02, 0.3)
+# What others tell deviates by less than this share of that.
+AGREEMENT = 0.2
 # Light beyond the one taken, over it: at least, or it does not fall off but stands alone, and at
 # most, or it is direct light of another place.
 LEAST_BEYOND = 0.03
 MOST_BEYOND = 0.6
 # Light on that side over light on the other.
 ONE_SIDED = 1.2
+# What is next to a camera pixel.
+NEXT_TO = np.ones((3, 3), dtype=bool)
+# Side of the square of camera pixels that decide together whether light falls off.
+TOGETHER = 7
 
 
 def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
@@ -44,27 +51,56 @@ def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
     Elsewhere
         All the direct light of these camera pixels.
     """
-    told, disagreement = told_by_lines(transport)
-    off = np.abs(transport.correspondence - told).max(axis=-1)
-    # Where q is noisy, more camera pixels tell more.
-    unsure = ~(disagreement < AGREEMENT * off)
-    by_planes, apart = told_by_planes(transport)
-    told[unsure], disagreement[unsure] = by_planes[unsure], apart[unsure]
-    off = np.abs(transport.correspondence - told).max(axis=-1)
-    # Comparisons with NaN are false: where no side tells anything.
-    chosen = opaque & (off > OFF[0]) & (off < OFF[1]) & (disagreement < AGREEMENT * off)
-    chosen &= sees_single_pixels(transport.footprint, transport.camera)
+    single = opaque & sees_single_pixels(transport.footprint, transport.camera)
+    # A crease is a line of camera pixels: those that may be drawn aside tell nothing of others.
+    _, doubted = _drawn_aside(transport, single, transport.lit)
+    others = transport.lit & ~ndimage.binary_dilation(doubted, NEXT_TO)
+    told, chosen = _drawn_aside(transport, single, others)
     pixels = np.flatnonzero(chosen)
     last = np.array(transport.projector) - 1
     places = np.clip(told.reshape(-1, 2)[pixels], 0, last)
     centres = np.rint(places).astype(np.int64)
     own = np.clip(transport.correspondence.reshape(-1, 2)[pixels], centres - 1, centres + 1)
-    before, after = (np.asarray(direct_weights(q, centres)[:, 0]) for q in (own, places))
+    if transport.footprint is None:
+        before, after = (np.asarray(direct_weights(q, centres)[:, 0]) for q in (own, places))
+    else:
+        before = box_weights(own, centres, transport.boxes[pixels])
+        seen = seen_of_projector(transport.correspondence)[pixels]
+        after = box_weights(places, centres, seen)
     kept = (before * after).sum(axis=1) / (after**2).sum(axis=1)
     direct = transport.direct.reshape(-1, transport.channels)[pixels]
     moved = (1 - kept) * direct.mean(axis=1)
     falls_off = _falls_off(transport, chosen, own - places, centres, moved)
-    return Elsewhere(pixels, places, kept[:, None] * direct).of(falls_off)
+    most = _of_most(pixels, falls_off, chosen) & (kept < 1)
+    return Elsewhere(pixels, places, kept[:, None] * direct).of(most)
+
+
+def _drawn_aside(
+    transport: Transport, single: Booleans, telling: Booleans
+) -> tuple[Floats, Booleans]:
+    """Return the q that others tell, (Cy, Cx, 2), and the camera pixels whose own q is another."""
+    told, deviation = told_by_others(transport.correspondence, telling)
+    off = np.abs(transport.correspondence - told).max(axis=-1)
+    # Comparisons with NaN are false: where no side tells anything.
+    return told, single & (off > OFF[0]) & (off < OFF[1]) & (deviation < AGREEMENT * off)
+
+
+def _of_most(pixels: Integers, one: Booleans, chosen: Booleans) -> Booleans:
+    """Return what is so of at least half of the chosen camera pixels about each, (n,).
+
+    Parameters
+    ----------
+    pixels : ndarray of int, shape (n,)
+        The chosen camera pixels.
+    one : ndarray of bool, shape (n,)
+        Whether it is so of each by itself.
+    chosen : ndarray of bool, shape (Cy, Cx)
+    """
+    votes = np.zeros(chosen.shape)
+    votes.ravel()[pixels] = np.where(one, 1.0, -1.0)
+    balance = ndimage.uniform_filter(votes, TOGETHER, mode="constant").ravel()[pixels]
+    # Sums of whole numbers, but for rounding.
+    return np.asarray(balance > -0.5 / TOGETHER**2)
 
 
 def _falls_off(

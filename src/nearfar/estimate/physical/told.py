@@ -5,79 +5,150 @@ Near edges and creases q changes its course, so that only one side may go on to 
 
 import numpy as np
 
-from nearfar.arrays import Floats, Integers
-from nearfar.estimate.physical.around import moved, steps
-from nearfar.transport.model import Transport
+from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.compiled import compiled
+from nearfar.estimate.physical.around import steps
+from nearfar.parallel import side_by_side
 
-# Camera pixels about one, in turn; each with those before and after it is a side.
-RING = np.array([[-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1], [1, 0], [1, -1], [0, -1]])
-SIDES = RING[(np.arange(8)[:, None] + np.arange(-1, 2)) % 8]
-# Camera pixels on each side through whose q a plane is laid, and half of the angle they lie in.
-PLANE_REACH = 3
+# Camera pixels up to this distance tell; a side has those within this angle of its middle.
+REACH = 6
 HALF_ANGLE = np.pi / 4 + 0.01
+SIDES = 8
+# Fewer camera pixels of a side tell nothing.
+LEAST_TELLING = 6
+BATCH_PIXELS = 4096
 
 
-def _known(transport: Transport) -> Floats:
-    """Return q, NaN at camera pixels without direct light, float64."""
-    lit = transport.lit[..., None]
-    return np.where(lit, transport.correspondence, np.nan).astype(np.float64)
+def told_by_others(correspondence: Floats, telling: Booleans) -> tuple[Floats, Floats]:
+    """Return the q that camera pixels on one side of each tell, by a plane through theirs.
 
+    Of eight sides it is the one that tells q best.
 
-def told_by_lines(transport: Transport) -> tuple[Floats, Floats]:
-    """Return the q (Cy, Cx, 2) that camera pixels on one side tell, and how much they disagree.
+    Parameters
+    ----------
+    correspondence : ndarray, shape (Cy, Cx, 2)
+        q.
+    telling : ndarray of bool, shape (Cy, Cx)
+        Camera pixels whose q is known and may tell.
 
-    Two camera pixels on a line through a third tell its q by going on as far again. Of the eight
-    sides it is the one from which q is drawn away, and where they agree the best. NaN where there
-    is none.
+    Returns
+    -------
+    told : ndarray, shape (Cy, Cx, 2)
+        NaN where no side tells anything.
+    deviation : ndarray, shape (Cy, Cx)
+        Its standard deviation, of the axis where it is larger: by how far the side's own q are from
+        the plane. Infinite where no side tells anything.
     """
-    q = _known(transport)
-    best, least = np.full(q.shape, np.nan), np.full(q.shape[:2], np.inf)
-    for side in SIDES:
-        next_ones = np.stack([moved(q, step, np.nan) for step in side])
-        told = 2 * next_ones - np.stack([moved(q, 2 * step, np.nan) for step in side])
-        known = np.asarray(np.isfinite(told).all(axis=-1))
-        several = known.sum(axis=0) > 1
-        # Those that are not known take no part in the mean, nor disagree with it.
-        told = np.where(known[..., None] & several[..., None], told, 0.0)
-        count = np.where(several, known.sum(axis=0), np.nan)
-        middle = told.sum(axis=0) / count[..., None]
-        apart = np.abs(told - middle).max(axis=-1)
-        disagreement = np.where(known, apart, 0.0).max(axis=0)
-        inwards = np.where(known[..., None], next_ones, middle).mean(axis=0)
-        away = ((q - middle) * (middle - inwards)).sum(axis=-1) > 0
-        better = away & (disagreement < least)
-        best[better], least[better] = middle[better], disagreement[better]
-    return best, least
+    q = np.where(telling[..., None], correspondence, 0.0).astype(np.float64)
+    told, deviation = np.full(q.shape, np.nan), np.full(telling.shape, np.inf)
+    sides = _sides()
+
+    def work(batch: slice) -> None:
+        _tell(q, telling, sides, batch.start, batch.stop, told, deviation)
+
+    side_by_side(work, blocks(telling.size, BATCH_PIXELS))
+    return told, deviation
 
 
-def told_by_planes(transport: Transport) -> tuple[Floats, Floats]:
-    """Return the same, told by planes through more camera pixels, where all of a side are known.
+def _sides() -> Integers:
+    """Return the steps (y, x) to the camera pixels of each side, (8, n, 2), 0 where it ends."""
+    every = steps(REACH)
+    every = every[np.hypot(*every.T) <= REACH + 0.5]
+    middles = 2 * np.pi / SIDES * np.arange(SIDES)
+    off = np.abs((np.arctan2(*every.T) - middles[:, None] + np.pi) % (2 * np.pi) - np.pi)
+    within = off <= HALF_ANGLE
+    found = np.zeros((SIDES, within.sum(axis=1).max(), 2), dtype=np.int64)
+    for side, chosen in zip(found, within, strict=True):
+        side[: chosen.sum()] = every[chosen]
+    return found
 
-    How much they disagree is the root mean square of what their q deviate from the plane.
+
+@compiled
+def _tell(
+    q: Floats,
+    telling: Booleans,
+    sides: Integers,
+    first: int,
+    last: int,
+    told: Floats,
+    deviation: Floats,
+) -> None:
+    """Write what the best side tells of camera pixels from first to last."""
+    sums, of_q, squares = np.empty((3, 3)), np.empty((3, 2)), np.empty(2)
+    inverse, reference = np.empty((3, 3)), np.empty(2)
+    for c in range(first, last):
+        y, x = divmod(c, telling.shape[1])
+        for side in range(len(sides)):
+            _sum(q, telling, (y, x), sides[side], reference, sums, of_q, squares)
+            if sums[0, 0] < LEAST_TELLING or not _invert(sums, inverse):
+                continue
+            left = 0.0
+            for axis in range(2):
+                explained = 0.0
+                for i in range(3):
+                    for j in range(3):
+                        explained += of_q[i, axis] * inverse[i, j] * of_q[j, axis]
+                left = max(left, squares[axis] - explained)
+            own = np.sqrt(left / (sums[0, 0] - 3.0) * inverse[0, 0])
+            if own < deviation[y, x]:
+                deviation[y, x] = own
+                for axis in range(2):
+                    told[y, x, axis] = reference[axis]
+                    for j in range(3):
+                        told[y, x, axis] += inverse[0, j] * of_q[j, axis]
+
+
+@compiled
+def _sum(
+    q: Floats,
+    telling: Booleans,
+    place: tuple[int, int],
+    side: Integers,
+    reference: Floats,
+    sums: Floats,
+    of_q: Floats,
+    squares: Floats,
+) -> None:
+    """Write the sums that a plane through the q of a side is fitted by.
+
+    Those of the products of 1 and the steps down and across, with each other and with q, and those
+    of q squared; q counts from the reference, one of the side's.
     """
-    q = _known(transport)
-    best, least = np.full(q.shape, np.nan), np.full(q.shape[:2], np.inf)
-    for side in _wedges():
-        design = np.column_stack([np.ones(len(side)), side])
-        inverse = np.linalg.pinv(design)
-        places = np.stack([moved(q, step, np.nan) for step in side])
-        plane = np.einsum("in,nyxa->iyxa", inverse, places)
-        places -= np.einsum("ni,iyxa->nyxa", design, plane)
-        freedom = len(side) - design.shape[1]
-        apart = np.sqrt(np.einsum("nyxa,nyxa->yxa", places, places) / freedom).max(axis=-1)
-        middle = plane[0]
-        inwards = np.einsum("i,iyxa->yxa", side.mean(axis=0), plane[1:])
-        away = ((middle - q) * inwards).sum(axis=-1) > 0
-        better = away & (apart < least)
-        best[better], least[better] = middle[better], apart[better]
-    return best, least
+    height, width = telling.shape
+    terms = np.ones(3)
+    sums[:], of_q[:], squares[:], reference[:] = 0.0, 0.0, 0.0, np.nan
+    for n in range(len(side)):
+        down, across = side[n, 0], side[n, 1]
+        y, x = place[0] + down, place[1] + across
+        inside = 0 <= y < height and 0 <= x < width and (down != 0 or across != 0)
+        if not inside or not telling[y, x]:
+            continue
+        # Sums of squares of large numbers would lose small differences.
+        if np.isnan(reference[0]):
+            reference[:] = q[y, x]
+        terms[1], terms[2] = down, across
+        for i in range(3):
+            for j in range(3):
+                sums[i, j] += terms[i] * terms[j]
+            for axis in range(2):
+                of_q[i, axis] += terms[i] * (q[y, x, axis] - reference[axis])
+        for axis in range(2):
+            squares[axis] += (q[y, x, axis] - reference[axis]) ** 2
 
 
-def _wedges() -> list[Integers]:
-    """Return the steps to the camera pixels on each of eight sides, (n, 2) each."""
-    every = steps(PLANE_REACH)
-    every = every[np.hypot(*every.T) <= PLANE_REACH]
-    angle = np.arctan2(*every.T)
-    turns = np.pi / 4 * np.arange(8)
-    off = np.abs((angle - turns[:, None] + np.pi) % (2 * np.pi) - np.pi)
-    return [every[one] for one in off <= HALF_ANGLE]
+@compiled
+def _invert(sums: Floats, inverse: Floats) -> bool:
+    """Write the inverse of a symmetric 3 x 3 matrix of whole numbers; return whether it has one."""
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            c, d = (j + 1) % 3, (j + 2) % 3
+            inverse[j, i] = sums[a, c] * sums[b, d] - sums[a, d] * sums[b, c]
+    determinant = 0.0
+    for j in range(3):
+        determinant += sums[0, j] * inverse[j, 0]
+    # Of whole numbers it is one, too: 0 where all camera pixels lie on a line.
+    if determinant < 0.5:
+        return False
+    inverse /= determinant
+    return True

@@ -59,6 +59,23 @@ def has_second(transport):
     return np.isfinite(transport.second_place).all(axis=-1)
 
 
+@pytest.mark.parametrize("more", [0.1, 0.2])
+def test_a_second_place_is_found_beside_light_that_no_smooth_component_holds(more):
+    """Next to q the window has a spike, so that photos alone are likeliest by free rows."""
+    q = surfaces()
+    rows = rows_of(q)
+    where = footprint(q[:, OUTLINE] - np.array([0.0, 2.0]), PROJECTOR)
+    outline = np.arange(CAMERA.height) * CAMERA.width + OUTLINE
+    for number, pixels, weights in zip(outline, where.pixels, where.weights, strict=True):
+        rows[number, 0, pixels] += more * weights
+    transport = estimated(rows, q)
+    found = has_second(transport)
+    assert found[:, OUTLINE].all()
+    assert not np.delete(found, OUTLINE, axis=1).any()
+    off = transport.second_place[:, OUTLINE] - places(q)
+    assert np.abs(off).max() < 0.3
+
+
 @pytest.fixture(scope="module")
 def found():
     q = surfaces()

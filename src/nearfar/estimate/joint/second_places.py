@@ -189,7 +189,8 @@ def _usual_choices(
     """Return components of camera pixels and their neighbours, (n, 9), and their mean scale, (n,).
 
     Components are -1 beyond the camera, and where light may come from anywhere: neighbours at an
-    outline have chosen them for what is looked for here.
+    outline have chosen them for what is looked for here. The camera pixel's own is kept: besides a
+    second place it may have more that no other component holds, as a q between two pixels.
     """
     component = fetch(choice.prior_component).reshape(camera).astype(np.int64)
     scale = fetch(choice.prior_scale).reshape(camera).astype(np.float64)
@@ -202,6 +203,8 @@ def _usual_choices(
     components = np.stack([component[place] for place in around], axis=1)
     scales = np.stack([scale[place] for place in around], axis=1)
     known = components >= 0
+    own = fetch(choice.prior_component)[pixels]
+    components[:, 0] = np.where(own < len(LIT_COMPONENTS), own, -1)
     mean = np.sum(np.log(scales), axis=1, where=known) / np.maximum(known.sum(axis=1), 1)
     return components, np.exp(mean)
 

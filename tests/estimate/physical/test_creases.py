@@ -82,6 +82,17 @@ def test_camera_pixels_of_a_crease_decide_together_whether_light_falls_off(creas
     np.testing.assert_array_equal(np.sort(split.elsewhere.pixels), expected)
 
 
+def test_what_the_projector_blurs_is_no_light_of_a_crease(crease):
+    """Of a wider footprint a shift moves a lesser share, and none of it is lost."""
+    transport, _ = crease
+    blurred = np.broadcast_to(np.float32([1.12, 1.12, 0.0, 0.0]), (*PROJECTOR, 4))
+    found = split_physically(replace(transport, footprint=blurred)).elsewhere
+    assert len(found.pixels) == PROJECTOR.width
+    kept = found.direct / 0.4
+    assert kept.min() > 1 - DRAWN
+    assert kept.max() < 1
+
+
 def telling_places(noise, *, seed=5):
     """Return q on a slanted plane, with noise, and without."""
     y, x = np.mgrid[:20, :23].astype(np.float64)

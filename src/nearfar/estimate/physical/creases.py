@@ -19,7 +19,6 @@ from nearfar.transport.boxes import box_weights
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
-from nearfar.transport.seen import seen_of_projector
 
 # In projector pixels: how far a q is off, at least and at most.
 OFF = (0.02, 0.3)
@@ -64,15 +63,15 @@ def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
     if transport.footprint is None:
         before, after = (np.asarray(direct_weights(q, centres)[:, 0]) for q in (own, places))
     else:
-        before = box_weights(own, centres, transport.boxes[pixels])
-        seen = seen_of_projector(transport.correspondence)[pixels]
-        after = box_weights(places, centres, seen)
+        # Both of the same footprint: what the projector blurs is no light of a crease.
+        boxes = transport.boxes[pixels]
+        before, after = (box_weights(q, centres, boxes) for q in (own, places))
     kept = (before * after).sum(axis=1) / (after**2).sum(axis=1)
     direct = transport.direct.reshape(-1, transport.channels)[pixels]
     moved = (1 - kept) * direct.mean(axis=1)
     falls_off = _falls_off(transport, chosen, own - places, centres, moved)
-    most = _of_most(pixels, falls_off, chosen) & (kept < 1)
-    return Elsewhere(pixels, places, kept[:, None] * direct).of(most)
+    is_crease = _majority(pixels, falls_off, chosen) & (kept < 1)
+    return Elsewhere(pixels, places, kept[:, None] * direct).of(is_crease)
 
 
 def _drawn_aside(
@@ -85,20 +84,20 @@ def _drawn_aside(
     return told, single & (off > OFF[0]) & (off < OFF[1]) & (deviation < AGREEMENT * off)
 
 
-def _of_most(pixels: Integers, one: Booleans, chosen: Booleans) -> Booleans:
-    """Return what is so of at least half of the chosen camera pixels about each, (n,).
+def _majority(pixels: Integers, votes: Booleans, chosen: Booleans) -> Booleans:
+    """Return, for each chosen camera pixel, the majority vote of those about it, (n,).
 
     Parameters
     ----------
     pixels : ndarray of int, shape (n,)
         The chosen camera pixels.
-    one : ndarray of bool, shape (n,)
-        Whether it is so of each by itself.
+    votes : ndarray of bool, shape (n,)
+        The vote of each. A tie counts as true.
     chosen : ndarray of bool, shape (Cy, Cx)
     """
-    votes = np.zeros(chosen.shape)
-    votes.ravel()[pixels] = np.where(one, 1.0, -1.0)
-    balance = ndimage.uniform_filter(votes, TOGETHER, mode="constant").ravel()[pixels]
+    signs = np.zeros(chosen.shape)
+    signs.ravel()[pixels] = np.where(votes, 1.0, -1.0)
+    balance = ndimage.uniform_filter(signs, TOGETHER, mode="constant").ravel()[pixels]
     # Sums of whole numbers, but for rounding.
     return np.asarray(balance > -0.5 / TOGETHER**2)
 

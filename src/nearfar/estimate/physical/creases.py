@@ -15,10 +15,11 @@ from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.physical.elsewhere import Elsewhere, sees_single_pixels
 from nearfar.estimate.physical.rows_about import REACH, of_rows_about_q
 from nearfar.estimate.physical.told import told_by_others
-from nearfar.transport.boxes import box_weights
+from nearfar.transport.boxes import blurred_boxes, box_weights
 from nearfar.transport.direct import direct_weights
 from nearfar.transport.model import Transport
 from nearfar.transport.near import centre
+from nearfar.transport.seen import seen_of_projector
 
 # In projector pixels: how far a q is off, at least and at most.
 OFF = (0.02, 0.3)
@@ -63,15 +64,27 @@ def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
     if transport.footprint is None:
         before, after = (np.asarray(direct_weights(q, centres)[:, 0]) for q in (own, places))
     else:
-        # Both of the same footprint: what the projector blurs is no light of a crease.
-        boxes = transport.boxes[pixels]
-        before, after = (box_weights(q, centres, boxes) for q in (own, places))
+        before = box_weights(own, centres, transport.boxes[pixels])
+        after = box_weights(places, centres, _usual_footprints(transport)[pixels])
     kept = (before * after).sum(axis=1) / (after**2).sum(axis=1)
     direct = transport.direct.reshape(-1, transport.channels)[pixels]
     moved = (1 - kept) * direct.mean(axis=1)
     falls_off = _falls_off(transport, chosen, own - places, centres, moved)
     is_crease = _majority(pixels, falls_off, chosen) & (kept < 1)
     return Elsewhere(pixels, places, kept[:, None] * direct).of(is_crease)
+
+
+def _usual_footprints(transport: Transport) -> Floats:
+    """Return footprints that are blurred as most about each camera pixel are, (C, 4).
+
+    Light of a crease may have given a camera pixel a footprint of its own.
+    """
+    seen = seen_of_projector(transport.correspondence)
+    # Boxes that are blurred by a box of some width have the squares of both.
+    blur = np.mean(transport.boxes[:, :2] ** 2 - seen[:, :2] ** 2, axis=1)
+    blur = np.where(transport.lit, blur.reshape(transport.camera), 0.0)
+    usual = ndimage.median_filter(blur, TOGETHER, mode="nearest")
+    return blurred_boxes(seen, np.sqrt(np.maximum(usual, 0.0)).reshape(-1, 1))
 
 
 def _drawn_aside(

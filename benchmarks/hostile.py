@@ -12,8 +12,7 @@ one projector pixel, for
 - Hadamard, brute force: where the budget allows them.
 
 With ``--look``, the plan is chosen by a first look of a fifth of P photos, which come on top of the
-budget, and "look" stands in place of "joint": where the look finds that no model describes the
-scene and the photos suffice, free rows from codes, otherwise the joint estimate.
+budget, and "look" stands in place of "joint".
 
 ``--alone`` leaves out all but the joint estimate; ``--budgets`` takes other shares of P. With
 ``--bars`` it prints for the joint estimate how many errors lie within one standard deviation,
@@ -22,9 +21,7 @@ in per cent, in place of the others.
 
 import argparse
 import sys
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -44,8 +41,7 @@ from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.hostile import HOSTILE, hostile_transport
 from nearfar.transport.model import Transport
-from nearfar.workflow.acquire import acquire, acquire_in_memory
-from nearfar.workflow.free_rows import reconstruct_free_rows
+from nearfar.workflow.acquire import acquire_in_memory
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.brute_force import BRUTE_FORCE
 from nearfar.workflow.rivals.hadamard import HADAMARD
@@ -164,12 +160,6 @@ def look(bench: Bench) -> Look:
     return look_at(jointly(measured(bench, plan), plan))
 
 
-def by_codes(bench: Bench, plan: Plan) -> Transport:
-    """Return free rows from photos of codes."""
-    with tempfile.TemporaryDirectory() as folder:
-        return reconstruct_free_rows(acquire(plan, Path(folder) / "c.zarr", bench.rig(1.0)))
-
-
 def estimates(
     bench: Bench, photos: int, seen: Look | None, *, rivals: bool
 ) -> Iterator[tuple[str, Relights]]:
@@ -181,11 +171,7 @@ def estimates(
         yield "joint", jointly(measurements, plan)
     else:
         chosen = plan_by_look(projector, photos, seen, checked=False)
-        is_by_codes = chosen.is_of_lamps
-        yield (
-            "look",
-            by_codes(bench, chosen) if is_by_codes else jointly(measured(bench, chosen), chosen),
-        )
+        yield "look", jointly(measured(bench, chosen), chosen)
     if not rivals:
         return
     yield "DFT", Dense(inverse_dft(measurements))

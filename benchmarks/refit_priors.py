@@ -35,7 +35,7 @@ from nearfar.estimate.joint.evidence import log_evidence, whiten
 from nearfar.estimate.joint.problem import Model, lay_out
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measure import measure
-from nearfar.plan.choose import choose_frequencies
+from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.fitted import FREE, LIT_COMPONENTS, PRIOR_SCALES, TYPICAL_SCENES
 from nearfar.priors.responses import response_prior

@@ -9,7 +9,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.plan import choose_plan, read_plan
-from nearfar.plan.choose import NOISE
+from nearfar.plan.choose_frequencies import NOISE
 from nearfar.plan.look import look_at, photos_for_window
 from nearfar.plan.typical import noise_of, typical_of
 from nearfar.scenes.hostile import hostile_transport
@@ -219,9 +219,9 @@ def test_a_look_at_what_is_not_direct_near_and_far_light_asks_for_every_frequenc
         assert said in ran.out
     codes = tmp_path / "codes.json"
     ran = check_done(run_nearfar(*wanted, "--photos", 170, "--look", look, "-o", codes))
-    assert "each projector pixel counts as a lamp of its own" in ran.out
-    assert "nearfar reconstruct --no-near --no-far" in ran.out
-    assert read_plan(codes).is_of_lamps
+    assert "codes of half of the projector's pixels, which tell all of them apart" in ran.out
+    assert "all frequencies are shown" in ran.out
+    assert read_plan(codes).is_by_codes
     ran = check_done(run_nearfar(*wanted, "--photos", 150, "--look", look, "--json"))
     found = json.loads(ran.out)
     assert found["look"]["model_holds"] is False

@@ -17,11 +17,8 @@ from nearfar.illumination.frequencies import (
 from nearfar.illumination.real_basis import real_basis
 from nearfar.plan import choose_plan, parse_plan
 from nearfar.plan.candidates import candidates
-from nearfar.plan.choose import (
-    FEWEST_PHOTOS,
-    choose_frequencies,
-    photos_of_every_frequency,
-)
+from nearfar.plan.choose import FEWEST_PHOTOS, photos_of_every_frequency
+from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.plan.look import look_at, photos_for_window
 from nearfar.plan.patterns import Sinusoid
 from nearfar.plan.typical import noise_of, typical_of

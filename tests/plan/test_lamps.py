@@ -7,8 +7,10 @@ from pydantic import ValidationError
 from nearfar.arrays import Size
 from nearfar.errors import PlanError
 from nearfar.plan import parse_plan
-from nearfar.plan.lamps import plan_lamps
+from nearfar.plan.codes import order_of_codes
+from nearfar.plan.lamps import plan_lamps, shares_of_photos
 from nearfar.plan.patterns import LampCode
+from nearfar.plan.references import FEWEST
 
 
 def _drawn(plan, purpose="direct"):
@@ -74,3 +76,14 @@ def test_codes_that_there_are_not_are_refused(order, row):
 def test_what_cannot_be_planned_gets_a_sentence(size, photos, says):
     with pytest.raises(PlanError, match=says):
         plan_lamps(size, photos)
+
+
+def test_references_and_checks_leave_room_for_all_codes():
+    projector = Size(8, 8)
+    needed = order_of_codes(projector.pixels) + 2 * FEWEST + 1
+    for photos in range(needed, 2 * needed):
+        shares = shares_of_photos(projector, photos, checked=True)
+        assert 2 * shares.references + shares.checks + shares.codes == photos
+        assert shares.codes >= order_of_codes(projector.pixels)
+        assert shares.references >= FEWEST
+        assert shares.checks >= 1

@@ -10,7 +10,7 @@ from nearfar.arrays import Size
 from nearfar.errors import PlanError
 from nearfar.illumination.frequencies import DC, as_array
 from nearfar.illumination.pictures import random_pattern
-from nearfar.plan import Plan, choose, choose_plan, expect_place, parse_plan, pitch_of
+from nearfar.plan import Plan, choose_frequencies, choose_plan, expect_place, parse_plan, pitch_of
 from nearfar.plan.candidates import candidates, high_frequencies
 from nearfar.plan.expect import (
     TYPICAL_DIRECT_DEVIATION,
@@ -63,7 +63,7 @@ def test_plans_of_single_pixels_are_what_they_always_were(projector, photos, che
 @pytest.mark.parametrize(("projector", "photos"), [(Size(24, 31), 61), (Size(1, 64), 60)])
 def test_thin_products_choose_plans_as_good_as_whole_covariances(projector, photos, monkeypatch):
     _, by_whole = choose_plan(projector, photos)
-    monkeypatch.setattr(choose, "MOST_WHOLE", 0.0)
+    monkeypatch.setattr(choose_frequencies, "MOST_WHOLE", 0.0)
     plan, by_thin = choose_plan(projector, photos)
     assert plan.pitch == 1
     np.testing.assert_allclose(by_thin, by_whole, rtol=1e-8)
@@ -85,7 +85,7 @@ def test_large_plans_are_chosen_by_thin_products(projector, photos, is_whole, mo
         raise asked
 
     chosen_by = "ErrorsTogether" if is_whole else "ErrorsLowRank"
-    monkeypatch.setattr(choose, chosen_by, refuse)
+    monkeypatch.setattr(choose_frequencies, chosen_by, refuse)
     with pytest.raises(RuntimeError, match="asked"):
         choose_plan(projector, photos)
 

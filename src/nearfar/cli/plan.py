@@ -192,8 +192,6 @@ class _Chosen(NamedTuple):
         found = []
         if self.look is not None:
             found.append(describe_look(self.look, self.plan, self.photos_for_window))
-            if self.plan.is_of_lamps:
-                found.append("reconstruct them with: nearfar reconstruct --no-near --no-far")
         if self.plan.expected_snr is not None:
             is_looked_at = self.look is not None
             found.append(describe_expected(self.plan.expected_snr, is_looked_at=is_looked_at))

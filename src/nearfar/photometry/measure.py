@@ -1,10 +1,11 @@
-"""From the photos of a plan to measurements, by inverse pairs or by reference."""
+"""From the photos of a plan to measurements, by inverse pairs, by reference or by codes."""
 
 from collections.abc import Callable
 
 from nearfar.arrays import Floats
 from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.real_basis import RealBasis
+from nearfar.photometry.by_codes import measure_by_codes, weighing_of
 from nearfar.photometry.by_inverse import find_pairs, measure_pairs, responses_of_pairs
 from nearfar.photometry.by_reference import measure_by_reference, responses_by_reference
 from nearfar.photometry.drift import find_references
@@ -26,6 +27,8 @@ def measured_frequencies(plan: Plan) -> set[Frequency]:
     """
     plan.require_real("measure")
     plan.require_sinusoids("measure")
+    if plan.is_by_codes:
+        return set(weighing_of(plan).basis.frequencies)
     if plan.offset == "reference":
         find_references(plan)
         return {frequency for frequency, _ in find_waves(plan)}
@@ -49,6 +52,9 @@ def measured_basis(plan: Plan) -> tuple[RealBasis, Floats]:
     """
     plan.require_real("measure")
     plan.require_sinusoids("measure")
+    if plan.is_by_codes:
+        weighing = weighing_of(plan)
+        return weighing.basis, weighing.multiplicity
     if plan.offset == "reference":
         basis, _, multiplicity = responses_by_reference(plan)
     else:
@@ -88,5 +94,7 @@ def measure(
     rows = slice(0, photos.camera.height) if rows is None else rows
     if photos.plan.offset == "reference":
         without_drift = photos if isinstance(photos, PhotosWithoutDrift) else remove_drift(photos)
+        if photos.plan.is_by_codes:
+            return measure_by_codes(without_drift, rows, progress)
         return measure_by_reference(without_drift, rows, progress)
     return measure_pairs(photos, rows, progress)

@@ -46,7 +46,7 @@ class Measurements:
     white_noise, black_noise : ndarray, shape (C, channels), float32
         Standard deviations of the white and the black that all sinusoids' responses were taken
         against: errors e_w and e_k of theirs add -(e_w + e_k) to every one of them. 0, the
-        default, where each was taken against its own inverse.
+        default, where each was taken against its own inverse, or by codes.
     light_noise : ndarray, shape (C, channels), float32
         Standard deviation of the response to DC, white - black, whatever its multiplicity; by
         default `noise`.

@@ -94,6 +94,12 @@ def with_checks(plan: Plan) -> Plan:
     PlanError
         If an estimate needs all photos of the plan.
     """
+    if plan.is_by_codes:
+        raise PlanError(
+            f"a plan of codes can be estimated from only after its last photo, so that there is "
+            f"nothing to check on the way: plan sinusoids, with `photos` no more than the "
+            f"{plan.projector.pixels} projector pixels."
+        )
     if plan.offset != "reference" or plan.counts["correspondence"]:
         raise PlanError(
             "a plan of inverse pairs, or with photos of its own for correspondence such as stripes "
@@ -134,8 +140,10 @@ def ends(plan: Plan) -> list[int]:
 
     By then every cosine has its sine, patterns for correspondence are complete or not started, and
     white and black have just been projected for the second time or later; or, in a plan of inverse
-    pairs, every pattern has its inverse, white among them.
+    pairs, every pattern has its inverse, white among them. Codes measure nothing before the last.
     """
+    if plan.is_by_codes:
+        return [len(plan.patterns)]
     own = [i for i, p in enumerate(plan.patterns) if p.purpose == "correspondence"]
     first, last = (own[0], own[-1]) if own else (0, -1)
     return [end for end in _ends_of(plan) if end <= first or end > last]

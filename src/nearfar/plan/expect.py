@@ -294,30 +294,6 @@ def light_weights(frequencies: list[Frequency], projector: Size, pitch: int) -> 
     return np.stack([PICTURE_VARIANCE * pictures / pictures.sum(), even / even.sum() / 12.0])
 
 
-def expected_of_codes(projector: Size, codes: int, references: int, noise: float) -> Expected:
-    """Return the SNR_b that all codes of an order, or more, are expected to leave without a prior.
-
-    A code lights half of the projector fully, a sinusoid all of it by halves: in the noise of a
-    response to a sinusoid, n codes tell each entry of a row with the variance noise^2 / n, in all
-    directions but white, which the references show (Harwit and Sloane 1979).
-
-    Parameters
-    ----------
-    projector : Size
-    codes : int
-    references : int
-        How often white and black are each photographed.
-    noise : float
-        Standard deviation of the response to a sinusoid, as a share of white.
-    """
-    of_light = np.array([PICTURE_VARIANCE, RANDOM_VARIANCE])
-    found = noise**2 * of_light * projector.pixels / codes
-    # Two photos, of white and of black, each with half the noise of a response.
-    of_white = 0.5 * noise**2 / references * PICTURE_SQUARED_MEAN
-    light = PICTURE_SQUARED_MEAN + of_light
-    return Expected(*(float(value) for value in 10 * np.log10(light / (found + of_white))))
-
-
 def expected_of(
     found: Floats, weights: Floats, references: int, typical: TypicalScenes, noise: float
 ) -> Expected:

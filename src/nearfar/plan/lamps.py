@@ -1,24 +1,19 @@
 """Plans for lamps without a neighbourhood: codes that rely on no order of the lamps."""
 
-from itertools import count
 from typing import NamedTuple
 
 from nearfar.arrays import AnySize, Size, as_size
 from nearfar.checks import as_count
 from nearfar.errors import PlanError
-from nearfar.illumination import patterns
+from nearfar.plan.codes import MOST_PIXELS, code, order_of_codes
 from nearfar.plan.model import Plan
-from nearfar.plan.patterns import LampCode, Pattern
+from nearfar.plan.patterns import Pattern
 from nearfar.plan.references import FEWEST, with_references
 
-# Lamps of which photos can be turned into rows.
-MOST_LAMPS = 4096
 # Photos to one white and one black.
 PHOTOS_TO_A_REFERENCE = 40
 # Share of the photos that are check photos.
 CHECKED_SHARE = 0.04
-# Share of the order from one row to the next: few photos are of rows that lie far apart.
-STEP = 0.382
 
 
 def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan:
@@ -50,10 +45,10 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
         If the size or the photos are not whole numbers.
     """
     projector, photos = as_size(projector, "projector"), as_count(photos, "photos")
-    if projector.pixels > MOST_LAMPS:
+    if projector.pixels > MOST_PIXELS:
         raise PlanError(
             f"{projector.pixels} lamps are too many to tell one by one: plan for a grid of at most "
-            f"{MOST_LAMPS}, or leave a range in the model."
+            f"{MOST_PIXELS}, or leave a range in the model."
         )
     references, checks, codes = shares_of_photos(projector, photos, checked=checked)
     if codes < 1:
@@ -61,12 +56,12 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
             f"{photos} photos are too few for two whites, two blacks, a code and one to check by: "
             f"plan with `photos={2 * FEWEST + 2}` or more."
         )
-    order = _order_from(projector.pixels)
+    order = order_of_codes(projector.pixels)
     # Of another order, so that they are like none of those that are estimated from.
-    other = _order_from(order + 1)
-    shown: list[Pattern] = [LampCode(order=order, row=_row(row, order)) for row in range(codes)]
+    other = order_of_codes(order + 1)
+    shown: list[Pattern] = [code(number, order) for number in range(codes)]
     for number in range(checks):
-        check = LampCode(order=other, row=_row(number, other), purpose="check")
+        check = code(number, other).model_copy(update={"purpose": "check"})
         shown.insert((2 * number + 1) * len(shown) // (2 * checks), check)
     one = Size(1, 1)
     return Plan(
@@ -78,17 +73,6 @@ def plan_lamps(projector: AnySize, photos: int, *, checked: bool = True) -> Plan
         correspondence="none",
         patterns=with_references(shown, references, references),
     )
-
-
-def photos_of_every_code(projector: Size, *, checked: bool = True) -> int | None:
-    """Return the fewest photos whose plan shows as many codes as tell every lamp apart.
-
-    All codes of an order do so with the least noise; if a few are left out, some sums of lamps
-    remain unknown, or nearly so. None for more lamps than can be planned for.
-    """
-    if projector.pixels > MOST_LAMPS:
-        return None
-    return _order_from(projector.pixels) + 2 * FEWEST + int(checked)
 
 
 class SharesOfPhotos(NamedTuple):
@@ -107,20 +91,9 @@ def shares_of_photos(projector: Size, photos: int, *, checked: bool) -> SharesOf
     """
     references = max(FEWEST, round(photos / PHOTOS_TO_A_REFERENCE))
     checks = max(1, round(CHECKED_SHARE * photos)) if checked else 0
-    left = photos - _order_from(projector.pixels)
+    left = photos - order_of_codes(projector.pixels)
     if 2 * FEWEST + int(checked) <= left < 2 * references + checks:
         # References first: black's error is in every code.
         references = min(references, (left - int(checked)) // 2)
         checks = min(checks, left - 2 * references)
     return SharesOfPhotos(references, checks, photos - 2 * references - checks)
-
-
-def _row(number: int, order: int) -> int:
-    return number * max(1, round(STEP * order)) % order
-
-
-def _order_from(least: int) -> int:
-    """Return the smallest order of codes that is at least as large."""
-    return next(
-        order for order in count(max(3, least)) if order % 4 == 3 and patterns.is_prime(order)
-    )

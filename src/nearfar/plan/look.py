@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nearfar.arrays import Size
-from nearfar.plan.choose import choose_frequencies
+from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.plan.typical import noise_of, typical_of
 from nearfar.plan.window import largest_window, pitch_of
 from nearfar.priors.component import PriorComponent

@@ -254,9 +254,14 @@ class Plan(Frozen):
             )
 
     @property
+    def is_by_codes(self) -> bool:
+        """Whether the plan shows codes, which measure all frequencies together."""
+        return any(isinstance(pattern, LampCode) for pattern in self.patterns)
+
+    @property
     def is_of_lamps(self) -> bool:
         """Whether the plan shows codes of lamps without a neighbourhood."""
-        return any(isinstance(pattern, LampCode) for pattern in self.patterns)
+        return self.is_by_codes and self.correspondence == "none"
 
     def draw(self, index: int) -> NDArray[np.uint8]:
         """Draw the 8-bit pattern of photo `index`, shape (Py, Px)."""

@@ -20,6 +20,8 @@ LONGEST_LINE_OF_SINGLE_PIXELS = 128
 # W where nothing is known: the largest of single pixels, and that at a larger pitch, where
 # windows reach over a quarter of the screen (docs/decisions/0042 compares others).
 LARGEST_DEFAULT, DEFAULT_AT_PITCH = 25, 9
+# f is kept at the measured ones of as many DFT frequencies on each side.
+FAR_BAND_SIDE = 13
 
 
 def pitch_of(projector: Size) -> int:
@@ -81,6 +83,11 @@ def default_window(projector: Size, pitch: int = 1) -> int:
     else:
         wanted = min(LARGEST_DEFAULT, max(5, round(_shorter(projector) / 6)))
     return int(min(2 * (wanted // 2) + 1, largest_window(projector, pitch)))
+
+
+def far_band(projector: Size) -> Size:
+    """Return the far band of plans that are chosen: 13 x 13, or as many as the projector has."""
+    return Size(*(min(FAR_BAND_SIDE, side - 1 + side % 2) for side in projector))
 
 
 def _shorter(projector: Size) -> int:

@@ -42,6 +42,7 @@ GARG = (
     "Garg, G., Talvala, E.-V., Levoy, M., Lensch, H.P.A.: Symmetric Photography: Exploiting "
     "Data-sparseness in Reflectance Fields. Eurographics Symposium on Rendering, 2006."
 )
+HARWIT = "Harwit, M., Sloane, N.J.A.: Hadamard Transform Optics. Academic Press, 1979."
 # What the methods of `nearfar compare` go back to, beside the paper.
 REFERENCES_OF_RIVALS = {
     "CLT": PEERS,
@@ -69,6 +70,12 @@ OFFSETS = {
     ),
     "none": "The patterns were complex, in theory, and have no offset.",
 }
+OF_CODES = (
+    "Each code lit about half of the projector's pixels, as a row of an S-matrix does [3]; the "
+    "response to every sinusoid was taken from the photos of all codes together, by least squares. "
+    "The drift of lamp and ambient light was taken out by the whites and blacks, which were "
+    "photographed at intervals."
+)
 CORRESPONDENCES = {
     "phase": "by the phase of the sinusoids' own photos",
     "stripes": "by photos of stripes",
@@ -76,7 +83,7 @@ CORRESPONDENCES = {
 }
 ESTIMATES = {
     "joint": (
-        "Each camera pixel's row was estimated from its photos of sinusoids, white and black, as "
+        "Each camera pixel's row was estimated from its responses to sinusoids and to white, as "
         "the mean of a Gaussian posterior whose prior the photos choose [2]; its covariance gives "
         "the error bars."
     ),
@@ -107,17 +114,26 @@ def reconstruction_methods(
     correspondence_given : bool
         Whether q was given, and not found in the photos.
     """
-    purposes = [f"{count} {PURPOSES[purpose]}" for purpose, count in plan.counts.items() if count]
     sentences = [
         f"The light transport from a projector of {plan.projector} pixels to a camera of "
         f"{transport.camera} pixels ({counted(transport.channels, 'channel')}) was measured by "
         f"frequency-space decomposition [1], from {len(plan.patterns)} photos: "
-        f"{', '.join(purposes)}.",
-        OFFSETS[plan.offset],
+        f"{_purposes(plan)}.",
+        OF_CODES if plan.is_by_codes else OFFSETS[plan.offset],
         _correspondence(plan, given=correspondence_given),
         _estimate(transport.provenance, describe_window(plan.window, plan.pitch), plan.far),
     ]
-    return _methods([*sentences, checked])
+    return _methods([*sentences, checked], [HARWIT] if plan.is_by_codes else None)
+
+
+def _purposes(plan: Plan) -> str:
+    """Return in words how many photos served which purpose."""
+    counts, words = plan.counts, PURPOSES
+    if plan.is_by_codes:
+        # The first white measures the response to DC, as far-range light.
+        counts = {**counts, "reference": counts["reference"] + counts["far"], "far": 0}
+        words = {**PURPOSES, "direct": "of codes"}
+    return ", ".join(f"{count} {words[purpose]}" for purpose, count in counts.items() if count)
 
 
 def any_patterns_methods(
@@ -214,6 +230,8 @@ def _correspondence(plan: Plan, *, given: bool) -> str:
     if given or plan.correspondence == "none":
         return f"{which} was known beforehand."
     how = CORRESPONDENCES.get(plan.correspondence, f"by the method {plan.correspondence}")
+    if plan.is_by_codes and plan.correspondence == "phase":
+        how = "by the phase of the responses to sinusoids"
     return f"{which} was found {how}."
 
 

@@ -40,13 +40,16 @@ def misfit_section(misfit: MisfitMaps | None) -> str:
         saturated=misfit.saturated,
         step=misfit.cell,
     )
-    by_frequency = plot(
-        _by_frequency(misfit),
-        "misfit by frequency",
-        "Each dot is a measured frequency, drawn twice as k and -k; coarse stripes are in the "
-        "middle, fine ones outside. Single bright dots are single bad photos; a bright ring or "
-        "middle is light of a kind that the model does not hold.",
-    )
+    by_frequency = ""
+    # Codes show all frequencies at once.
+    if misfit.of_frequencies:
+        by_frequency = plot(
+            _by_frequency(misfit),
+            "misfit by frequency",
+            "Each dot is a measured frequency, drawn twice as k and -k; coarse stripes are in the "
+            "middle, fine ones outside. Single bright dots are single bad photos; a bright ring or "
+            "middle is light of a kind that the model does not hold.",
+        )
     return f"""{title}
 <p>Each photo is compared with the relit picture of its pattern. Misfit is the squared difference
 over what noise makes of it: about 1, or somewhat less, where all is well.{checks}</p>

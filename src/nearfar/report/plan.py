@@ -1,17 +1,23 @@
 """Description of a plan."""
 
+from collections import Counter
+
 from nearfar.plan import Plan
+from nearfar.plan.checks import is_reference
 from nearfar.plan.choose import can_list_every_frequency, photos_of_every_frequency
 from nearfar.plan.expected_range import ExpectedRange
 from nearfar.plan.look import Look
-from nearfar.plan.patterns import LampCode
+from nearfar.plan.patterns import LampCode, Pattern
 from nearfar.plan.recognition import summarise
 from nearfar.plan.recognition.own import recognised_in
 from nearfar.plan.window import largest_window
 
-BY_CODES = (
-    "codes of half of the projector's pixels are expected to relight better than sinusoids: "
-    "planned without a window and a band, each projector pixel counts as a lamp of its own"
+# Sorts of photos of a plan of codes, as they are counted.
+SORTS = CODES, SINUSOIDS, TO_CHECK, WHITE_AND_BLACK = (
+    "codes",
+    "sinusoids with their inverses",
+    "to check by",
+    "white and black",
 )
 
 
@@ -35,6 +41,8 @@ def describe_plan(plan: Plan) -> str:
         )
     if plan.is_of_lamps:
         return _describe_lamps(plan)
+    if plan.is_by_codes:
+        return _describe_codes(plan)
     counts = ", ".join(f"{count} {purpose}" for purpose, count in plan.counts.items() if count)
     return "\n".join(
         [
@@ -50,7 +58,6 @@ def describe_plan(plan: Plan) -> str:
 
 def _describe_lamps(plan: Plan) -> str:
     """Describe a plan of codes of lamps."""
-    codes, checks = plan.counts["direct"], plan.counts["check"]
     lamps = plan.projector.pixels
     rows = {
         pattern.row
@@ -60,15 +67,40 @@ def _describe_lamps(plan: Plan) -> str:
     tells = (
         "tell all of them apart" if len(rows) >= lamps else f"are {len(rows) / lamps:.0%} of them"
     )
-    others = len(plan.patterns) - codes - checks
     return "\n".join(
         [
             f"{lamps} lamps of {plan.projector}, in no order: codes of half of the lamps, which "
             f"{tells}",
-            f"{len(plan.patterns)} photos: {codes} codes, {checks} to check by, {others} white and "
-            f"black",
+            _describe_photos_of_codes(plan),
         ]
     )
+
+
+def _describe_codes(plan: Plan) -> str:
+    """Describe a plan of codes that measure all frequencies together."""
+    return "\n".join(
+        [
+            f"projector {plan.projector}, W = {plan.window}, far band {plan.far}: codes of half of "
+            f"the projector's pixels, which tell all of them apart with half the variance of "
+            f"sinusoids",
+            f"{_describe_photos_of_codes(plan)}; {_against(plan)}",
+        ]
+    )
+
+
+def _describe_photos_of_codes(plan: Plan) -> str:
+    shown = Counter(_sort_of(pattern) for pattern in plan.patterns)
+    counts = ", ".join(f"{shown[sort]} {sort}" for sort in SORTS if shown[sort])
+    return f"{len(plan.patterns)} photos: {counts}"
+
+
+def _sort_of(pattern: Pattern) -> str:
+    """Return what a photo of a plan of codes is of."""
+    if pattern.purpose == "check":
+        return TO_CHECK
+    if isinstance(pattern, LampCode):
+        return CODES
+    return WHITE_AND_BLACK if is_reference(pattern) else SINUSOIDS
 
 
 def _describe_pitch(plan: Plan) -> str:
@@ -129,8 +161,6 @@ def describe_look(look: Look, plan: Plan, photos_for_window: int | None) -> str:
     """
     if not look.model_holds:
         return _describe_no_model(look, plan)
-    if plan.is_of_lamps:
-        return BY_CODES
     if look.reach is None:
         return f"the look shows hardly any near-range light: planned with W = {plan.window}"
     more = " or more" if look.reach >= look.window else ""
@@ -154,8 +184,6 @@ def _describe_no_model(look: Look, plan: Plan) -> str:
         f"the scene is not direct, near-range and far-range light alone: by its light, "
         f"{look.free_share:.0%} of the look's camera pixels fit no window and no band"
     )
-    if plan.is_of_lamps:
-        return f"{found}; {BY_CODES}"
     if not can_list_every_frequency(plan.projector):
         return f"{found}. The projector has too many frequencies to do without them"
     if plan.transport_photos >= plan.projector.pixels:

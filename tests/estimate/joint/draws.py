@@ -14,7 +14,7 @@ from nearfar.illumination.frequencies import DC
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
-from nearfar.plan.choose import choose_frequencies
+from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.transport import near

@@ -23,7 +23,7 @@ from nearfar.illumination.pictures import standard_lights
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
-from nearfar.plan.choose import choose_frequencies
+from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import far_variance, near_covariance, spectral_density
 from nearfar.rigs.simulated.camera import SimulatedCamera

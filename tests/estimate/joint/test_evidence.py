@@ -18,7 +18,7 @@ from nearfar.estimate.joint.evidence import (
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
-from nearfar.plan.choose import choose_frequencies
+from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.fitted import LIT_COMPONENTS, PRIOR_SCALES
 from nearfar.priors.responses import response_prior

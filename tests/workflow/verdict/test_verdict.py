@@ -98,7 +98,7 @@ def test_photos_as_far_off_as_expected_are_not_searched(reconstructed, monkeypat
     def search(*_args, **_options):
         raise AssertionError("photos were searched")
 
-    monkeypatch.setattr("nearfar.workflow.diagnosis.single_photos.estimate_by_sweeps", search)
+    monkeypatch.setattr("nearfar.workflow.diagnosis.left_out.estimate_by_sweeps", search)
     assert judge_reconstruction(stored, capture).grade == "good"
     with pytest.raises(AssertionError, match="searched"):
         find_what_spoils(stored, capture)

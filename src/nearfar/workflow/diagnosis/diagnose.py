@@ -23,6 +23,7 @@ from nearfar.workflow.diagnosis.inverse_pairs import (
     has_odd_pairs,
     steady_pairs,
 )
+from nearfar.workflow.diagnosis.left_out import SWEEPS
 from nearfar.workflow.diagnosis.misfit import (
     SteadyPhotos,
     fit_photos,
@@ -35,7 +36,7 @@ from nearfar.workflow.diagnosis.odd_references import find_odd_references
 from nearfar.workflow.diagnosis.sample import CameraSample, sample_camera
 from nearfar.workflow.diagnosis.sequence import find_other_order
 from nearfar.workflow.diagnosis.shifted_whites import find_shifted_whites
-from nearfar.workflow.diagnosis.single_photos import SWEEPS, SpoiltPhotos, find_spoilt_photos
+from nearfar.workflow.diagnosis.single_photos import SpoiltPhotos, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
 
 # What a response that is not linear, or JPEG, looks like.

@@ -14,10 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
-from nearfar.correspondence import correspond_by_phase
-from nearfar.errors import InputError
 from nearfar.estimate.error_bars import ErrorBars
-from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.faults.of_photos import (
     ColoursSwapped,
     ExposureChanged,
@@ -27,8 +24,6 @@ from nearfar.faults.of_photos import (
     ShowsOtherPattern,
     Spoilt,
 )
-from nearfar.photometry.by_inverse import find_pairs
-from nearfar.photometry.measure import measure
 from nearfar.plan import Sinusoid
 from nearfar.transport.model import Transport
 from nearfar.workflow.diagnosis.explanations import (
@@ -39,6 +34,7 @@ from nearfar.workflow.diagnosis.explanations import (
     exposure_change,
     simplest,
 )
+from nearfar.workflow.diagnosis.left_out import HELD_OUT, estimate_without
 from nearfar.workflow.diagnosis.misfit import (
     LEAST_IN_SUM,
     PhotoFits,
@@ -58,10 +54,6 @@ TURNS_OF_LEAVING = 8
 # A photo is explained by nothing known, yet spoilt, above this many times the misfit of the others
 # that were left out with it.
 UNEXPLAINED_RATIO = 40.0
-# Photos of these purposes are not estimated from.
-HELD_OUT = ("check", "correspondence")
-# Sweeps of the estimate.
-SWEEPS = 2
 
 
 class SpoiltPhotos(NamedTuple):
@@ -102,17 +94,18 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
         return SpoiltPhotos([], [])
     for _ in range(ROUNDS):
         suspects = _suspects(fits.misfit, good & ~fixed)
-        without = _estimate_without(fits, good, suspects, known) if suspects else None
+        without = estimate_without(fits, good, suspects, known) if suspects else None
         found = _explain_all(fits, without, suspects, good) if without is not None else {}
         if not found:
             break
         explained |= found
         good[list(found)] = False
-        again = _estimate_without(fits, good, [], known)
+        again = estimate_without(fits, good, [], known)
         if again is None:
             break
         fits = fit_photos(fits.without_drift, again)
-    explained |= _explain_by_turns(fits, good, explained, known)
+    if not plan.is_by_codes:
+        explained |= _explain_by_turns(fits, good, explained, known)
     certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     probable = {n: e for n, e in explained.items() if n not in certain}
     return SpoiltPhotos(_as_faults(certain), _as_faults(probable))
@@ -149,7 +142,7 @@ def _explain_by_turns(
     measured = good & ~serves(plan, *HELD_OUT) & ~is_white_or_black(plan)
     for turn in range(TURNS_OF_LEAVING):
         left_out = np.flatnonzero(measured & (turns == turn)).tolist()
-        without = _estimate_without(fits, good, left_out, known) if left_out else None
+        without = estimate_without(fits, good, left_out, known) if left_out else None
         if without is not None:
             relit[left_out] = relight(plan, without, left_out)
     by_turns = replace(fits, relit=relit)
@@ -187,39 +180,6 @@ def _is_shared(fits: PhotoFits, change: Explanation, number: int, good: Booleans
             if left < LEAST_IN_SUM * np.abs(mine).max():
                 return True
     return False
-
-
-def _estimate_without(
-    fits: PhotoFits, good: Booleans, left_out: list[int], known: Floats
-) -> Transport | None:
-    """Estimate the transport without some photos; None if too few remain."""
-    plan = fits.plan
-    keep = good & ~serves(plan, *HELD_OUT)
-    keep[left_out] = False
-    # A photo is nothing without its inverse, where all come in pairs; a cosine without its sine.
-    for pair in find_pairs(plan) if plan.offset == "inverse" else []:
-        keep[[pair.photo, pair.inverse]] = keep[pair.photo] and keep[pair.inverse]
-    kept = {
-        (p.frequency, p.kind)
-        for p, is_kept in zip(plan.patterns, keep, strict=True)
-        if is_kept and isinstance(p, Sinusoid)
-    }
-    for number, pattern in enumerate(plan.patterns):
-        if isinstance(pattern, Sinusoid) and not pattern.frequency.is_own_negative:
-            other = "sine" if pattern.kind == "cosine" else "cosine"
-            keep[number] &= (pattern.frequency, other) in kept
-    try:
-        measurements = measure(fits.without_drift.only(np.flatnonzero(keep)))
-    except InputError:
-        return None
-    try:
-        q = correspond_by_phase(measurements, pitch=plan.pitch).q
-    except InputError:
-        # The lowest frequencies, which place q, are among those that were left out.
-        q = known
-    return estimate_by_sweeps(
-        measurements, q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS
-    )
 
 
 def _explain_all(

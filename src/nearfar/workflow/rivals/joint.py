@@ -11,7 +11,7 @@ from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
-from nearfar.plan.choose import NOISE
+from nearfar.plan.choose_frequencies import NOISE
 from nearfar.workflow.acquire import acquire_in_memory
 from nearfar.workflow.rivals.bench import Bench
 from nearfar.workflow.rivals.rival import Attempt, Budget, Rival

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks.spoils import SPOILS, shoot
+from scipy import ndimage
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
@@ -11,7 +12,7 @@ from nearfar.plan.patterns import LampCode
 from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.left_out import estimate_without
-from nearfar.workflow.diagnosis.misfit import fit_photos
+from nearfar.workflow.diagnosis.misfit import Fits, effects_on_code, fit_photos
 from nearfar.workflow.diagnosis.sample import sample_camera
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
 
@@ -45,6 +46,8 @@ def test_good_photos_of_codes_are_not_accused(shot, reconstructed):
     [
         ("gamma", 1.1),
         ("camera moved, pixels", 0.2),
+        ("projector moved, pixels", 0.2),
+        ("projector out of focus, pixels", 1.0),
         ("photos swapped", 2),
         ("photos rotated", 1),
         ("photos mirrored", 1),
@@ -56,6 +59,34 @@ def test_good_photos_of_codes_are_not_accused(shot, reconstructed):
 def test_what_spoils_photos_of_codes_is_named(shot, reconstructed, name, strength):
     found = find_what_spoils(*reconstructed(SPOILS[name].apply(shot, strength)))
     assert found[0].cause in SPOILS[name].causes
+
+
+def test_neighbouring_codes_tell_what_a_projector_that_moves_or_blurs_changes(shot):
+    plan, camera = shot.plan, (16, 16, 3)
+
+    def picture(light):
+        return np.asarray(shot.truth @ light.astype(np.float32)).reshape(camera)
+
+    lights = [plan.draw(number) / 255 for number in range(len(plan.patterns))]
+    number = list(find_codes(plan).rows)[50]
+    relit = np.stack([picture(light) for light in lights])
+    fits = Fits(relit, relit, np.ones_like(relit), np.zeros(camera), np.zeros(camera))
+    by_row = {row: number for number, row in find_codes(plan).rows.items()}
+    found = effects_on_code(fits, plan, plan.patterns[number], by_row)
+
+    def shifted(*by):
+        return picture(ndimage.shift(lights[number], by, order=1, mode="nearest"))
+
+    expected = (
+        (shifted(0.2, 0) - shifted(-0.2, 0)) / 0.4,
+        (shifted(0, 0.2) - shifted(0, -0.2)) / 0.4,
+        picture(lights[number]) - picture(ndimage.gaussian_filter(lights[number], 0.4)),
+    )
+    for one, other in zip(found, expected, strict=True):
+        # All but at the projector's border.
+        assert np.corrcoef(one.ravel(), other.ravel())[0, 1] > 0.97
+    for one, other in zip(found[:2], expected[:2], strict=True):
+        assert np.sum(one * other) / np.sum(one**2) == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_photo_that_is_left_out_has_no_part_in_the_estimate(shot, reconstructed):

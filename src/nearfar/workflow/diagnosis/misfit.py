@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.illumination.frequencies import DC
 from nearfar.parallel import side_by_side
+from nearfar.photometry.by_codes import find_codes
 from nearfar.photometry.photos import Photos
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import is_reference
-from nearfar.plan.patterns import HalfScreen, Pattern, Picture
+from nearfar.plan.patterns import HalfScreen, LampCode, Pattern, Picture
 from nearfar.transport.model import Transport
 from nearfar.workflow.diagnosis.sample import PATCH, CameraSample
 
@@ -58,6 +59,7 @@ REGIONS_A_SIDE = 3
     BEND,
 ) = range(9)
 CAUSES = 9
+OF_PROJECTOR = slice(PROJECTOR_DOWN, PROJECTOR_FOCUS + 1)
 
 
 class SteadyPhotos(Photos, Protocol):
@@ -230,10 +232,12 @@ def normal_equations(sample: CameraSample, fits: Fits) -> NormalEquations:
     numbers = len(plan.patterns)
     matrix = np.zeros((numbers, count, CAUSES, CAUSES))
     vector = np.zeros((numbers, count, CAUSES))
-    partner = _partners(plan)
+    partner, by_row = _partners(plan), _photos_of_codes(plan)
     scale = float(fits.white.max()) or 1.0
     for number in range(numbers):
         causes = _effects(fits, plan, number, partner.get(number), scale)
+        if isinstance(pattern := plan.patterns[number], LampCode) and pattern.purpose != "check":
+            causes[OF_PROJECTOR] = effects_on_code(fits, plan, pattern, by_row)
         weight = 1 / fits.variance[number]
         difference = fits.photos[number] - fits.relit[number]
         for place in range(count):
@@ -271,6 +275,32 @@ def _effects(
                 np.float32(part) * other for part in cycles
             )
     return effects
+
+
+def effects_on_code(
+    fits: Fits, plan: Plan, code: LampCode, by_row: dict[int, int]
+) -> NDArray[np.float32]:
+    """Return the derivatives of a code's photo by the projector's causes, as in `_effects`.
+
+    A code that is shifted by one projector pixel is the code of the next row, but for the
+    projector's border.
+    """
+
+    def relit(step: int) -> Floats:
+        return np.asarray(fits.relit[by_row[(code.row + step) % code.order]])
+
+    down, across = plan.projector.width, 1
+    shifts = [(relit(-step) - relit(step)) / 2 for step in (down, across)]
+    steps = (down, -down, across, -across)
+    focus = len(steps) * relit(0) - sum(relit(step) for step in steps)
+    return np.stack([*shifts, focus]).astype(np.float32)
+
+
+def _photos_of_codes(plan: Plan) -> dict[int, int]:
+    """Return a photo of each row of the codes of a plan."""
+    if not plan.is_by_codes:
+        return {}
+    return {row: number for number, row in find_codes(plan).rows.items()}
 
 
 def _partners(plan: Plan) -> dict[int, int]:

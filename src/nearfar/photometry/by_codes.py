@@ -137,7 +137,7 @@ def weighing_of(plan: Plan) -> Weighing:
     ------
     InputError
         If codes are missing, or shown more often than others, or if a wave is none of the
-        projector's DFT, or lacks its sine or cosine.
+        projector's DFT.
     """
     codes, basis = find_codes(plan), every_frequency(plan.projector)
     # A photo of a wave that is its own negative has twice the power.

@@ -241,6 +241,20 @@ def test_a_scheduler_that_is_lost_costs_what_was_not_written(
     assert _files(tmp_path / "t.zarr") == local
 
 
+def test_a_fault_of_closing_does_not_hide_that_a_scheduler_was_lost(cluster, monkeypatch):
+    from nearfar.workflow.reconstruction.cluster import connected
+
+    close = distributed.Client.close
+
+    def close_and_fail(client, *arguments, **options):
+        close(client, *arguments, **options)
+        raise RuntimeError("Cannot change state of expiring Timeout")
+
+    monkeypatch.setattr(distributed.Client, "close", close_and_fail)
+    with pytest.raises(ClusterError, match="was lost"), connected(cluster):
+        raise ClusterError("the scheduler was lost")
+
+
 def test_a_scheduler_that_dies_as_a_result_is_asked_for_is_no_fault_of_the_disk(
     copied, tmp_path, monkeypatch
 ):

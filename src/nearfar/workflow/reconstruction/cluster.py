@@ -84,7 +84,7 @@ class DaskExecutor:
         assert isinstance(store, TileWriter), "workers write into a folder that all see"
         source, scheduler = work.capture.path.resolve(), self._scheduler
         store = replace(store, folder=store.folder.resolve())
-        with _connected(scheduler) as client, _lost_scheduler(scheduler):
+        with connected(scheduler) as client, _lost_scheduler(scheduler):
             _require_workers(client, scheduler, source, store.folder, work.options.memory)
             run, marker = secrets.token_hex(8), store.folder / RUN_MARKER
             marker.write_text(run)
@@ -143,7 +143,7 @@ def _require_run(folder: Path, run: str) -> None:
 
 
 @contextmanager
-def _connected(scheduler: str) -> Iterator[Client]:
+def connected(scheduler: str) -> Iterator[Client]:
     """Connect to a scheduler."""
     # The correspondence of a tile travels with its task, and may exceed what Dask warns of.
     with config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
@@ -154,8 +154,15 @@ def _connected(scheduler: str) -> Iterator[Client]:
                 f"there is no scheduler at {scheduler} ({str(error).splitlines()[0]}): start one "
                 f"by dask scheduler, and give its address as it prints it, tcp://HOST:8786."
             ) from error
-        with client:
+        try:
             yield client
+        except BaseException:
+            # Of a lost scheduler, Dask may close while its attempt to reconnect expires, which is
+            # an error of its own and hides what happened.
+            with suppress(RuntimeError):
+                client.close()
+            raise
+        client.close()
 
 
 @contextmanager

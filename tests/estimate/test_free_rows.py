@@ -8,10 +8,10 @@ from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.free_rows.design import design_of
 from nearfar.estimate.free_rows.error_bars import variance_in_noise
 from nearfar.estimate.free_rows.estimate import estimate_free_rows, posterior_of
+from nearfar.illumination.real_basis import basis_of_every_frequency
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import FreePosterior
 from nearfar.transport.verdict import KeptVerdict
-from nearfar.workflow.free_rows import free_basis
 
 LAMPS, PIXELS, BLACK = 32, 200, 0.03
 
@@ -151,7 +151,7 @@ def test_error_bars_of_a_transport_are_those_of_its_direct_light_and_of_each_lam
             direct=np.zeros((1, 3, 1), np.float32),
             near=np.zeros((1, 3, 1, 0, 0), np.float32),
             far=np.zeros((1, 3, 1, LAMPS), np.float32),
-            far_basis=free_basis(projector),
+            far_basis=basis_of_every_frequency(projector),
             black=np.zeros((1, 3, 1), np.float32),
             noise=noise[None, :, None],
             parts=("direct", "free"),

@@ -8,8 +8,8 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.illumination.frequencies import DC, Frequency
+from nearfar.illumination.real_basis import basis_of_every_frequency
 from nearfar.photometry.by_codes import (
-    every_frequency,
     find_codes,
     responses_of_photos,
     weighing_of,
@@ -180,4 +180,4 @@ def test_rounding_of_waves_to_levels_leaves_no_error():
 
 def test_all_frequencies_are_as_many_as_the_projectors_pixels():
     for size in (PROJECTOR, Size(1, 11), Size(16, 16)):
-        assert every_frequency(size).count == size.pixels
+        assert basis_of_every_frequency(size).count == size.pixels

@@ -1,6 +1,8 @@
 """Plans of all codes, where the photos suffice."""
 
+import re
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
@@ -13,7 +15,10 @@ from nearfar.plan.choose_frequencies import choose_frequencies
 from nearfar.plan.codes import code, count_of_codes, order_of_codes
 from nearfar.plan.patterns import LampCode, Sinusoid
 from nearfar.plan.sharing import plan_of_each, shared_plan
+from nearfar.report.methods import reconstruction_methods
 from nearfar.report.plan import describe_plan
+from nearfar.report.reconstruction import plan_table
+from tests.worlds import model_transport
 
 PROJECTOR = Size(8, 8)
 CODES = 67
@@ -78,6 +83,14 @@ def test_codes_are_expected_to_do_better_than_sinusoids():
         assert of_codes.random > of_sinusoids.random + 0.9
 
 
+def test_lines_of_pixels_have_windows_of_single_pixels():
+    sinusoids, _ = choose_plan(Size(1, 512), 200)
+    assert sinusoids.pitch > 1
+    codes, _ = choose_plan(Size(1, 512), 620)
+    assert codes.is_by_codes
+    assert (codes.pitch, codes.window) == (1, 25)
+
+
 def test_projectors_of_more_pixels_than_are_taken_apart_have_sinusoids():
     assert count_of_codes(Size(65, 65)) == float("inf")
     assert count_of_codes(Size(64, 64)) == 4099
@@ -107,3 +120,18 @@ def test_a_plan_of_codes_is_described():
     assert "projector 8x8, W = 5" in said
     assert "codes of half of the projector's pixels" in said
     assert "80 photos: 67 codes, 4 to check by, 9 white and black" in said
+
+
+def test_methods_count_codes_and_sinusoids():
+    photos = model_transport(PROJECTOR, Size(3, 4), window=5, far=Size(3, 3))
+    transport = replace(photos, provenance={"method": "joint", "square": False})
+    said = reconstruction_methods(transport, choose_plan(PROJECTOR, 99)[0], "Checked.").text
+    assert "from 99 photos: 67 codes, 16 sinusoids with their inverses, 4 to check by" in said
+    assert "12 white and black. Each code lit about half" in said
+
+
+def test_a_report_counts_codes_and_no_checkerboard():
+    table = plan_table(choose_plan(PROJECTOR, 99)[0])
+    for sort, count in (("codes", 67), ("sinusoids with their inverses", 16)):
+        assert re.search(rf"{sort}</\w+>\s*<\w+[^>]*>{count}<", table), table
+    assert "checkerboard" not in table

@@ -10,14 +10,13 @@ import pytest
 import nearfar
 from nearfar.arrays import Size
 from nearfar.errors import InputError, UnreadableFileError
-from nearfar.illumination.real_basis import real_basis
+from nearfar.illumination.real_basis import basis_of_every_frequency, real_basis
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS
 from nearfar.transport.plots import Plots
 from nearfar.transport.posterior import FreePosterior
 from nearfar.transport.store import load_transport, save_transport
 from nearfar.transport.stored import open_transport
-from nearfar.workflow.free_rows import free_basis
 from tests.metadata import change_attributes
 from tests.worlds import model_transport
 
@@ -37,7 +36,7 @@ def free(rows):
     q = np.stack([generator.integers(0, side, CAMERA) for side in PROJECTOR], axis=-1).astype(
         np.float32
     )
-    basis = free_basis(PROJECTOR)
+    basis = basis_of_every_frequency(PROJECTOR)
     return Transport(
         projector=PROJECTOR,
         correspondence=q,

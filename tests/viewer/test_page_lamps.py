@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.illumination.real_basis import basis_of_every_frequency
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import LEAST_SQUARES, FreePosterior
 from nearfar.transport.rows import of_rows
@@ -14,7 +15,6 @@ from nearfar.transport.store import save_transport
 from nearfar.viewer.interactive import InteractiveTransport
 from nearfar.viewer.payloads import describe_scene
 from nearfar.viewer.transport_row import transport_row
-from nearfar.workflow.free_rows import free_basis
 from tests.viewer.asking import ask
 from tests.viewer.browsing import settled, show
 from tests.viewer.conftest import served_view
@@ -26,7 +26,7 @@ DIRECTIONS = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0.6, 0, 
 @pytest.fixture(scope="module")
 def stage() -> Transport:
     rows = np.random.default_rng(0).random((*CAMERA, 3, 6)).astype(np.float32) / 6
-    basis, shape = free_basis(LAMPS), (*CAMERA, 3)
+    basis, shape = basis_of_every_frequency(LAMPS), (*CAMERA, 3)
     return Transport(
         projector=LAMPS,
         correspondence=np.full((*CAMERA, 2), np.nan, np.float32),

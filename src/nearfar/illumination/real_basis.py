@@ -17,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Complexes, Floats, Integers, Size, beside, namespace, product
-from nearfar.illumination.frequencies import Frequency, as_array
+from nearfar.illumination.frequencies import (
+    Frequency,
+    as_array,
+    far_frequencies,
+    representatives,
+)
 
 # Values of drawn patterns, (M, P), up to which they are kept; beyond, sums go an axis at a time.
 MOST_HELD = 2**26
@@ -246,3 +251,8 @@ class RealBasis:
 def real_basis(frequencies: Sequence[Frequency], projector: Size) -> RealBasis:
     """Return the basis of cosines and sines of frequencies, each of which stands for +-k."""
     return RealBasis(tuple(frequencies), projector)
+
+
+def basis_of_every_frequency(projector: Size) -> RealBasis:
+    """Return the basis of all frequencies of a projector's DFT, as many as it has pixels."""
+    return real_basis(representatives(far_frequencies(projector, projector)), projector)

@@ -27,13 +27,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Floats, Size, blocks
+from nearfar.arrays import Floats, blocks
 from nearfar.compiled import compiled
 from nearfar.errors import InputError
-from nearfar.illumination.frequencies import DC, far_frequencies, representatives
+from nearfar.illumination.frequencies import DC
 from nearfar.illumination.patterns import s_matrix_row
-from nearfar.illumination.real_basis import RealBasis, real_basis
+from nearfar.illumination.real_basis import RealBasis, basis_of_every_frequency
 from nearfar.parallel import side_by_side, single_threaded_products
+from nearfar.photometry.by_reference import levels_by_references
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.photometry.measurements import Measurements
@@ -41,9 +42,7 @@ from nearfar.photometry.photos import (
     Reference,
     find_waves,
     in_batches,
-    mean_photo,
     size_of_rows,
-    two_levels,
 )
 from nearfar.photometry.quantisation import without_quantisation
 from nearfar.plan import Plan
@@ -109,23 +108,18 @@ def find_codes(plan: Plan) -> Codes:
         for number, pattern in enumerate(plan.patterns)
         if isinstance(pattern, LampCode) and pattern.purpose != "check"
     }
-    orders = {pattern.order for pattern in shown.values()}
-    times = Counter((pattern.order, pattern.row) for pattern in shown.values())
-    order, repeats = max(orders, default=0), max(times.values(), default=0)
-    if len(shown) != order * repeats:
-        missing = order * max(1, repeats) - len(shown)
+    order = max((pattern.order for pattern in shown.values()), default=0)
+    times = Counter(pattern.row for pattern in shown.values() if pattern.order == order)
+    repeats = max(times.values(), default=0)
+    if not shown or len(shown) != order * repeats or times.total() != len(shown):
+        missing = order * repeats - times.total()
         raise InputError(
-            f"{missing} of the photos of {order} codes are missing, and responses to waves are "
-            f"measured by all codes alone: take the remaining photos, or estimate free rows by "
+            f"{missing} of the photos of {order} codes are missing, and the joint estimate needs "
+            f"all of them: take the remaining photos, or estimate free rows by "
             f"`reconstruct(no_near=True, no_far=True)`."
         )
     rows = {number: pattern.row for number, pattern in shown.items()}
     return Codes(order, rows, repeats)
-
-
-def every_frequency(projector: Size) -> RealBasis:
-    """Return the basis of all frequencies of a projector's DFT, which all codes measure."""
-    return real_basis(representatives(far_frequencies(projector, projector)), projector)
 
 
 # Tiles of camera rows share it.
@@ -139,7 +133,7 @@ def weighing_of(plan: Plan) -> Weighing:
         If codes are missing, or shown more often than others, or if a wave is none of the
         projector's DFT.
     """
-    codes, basis = find_codes(plan), every_frequency(plan.projector)
+    codes, basis = find_codes(plan), basis_of_every_frequency(plan.projector)
     # A photo of a wave that is its own negative has twice the power.
     own = np.array([k.is_own_negative for k in basis.frequencies])[basis.index]
     by_codes = np.where(own, 1.0, 2.0) * (codes.order + 1) / basis.projector.pixels * codes.repeats
@@ -217,24 +211,16 @@ def measure_by_codes(
     responses = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
     total = np.zeros((camera.pixels, photos.channels))
     for numbers, read in in_batches(photos, sorted(weighing.place), rows):
-        of_codes = [place for place, number in enumerate(numbers) if number in codes.rows]
-        total += read[of_codes].sum(axis=0, dtype=np.float64)
+        shown = [place for place, number in enumerate(numbers) if number in codes.rows]
+        total += read[shown].sum(axis=0, dtype=np.float64)
         _add_photos(responses, read, weighing.weights[[weighing.place[n] for n in numbers]])
         if progress is not None:
             progress(numbers[-1] + 1)
-    whites, blacks = find_references(photos.plan)
-    white = mean_photo(photos, whites.tolist(), rows)
-    black = mean_photo(photos, blacks.tolist(), rows)
     mean = total / len(codes.rows)
     # Each pixel is lit by (q + 1) / 2 of the q codes.
     lit_share = (codes.order + 1) / (2 * codes.order)
-    levels = two_levels(
-        [
-            Reference(white, 1.0, 1.0, photos.variance(white) / len(whites)),
-            Reference(black, 1.0, 0.0, photos.variance(black) / len(blacks)),
-            Reference(mean, 1.0, lit_share, photos.variance(mean) / len(codes.rows)),
-        ]
-    )
+    of_codes = Reference(mean, 1.0, lit_share, photos.variance(mean) / len(codes.rows))
+    levels = levels_by_references(photos, rows, [of_codes])
     half = levels.black + levels.light / 2
     responses -= half[..., None].astype(np.float32) * weighing.of_offset
     responses[..., basis.response_indices([DC])[0]] = levels.light
@@ -254,7 +240,7 @@ def measure_by_codes(
 
 
 def responses_of_photos(plan: Plan, numbers: Sequence[int], photos: Floats) -> Floats:
-    """Return what some photos of codes and waves add to the responses other than that to DC.
+    """Return the contribution of some photos to all responses but that to DC.
 
     Parameters
     ----------

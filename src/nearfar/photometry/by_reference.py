@@ -23,6 +23,8 @@ from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.photometry.measurements import Measurements
 from nearfar.photometry.photos import (
+    Levels,
+    PhotosWithNoise,
     Reference,
     basis_of,
     find_waves,
@@ -64,6 +66,22 @@ def responses_by_reference(plan: Plan) -> tuple[RealBasis, dict[int, tuple[int, 
     return basis, terms, multiplicity
 
 
+def levels_by_references(
+    photos: PhotosWithNoise, rows: slice, others: Sequence[Reference]
+) -> Levels:
+    """Return black and light by the photos of white and black, and by other references."""
+    whites, blacks = find_references(photos.plan)
+    white = mean_photo(photos, whites.tolist(), rows)
+    black = mean_photo(photos, blacks.tolist(), rows)
+    return two_levels(
+        [
+            Reference(white, 1.0, 1.0, photos.variance(white) / len(whites)),
+            Reference(black, 1.0, 0.0, photos.variance(black) / len(blacks)),
+            *others,
+        ]
+    )
+
+
 def _add_photos(
     responses: Floats, photos: Floats, both: Floats, terms: Sequence[tuple[int, int]]
 ) -> None:
@@ -103,16 +121,7 @@ def measure_by_reference(
     """
     camera = size_of_rows(photos, rows)
     basis, terms, multiplicity = responses_by_reference(photos.plan)
-    whites, blacks = find_references(photos.plan)
-    white = mean_photo(photos, whites.tolist(), rows)
-    black = mean_photo(photos, blacks.tolist(), rows)
-    levels = two_levels(
-        [
-            Reference(white, 1.0, 1.0, photos.variance(white) / len(whites)),
-            Reference(black, 1.0, 0.0, photos.variance(black) / len(blacks)),
-            *stripe_references(photos, rows, photos.variance),
-        ]
-    )
+    levels = levels_by_references(photos, rows, stripe_references(photos, rows, photos.variance))
     both = (2 * levels.black + levels.light).astype(np.float32)
     responses = np.zeros((camera.pixels, photos.channels, basis.count), dtype=np.float32)
     for numbers, read in in_batches(photos, sorted(terms), rows):

@@ -111,9 +111,11 @@ def choose_plan(
             f"pattern grid of at most {MOST_LISTED} pixels, and {LARGEST_LISTED_SIDE} on the "
             f"shorter side."
         )
+    checks = _checks(projector, photos, checks, every_frequency=every_frequency)
+    by_codes = suffice_for_codes(projector, photos, checks, every_frequency=every_frequency)
     # Rows that photos of every frequency show need no model, and fit none of several pixels.
     is_whole = photos >= photos_of_every_frequency(projector)
-    shows_all = every_frequency or (is_whole and can_list_every_frequency(projector))
+    shows_all = every_frequency or by_codes or (is_whole and can_list_every_frequency(projector))
     pitch = 1 if shows_all else pitch_of(projector)
     window = default_window(projector, pitch) if window is None else window
     if not 1 <= window <= largest_window(projector, pitch):
@@ -122,19 +124,13 @@ def choose_plan(
             f"W = {window}{apart} does not fit a projector of {projector}: choose `window` "
             f"between 1 and {largest_window(projector, pitch)}."
         )
-    if checks is not None:
-        checks = as_count(checks, "checks", 0)
-    else:
-        checks = check_pairs(photos)
-        if every_frequency:
-            checks = _fitting_checks(projector, photos, checks)
     own = photos - 2 * checks
     if own < FEWEST_PHOTOS - 2:
         raise PlanError(
             f"{checks} check patterns and their inverses leave too few of {photos} photos: plan "
             f"with `photos={FEWEST_PHOTOS + 2 * checks}` or more."
         )
-    if suffice_for_codes(projector, photos, checks, every_frequency=every_frequency):
+    if by_codes:
         return plan_by_codes(
             projector,
             photos,
@@ -190,8 +186,16 @@ def choose_plan(
     return plan, choice.expected
 
 
-def _fitting_checks(projector: Size, photos: int, checks: int) -> int:
-    """Return the number of check patterns; they leave photos for all codes, or all frequencies."""
+def _checks(projector: Size, photos: int, given: int | None, *, every_frequency: bool) -> int:
+    """Return the number of check patterns, as given or by default.
+
+    Where every frequency is asked for, they leave photos for all codes, or for all frequencies.
+    """
+    if given is not None:
+        return as_count(given, "checks", 0)
+    checks = check_pairs(photos)
+    if not every_frequency:
+        return checks
     for needed in (count_of_codes(projector) + 2 * FEWEST, photos_of_every_frequency(projector)):
         if photos - needed >= 2:
             return min(checks, int(photos - needed) // 2)

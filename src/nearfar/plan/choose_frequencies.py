@@ -169,7 +169,7 @@ def best_next(
 
 
 def purpose_of(frequency: Frequency, far: Set[Frequency]) -> Purpose:
-    """Return what photos of a frequency are for: far-range light, if it is in the far band."""
+    """Return the purpose of a frequency's photos: far if it is in the far band, otherwise near."""
     return "far" if frequency in far or -frequency in far else "near"
 
 

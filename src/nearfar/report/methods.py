@@ -8,7 +8,7 @@ from nearfar.decibels import in_words
 from nearfar.plan import Plan
 from nearfar.release import version
 from nearfar.report.about import PAPER, Methods, software_reference
-from nearfar.report.plan import describe_window
+from nearfar.report.plan import count_by_sort, describe_window
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.transport.verdict import KeptVerdict
@@ -72,7 +72,8 @@ OFFSETS = {
 }
 OF_CODES = (
     "Each code lit about half of the projector's pixels, as a row of an S-matrix does [3]; the "
-    "response to every sinusoid was taken from the photos of all codes together, by least squares. "
+    "response to every sinusoid was taken from the photos of all codes together, by least squares, "
+    "and from photos of the sinusoid itself, if there are any. "
     "The drift of lamp and ambient light was taken out by the whites and blacks, which were "
     "photographed at intervals."
 )
@@ -128,12 +129,9 @@ def reconstruction_methods(
 
 def _purposes(plan: Plan) -> str:
     """Return in words how many photos served which purpose."""
-    counts, words = plan.counts, PURPOSES
     if plan.is_by_codes:
-        # The first white measures the response to DC, as far-range light.
-        counts = {**counts, "reference": counts["reference"] + counts["far"], "far": 0}
-        words = {**PURPOSES, "direct": "of codes"}
-    return ", ".join(f"{count} {words[purpose]}" for purpose, count in counts.items() if count)
+        return ", ".join(f"{count} {sort}" for sort, count in count_by_sort(plan).items())
+    return ", ".join(f"{count} {PURPOSES[name]}" for name, count in plan.counts.items() if count)
 
 
 def any_patterns_methods(

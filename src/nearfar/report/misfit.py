@@ -46,9 +46,9 @@ def misfit_section(misfit: MisfitMaps | None) -> str:
         by_frequency = plot(
             _by_frequency(misfit),
             "misfit by frequency",
-            "Each dot is a measured frequency, drawn twice as k and -k; coarse stripes are in the "
-            "middle, fine ones outside. Single bright dots are single bad photos; a bright ring or "
-            "middle is light of a kind that the model does not hold.",
+            "Each dot is a frequency that was photographed, drawn twice as k and -k; coarse "
+            "stripes are in the middle, fine ones outside. Single bright dots are single bad "
+            "photos; a bright ring or middle is light of a kind that the model does not hold.",
         )
     return f"""{title}
 <p>Each photo is compared with the relit picture of its pattern. Misfit is the squared difference

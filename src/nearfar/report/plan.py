@@ -89,13 +89,18 @@ def _describe_codes(plan: Plan) -> str:
 
 
 def _describe_photos_of_codes(plan: Plan) -> str:
-    shown = Counter(_sort_of(pattern) for pattern in plan.patterns)
-    counts = ", ".join(f"{shown[sort]} {sort}" for sort in SORTS if shown[sort])
+    counts = ", ".join(f"{count} {sort}" for sort, count in count_by_sort(plan).items())
     return f"{len(plan.patterns)} photos: {counts}"
 
 
+def count_by_sort(plan: Plan) -> dict[str, int]:
+    """Return how many photos of each sort a plan of codes has."""
+    shown = Counter(_sort_of(pattern) for pattern in plan.patterns)
+    return {sort: shown[sort] for sort in SORTS if shown[sort]}
+
+
 def _sort_of(pattern: Pattern) -> str:
-    """Return what a photo of a plan of codes is of."""
+    """Return the sort of a pattern, as it is counted in a plan of codes."""
     if pattern.purpose == "check":
         return TO_CHECK
     if isinstance(pattern, LampCode):

@@ -9,7 +9,7 @@ from nearfar.markup import numbers
 from nearfar.plan import Plan
 from nearfar.report.methods import checked_by_photos, reconstruction_methods
 from nearfar.report.misfit import misfit_section
-from nearfar.report.plan import describe_window
+from nearfar.report.plan import count_by_sort, describe_window
 from nearfar.report.transport_page import Told, displayed, transport_page
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps
@@ -66,7 +66,7 @@ def reconstruction_page(
         f"""{_held_out(verdict)}
 {misfit_section(misfit)}
 <h2>The plan</h2>
-{_plan_table(plan)}""",
+{plan_table(plan)}""",
         reconstruction_methods(
             stored,
             plan,
@@ -105,8 +105,12 @@ assumption.</p>
 """
 
 
-def _plan_table(plan: Plan) -> str:
-    rows = [[PURPOSES[name], str(count)] for name, count in plan.counts.items() if count]
+def plan_table(plan: Plan) -> str:
+    """Return a table of a plan's photos, window and far band, as HTML."""
+    counts = {PURPOSES[name]: count for name, count in plan.counts.items() if count}
+    if plan.is_by_codes:
+        counts = count_by_sort(plan)
+    rows = [[name, str(count)] for name, count in counts.items()]
     rows.append(["all photos", str(len(plan.patterns))])
     rows.append(["window of near-range light", describe_window(plan.window, plan.pitch)])
     rows.append(["far band", str(plan.far)])

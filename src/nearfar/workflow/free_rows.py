@@ -10,14 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Floats, Size, blocks
+from nearfar.arrays import Floats, blocks
 from nearfar.capture import Capture
 from nearfar.correspondence import Correspondence
 from nearfar.errors import InputError
 from nearfar.estimate.free_rows.design import Design, design_of
 from nearfar.estimate.free_rows.estimate import FreeRows, estimate_free_rows, posterior_of
-from nearfar.illumination.frequencies import far_frequencies, representatives
-from nearfar.illumination.real_basis import RealBasis, real_basis
+from nearfar.illumination.real_basis import RealBasis, basis_of_every_frequency
 from nearfar.photometry.photos import Photos
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
@@ -130,11 +129,6 @@ def black_taken_as_0(capture: Capture) -> str:
     )
 
 
-def free_basis(projector: Size) -> RealBasis:
-    """Return the basis of all frequencies of a projector, in which free rows are kept."""
-    return real_basis(representatives(far_frequencies(projector, projector)), projector)
-
-
 def _prepare(
     capture: Capture, correspondence: Correspondence | None, memory: int, progress: Report
 ) -> _Job:
@@ -161,7 +155,7 @@ def _prepare(
     sample = _sample(photos, height)
     chosen = None if lamps is None else lamps.ravel()[sample.pixels]
     judged = judge_free_rows(sample.values, patterns, used, held_out, chosen)
-    basis = free_basis(capture.plan.projector)
+    basis = basis_of_every_frequency(capture.plan.projector)
     return _Job(capture, photos, used, design, basis, lamps, judged, height)
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import nnls
 from nearfar.arrays import Floats, Size, blocks
 from nearfar.errors import InputError
 from nearfar.estimate.light_stage import LampGains, Sums, fit_gains, spread_of, sums_of
+from nearfar.illumination.real_basis import basis_of_every_frequency
 from nearfar.progress import Report, ignore_progress
 from nearfar.release import version
 from nearfar.transport.model import Transport
@@ -20,7 +21,6 @@ from nearfar.transport.posterior import LEAST_SQUARES, FreePosterior
 from nearfar.transport.quality import Quality
 from nearfar.transport.store_writing import write_transport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
-from nearfar.workflow.free_rows import free_basis
 from nearfar.workflow.light_stage_photos import LightStage
 from nearfar.workflow.verdict.verdict import DOUBTFUL_DECIBELS, WRONG_DECIBELS
 
@@ -122,7 +122,7 @@ def _blocks(
 ) -> Iterator[Transport]:
     lamps, height = len(stage.names), len(stage.black)
     projector = Size(1, lamps)
-    basis = free_basis(projector)
+    basis = basis_of_every_frequency(projector)
     factors = np.ones(lamps) if gains is None else gains.gains
     noise = np.zeros(stage.black.shape) if gains is None else _noise(stage, gains)
     provenance = _provenance(stage, gains)

@@ -40,6 +40,10 @@ class Variances(Protocol):
         """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
         ...
 
+    def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return one of what to add, for squared error bars; see `nearfar.estimate.truncated`."""
+        ...
+
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
         ...
@@ -140,6 +144,9 @@ class ErrorBars:
     ) -> Floats:
         """Return the standard deviation of a relit picture.
 
+        Where its errors have heavy tails, as under light of a few projector pixels on rows of few
+        bright entries, it is half the width of the interval that holds 68 % of them.
+
         Parameters
         ----------
         light : ndarray, shape (Py, Px) or (Py, Px, channels)
@@ -156,25 +163,61 @@ class ErrorBars:
         InputError
             As `Transport.relight`.
         """
+        gains = gains_on(self._transport.parts, direct, near, far, free)
+
+        def squares_under(flat: Floats) -> Callable[[slice], Floats]:
+            variances = self._variances.of_picture(flat, gains)
+            changes = self._variances.change_by_place(flat, gains)
+            return lambda batch: np.maximum(variances(batch) + changes(batch), 0.0)
+
+        return self._transport.picture(np.sqrt(self._squares(light, squares_under)))
+
+    def mean_squares(self, light: Floats) -> Floats:
+        """Return the mean square of the errors of a relit picture that the prior expects.
+
+        It is for means over many camera pixels: it expects as much of all entries of a row, and
+        takes less time than `picture`.
+
+        Parameters
+        ----------
+        light : ndarray, shape (Py, Px) or (Py, Px, channels)
+
+        Returns
+        -------
+        ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+            Squares of photo units; infinite at saturated camera pixels.
+
+        Raises
+        ------
+        InputError
+            As `Transport.relight`.
+        """
+        gains = gains_on(self._transport.parts, 1.0, 1.0, 1.0, 1.0)
+        squares = self._squares(light, lambda flat: self._variances.of_picture(flat, gains))
+        return self._transport.picture(squares)
+
+    def _squares(
+        self, light: Floats, squares_under: Callable[[Floats], Callable[[slice], Floats]]
+    ) -> Floats:
+        """Return squares of error bars of all camera pixels, (C, channels), float32."""
         transport = self._transport
-        gains = gains_on(transport.parts, direct, near, far, free)
         lights = transport.lights(light)
         number, channels = transport.camera.pixels, transport.channels
         found = np.empty((number, channels), dtype=np.float32)
         for place, flat in enumerate(lights):
-            variances = self._variances.of_picture(flat, gains)
+            of_batch = squares_under(flat)
             own = slice(None) if len(lights) == 1 else slice(place, place + 1)
 
             def work(
                 batch: slice,
-                variances: Callable[[slice], Floats] = variances,
+                of_batch: Callable[[slice], Floats] = of_batch,
                 own: slice = own,
             ) -> None:
-                found[batch, own] = self._widening * np.sqrt(variances(batch)[:, own])
+                found[batch, own] = self._widening**2 * of_batch(batch)[:, own]
 
             side_by_side(work, blocks(number, BATCH_PIXELS))
         found[self._unknown] = np.inf
-        return transport.picture(found)
+        return found
 
     def direct(self) -> Floats:
         """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light.

@@ -56,6 +56,10 @@ class FreeVariances:
 
         return of_pixels
 
+    def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return what to add for squared error bars: nothing."""
+        return lambda batch: np.zeros((1, 1))
+
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
         white = np.ones((1, self._transport.projector.pixels))

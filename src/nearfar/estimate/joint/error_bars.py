@@ -32,7 +32,7 @@ from nearfar.estimate.joint.posterior_variance import (
 )
 from nearfar.estimate.joint.second_places import responses_of
 from nearfar.estimate.joint.shares import share_on_projector
-from nearfar.estimate.truncated import truncated_variance
+from nearfar.estimate.truncated import change_by_place, truncated_variance
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.near_basis import NearBasis
@@ -117,6 +117,19 @@ class JointVariances:
         at_second = partial(self._at_second, light[None])
         shown = _Light(float(light.mean()), seen, overlap.astype(np.float32), truncated, at_second)
         return lambda batch: self._variance(batch, self._of_light(batch, shown, gains))
+
+    def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return what to add for squared error bars; see `nearfar.estimate.truncated`."""
+        posterior, channels = self._posterior, self._transport.channels
+        change = change_by_place(self._transport, light, posterior.prior_components)
+
+        def of_pixels(batch: slice) -> Floats:
+            scale = posterior.prior_scale.ravel()[batch, None].astype(np.float64)
+            squared = (scale * posterior.white.reshape(-1, channels)[batch]) ** 2
+            changes = change(batch, posterior.prior_component.ravel()[batch], squared)
+            return np.asarray(gains.far**2 * self._more(batch) * changes)
+
+        return of_pixels
 
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
@@ -314,8 +327,11 @@ class JointVariances:
 
     def _variance(self, batch: slice, functionals: Functionals) -> Floats:
         """Return variances, (n, channels), of each pixel's or of one pixel's many."""
-        more = 1.0 + (SECOND_WIDENING**2 - 1.0) * self._has_second(batch)
-        return np.asarray(more * self._posterior_variance(batch, functionals))
+        return np.asarray(self._more(batch) * self._posterior_variance(batch, functionals))
+
+    def _more(self, batch: slice) -> Floats:
+        """Return how much larger variances are where there is a second place, (n, 1)."""
+        return np.asarray(1.0 + (SECOND_WIDENING**2 - 1.0) * self._has_second(batch))
 
     def _posterior_variance(self, batch: slice, functionals: Functionals) -> Floats:
         """Return posterior variances, (n, channels)."""

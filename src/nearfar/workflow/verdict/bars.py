@@ -55,5 +55,5 @@ def mean_square(bars: ErrorBars, light: Floats, usable: Booleans) -> float:
     light : ndarray, shape (Py, Px)
     usable : ndarray of bool, shape (C,)
     """
-    deviation = bars.picture(light).reshape(len(usable), -1)[usable]
-    return float(np.mean(np.square(deviation, dtype=np.float64)))
+    squares = bars.mean_squares(light).reshape(len(usable), -1)[usable]
+    return float(np.mean(squares, dtype=np.float64))

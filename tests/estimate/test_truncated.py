@@ -1,0 +1,177 @@
+"""Error bars by where a row has light: what no photo shows lies about its bright entries."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nearfar.arrays import Size
+from nearfar.correspondence import correspond_by_phase
+from nearfar.estimate.error_bars import ErrorBars
+from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.truncated import change_by_place, truncated_variance
+from nearfar.illumination.frequencies import far_frequencies, representatives
+from nearfar.illumination.real_basis import real_basis
+from nearfar.photometry.measure import measure
+from nearfar.plan import choose_plan
+from nearfar.priors.component import PriorComponent
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.scenes.hostile import hostile_transport
+from nearfar.transport.model import Transport
+from nearfar.workflow.acquire import acquire_in_memory
+
+PROJECTOR = Size(12, 14)
+# Light of which nothing is known, and light that falls with frequency.
+COMPONENTS = (PriorComponent(0.0, 1.0, 1e6), PriorComponent(0.0, 1.0, 3.0))
+
+
+def _transport(rows):
+    """Hold the low frequencies of rows (n, channels, Py, Px) as far-range light."""
+    basis = real_basis(representatives(far_frequencies(Size(5, 5), PROJECTOR)), PROJECTOR)
+    count, channels = rows.shape[:2]
+    shape = (1, count, channels)
+    return Transport(
+        projector=PROJECTOR,
+        correspondence=np.full((1, count, 2), np.nan, np.float32),
+        direct=np.zeros(shape, np.float32),
+        near=np.zeros((*shape, 3, 3), np.float32),
+        far=basis.analyse(rows.reshape(*shape, -1).astype(np.float32)) / basis.weights,
+        far_basis=basis,
+        black=np.zeros(shape, np.float32),
+        noise=np.full(shape, 1e-3, np.float32),
+    )
+
+
+def _changes(transport, light, component, scale=1.0):
+    number = transport.camera.pixels
+    chosen = np.full(number, component)
+    squared = np.full((number, transport.channels), float(scale) ** 2)
+    change = change_by_place(transport, light.ravel(), COMPONENTS)
+    return change(slice(None), chosen, squared)
+
+
+def _single(y, x):
+    light = np.zeros(PROJECTOR)
+    light[y, x] = 1.0
+    return light
+
+
+def _bump(height=1.0, base=0.0):
+    y, x = (np.arange(side) - side // 2 for side in PROJECTOR)
+    return base + height * np.exp(-(y[:, None] ** 2 + x**2) / 8.0)
+
+
+def test_rows_that_are_dark_or_even_change_nothing():
+    transport = _transport(np.stack([np.zeros(PROJECTOR), np.ones(PROJECTOR)])[:, None])
+    for component in range(2):
+        total = truncated_variance(transport, _single(3, 4).ravel(), COMPONENTS)[component]
+        changes = _changes(transport, _single(3, 4), component)
+        np.testing.assert_allclose(changes, 0.0, atol=1e-5 * total)
+
+
+def test_white_and_what_the_transport_holds_change_nothing():
+    transport = _transport(_bump()[None, None])
+    y = np.arange(PROJECTOR.height)[:, None]
+    held = 0.5 + 0.5 * np.cos(2 * np.pi * y / PROJECTOR.height) * np.ones(PROJECTOR)
+    for light in (np.ones(PROJECTOR), held):
+        assert np.all(_changes(transport, light, 0) == 0.0)
+
+
+def test_bars_are_wide_at_bright_entries_and_narrow_at_dark_ones():
+    transport = _transport(_bump()[None, None])
+    scale = 0.01
+    bright = _changes(transport, _single(6, 7), 0, scale).item()
+    dark = _changes(transport, _single(0, 0), 0, scale).item()
+    total = scale**2 * truncated_variance(transport, _single(0, 0).ravel(), COMPONENTS)[0]
+    assert dark < -0.8 * total
+    assert bright > total
+    # A twentieth is the same everywhere.
+    assert dark > -0.951 * total
+
+
+@pytest.mark.parametrize("component", [0, 1])
+def test_what_all_projector_pixels_add_up_to_stays_where_rows_are_not_sparse(component):
+    # A bump on much light has little kurtosis, so that bars are standard deviations.
+    transport = _transport(_bump(0.8, 1.0)[None, None])
+    changes, total = [], 0.0
+    for y in range(PROJECTOR.height):
+        for x in range(PROJECTOR.width):
+            changes.append(_changes(transport, _single(y, x), component).item())
+            total += truncated_variance(transport, _single(y, x).ravel(), COMPONENTS)[component]
+    assert np.max(np.abs(changes)) > 0.2 * total / len(changes)
+    assert abs(sum(changes)) < 1e-4 * total
+
+
+def test_bars_of_sparse_rows_are_narrower_the_less_is_known_of_them():
+    transport = _transport(_bump()[None, None])
+    every = [_single(y, x) for y in range(PROJECTOR.height) for x in range(PROJECTOR.width)]
+    shares = []
+    for scale in (1e-6, 0.1, 1e3):
+        total = sum(truncated_variance(transport, one.ravel(), COMPONENTS)[0] for one in every)
+        change = sum(_changes(transport, one, 0, scale).item() for one in every)
+        shares.append(1 + change / (scale**2 * total))
+    assert shares[0] > 0.99
+    assert shares[0] > shares[1] > shares[2]
+    # A quarter of a standard deviation where nothing is known.
+    assert 0.25**2 <= shares[2] < 0.1
+
+
+def test_bars_under_light_of_many_projector_pixels_are_standard_deviations():
+    transport = _transport(_bump()[None, None])
+    lights = np.random.default_rng(0).random((60, *PROJECTOR))
+    total = sum(truncated_variance(transport, one.ravel(), COMPONENTS)[0] for one in lights)
+    change = sum(_changes(transport, one, 0, 10.0).item() for one in lights) / 100.0
+    assert abs(change) < 0.05 * total
+
+
+def test_channels_and_camera_pixels_keep_their_own_scales():
+    rows = np.stack([np.stack([_bump(), 0.5 * _bump()]), np.stack([_bump(), np.zeros(PROJECTOR)])])
+    transport = _transport(rows)
+    chosen, light = np.array([0, 1]), _single(6, 7).ravel()
+    squared = np.array([[1.0, 4.0], [9.0, 0.0]])
+    both = change_by_place(transport, light, COMPONENTS)(slice(None), chosen, squared)
+    for pixel in range(2):
+        one = slice(pixel, pixel + 1)
+        alone = change_by_place(transport, light, COMPONENTS)(one, chosen[one], squared[one])
+        np.testing.assert_allclose(both[one], alone, rtol=1e-5)
+    np.testing.assert_allclose(both[0, 1], 4.0 * both[0, 0], rtol=1e-6)
+    assert both[1, 1] == 0.0
+
+
+def test_rows_of_larger_projectors_are_not_looked_at():
+    transport = replace(_transport(_bump()[None, None]), pitch=2, near=np.zeros((1, 1, 1, 9, 1)))
+    assert transport.pitch == 2
+    assert np.all(_changes(transport, _single(6, 7), 0) == 0.0)
+
+
+@pytest.mark.parametrize("name", ["caustics", "permuted"])
+@pytest.mark.parametrize("photos", [60, 130])
+def test_errors_of_single_projector_pixels_lie_within_their_bars(name, photos):
+    projector = Size(14, 14)
+    scene = hostile_transport(name, projector, Size(14, 16))
+    plan, _ = choose_plan(projector, photos)
+    camera = SimulatedCamera(
+        full_well=1e6, read_noise=1e3, bits=16, black_level=0.1, shot_noise=False
+    )
+    rig = SimulatedRig(scene, name, SimulatedProjector(), camera, 0.8, 0)
+    measurements = measure(acquire_in_memory(plan, rig))
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+    bars, truth = ErrorBars(found), 0.8 * scene.rows(slice(None))[:, 0]
+    rows = found.rows(slice(None))[:, 0]
+    within, within_mean, errors, expected = [], [], [], []
+    for pixel in range(0, projector.pixels, 5):
+        light = np.eye(projector.pixels, dtype=np.float32)[pixel].reshape(projector)
+        error = np.abs(rows[:, pixel] - truth[:, pixel])
+        within.append(error < bars.picture(light).ravel())
+        within_mean.append(error**2 < bars.mean_squares(light).ravel())
+        errors.append(error)
+        expected.append(bars.picture(light).ravel())
+    assert 0.6 < np.mean(within) < 0.78
+    # One and the same bar for all entries of a row would hold more of them.
+    assert np.mean(within_mean) > np.mean(within) + 0.05
+    # Bars tell where errors are large.
+    largest = np.argsort(np.ravel(expected))[-len(np.ravel(expected)) // 10 :]
+    assert np.mean(np.ravel(errors)[largest]) > 2.5 * np.mean(errors)

@@ -9,7 +9,8 @@ from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import estimate_jointly
-from nearfar.estimate.truncated import change_by_place, truncated_variance
+from nearfar.estimate.joint.error_bars import JointVariances
+from nearfar.estimate.truncated import LEAST_LEFT, change_by_place, truncated_variance
 from nearfar.illumination.frequencies import far_frequencies, representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
@@ -146,9 +147,8 @@ def test_rows_of_larger_projectors_are_not_looked_at():
     assert np.all(_changes(transport, _single(6, 7), 0) == 0.0)
 
 
-@pytest.mark.parametrize("name", ["caustics", "permuted"])
-@pytest.mark.parametrize("photos", [60, 130])
-def test_errors_of_single_projector_pixels_lie_within_their_bars(name, photos):
+def _found(name, photos):
+    """Reconstruct a hostile transport of 14x14 projector pixels; and its true rows."""
     projector = Size(14, 14)
     scene = hostile_transport(name, projector, Size(14, 16))
     plan, _ = choose_plan(projector, photos)
@@ -159,7 +159,29 @@ def test_errors_of_single_projector_pixels_lie_within_their_bars(name, photos):
     measurements = measure(acquire_in_memory(plan, rig))
     q = correspond_by_phase(measurements, pitch=plan.pitch).q
     found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
-    bars, truth = ErrorBars(found), 0.8 * scene.rows(slice(None))[:, 0]
+    return found, 0.8 * scene.rows(slice(None))[:, 0]
+
+
+def test_no_rounding_takes_all_of_a_bar(monkeypatch):
+    found, _ = _found("caustics", 60)
+    light = np.eye(found.projector.pixels, dtype=np.float32)[40].reshape(found.projector)
+    squares = ErrorBars(found).mean_squares(light).ravel()
+    # With little else than truncated light, rounding can take more than there is.
+    monkeypatch.setattr(
+        JointVariances,
+        "change_by_place",
+        lambda self, light, gains: lambda batch: -1.01 * squares[batch, None],
+    )
+    bars = ErrorBars(found).picture(light).ravel()
+    np.testing.assert_allclose(bars**2, LEAST_LEFT * squares, rtol=1e-4)
+    assert np.all(bars > 0)
+
+
+@pytest.mark.parametrize("name", ["caustics", "permuted"])
+@pytest.mark.parametrize("photos", [60, 130])
+def test_errors_of_single_projector_pixels_lie_within_their_bars(name, photos):
+    found, truth = _found(name, photos)
+    bars, projector = ErrorBars(found), found.projector
     rows = found.rows(slice(None))[:, 0]
     within, within_mean, errors, expected = [], [], [], []
     for pixel in range(0, projector.pixels, 5):

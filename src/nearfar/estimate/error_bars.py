@@ -16,6 +16,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.any_patterns.error_bars import PatternVariances
 from nearfar.estimate.free_rows.error_bars import FreeVariances
 from nearfar.estimate.joint.error_bars import JointVariances
+from nearfar.estimate.truncated import LEAST_LEFT
 from nearfar.parallel import side_by_side
 from nearfar.transport import near
 from nearfar.transport.boxes import box_axes
@@ -168,7 +169,12 @@ class ErrorBars:
         def squares_under(flat: Floats) -> Callable[[slice], Floats]:
             variances = self._variances.of_picture(flat, gains)
             changes = self._variances.change_by_place(flat, gains)
-            return lambda batch: np.maximum(variances(batch) + changes(batch), 0.0)
+
+            def of_batch(batch: slice) -> Floats:
+                before = variances(batch)
+                return np.asarray(np.maximum(before + changes(batch), LEAST_LEFT * before))
+
+            return of_batch
 
         return self._transport.picture(np.sqrt(self._squares(light, squares_under)))
 

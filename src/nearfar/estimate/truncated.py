@@ -35,6 +35,8 @@ EVEN_KURTOSIS = 1.8
 # reached. Fitted to 68th percentiles of errors of single projector pixels on hostile transports.
 NARROWED = 0.75
 SPARSE_EXCESS = 1.0
+# Share of a variance that is left at the least; less is rounding.
+LEAST_LEFT = EVERYWHERE * (1 - NARROWED) ** 2
 # Smaller shares of a light's response to DC are rounding.
 ROUNDING = 1e-9
 # Keeps quotients finite, and so are its squares.

@@ -42,7 +42,10 @@ class Variances(Protocol):
         ...
 
     def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return one of what to add, for squared error bars; see `nearfar.estimate.truncated`."""
+        """Return a function of camera pixels: corrections of these variances, (n, channels).
+
+        Squared error bars are the variances plus these; see `nearfar.estimate.truncated`.
+        """
         ...
 
     def of_direct(self, batch: slice) -> Floats:

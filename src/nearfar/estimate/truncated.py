@@ -1,7 +1,7 @@
 """The variance of what a transport does not hold of far-range light.
 
 The prior expects the same of it all over a row. It lies where the row has light, though: most of
-what is missing are the edges of bright entries. With h_k^2 the spectral density at frequencies that
+it are the edges of bright entries. With h_k^2 the spectral density at frequencies that
 are not held, a light l has the variance sum_p (h * l)(p)^2. Each projector pixel p then counts by
 the power of F about it.
 
@@ -41,7 +41,7 @@ LEAST_LEFT = EVERYWHERE * (1 - NARROWED) ** 2
 ROUNDING = 1e-9
 # Keeps quotients finite, and so are its squares.
 TINY = float(np.finfo(np.float64).tiny) ** 0.5
-# Values of rows that are looked at at once.
+# Values of rows that are computed at once.
 VALUES_AT_ONCE = 2**23
 
 
@@ -70,17 +70,17 @@ def truncated_variance(
 def change_by_place(
     transport: Transport, light: Floats, prior_components: Sequence[PriorComponent]
 ) -> Callable[[slice, Integers, Floats], Floats]:
-    """Return what the place of a row's light changes of squared error bars, under a light (P,).
+    """Return the correction of variances for where rows have light, under a light (P,).
 
-    Only where near-range functions are single projector pixels: rows of larger projectors are too
-    long to be looked at for each light.
+    It is 0 where near-range functions are wider than a projector pixel: rows of such projectors are
+    too long to be computed for each light.
 
     Returns
     -------
     callable
         A function of a block of camera pixels, of the prior component of each, (n,), and of its
-        squared prior scale in photo units, (n, channels). It returns what is to be added to
-        `truncated_variance` times the squared scale, (n, channels).
+        squared prior scale in photo units, (n, channels). It returns corrections, (n, channels):
+        a squared error bar is the variance plus its correction.
     """
     if transport.pitch > 1:
         return lambda batch, chosen, squared_scale: np.zeros(squared_scale.shape)
@@ -97,14 +97,14 @@ def change_by_place(
 
     def relative(some: Floats, chosen: Integers, squared_scale: Floats) -> Floats:
         """Return squared error bars over the squared prior scale, (n,)."""
-        power, mean, kurtosis = _power_of_rows(transport, some)
+        power, variance, kurtosis = _power_of_rows(transport, some)
         local = np.empty(len(chosen))
         for place in np.unique(chosen):
             alike = chosen == place
             local[alike] = power[alike] @ about[place]
         local = EVERYWHERE * totals[chosen] + (1 - EVERYWHERE) * local
         unknown = of_entry[chosen] * squared_scale.sum(axis=1)
-        unknown /= np.maximum(unknown + mean, TINY)
+        unknown /= np.maximum(unknown + variance, TINY)
         excess = np.maximum(kurtosis - EVEN_KURTOSIS, 0.0) / numbers[chosen]
         return np.asarray(local * _narrowing(excess, unknown) ** 2)
 
@@ -142,7 +142,7 @@ def _by_pixel(
 
 
 def _power_of_rows(transport: Transport, far: Floats) -> tuple[Floats, Floats, Floats]:
-    """Look at where rows of F have light, all channels together.
+    """Return how the power of rows of F is distributed, all channels together.
 
     Returns
     -------

@@ -107,7 +107,7 @@ class PatternVariances:
         return of_pixels
 
     def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return what to add for squared error bars: nothing, as hardly any light is not held."""
+        """Return corrections of 0: nearly all frequencies of far-range light are held."""
         return lambda batch: np.zeros((1, 1))
 
     def of_direct(self, batch: slice) -> Floats:

@@ -57,7 +57,7 @@ class FreeVariances:
         return of_pixels
 
     def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return what to add for squared error bars: nothing."""
+        """Return corrections of 0: free rows expect the same of all lamps."""
         return lambda batch: np.zeros((1, 1))
 
     def of_direct(self, batch: slice) -> Floats:

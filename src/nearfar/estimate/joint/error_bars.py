@@ -119,7 +119,10 @@ class JointVariances:
         return lambda batch: self._variance(batch, self._of_light(batch, shown, gains))
 
     def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return what to add for squared error bars; see `nearfar.estimate.truncated`."""
+        """Return a function of camera pixels: corrections of variances, (n, channels).
+
+        Squared error bars under a light (P,) are variances plus these.
+        """
         posterior, channels = self._posterior, self._transport.channels
         change = change_by_place(self._transport, light, posterior.prior_components)
 

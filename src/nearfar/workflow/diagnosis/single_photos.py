@@ -219,9 +219,9 @@ def _surprises(fits: PhotoFits, without: Transport, number: int) -> bool:
     """
     plan = fits.plan
     light = plan.draw(number) / np.float32(255)
-    bars = ErrorBars(without).picture(light).reshape(fits.white.shape)
-    is_known = np.isfinite(bars)
-    variance = fits.variance[number] + np.where(is_known, bars, np.inf) ** 2
+    expected = ErrorBars(without).mean_squares(light).reshape(fits.white.shape)
+    is_known = np.isfinite(expected)
+    variance = fits.variance[number] + np.where(is_known, expected, np.inf)
     squares = (fits.photos[number] - fits.relit[number]) ** 2 / variance
     return float(squares.sum() / max(1, is_known.sum())) > SUSPECT_MISFIT
 

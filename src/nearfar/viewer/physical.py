@@ -124,6 +124,7 @@ def _of_pixels(split: PhysicalSplit, rows: Integers, columns: Integers) -> Physi
         tuple(_body_of(body, places.ravel()) for body in split.bodies),
         _elsewhere_of(split.elsewhere, places.ravel()),
         None if split.footprint is None else split.footprint[np.ix_(rows, columns)],
+        None if split.own_share is None else split.own_share[np.ix_(rows, columns)],
     )
 
 

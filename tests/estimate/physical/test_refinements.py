@@ -5,53 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nearfar import Size, Transport
-from nearfar.estimate.physical.elsewhere import Elsewhere, nowhere
+from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import source_at
 from nearfar.estimate.physical.outlines import with_outlines
 from nearfar.estimate.physical.specks import without_specks
-from nearfar.estimate.physical.split import PhysicalSplit, Translucent
-from nearfar.illumination.frequencies import DC
+from nearfar.estimate.physical.split import Translucent
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.pictures import random_pattern
-from nearfar.illumination.real_basis import real_basis
-
-CAMERA = Size(13, 13)
-PROJECTOR = Size(19, 48)
-WINDOW = 7
-WHITE = np.ones(PROJECTOR, np.float32)
-
-
-def places(*, gap=0, from_column=13):
-    """Return q, a projector pixel for each camera pixel, with a gap at a column of the camera."""
-    y, x = np.mgrid[: CAMERA.height, : CAMERA.width].astype(np.float32)
-    return np.stack([y + 3, x + 3 + gap * (x >= from_column)], axis=-1)
-
-
-def transport_of(direct, interreflection, q, near=None):
-    """Return a transport of one channel whose far-range light is even."""
-    basis = real_basis([DC], PROJECTOR)
-    shape = (*CAMERA, 1)
-    if near is None:
-        near = np.zeros((*shape, WINDOW, WINDOW))
-    blank = Transport(
-        projector=PROJECTOR,
-        correspondence=q.astype(np.float32),
-        direct=direct[..., None].astype(np.float32),
-        near=near.astype(np.float32),
-        far=np.ones((*shape, 1), np.float32),
-        far_basis=basis,
-        black=np.zeros(shape, np.float32),
-        noise=np.full(shape, 1e-3, np.float32),
-    )
-    unit = blank.components(WHITE).far.reshape(CAMERA)
-    return replace(blank, far=blank.far * (interreflection / unit)[..., None, None])
-
-
-def split_of(transport, *bodies):
-    return PhysicalSplit(transport, transport.direct, bodies, nowhere(1), transport.footprint)
-
+from tests.estimate.physical.even import (
+    CAMERA,
+    PROJECTOR,
+    WHITE,
+    WINDOW,
+    places,
+    split_of,
+    transport_of,
+)
 
 OF_BODY = 0.6
 OUTLINE = 6
@@ -199,3 +169,37 @@ def test_of_two_places_of_a_camera_pixel_the_later_counts():
     (index,) = np.flatnonzero(both.pixels == 4)
     assert both.direct[index] == 0.3
     assert tuple(both.places[index]) == (2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("total", "spread", "moves"),
+    [(0.6, 0.0, True), (0.4, 0.0, False), (0.6, 0.03, False)],
+    ids=["alone", "less bright", "among unlike ones"],
+)
+def test_inter_reflection_of_one_camera_pixel_far_beyond_those_around_it_is_direct_light(
+    total, spread, moves
+):
+    interreflection = np.full(CAMERA, 0.1)
+    # Two on each side: one may lie beyond.
+    interreflection[5, 5:7] = interreflection[6, 5] = 0.1 + spread
+    interreflection[MIDDLE] = 0.14
+    direct = 0.6 - interreflection
+    direct[MIDDLE] = total - 0.14
+    before = split_of(transport_of(direct, interreflection, places()))
+    split = without_specks(before)
+    change = split.direct - before.direct
+    # Far-range light is a little light next to q, too.
+    assert change[MIDDLE].item() == pytest.approx(0.04 if moves else 0.0, abs=3e-3)
+    change[MIDDLE] = 0.0
+    np.testing.assert_allclose(change, 0.0, atol=1e-6)
+
+
+def test_next_to_camera_pixels_without_direct_light_nothing_stands_out_alone():
+    interreflection = np.full(CAMERA, 0.1)
+    interreflection[MIDDLE] = 0.14
+    q = places()
+    q[5, 5] = np.nan
+    direct = 0.6 - interreflection
+    direct[5, 5] = 0.0
+    before = split_of(transport_of(direct, interreflection, q))
+    np.testing.assert_allclose(without_specks(before).direct, before.direct, atol=1e-3)

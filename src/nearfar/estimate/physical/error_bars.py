@@ -1,11 +1,13 @@
 """Error bars of the physical split: how far its components are from physical truth.
 
 At opaque surfaces direct light is as sure as the estimate has it, and inter-reflection errs by what
-direct light and the picture err. At translucent ones the kernels decide. What they leave of the
-responses, as a share, says how good they are; the errors of components go with the root of it.
+direct light and the picture err; where inter-reflection was smoothed, by less. At translucent ones
+the kernels decide. What they leave of the responses, as a share, says how good they are; the errors
+of components go with the root of it.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +31,30 @@ OF_SUBSURFACE = 0.5
 OF_BOXES = 0.1
 # Of direct light from other places than q, as a share of it: what neighbours tell.
 OF_ELSEWHERE = 0.1
-# Correlation of the two: what one gains the other loses.
+# Share of the variance of inter-reflection's errors that neighbouring camera pixels have in common,
+# so that their mean does not lower it. Measured on wedge and corner.
+IN_COMMON = 0.15
+# Correlation of direct and subsurface light: what one gains the other loses.
 CORRELATION = -0.5
+
+
+class _Deviations(NamedTuple):
+    """What the errors of components follow from, each (C, channels).
+
+    Attributes
+    ----------
+    of_picture, of_direct, of_under, of_white : ndarray
+        Standard deviations of the whole picture, of direct light before inter-reflection was
+        smoothed, of subsurface light, and of all light under white times that from q.
+    smoothed : ndarray
+        Share of inter-reflection that neighbours tell.
+    """
+
+    of_picture: Floats
+    of_direct: Floats
+    of_under: Floats
+    of_white: Floats
+    smoothed: Floats
 
 
 class PhysicalErrorBars:
@@ -78,8 +102,7 @@ class PhysicalErrorBars:
             As `Transport.components`.
         """
         deviations = self._deviations(light)
-        alone = np.eye(3)
-        return PhysicalComponents(*(self._with_gains(*deviations, *gains) for gains in alone))
+        return PhysicalComponents(*(self._with_gains(deviations, *gains) for gains in np.eye(3)))
 
     def picture(
         self,
@@ -109,10 +132,10 @@ class PhysicalErrorBars:
         """
         given = {"direct": direct, "subsurface": subsurface, "interreflection": interreflection}
         gains = [as_number(gain, f"the gain of {name}") for name, gain in given.items()]
-        return self._with_gains(*self._deviations(light), *gains)
+        return self._with_gains(self._deviations(light), *gains)
 
-    def _deviations(self, light: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return those of the whole picture, direct and subsurface light, (C, channels) each."""
+    def _deviations(self, light: Floats) -> "_Deviations":
+        """Return the standard deviations that those of components follow from."""
         transport = self._split.transport
         shape = (transport.camera.pixels, transport.channels)
         of_picture = self._bars.picture(light).reshape(shape).astype(np.float64)
@@ -143,27 +166,32 @@ class PhysicalErrorBars:
         elsewhere, flat = self._split.elsewhere, np.asarray(transport.lights(light))
         told = OF_ELSEWHERE * np.abs(elsewhere.under(flat, transport.projector))
         of_direct[elsewhere.pixels] = np.hypot(of_direct[elsewhere.pixels], told)
-        return of_picture, of_direct, of_under
+        smoothed: Floats = np.zeros(shape)
+        of_white: Floats = np.zeros(shape)
+        if self._split.own_share is not None:
+            smoothed = 1 - np.repeat(self._split.own_share.reshape(-1, 1), transport.channels, 1)
+            every = np.ones(transport.projector, dtype=np.float32)
+            of_white = self._bars.picture(every).reshape(shape) * np.abs(lit)
+        return _Deviations(of_picture, of_direct, of_under, of_white, smoothed)
 
     def _with_gains(
-        self,
-        of_picture: Floats,
-        of_direct: Floats,
-        of_under: Floats,
-        direct: float,
-        subsurface: float,
-        interreflection: float,
+        self, deviations: "_Deviations", direct: float, subsurface: float, interreflection: float
     ) -> Floats:
         """Combine them: inter-reflection is the picture less the other two."""
-        known = np.isfinite(of_picture)
-        whole, one, other = (
-            gain * np.where(known & np.isfinite(part), part, 0.0)
-            for gain, part in (
-                (interreflection, of_picture),
-                (direct - interreflection, of_direct),
-                (subsurface - interreflection, of_under),
-            )
+        known = np.isfinite(deviations.of_picture)
+        of_picture, of_direct, of_under = (
+            np.where(known & np.isfinite(part), part, 0.0) for part in deviations[:3]
         )
-        variance = whole**2 + one**2 + other**2 + 2 * CORRELATION * one * other
+        smoothed, beyond = deviations.smoothed, direct - interreflection
+        # Direct light has the error of the light under white that it was told from.
+        of_white = np.where(known, deviations.of_white, 0.0)
+        common = np.minimum(of_picture, of_white)
+        whole = interreflection * common + beyond * smoothed * of_white
+        apart = interreflection**2 * (of_picture**2 - common**2)
+        one = beyond * (1 - smoothed) * of_direct
+        other = (subsurface - interreflection) * of_under
+        left = 1 - (1 - IN_COMMON) * smoothed - (1 - smoothed) ** 2
+        of_others = beyond**2 * left * (of_white**2 + of_direct**2) + apart
+        variance = whole**2 + one**2 + other**2 + 2 * CORRELATION * one * other + of_others
         found = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.inf)
         return np.asarray(self._split.transport.picture(found.astype(np.float32)))

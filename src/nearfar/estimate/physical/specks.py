@@ -4,12 +4,15 @@ An estimate takes direct light to come through a footprint of one projector pixe
 through a wider one, or from a q that is off, is left next to q, and the camera pixel stands out
 from those around it in two ways: of all its light more is next to q, and more is inter-reflection.
 Inter-reflection over all light is smooth, as albedo cancels. What stands out in both ways is moved
-to direct light; where a camera pixel has too little of both, direct light gives it back.
+to direct light; where a camera pixel has too little of both, direct light gives it back. So is
+inter-reflection that stands out far beyond what the camera pixels around it differ by, if all of
+them are as bright.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import neighbours
@@ -23,6 +26,10 @@ NEXT_TO_Q = 2.3
 # A camera pixel stands out if it lies beyond all but one of the eight about it: a line of them,
 # such as a crease, does not.
 EXCEPTIONS = 1
+# By how many times what those about it differ by, without these exceptions, it stands out far.
+FAR_OUT = 2.0
+# Of all light, how much less or more than theirs is as bright.
+AS_BRIGHT = 0.15
 # In photo units: light under white by which others are divided.
 DARK = 1e-6
 
@@ -54,6 +61,8 @@ def without_specks(split: PhysicalSplit) -> PhysicalSplit:
     alike = chosen[..., None] & (excess * excess_next_to_q > 0)
     least = np.minimum(np.abs(excess), np.abs(excess_next_to_q))
     change = np.where(alike, np.sign(excess) * least * total, 0.0)
+    alone = chosen & _is_alone(parts[2] / total, total, chosen)
+    change = np.where(alone[..., None], excess * total, change)
     return replace(split, direct=split.direct + change.astype(np.float32))
 
 
@@ -61,6 +70,20 @@ def _standing_out(share: Floats) -> Floats:
     """Return by how much each camera pixel lies beyond those around it."""
     ordered = np.sort(neighbours(share), axis=0)
     return np.asarray(share - np.clip(share, ordered[EXCEPTIONS], ordered[-1 - EXCEPTIONS]))
+
+
+def _is_alone(share: Floats, total: Floats, chosen: Booleans) -> Booleans:
+    """Return where a share stands out far among chosen camera pixels as bright, (Cy, Cx)."""
+    grey = share.mean(axis=-1, keepdims=True)
+    ordered = np.sort(neighbours(grey), axis=0)
+    spread = ordered[-1 - EXCEPTIONS] - ordered[EXCEPTIONS]
+    brightness = total.mean(axis=-1, keepdims=True)
+    bright = np.sort(neighbours(brightness), axis=0)
+    found = np.abs(_standing_out(grey)) > FAR_OUT * spread
+    found &= brightness > (1 - AS_BRIGHT) * bright[EXCEPTIONS]
+    found &= brightness < (1 + AS_BRIGHT) * bright[-1 - EXCEPTIONS]
+    surrounded = ndimage.minimum_filter(chosen, 3, mode="constant", cval=False)
+    return np.asarray(found[..., 0] & surrounded)
 
 
 def _light_next_to_q(transport: Transport) -> Floats:

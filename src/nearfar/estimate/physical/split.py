@@ -6,7 +6,7 @@ share, what it adds at q is taken from direct light, and all the rest is inter-r
 is the transport as it was.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -118,6 +118,9 @@ class PhysicalSplit:
     footprint : ndarray, shape (Cy, Cx, 4), or None
         Direct light's footprint, as `Transport.footprint`. At translucent surfaces it may be
         narrower than the transport's, which takes light under the surface for blur.
+    own_share : ndarray, shape (Cy, Cx), or None
+        Weight of each camera pixel's own inter-reflection, where those around it tell the rest;
+        also the share of its error's variance that this leaves. None: 1 everywhere.
 
     Examples
     --------
@@ -133,6 +136,7 @@ class PhysicalSplit:
     bodies: tuple[Translucent, ...]
     elsewhere: Elsewhere
     footprint: Floats | None
+    own_share: Floats | None = None
 
     def components(self, light: Floats) -> PhysicalComponents:
         """Relight each component by itself.
@@ -227,6 +231,41 @@ class PhysicalSplit:
         gains = [as_number(gain, f"the gain of {name}") for name, gain in given.items()]
         parts = self.components(light)
         return np.asarray(sum(gain * part for gain, part in zip(gains, parts, strict=True)))
+
+
+def with_more_direct(split: PhysicalSplit, change: Floats) -> PhysicalSplit:
+    """Return a split with more direct light, and as much less inter-reflection.
+
+    Parameters
+    ----------
+    split : PhysicalSplit
+    change : ndarray, shape (Cy, Cx, channels)
+        Under white. It goes where the direct light of a camera pixel comes from: to q, but
+        elsewhere if none comes from q. No direct light becomes negative.
+
+    Returns
+    -------
+    PhysicalSplit
+    """
+    channels = split.transport.channels
+    direct, flat = split.direct.reshape(-1, channels), change.reshape(-1, channels)
+    pixels, _, from_elsewhere = split.elsewhere
+    only = ~direct[pixels].any(axis=1)
+    of_elsewhere = from_elsewhere.copy()
+    of_elsewhere[only] = _no_less(of_elsewhere[only], flat[pixels[only]])
+    others = np.ones(len(direct), dtype=bool)
+    others[pixels[only]] = False
+    at_q = np.where(others[:, None], _no_less(direct, flat), direct).astype(np.float32)
+    return replace(
+        split,
+        direct=at_q.reshape(split.direct.shape),
+        elsewhere=split.elsewhere._replace(direct=of_elsewhere),
+    )
+
+
+def _no_less(direct: Floats, change: Floats) -> Floats:
+    """Return direct light with a change, which makes none negative."""
+    return np.asarray(np.maximum(direct + change, np.minimum(direct, 0.0)))
 
 
 def _spread(source: Dipole, slope: Integers, lit: Floats, where: Footprint) -> Floats:

@@ -4,7 +4,9 @@ import numpy as np
 
 from nearfar.checks import require_instance
 from nearfar.errors import InputError
+from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
+from nearfar.estimate.physical.crease_light import at_creases, with_crease_light
 from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.elsewhere import at_second_places
 from nearfar.estimate.physical.footprints import footprints
@@ -13,6 +15,7 @@ from nearfar.estimate.physical.kernels import enlarged
 from nearfar.estimate.physical.medium import Media, is_deep, is_even, media_of
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
+from nearfar.estimate.physical.smooth import with_smooth_interreflection
 from nearfar.estimate.physical.specks import without_specks
 from nearfar.estimate.physical.split import PhysicalSplit, Translucent
 from nearfar.estimate.physical.translucent import translucent
@@ -78,7 +81,12 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         elsewhere,
         None if transport.footprint is None else boxes.reshape(transport.footprint.shape),
     )
-    return without_holes(without_specks(with_outlines(split)))
+    split = without_holes(without_specks(with_outlines(split)))
+    near_creases = at_creases(split, creases)
+    # What errs by how much, nobody knows of a transport without error bars.
+    if transport.posterior is not None:
+        split = with_smooth_interreflection(split, ErrorBars(transport).direct(), near_creases)
+    return with_crease_light(split, near_creases)
 
 
 def _fitted(body: Body, transport: Transport) -> tuple[Body, Media]:

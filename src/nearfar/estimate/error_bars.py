@@ -235,8 +235,11 @@ class ErrorBars:
         """
         transport = self._transport
         found = np.empty((transport.camera.pixels, transport.channels), dtype=np.float32)
-        for batch in blocks(len(found), BATCH_PIXELS):
+
+        def work(batch: slice) -> None:
             found[batch] = self._widening * np.sqrt(self._variances.of_direct(batch))
+
+        side_by_side(work, blocks(len(found), BATCH_PIXELS))
         found *= transport.lit.reshape(-1, 1)
         found[self._unknown] = np.inf
         return found.reshape(*transport.camera, transport.channels)

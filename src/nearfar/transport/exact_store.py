@@ -240,8 +240,8 @@ def _as_matrices(
     if camera is None or camera.pixels != rows:
         raise InputError(
             f"{source} has {rows} rows, from which no camera size follows for a projector of "
-            f"{projector}: give `camera`, store it in the .npz as camera, or set it under [scene] "
-            f"in RIG.toml."
+            f"{projector}: store it in the .npz as camera, set it under [scene] in RIG.toml, or "
+            f"give `camera` where it is taken."
         )
     return np.ascontiguousarray(np.moveaxis(dense, 2, 0), dtype=np.float32), projector, camera
 

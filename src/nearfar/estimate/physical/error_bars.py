@@ -24,7 +24,10 @@ OF_DIRECT = 1.0
 # How well what a kernel adds at q is known at best, as a share of it: all of a body has the same
 # error, which responses do not show. Measured on five scenes, none of them held out.
 OF_KERNEL = 0.08
-OF_SUBSURFACE = 0.5
+OF_SUBSURFACE = 0.4
+# How well subsurface light is known at best, as a share of it. Measured under white and natural
+# pictures on cornell and cornell-aside.
+LEAST_OF_SUBSURFACE = 0.05
 # Of direct light where its footprint is of boxes, as a share of it: an estimate has too much or too
 # little of the fastest waves, the same at all of a body. Measured on cornell and cornell-aside at
 # 128x128.
@@ -148,7 +151,8 @@ class PhysicalErrorBars:
             left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
             peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
             known = np.hypot(OF_DIRECT * left, OF_KERNEL) * body.amplitude * peaks
-            of_under[body.pixels] = OF_SUBSURFACE * left * under[body.pixels]
+            of_under[body.pixels] = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE)
+            of_under[body.pixels] *= under[body.pixels]
             if self._split.footprint is not None:
                 taken = OF_BOXES * direct[body.pixels]
                 known = np.hypot(known, taken)

@@ -10,12 +10,13 @@ from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.error_bars import JointVariances
-from nearfar.estimate.truncated import LEAST_LEFT, change_by_place, truncated_variance
+from nearfar.estimate.truncated import LEAST_LEFT, Rows, change_by_place, truncated_variance
 from nearfar.illumination.frequencies import far_frequencies, representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.priors.component import PriorComponent
+from nearfar.priors.covariance import spectral_density
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -45,12 +46,25 @@ def _transport(rows):
     )
 
 
-def _changes(transport, light, component, scale=1.0):
-    number = transport.camera.pixels
-    chosen = np.full(number, component)
-    squared = np.full((number, transport.channels), float(scale) ** 2)
-    change = change_by_place(transport, light.ravel(), COMPONENTS)
-    return change(slice(None), chosen, squared)
+def _multiplicity(transport, often=1.0):
+    """Return how often each frequency was measured: those that the transport holds, alike."""
+    found = np.zeros(transport.projector)
+    cycles = transport.far_basis.cycles * transport.projector
+    for sign in (1, -1):
+        y, x = (np.rint(sign * cycles).astype(int) % transport.projector).T
+        found[y, x] = often
+    return found
+
+
+def _changes(transport, light, component, scale=1.0, noise=0.0):
+    shape = (transport.camera.pixels, transport.channels)
+    rows = Rows(
+        np.full(shape[0], component),
+        np.full(shape, float(scale) ** 2),
+        np.full(shape, float(noise) ** 2),
+        _multiplicity(transport),
+    )
+    return change_by_place(transport, light.ravel(), COMPONENTS, rows)(slice(None))
 
 
 def _single(y, x):
@@ -132,13 +146,44 @@ def test_channels_and_camera_pixels_keep_their_own_scales():
     transport = _transport(rows)
     chosen, light = np.array([0, 1]), _single(6, 7).ravel()
     squared = np.array([[1.0, 4.0], [9.0, 0.0]])
-    both = change_by_place(transport, light, COMPONENTS)(slice(None), chosen, squared)
+    rows = Rows(chosen, squared, np.zeros((2, 2)), _multiplicity(transport))
+    change = change_by_place(transport, light, COMPONENTS, rows)
+    both = change(slice(None))
     for pixel in range(2):
         one = slice(pixel, pixel + 1)
-        alone = change_by_place(transport, light, COMPONENTS)(one, chosen[one], squared[one])
+        alone = change(one)
         np.testing.assert_allclose(both[one], alone, rtol=1e-5)
     np.testing.assert_allclose(both[0, 1], 4.0 * both[0, 0], rtol=1e-6)
     assert both[1, 1] == 0.0
+
+
+def _missed(transport, light, density, ratio):
+    """Return the variance of what an estimate misses, at unit prior scale."""
+    power = np.abs(np.fft.fft2(light)) ** 2
+    expected = np.full(transport.projector, density)
+    expected[0, 0] = 0.0
+    gain = 0.5 * expected * ratio * _multiplicity(transport)
+    gain /= 1 + gain
+    return np.sum(expected * (1 - gain) ** 2 * power) / transport.projector.pixels**2
+
+
+@pytest.mark.parametrize("octave", [-6, 0, 3])
+def test_what_noise_makes_the_prior_shrink_lies_about_bright_entries_too(octave):
+    # Little of the bump is not known: bars are standard deviations.
+    transport, scale = _transport(_bump()[None, None]), 1e-4
+    noise = scale * 2.0 ** (-octave / 2)
+    density = spectral_density(np.zeros(1), COMPONENTS[0]).item()
+    missed = scale**2 * _missed(transport, _single(0, 0), density, 2.0**octave)
+    changes = [
+        _changes(transport, _single(y, x), 0, scale, noise).item()
+        for y in range(PROJECTOR.height)
+        for x in range(PROJECTOR.width)
+    ]
+    assert abs(sum(changes)) < 1e-3 * len(changes) * missed
+    # All but five per cent of it is taken from dark entries.
+    assert changes[0] == pytest.approx(-0.95 * missed, rel=0.01)
+    # Without noise only what the transport does not hold is missed.
+    assert changes[0] < _changes(transport, _single(0, 0), 0, scale).item()
 
 
 def test_rows_of_larger_projectors_are_not_looked_at():

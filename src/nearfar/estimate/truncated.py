@@ -1,9 +1,10 @@
-"""The variance of what a transport does not hold of far-range light.
+"""The variance of what an estimate misses of far-range light.
 
-The prior expects the same of it all over a row. It lies where the row has light, though: most of
-it are the edges of bright entries. With h_k^2 the spectral density at frequencies that
-are not held, a light l has the variance sum_p (h * l)(p)^2. Each projector pixel p then counts by
-the power of F about it.
+It misses all of what the transport does not hold, and, at frequencies that it holds, what the prior
+shrinks: with a gain g, (1 - g)^2 of the power. The prior expects the same of it all over a row. It
+lies where the row has light, though: most of it are the edges and peaks of bright entries. With
+h_k^2 the spectral density of what is missed, a light l has the variance sum_p (h * l)(p)^2. Each
+projector pixel p then counts by the power of F about it.
 
 Rows of few bright entries leave errors with heavy tails: one standard deviation would hold 80 to
 90 % of them. An error bar is half the width of the interval that holds 68 %, and is narrower there:
@@ -14,6 +15,7 @@ Index convention: n runs over camera pixels, p over projector pixels.
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -41,6 +43,8 @@ LEAST_LEFT = EVERYWHERE * (1 - NARROWED) ** 2
 ROUNDING = 1e-9
 # Keeps quotients finite, and so are its squares.
 TINY = float(np.finfo(np.float64).tiny) ** 0.5
+# Powers of 2 of variance ratios that are told apart; of the last, measurements are exact.
+OCTAVES = -30, 60
 # Values of rows that are computed at once.
 VALUES_AT_ONCE = 2**23
 
@@ -67,9 +71,31 @@ def truncated_variance(
     return np.array(total) / projector.pixels**2
 
 
+class Rows(NamedTuple):
+    """What the prior expects of rows, and how well photos tell of them.
+
+    Attributes
+    ----------
+    component : ndarray of int, shape (C,)
+        The prior component of each camera pixel.
+    squared_scale : ndarray, shape (C, channels)
+        Square of its prior scale, photo units.
+    squared_noise : ndarray, shape (C, channels)
+        Variance of a measured response.
+    multiplicity : ndarray, shape (Py, Px)
+        How often the response to each frequency of the projector's DFT was measured; 0 where the
+        transport holds none.
+    """
+
+    component: Integers
+    squared_scale: Floats
+    squared_noise: Floats
+    multiplicity: Floats
+
+
 def change_by_place(
-    transport: Transport, light: Floats, prior_components: Sequence[PriorComponent]
-) -> Callable[[slice, Integers, Floats], Floats]:
+    transport: Transport, light: Floats, prior_components: Sequence[PriorComponent], rows: Rows
+) -> Callable[[slice], Floats]:
     """Return the correction of variances for where rows have light, under a light (P,).
 
     It is 0 where near-range functions are wider than a projector pixel: rows of such projectors are
@@ -78,21 +104,31 @@ def change_by_place(
     Returns
     -------
     callable
-        A function of a block of camera pixels, of the prior component of each, (n,), and of its
-        squared prior scale in photo units, (n, channels). It returns corrections, (n, channels):
-        a squared error bar is the variance plus its correction.
+        A function of a block of camera pixels, which returns corrections, (n, channels): a squared
+        error bar is the variance plus its correction.
     """
     if transport.pitch > 1:
-        return lambda batch, chosen, squared_scale: np.zeros(squared_scale.shape)
-    shares = _by_pixel(transport, light, prior_components)
+        return lambda batch: np.zeros(rows.squared_scale[batch].shape)
+    ratio = rows.squared_scale.mean(axis=1) / np.maximum(rows.squared_noise.mean(axis=1), TINY)
+    octave = np.clip(np.rint(np.log2(np.maximum(ratio, TINY))), *OCTAVES)
+    kinds, kind = np.unique(np.stack([rows.component, octave]), axis=1, return_inverse=True)
+    kind = kind.ravel()
+    densities = [
+        _unknown_density(
+            transport,
+            prior_components[int(place)],
+            2.0**power if power < OCTAVES[1] else np.inf,
+            rows.multiplicity,
+        )
+        for place, power in kinds.T
+    ]
+    shares = _by_pixel(transport, light, densities)
     totals = shares.sum(axis=1)
     # How many projector pixels share the variance.
     numbers = np.maximum(totals, TINY) ** 2 / np.maximum((shares**2).sum(axis=1), TINY**2)
     drawn = shares.reshape(-1, *transport.projector)
     about = gaussian_filter(drawn, (0, ABOUT, ABOUT), mode="wrap").reshape(shares.shape)
-    alone = np.zeros(light.shape)
-    alone[0] = 1.0
-    of_entry = truncated_variance(transport, alone, prior_components)
+    of_entry = np.array([one.sum() for one in densities]) / transport.projector.pixels**2
     far = transport.far.reshape(transport.camera.pixels, transport.channels, -1)
 
     def relative(some: Floats, chosen: Integers, squared_scale: Floats) -> Floats:
@@ -108,36 +144,47 @@ def change_by_place(
         excess = np.maximum(kurtosis - EVEN_KURTOSIS, 0.0) / numbers[chosen]
         return np.asarray(local * _narrowing(excess, unknown) ** 2)
 
-    def of_pixels(batch: slice, chosen: Integers, squared_scale: Floats) -> Floats:
+    def of_pixels(batch: slice) -> Floats:
+        squared_scale, chosen = rows.squared_scale[batch], kind[batch]
         found = np.zeros(squared_scale.shape)
         if not totals[chosen].any():
             return found
-        rows = far[batch]
+        held = far[batch]
         step = max(1, VALUES_AT_ONCE // (transport.channels * transport.projector.pixels))
         for some in blocks(len(chosen), step):
             mine = chosen[some]
-            change = relative(rows[some], mine, squared_scale[some]) - totals[mine]
+            change = relative(held[some], mine, squared_scale[some]) - totals[mine]
             found[some] = squared_scale[some] * change[:, None]
         return found
 
     return of_pixels
 
 
-def _by_pixel(
-    transport: Transport, light: Floats, prior_components: Sequence[PriorComponent]
+def _unknown_density(
+    transport: Transport, prior_component: PriorComponent, ratio: float, multiplicity: Floats
 ) -> Floats:
-    """Return (h * l)(p)^2 at unit prior scale, for each prior component: (components, P)."""
+    """Return the spectral density of what is missing of rows at unit prior scale, (Py, Px).
+
+    All of it at frequencies that are not held, and of others what the estimate shrinks.
+    """
+    projector = transport.projector
+    down, across = (side * np.fft.fftfreq(side) for side in projector)
+    density = spectral_density(np.hypot(down[:, None], across), prior_component)
+    density[0, 0] = 0.0
+    # A cosine and a sine share the density of a pair.
+    told = 0.5 * multiplicity * density
+    told = np.multiply(told, ratio, out=np.zeros(projector), where=told > 0)
+    return np.asarray(density / (1.0 + told) ** 2)
+
+
+def _by_pixel(transport: Transport, light: Floats, densities: Sequence[Floats]) -> Floats:
+    """Return (h * l)(p)^2 at unit prior scale, for densities h_k^2: (densities, P)."""
     projector = transport.projector
     spectrum = np.fft.fft2(light.reshape(projector).astype(np.float64))
-    spectrum[_is_held(transport) | (np.abs(spectrum) <= ROUNDING * np.abs(light).sum())] = 0.0
+    spectrum[np.abs(spectrum) <= ROUNDING * np.abs(light).sum()] = 0.0
     if not spectrum.any():
-        return np.zeros((len(prior_components), projector.pixels))
-    down, across = (side * np.fft.fftfreq(side) for side in projector)
-    radius = np.hypot(down[:, None], across)
-    drawn = [
-        np.fft.ifft2(np.sqrt(spectral_density(radius, one)) * spectrum).real
-        for one in prior_components
-    ]
+        return np.zeros((len(densities), projector.pixels))
+    drawn = [np.fft.ifft2(np.sqrt(one) * spectrum).real for one in densities]
     return np.stack(drawn).reshape(-1, projector.pixels) ** 2 / projector.pixels
 
 

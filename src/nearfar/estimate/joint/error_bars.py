@@ -32,7 +32,7 @@ from nearfar.estimate.joint.posterior_variance import (
 )
 from nearfar.estimate.joint.second_places import responses_of
 from nearfar.estimate.joint.shares import share_on_projector
-from nearfar.estimate.truncated import change_by_place, truncated_variance
+from nearfar.estimate.truncated import Rows, change_by_place, truncated_variance
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.near_basis import NearBasis
@@ -123,16 +123,30 @@ class JointVariances:
 
         Squared error bars under a light (P,) are variances plus these.
         """
-        posterior, channels = self._posterior, self._transport.channels
-        change = change_by_place(self._transport, light, posterior.prior_components)
+        change = change_by_place(
+            self._transport, light, self._posterior.prior_components, self._rows()
+        )
+        return lambda batch: np.asarray(gains.far**2 * self._more(batch) * change(batch))
 
-        def of_pixels(batch: slice) -> Floats:
-            scale = posterior.prior_scale.ravel()[batch, None].astype(np.float64)
-            squared = (scale * posterior.white.reshape(-1, channels)[batch]) ** 2
-            changes = change(batch, posterior.prior_component.ravel()[batch], squared)
-            return np.asarray(gains.far**2 * self._more(batch) * changes)
-
-        return of_pixels
+    def _rows(self) -> Rows:
+        """Return what is expected and known of all rows."""
+        posterior, transport = self._posterior, self._transport
+        shape = (transport.camera.pixels, transport.channels)
+        noise = transport.noise.reshape(shape).astype(np.float64) ** 2
+        scale = posterior.prior_scale.reshape(-1, 1) * posterior.white.reshape(shape)
+        basis, projector = self._centred.basis, transport.projector
+        multiplicity = np.zeros(projector)
+        # Cosine and sine of a pair are measured alike.
+        places = np.rint(basis.cycles[basis.index] * projector).astype(np.int64)
+        for sign in (1, -1):
+            y, x = (sign * places % projector).T
+            multiplicity[y, x] = self._is_held * posterior.multiplicity
+        return Rows(
+            posterior.prior_component.ravel().astype(np.int64),
+            scale.astype(np.float64) ** 2,
+            noise * posterior.noise_share.reshape(shape),
+            multiplicity,
+        )
 
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""

@@ -49,6 +49,12 @@ LIKE_RESPONSES = 7
 MEDIAN_OF_SQUARES = 0.455
 # No response is known better than the mean by this factor in power.
 LEAST_POWER = 1e-3
+# A channel's attenuation times depth is unlike that of the others if it is less by this factor.
+UNLIKE = 4.0
+# Standard deviation, in logarithms, of what the other channels then tell of it; and how many camera
+# pixels it is weighed against, as errors of the model are the same all over a body.
+LIKE_DEVIATION = 0.9
+INDEPENDENT = 3.0
 ROUNDS = 3
 ITERATIONS = 60
 
@@ -102,19 +108,65 @@ def media_of(body: Body) -> Media:
     -------
     Media
     """
-    channels = range(body.responses.shape[1])
-    everywhere = np.arange(len(body.pixels))
-    sample = np.random.default_rng(0).permutation(np.flatnonzero(body.inner))[:SAMPLE]
-    slope: Integers = np.zeros(len(everywhere), dtype=np.int64)
-    power = np.tile(1 + SLOW_POWER / (1 + (body.frequency / SLOW) ** 3), (len(channels), 1))
+    slope: Integers = np.zeros(len(body.pixels), dtype=np.int64)
+    sample, power = _sample(body), _power_before(body)
     sources = [
         min(_guesses(), key=lambda one: _misfit(body, i, one, slope, power[i], sample))
-        for i in channels
+        for i in range(len(power))
     ]
+    return _settled(body, sources, slope, np.full(len(sources), np.nan))
+
+
+def with_like_channels(body: Body, media: Media) -> Media:
+    """Return media in which light fades in every channel, if it does in most.
+
+    A channel whose kernel reaches as far as responses tell anything may be taken for one that
+    hardly fades. Its attenuation times depth is then fitted anew, with that of the other channels
+    as what is expected.
+
+    Parameters
+    ----------
+    body : Body
+    media : Media
+
+    Returns
+    -------
+    Media
+    """
+    found = np.stack([_logarithms(source) for source in media.sources])
+    if len(found) == 1:
+        return media
+    others = (found.sum(axis=0) - found) / (len(found) - 1)
+    unlike = found[:, 1] < others[:, 1] - np.log(UNLIKE)
+    if not unlike.any():
+        return media
+    like = found[~unlike].mean(axis=0)
+    depth, product = np.exp(like)
+    start = source_at(float(depth), float(product / depth))
+    sources = [
+        start if other else source for other, source in zip(unlike, media.sources, strict=True)
+    ]
+    return _settled(body, sources, media.slope, np.where(unlike, like[1], np.nan))
+
+
+def _settled(body: Body, sources: list[Dipole], slope: Integers, expected: Floats) -> Media:
+    """Refine sources, slopes and the power of what is left in turn.
+
+    Parameters
+    ----------
+    body : Body
+    sources : list of Dipole
+        Where to begin, for each channel.
+    slope : ndarray of int, shape (n,)
+    expected : ndarray, shape (channels,)
+        Logarithm of attenuation times depth; NaN where nothing is expected.
+    """
+    everywhere, sample, power = np.arange(len(body.pixels)), _sample(body), _power_before(body)
     fits: list[Amplitudes] = []
     for _ in range(ROUNDS):
         sources = [
-            _refined(body, i, source, slope, power[i], sample) for i, source in enumerate(sources)
+            _refined(body, i, source, slope, power[i], sample, float(expected[i]))
+            for i, source in enumerate(sources)
         ]
         slope = _slopes(body, sources, power)
         fits = [
@@ -132,20 +184,31 @@ def media_of(body: Body) -> Media:
 
 
 def is_even(media: Media) -> bool:
-    """Return whether light hardly fades as far as kernels are compared, in any channel.
+    """Return whether light hardly fades as far as kernels are compared.
 
-    The source then ended at the greatest depth, or the attenuation at the least.
+    The source then ended at the greatest depth in any channel, or the attenuation at the least in
+    half of them or more.
     """
     least, most = np.log(RANGES).T
     found = np.stack([_logarithms(source) for source in media.sources])
-    return bool(
-        np.any(found[:, 0] > most[0] - AT_BOUND) or np.any(found[:, 1] < least[1] + AT_BOUND)
-    )
+    deep, faint = found[:, 0] > most[0] - AT_BOUND, found[:, 1] < least[1] + AT_BOUND
+    return bool(deep.any() or 2 * faint.sum() >= len(found))
 
 
 def is_deep(media: Media) -> bool:
     """Return whether kernels are compared too near to q to tell the medium, in any channel."""
     return max(source.real for source in media.sources) > DEEP
+
+
+def _sample(body: Body) -> Integers:
+    """Return the camera pixels that media are fitted to, as indices of the body's."""
+    return np.random.default_rng(0).permutation(np.flatnonzero(body.inner))[:SAMPLE]
+
+
+def _power_before(body: Body) -> Floats:
+    """Return the power of inter-reflection before any fit, (channels, R)."""
+    power = 1 + SLOW_POWER / (1 + (body.frequency / SLOW) ** 3)
+    return np.tile(power, (body.responses.shape[1], 1))
 
 
 def _guesses() -> list[Dipole]:
@@ -199,16 +262,25 @@ def _misfit(
 
 
 def _refined(
-    body: Body, channel: int, source: Dipole, slope: Integers, power: Floats, sample: Integers
+    body: Body,
+    channel: int,
+    source: Dipole,
+    slope: Integers,
+    power: Floats,
+    sample: Integers,
+    expected: float,
 ) -> Dipole:
     """Return the source that fits best, from one that is near."""
+    weight = len(sample) / INDEPENDENT / LIKE_DEVIATION**2
 
     def source_of(logarithms: NDArray[np.float64]) -> Dipole:
         depth, product = np.exp(np.clip(logarithms, *np.log(RANGES).T))
         return source_at(float(depth), float(product / depth))
 
     def misfit(logarithms: NDArray[np.float64]) -> float:
-        return _misfit(body, channel, source_of(logarithms), slope, power, sample)
+        apart = 0.0 if np.isnan(expected) else (logarithms[1] - expected) ** 2
+        found = _misfit(body, channel, source_of(logarithms), slope, power, sample)
+        return found + weight * apart
 
     best = optimize.minimize(
         misfit,

@@ -12,7 +12,13 @@ from nearfar.estimate.physical.elsewhere import at_second_places
 from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
-from nearfar.estimate.physical.medium import Media, is_deep, is_even, media_of
+from nearfar.estimate.physical.medium import (
+    Media,
+    is_deep,
+    is_even,
+    media_of,
+    with_like_channels,
+)
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.smooth import with_smooth_interreflection
@@ -20,6 +26,10 @@ from nearfar.estimate.physical.specks import without_specks
 from nearfar.estimate.physical.split import PhysicalSplit, Translucent
 from nearfar.estimate.physical.translucent import translucent
 from nearfar.transport.model import Transport
+
+# Where kernels explain a lesser share of what direct light leaves of a body, as the median over its
+# camera pixels, it is not translucent.
+EXPLAINED_OF_BODY = 0.7
 
 
 def split_physically(transport: Transport) -> PhysicalSplit:
@@ -59,8 +69,9 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     bodies = []
     for found in bodies_at(transport, seen, narrow, waves_of(transport)):
         body, media = _fitted(found, transport)
-        if np.median(media.explained[body.inner]) < LEAST_EXPLAINED or is_even(media):
+        if np.median(media.explained[body.inner]) < EXPLAINED_OF_BODY or is_even(media):
             continue
+        media = with_like_channels(body, media)
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]
         boxes[body.pixels[kept]] = narrow[body.pixels[kept]]

@@ -111,6 +111,11 @@ def test_of_saturated_camera_pixels_nothing_is_known(scene, split):
     found = PhysicalErrorBars(spoilt).picture(np.ones(scene.projector, np.float32), subsurface=0.0)
     assert np.isinf(found[3, 5]).all()
     assert np.isfinite(found[~saturated]).all()
+    dark_there = np.zeros(scene.projector, np.float32)
+    dark_there[-3:, -3:] = 1.0
+    for part in PhysicalErrorBars(spoilt).components(dark_there):
+        assert np.isinf(part[3, 5]).all()
+        assert np.isfinite(part[~saturated]).all()
 
 
 def test_a_transport_without_error_bars_says_so(split):

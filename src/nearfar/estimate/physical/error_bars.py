@@ -142,7 +142,8 @@ class PhysicalErrorBars:
         transport = self._split.transport
         shape = (transport.camera.pixels, transport.channels)
         of_picture = self._bars.picture(light).reshape(shape).astype(np.float64)
-        of_direct = self._bars.direct().reshape(shape).astype(np.float64)
+        # Where nothing is known, the picture's are infinite: that says it of all components.
+        of_direct = _finite(self._bars.direct().reshape(shape).astype(np.float64))
         under = self._split.components(light).subsurface.reshape(shape)
         direct = self._split.direct.reshape(shape)
         white = np.ones((1, transport.projector.pixels))
@@ -175,20 +176,17 @@ class PhysicalErrorBars:
         if self._split.own_share is not None:
             smoothed = 1 - np.repeat(self._split.own_share.reshape(-1, 1), transport.channels, 1)
             every = np.ones(transport.projector, dtype=np.float32)
-            of_white = self._bars.picture(every).reshape(shape) * np.abs(lit)
+            of_white = _finite(self._bars.picture(every).reshape(shape)) * np.abs(lit)
         return _Deviations(of_picture, of_direct, of_under, of_white, smoothed)
 
     def _with_gains(
         self, deviations: "_Deviations", direct: float, subsurface: float, interreflection: float
     ) -> Floats:
         """Combine them: inter-reflection is the picture less the other two."""
-        known = np.isfinite(deviations.of_picture)
-        of_picture, of_direct, of_under = (
-            np.where(known & np.isfinite(part), part, 0.0) for part in deviations[:3]
-        )
-        smoothed, beyond = deviations.smoothed, direct - interreflection
+        of_picture, of_direct, of_under, of_white, smoothed = deviations
+        known, beyond = np.isfinite(of_picture), direct - interreflection
+        of_picture = _finite(of_picture)
         # Direct light has the error of the light under white that it was told from.
-        of_white = np.where(known, deviations.of_white, 0.0)
         common = np.minimum(of_picture, of_white)
         whole = interreflection * common + beyond * smoothed * of_white
         apart = interreflection**2 * (of_picture**2 - common**2)
@@ -199,3 +197,8 @@ class PhysicalErrorBars:
         variance = whole**2 + one**2 + other**2 + 2 * CORRELATION * one * other + of_others
         found = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.inf)
         return np.asarray(self._split.transport.picture(found.astype(np.float32)))
+
+
+def _finite(deviations: Floats) -> Floats:
+    """Return standard deviations, 0 in place of infinite ones."""
+    return np.where(np.isfinite(deviations), deviations, 0.0)

@@ -11,7 +11,8 @@ deviation of the error bars, at translucent surfaces and at others. The model's 
 stands beside subsurface light, its far-range light beside inter-reflection. Last come direct and
 global light, by the physical split and by the checkerboards of Nayar et al. (2006) that take no
 more photos, black included.
-alcove, shelf, hand and marble took no part in any choice that the split made.
+No constant of the split was fitted to alcove, shelf, hand and marble; all but marble were looked at
+when inter-reflection was made smooth (decision 0104).
 """
 
 import argparse

@@ -72,7 +72,7 @@ def truncated_variance(
 
 
 class Rows(NamedTuple):
-    """What the prior expects of rows, and how well photos tell of them.
+    """Priors of all rows, the noise of their responses, and which frequencies were measured.
 
     Attributes
     ----------
@@ -163,9 +163,10 @@ def change_by_place(
 def _unknown_density(
     transport: Transport, prior_component: PriorComponent, ratio: float, multiplicity: Floats
 ) -> Floats:
-    """Return the spectral density of what is missing of rows at unit prior scale, (Py, Px).
+    """Return the spectral density of what an estimate misses at unit prior scale, (Py, Px).
 
-    All of it at frequencies that are not held, and of others what the estimate shrinks.
+    At frequencies that the transport does not hold it is the prior's, at others the bias that
+    shrinkage leaves: S / (1 + s^2 m S / sigma^2)^2, measured m times.
     """
     projector = transport.projector
     down, across = (side * np.fft.fftfreq(side) for side in projector)

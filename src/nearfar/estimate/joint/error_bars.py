@@ -129,7 +129,7 @@ class JointVariances:
         return lambda batch: np.asarray(gains.far**2 * self._more(batch) * change(batch))
 
     def _rows(self) -> Rows:
-        """Return what is expected and known of all rows."""
+        """Return prior component, prior scale, noise and measured frequencies of all rows."""
         posterior, transport = self._posterior, self._transport
         shape = (transport.camera.pixels, transport.channels)
         noise = transport.noise.reshape(shape).astype(np.float64) ** 2

@@ -13,12 +13,10 @@ from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import moved, steps
+from nearfar.estimate.physical.creases import NEXT_TO
 from nearfar.estimate.physical.elsewhere import Elsewhere
-from nearfar.estimate.physical.smooth import DARK, opaque
-from nearfar.estimate.physical.split import PhysicalSplit, with_more_direct
+from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque, with_more_direct
 
-# Camera pixels next to one at which q was drawn aside are at the crease as well.
-NEXT_TO = np.ones((3, 3), dtype=bool)
 # So many of the eight around may have less inter-reflection.
 DARKER = 3
 # How far on both sides camera pixels tell which way a crease runs.
@@ -28,7 +26,7 @@ DIRECTIONS = np.array([(0, 1), (1, 0), (1, 1), (1, -1)])
 
 
 def at_creases(split: PhysicalSplit, drawn: Elsewhere) -> Booleans:
-    """Return the camera pixels at creases, shape (Cy, Cx).
+    """Return the camera pixels at creases and those next to them, shape (Cy, Cx).
 
     Parameters
     ----------

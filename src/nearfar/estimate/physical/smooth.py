@@ -13,13 +13,11 @@ from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import moved, steps
-from nearfar.estimate.physical.split import PhysicalSplit, with_more_direct
+from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque, with_more_direct
 
 # Share of the variance of direct light's error bars that makes inter-reflection deviate from that
 # around it. Measured on wedge and corner.
 BY_ERRORS = 0.7
-# In photo units: light under white by which others are divided.
-DARK = 1e-6
 
 
 def with_smooth_interreflection(
@@ -61,14 +59,6 @@ def with_smooth_interreflection(
     # A mean of n has 1 / n of the camera pixel's own.
     own_share = gain + (1 - gain) / count
     return replace(with_more_direct(split, change), own_share=own_share)
-
-
-def opaque(split: PhysicalSplit) -> Booleans:
-    """Return camera pixels with direct light at which nothing is translucent, (Cy, Cx)."""
-    found = split.transport.lit.copy()
-    for body in split.bodies:
-        found.ravel()[body.pixels] = False
-    return np.asarray(found)
 
 
 def _mean_of_opposite(

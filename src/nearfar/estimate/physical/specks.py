@@ -4,9 +4,9 @@ An estimate takes direct light to come through a footprint of one projector pixe
 through a wider one, or from a q that is off, is left next to q, and the camera pixel stands out
 from those around it in two ways: of all its light more is next to q, and more is inter-reflection.
 Inter-reflection over all light is smooth, as albedo cancels. What stands out in both ways is moved
-to direct light; where a camera pixel has too little of both, direct light gives it back. So is
-inter-reflection that stands out far beyond what the camera pixels around it differ by, if all of
-them are as bright.
+to direct light; where a camera pixel has too little of both, direct light gives it back.
+Inter-reflection that stands out by far more than the camera pixels around it differ from each other
+is moved as well, if all of them are as bright.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import neighbours
 from nearfar.estimate.physical.cells import cell_side
 from nearfar.estimate.physical.rows_about import of_rows_about_q, offsets
-from nearfar.estimate.physical.split import PhysicalSplit
+from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque
 from nearfar.transport.model import Transport
 
 # Distance of light that is next to q, in cells.
@@ -30,8 +30,6 @@ EXCEPTIONS = 1
 FAR_OUT = 2.0
 # Of all light, how much less or more than theirs is as bright.
 AS_BRIGHT = 0.15
-# In photo units: light under white by which others are divided.
-DARK = 1e-6
 
 
 def without_specks(split: PhysicalSplit) -> PhysicalSplit:
@@ -50,9 +48,7 @@ def without_specks(split: PhysicalSplit) -> PhysicalSplit:
     white = np.ones(transport.projector, dtype=np.float32)
     parts = [np.reshape(part, shape) for part in split.components(white)]
     total = np.maximum(np.asarray(sum(parts)), DARK)
-    chosen = transport.lit.copy()
-    for body in split.bodies:
-        chosen.ravel()[body.pixels] = False
+    chosen = opaque(split)
     chosen.ravel()[split.elsewhere.pixels] = False
     # Camera pixels without direct light have nothing but inter-reflection: next to a shadow, others
     # that are partly in it do not stand out.

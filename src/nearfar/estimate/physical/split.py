@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
-from nearfar.arrays import Floats, Integers, Size
+from nearfar.arrays import Booleans, Floats, Integers, Size
 from nearfar.checks import as_number
 from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.kernels import SAMPLES, kernel
@@ -30,6 +30,8 @@ FADED = 7.0
 # samples on each side of q.
 ODD_SAMPLES = (SAMPLES, 3, 1)
 LARGEST_REACH = 1000
+# In photo units: light under white by which components are divided, at least.
+DARK = 1e-6
 
 
 class PhysicalComponents(NamedTuple):
@@ -231,6 +233,14 @@ class PhysicalSplit:
         gains = [as_number(gain, f"the gain of {name}") for name, gain in given.items()]
         parts = self.components(light)
         return np.asarray(sum(gain * part for gain, part in zip(gains, parts, strict=True)))
+
+
+def opaque(split: PhysicalSplit) -> Booleans:
+    """Return camera pixels with direct light at which nothing is translucent, (Cy, Cx)."""
+    found = split.transport.lit.copy()
+    for body in split.bodies:
+        found.ravel()[body.pixels] = False
+    return np.asarray(found)
 
 
 def with_more_direct(split: PhysicalSplit, change: Floats) -> PhysicalSplit:

@@ -94,7 +94,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     )
     split = without_holes(without_specks(with_outlines(split)))
     near_creases = at_creases(split, creases)
-    # What errs by how much, nobody knows of a transport without error bars.
+    # Without error bars nothing says how much of inter-reflection is noise.
     if transport.posterior is not None:
         split = with_smooth_interreflection(split, ErrorBars(transport).direct(), near_creases)
     return with_crease_light(split, near_creases)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from nearfar import ErrorBars, Size, choose_plan, natural_picture, snr
 from nearfar.correspondence import correspond_by_phase
@@ -81,6 +82,28 @@ def test_error_bars_of_components_hold_as_often_as_they_should(scene, split):
                 assert not bars[i][opaque].any()
             else:
                 assert 0.6 < within[opaque].mean() < 0.85, part
+
+
+def test_at_outlines_direct_and_subsurface_light_have_what_the_other_lacks(scene, split):
+    """Their sum, and inter-reflection, are as sure as elsewhere."""
+    white = np.ones(scene.projector, np.float32)
+    candle = np.zeros(split.transport.camera.pixels, bool)
+    for body in split.bodies:
+        candle[body.pixels] = True
+    candle = candle.reshape(split.transport.camera)
+    outline = candle & ~ndimage.binary_erosion(candle, np.ones((3, 3)))
+    bars, found = PhysicalErrorBars(split), split.components(white)
+    direct, subsurface, interreflection = bars.components(white)
+    assert np.all(direct[outline] >= 0.0999 * np.abs(found.direct[outline]))
+    assert np.all(subsurface[outline] >= 0.0999 * np.abs(found.direct[outline]))
+    assert np.median((interreflection / direct)[outline]) < 1.5
+    both = bars.picture(white, interreflection=0.0)
+    assert np.all(both[outline] < np.hypot(direct, subsurface)[outline])
+    assert np.mean((both < direct)[outline]) > 0.05
+    # All inside is lit; there, direct light is no surer than half of what the estimate says of it.
+    inner = candle & ~outline
+    own = ErrorBars(split.transport).direct()[inner]
+    assert np.mean(direct[inner] > 0.49 * own) > 0.95
 
 
 def test_bars_grow_with_the_light(scene, split):

@@ -103,7 +103,27 @@ class Body:
         at_offsets = flat[:, None] * self.at_offsets
         if self.cell_side > 1:
             at_offsets *= self._of_pixels(source, slope) / (flat @ self.at_offsets)
-        of_groups = summed(at_offsets)
+        return self._to_groups(summed(at_offsets), chosen)
+
+    def to_offsets(self, light: Floats, chosen: Integers) -> Floats:
+        """Return the responses of chosen camera pixels to light of cells at offsets from q.
+
+        A camera pixel sees it from all of its footprint; none comes from beside the body.
+
+        Parameters
+        ----------
+        light : ndarray, shape (O,)
+        chosen : ndarray of int, shape (m,)
+            Indices into `pixels`.
+
+        Returns
+        -------
+        ndarray, shape (m, R)
+        """
+        return self._to_groups(summed(light[:, None] * self.at_offsets), chosen)
+
+    def _to_groups(self, of_groups: Complexes, chosen: Integers) -> Floats:
+        """Return responses to light whose groups of cells have responses (G, K), shape (m, R)."""
         found = np.empty((len(chosen), len(self.frequency)))
 
         def work(batch: slice) -> None:

@@ -10,21 +10,28 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
-from nearfar.arrays import Floats
+from nearfar.arrays import Booleans, Floats
 from nearfar.checks import as_number, require_instance
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.kernels import kernel
 from nearfar.estimate.physical.responses import unit_direct
-from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit
+from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, opaque
 
 # Standard deviation over the root of the share left: of direct light, times what kernels add at q;
-# of subsurface light, times itself. Measured on the scenes cornell and cornell-aside.
-OF_DIRECT = 1.0
-# How well what a kernel adds at q is known at best, as a share of it: all of a body has the same
-# error, which responses do not show. Measured on five scenes, none of them held out.
-OF_KERNEL = 0.08
+# of subsurface light, times itself. These and the next were measured on cornell, cornell-aside and
+# the steps and the tree of benchmarks/trial_bodies.py.
+OF_DIRECT = 0.75
 OF_SUBSURFACE = 0.4
+# How well what a kernel adds at q is known at best, as a share of it: all of a body has the same
+# error, which responses do not show.
+OF_KERNEL = 0.04
+# Of the estimate's own standard deviation of direct light: a shared kernel leaves that much of it.
+OF_ESTIMATE = 0.5
+# Of direct light at the outlines of translucent bodies, where a camera pixel sees a part of one, as
+# a share of it.
+OF_OUTLINE = 0.1
 # How well subsurface light is known at best, as a share of it. Measured under white and natural
 # pictures on cornell and cornell-aside.
 LEAST_OF_SUBSURFACE = 0.05
@@ -39,6 +46,7 @@ OF_ELSEWHERE = 0.1
 IN_COMMON = 0.15
 # Correlation of direct and subsurface light: what one gains the other loses.
 CORRELATION = -0.5
+SQUARE = np.ones((3, 3), dtype=bool)
 
 
 class _Deviations(NamedTuple):
@@ -46,9 +54,10 @@ class _Deviations(NamedTuple):
 
     Attributes
     ----------
-    of_picture, of_direct, of_under, of_white : ndarray
+    of_picture, of_direct, of_under, exchanged, of_white : ndarray
         Standard deviations of the whole picture, of direct light before inter-reflection was
-        smoothed, of subsurface light, and of all light under white times that from q.
+        smoothed, of subsurface light, of what one of these two has of the other's at the outlines
+        of bodies, and of all light under white times that from q.
     smoothed : ndarray
         Share of inter-reflection that neighbours tell.
     """
@@ -56,6 +65,7 @@ class _Deviations(NamedTuple):
     of_picture: Floats
     of_direct: Floats
     of_under: Floats
+    exchanged: Floats
     of_white: Floats
     smoothed: Floats
 
@@ -152,6 +162,7 @@ class PhysicalErrorBars:
             left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
             peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
             known = np.hypot(OF_DIRECT * left, OF_KERNEL) * body.amplitude * peaks
+            known = np.hypot(known, OF_ESTIMATE * of_direct[body.pixels])
             of_under[body.pixels] = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE)
             of_under[body.pixels] *= under[body.pixels]
             if self._split.footprint is not None:
@@ -162,12 +173,15 @@ class PhysicalErrorBars:
                 taken *= under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
                 of_under[body.pixels] = np.hypot(of_under[body.pixels], taken)
             of_direct[body.pixels] = known
+        at_outlines = OF_OUTLINE * np.abs(direct) * _outlines(self._split).reshape(-1, 1)
+        beside = opaque(self._split).reshape(-1, 1)
+        of_direct = np.hypot(of_direct, at_outlines * beside)
         factors = unit_direct(transport.factors)
         if self._split.footprint is not None:
             factors = replace(factors, boxes=self._split.footprint.reshape(-1, 4))
         lights = [factors.analyse(one[None]) for one in transport.lights(light)]
         lit = np.concatenate([factors.relit(one).direct for one in lights], axis=1)
-        of_direct = of_direct * np.abs(lit)
+        of_direct, exchanged = of_direct * np.abs(lit), at_outlines * ~beside * np.abs(lit)
         elsewhere, flat = self._split.elsewhere, np.asarray(transport.lights(light))
         told = OF_ELSEWHERE * np.abs(elsewhere.under(flat, transport.projector))
         of_direct[elsewhere.pixels] = np.hypot(of_direct[elsewhere.pixels], told)
@@ -177,13 +191,13 @@ class PhysicalErrorBars:
             smoothed = 1 - np.repeat(self._split.own_share.reshape(-1, 1), transport.channels, 1)
             every = np.ones(transport.projector, dtype=np.float32)
             of_white = _finite(self._bars.picture(every).reshape(shape)) * np.abs(lit)
-        return _Deviations(of_picture, of_direct, of_under, of_white, smoothed)
+        return _Deviations(of_picture, of_direct, of_under, exchanged, of_white, smoothed)
 
     def _with_gains(
         self, deviations: "_Deviations", direct: float, subsurface: float, interreflection: float
     ) -> Floats:
         """Combine them: inter-reflection is the picture less the other two."""
-        of_picture, of_direct, of_under, of_white, smoothed = deviations
+        of_picture, of_direct, of_under, exchanged, of_white, smoothed = deviations
         known, beyond = np.isfinite(of_picture), direct - interreflection
         of_picture = _finite(of_picture)
         # Direct light has the error of the light under white that it was told from.
@@ -195,8 +209,17 @@ class PhysicalErrorBars:
         left = 1 - (1 - IN_COMMON) * smoothed - (1 - smoothed) ** 2
         of_others = beyond**2 * left * (of_white**2 + of_direct**2) + apart
         variance = whole**2 + one**2 + other**2 + 2 * CORRELATION * one * other + of_others
+        variance += ((direct - subsurface) * exchanged) ** 2
         found = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.inf)
         return np.asarray(self._split.transport.picture(found.astype(np.float32)))
+
+
+def _outlines(split: PhysicalSplit) -> Booleans:
+    """Return camera pixels on both sides of the outlines of translucent bodies, (Cy, Cx)."""
+    lit = split.transport.lit
+    within = lit & ~opaque(split)
+    about = ndimage.binary_dilation(within, SQUARE) & lit
+    return np.asarray(about & ~ndimage.binary_erosion(within, SQUARE))
 
 
 def _finite(deviations: Floats) -> Floats:

@@ -10,6 +10,7 @@ not tell its subsurface light at q from direct light.
 Index convention: c runs over the body's camera pixels, r over real responses.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,9 +52,10 @@ MEDIAN_OF_SQUARES = 0.455
 LEAST_POWER = 1e-3
 # A channel's attenuation times depth is unlike that of the others if it is less by this factor.
 UNLIKE = 4.0
-# Standard deviation, in logarithms, of what the other channels then tell of it; and how many camera
-# pixels it is weighed against, as errors of the model are the same all over a body.
-LIKE_DEVIATION = 0.9
+# Standard deviations, in logarithms, of what the other channels tell of depth and of attenuation
+# times depth: scattering changes little with the colour of light, absorption much. And how many
+# camera pixels this is weighed against, as errors of the model are the same all over a body.
+LIKE_DEVIATIONS = np.array([0.3, 0.9])
 INDEPENDENT = 3.0
 ROUNDS = 3
 ITERATIONS = 60
@@ -114,7 +116,7 @@ def media_of(body: Body) -> Media:
         min(_guesses(), key=lambda one: _misfit(body, i, one, slope, power[i], sample))
         for i in range(len(power))
     ]
-    return _settled(body, sources, slope, np.full(len(sources), np.nan))
+    return _settled(body, sources, slope, np.full((len(sources), 2), np.nan))
 
 
 def with_like_channels(body: Body, media: Media) -> Media:
@@ -136,8 +138,7 @@ def with_like_channels(body: Body, media: Media) -> Media:
     found = np.stack([_logarithms(source) for source in media.sources])
     if len(found) == 1:
         return media
-    others = (found.sum(axis=0) - found) / (len(found) - 1)
-    unlike = found[:, 1] < others[:, 1] - np.log(UNLIKE)
+    unlike = found[:, 1] < _of_others(media)[:, 1] - np.log(UNLIKE)
     if not unlike.any():
         return media
     like = found[~unlike].mean(axis=0)
@@ -146,26 +147,34 @@ def with_like_channels(body: Body, media: Media) -> Media:
     sources = [
         start if other else source for other, source in zip(unlike, media.sources, strict=True)
     ]
-    return _settled(body, sources, media.slope, np.where(unlike, like[1], np.nan))
+    return _settled(body, sources, media.slope, np.where(unlike[:, None], like, np.nan))
 
 
-def _settled(body: Body, sources: list[Dipole], slope: Integers, expected: Floats) -> Media:
+def _of_others(media: Media) -> Floats:
+    """Return the mean logarithms of all other channels for each, (channels, 2); NaN if alone."""
+    found = np.stack([_logarithms(source) for source in media.sources])
+    if len(found) == 1:
+        return np.full(found.shape, np.nan)
+    return np.asarray((found.sum(axis=0) - found) / (len(found) - 1))
+
+
+def _settled(body: Body, sources: Sequence[Dipole], slope: Integers, expected: Floats) -> Media:
     """Refine sources, slopes and the power of what is left in turn.
 
     Parameters
     ----------
     body : Body
-    sources : list of Dipole
+    sources : sequence of Dipole
         Where to begin, for each channel.
     slope : ndarray of int, shape (n,)
-    expected : ndarray, shape (channels,)
-        Logarithm of attenuation times depth; NaN where nothing is expected.
+    expected : ndarray, shape (channels, 2)
+        Logarithms of depth, and of attenuation times depth; NaN where nothing is expected.
     """
     everywhere, sample, power = np.arange(len(body.pixels)), _sample(body), _power_before(body)
     fits: list[Amplitudes] = []
     for _ in range(ROUNDS):
         sources = [
-            _refined(body, i, source, slope, power[i], sample, float(expected[i]))
+            _refined(body, i, source, slope, power[i], sample, expected[i])
             for i, source in enumerate(sources)
         ]
         slope = _slopes(body, sources, power)
@@ -173,7 +182,7 @@ def _settled(body: Body, sources: list[Dipole], slope: Integers, expected: Float
             _fit_slopes(body, i, source, slope, power[i], everywhere)
             for i, source in enumerate(sources)
         ]
-        power = np.stack([_power(body, fit) for fit in fits])
+        power = np.stack([power_of(body, fit.left) for fit in fits])
     return Media(
         tuple(sources),
         slope,
@@ -183,16 +192,43 @@ def _settled(body: Body, sources: list[Dipole], slope: Integers, expected: Float
     )
 
 
+def fitted_again(body: Body, media: Media) -> Media:
+    """Fit media of a translucent body from those that are near, all channels with like fading.
+
+    Of each channel the mean depth, and attenuation times depth, of the others are expected.
+
+    Parameters
+    ----------
+    body : Body
+    media : Media
+
+    Returns
+    -------
+    Media
+    """
+    return _settled(body, media.sources, media.slope, _of_others(media))
+
+
+def kernels_of(body: Body, media: Media, channel: int) -> Floats:
+    """Return the responses of all camera pixels to the kernels of a channel, (n, R)."""
+    shape = np.empty(body.responses[:, channel].shape)
+    for number in np.unique(media.slope):
+        here = np.flatnonzero(media.slope == number)
+        shape[here] = body.to_kernel(media.sources[channel], SLOPES[number], here)
+    return shape
+
+
 def is_even(media: Media) -> bool:
     """Return whether light hardly fades as far as kernels are compared.
 
     The source then ended at the greatest depth in any channel, or the attenuation at the least in
-    half of them or more.
+    all of them, or in one whose source is deep.
     """
     least, most = np.log(RANGES).T
     found = np.stack([_logarithms(source) for source in media.sources])
-    deep, faint = found[:, 0] > most[0] - AT_BOUND, found[:, 1] < least[1] + AT_BOUND
-    return bool(deep.any() or 2 * faint.sum() >= len(found))
+    deepest, faint = found[:, 0] > most[0] - AT_BOUND, found[:, 1] < least[1] + AT_BOUND
+    deep = found[:, 0] > np.log(DEEP)
+    return bool(deepest.any() or faint.all() or np.any(deep & faint))
 
 
 def is_deep(media: Media) -> bool:
@@ -220,8 +256,25 @@ def _logarithms(source: Dipole) -> NDArray[np.float64]:
     return np.log([source.real, source.attenuation * source.real])
 
 
-def _fit(body: Body, channel: int, shape: Floats, power: Floats, chosen: Integers) -> Amplitudes:
-    """Fit d and s to responses of some power of what they leave, by weighted least squares."""
+def amplitudes(
+    body: Body, channel: int, shape: Floats, power: Floats, chosen: Integers
+) -> Amplitudes:
+    """Fit d and s to responses of some power of what they leave, by weighted least squares.
+
+    Parameters
+    ----------
+    body : Body
+    channel : int
+    shape : ndarray, shape (m, R)
+        Responses to a kernel of unit amplitude.
+    power : ndarray, shape (R,)
+    chosen : ndarray of int, shape (m,)
+        Indices into the body's camera pixels.
+
+    Returns
+    -------
+    Amplitudes
+    """
     responses, unit = body.responses[chosen, channel], body.to_direct[chosen]
     weighed_unit, weighed_shape = unit / power, shape / power
     of_direct, of_both, with_direct = (
@@ -245,7 +298,7 @@ def _fit_slopes(
     for number in np.unique(slope[chosen]):
         here = slope[chosen] == number
         shape[here] = body.to_kernel(source, SLOPES[number], chosen[here])
-    return _fit(body, channel, shape, power, chosen)
+    return amplitudes(body, channel, shape, power, chosen)
 
 
 def _weighed(left: Floats, power: Floats) -> Floats:
@@ -268,19 +321,19 @@ def _refined(
     slope: Integers,
     power: Floats,
     sample: Integers,
-    expected: float,
+    expected: Floats,
 ) -> Dipole:
     """Return the source that fits best, from one that is near."""
-    weight = len(sample) / INDEPENDENT / LIKE_DEVIATION**2
+    weight = len(sample) / INDEPENDENT
 
     def source_of(logarithms: NDArray[np.float64]) -> Dipole:
         depth, product = np.exp(np.clip(logarithms, *np.log(RANGES).T))
         return source_at(float(depth), float(product / depth))
 
     def misfit(logarithms: NDArray[np.float64]) -> float:
-        apart = 0.0 if np.isnan(expected) else (logarithms[1] - expected) ** 2
+        apart = np.nansum(((logarithms - expected) / LIKE_DEVIATIONS) ** 2)
         found = _misfit(body, channel, source_of(logarithms), slope, power, sample)
-        return found + weight * apart
+        return found + weight * float(apart)
 
     best = optimize.minimize(
         misfit,
@@ -309,15 +362,15 @@ def _misfits(body: Body, channel: int, shape: Floats, power: Floats) -> Floats:
 
     def work(batch: slice) -> None:
         chosen = np.arange(*batch.indices(len(shape)))
-        found[batch] = _weighed(_fit(body, channel, shape[batch], power, chosen).left, power)
+        found[batch] = _weighed(amplitudes(body, channel, shape[batch], power, chosen).left, power)
 
     side_by_side(work, blocks(len(shape), BATCH_PIXELS))
     return found
 
 
-def _power(body: Body, fit: Amplitudes) -> Floats:
-    """Return the power of what a fit leaves, smooth over frequencies, shape (R,)."""
-    own = np.median(fit.left[body.inner] ** 2, axis=0) / MEDIAN_OF_SQUARES
+def power_of(body: Body, left: Floats) -> Floats:
+    """Return the power of what a fit leaves (n, R), smooth over frequencies, shape (R,)."""
+    own = np.median(left[body.inner] ** 2, axis=0) / MEDIAN_OF_SQUARES
     rising = np.argsort(body.frequency, kind="stable")
     power = np.empty_like(own)
     power[rising] = ndimage.uniform_filter1d(own[rising], LIKE_RESPONSES, mode="nearest")

@@ -19,6 +19,7 @@ from nearfar.estimate.physical.medium import (
     media_of,
     with_like_channels,
 )
+from nearfar.estimate.physical.one_side import with_light_from_one_side
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.smooth import with_smooth_interreflection
@@ -71,7 +72,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         body, media = _fitted(found, transport)
         if np.median(media.explained[body.inner]) < EXPLAINED_OF_BODY or is_even(media):
             continue
-        media = with_like_channels(body, media)
+        media = with_light_from_one_side(body, with_like_channels(body, media))
         kept = body.inner | (media.explained >= LEAST_EXPLAINED)
         direct[body.pixels[kept]] = media.direct[kept]
         boxes[body.pixels[kept]] = narrow[body.pixels[kept]]

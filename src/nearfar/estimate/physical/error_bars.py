@@ -18,6 +18,7 @@ from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.kernels import kernel
 from nearfar.estimate.physical.responses import unit_direct
 from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, opaque
+from nearfar.estimate.physical.translucent import SQUARE
 
 # Standard deviation over the root of the share left: of direct light, times what kernels add at q;
 # of subsurface light, times itself. These and the next were measured on cornell, cornell-aside and
@@ -46,7 +47,6 @@ OF_ELSEWHERE = 0.1
 IN_COMMON = 0.15
 # Correlation of direct and subsurface light: what one gains the other loses.
 CORRELATION = -0.5
-SQUARE = np.ones((3, 3), dtype=bool)
 
 
 class _Deviations(NamedTuple):

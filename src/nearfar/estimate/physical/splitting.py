@@ -6,6 +6,7 @@ from nearfar.checks import require_instance
 from nearfar.errors import InputError
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
+from nearfar.estimate.physical.colours import with_colours_of_bodies
 from nearfar.estimate.physical.crease_light import at_creases, with_crease_light
 from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.elsewhere import at_second_places
@@ -93,7 +94,8 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         elsewhere,
         None if transport.footprint is None else boxes.reshape(transport.footprint.shape),
     )
-    split = without_holes(without_specks(with_outlines(split)))
+    split = with_colours_of_bodies(with_outlines(split))
+    split = without_holes(without_specks(split))
     near_creases = at_creases(split, creases)
     # Without error bars nothing says how much of inter-reflection is noise.
     if transport.posterior is not None:

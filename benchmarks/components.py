@@ -11,8 +11,8 @@ deviation of the error bars, at translucent surfaces and at others. The model's 
 stands beside subsurface light, its far-range light beside inter-reflection. Last come direct and
 global light, by the physical split and by the checkerboards of Nayar et al. (2006) that take no
 more photos, black included.
-No constant of the split was fitted to alcove, shelf, hand and marble; all but marble were looked at
-when inter-reflection was made smooth (decision 0104).
+No constant of the split was fitted to alcove, shelf, hand and marble; they were looked at when
+inter-reflection was made smooth and light from one side was told apart (decisions 0104 and 0107).
 """
 
 import argparse

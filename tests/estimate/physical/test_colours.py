@@ -62,9 +62,9 @@ def test_a_brighter_or_darker_outline_of_the_same_colour_stays(split, factor):
 
 def test_a_colour_inside_a_body_stays(split):
     (body,) = split.bodies
-    change = np.ones((len(body.pixels), 2))
-    change[~outline_of(split), 0] = np.random.default_rng(1).uniform(0.2, 1)
-    lit = with_amplitude(split, change)
     inner = ~outline_of(split)
+    change = np.ones((len(body.pixels), 2))
+    change[inner, 0] = np.random.default_rng(1).uniform(0.2, 1, inner.sum())
+    lit = with_amplitude(split, change)
     mended = with_colours_of_bodies(lit).bodies[0].amplitude
     np.testing.assert_array_equal(mended[inner], lit.bodies[0].amplitude[inner])

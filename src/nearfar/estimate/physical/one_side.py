@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.estimate.physical.body import BATCH_PIXELS, Body
 from nearfar.estimate.physical.cells import REACH, groups, offsets
 from nearfar.estimate.physical.kernels import kernel
@@ -101,26 +101,26 @@ def with_light_from_one_side(body: Body, media: Media) -> Media:
 def _from_one_side(body: Body, media: Media) -> _Found:
     """Fit direct and subsurface light, with a blob of light where one explains much."""
     every = np.arange(len(body.pixels))
-    blobs = np.stack([body.to_offsets(blob, every) for blob in _blobs()])
-    channels, direct, amplitude = [], media.direct.copy(), media.amplitude.copy()
+    terms, direct, amplitude = [], media.direct.copy(), media.amplitude.copy()
     for i in range(len(media.sources)):
         shape = kernels_of(body, media, i)
         left = body.responses[:, i] - media.direct[:, i, None] * body.to_direct
         power = power_of(body, left - media.amplitude[:, i, None] * shape)
         direct[:, i], amplitude[:, i], _ = amplitudes(body, i, shape, power, every)
-        channels.append(_terms(body, media, i, shape, power, blobs))
-    misfit = body.share(np.sum([one.misfit for one in channels], axis=0))
-    less = np.sum([one.less for one in channels], axis=0)
+        terms.append(_terms(body, media, i, shape, power))
+    misfit = body.share(np.sum([one.misfit for one in terms], axis=0))
+    less = np.sum([one.less for one in terms], axis=0)
     less = np.stack([body.share(of_blob) for of_blob in less])
     best = less.argmax(axis=0)
     chosen = _surrounded(body) & (misfit - less[best, every] < LEAST_GAIN * misfit)
     light = np.zeros_like(body.responses)
-    some = every[chosen]
-    best = best[chosen]
-    for i, one in enumerate(channels):
-        direct[some, i] = one.direct[best, some]
-        amplitude[some, i] = np.maximum(one.amplitude[best, some], 0.0)
-        light[some, i] = one.strength[best, some, None] * blobs[best, some]
+    for number, blob in enumerate(_blobs()):
+        some = np.flatnonzero(chosen & (best == number))
+        of_unit = body.to_offsets(blob, some)
+        for i, one in enumerate(terms):
+            direct[some, i] = one.direct[number, some]
+            amplitude[some, i] = np.maximum(one.amplitude[number, some], 0.0)
+            light[some, i] = one.strength[number, some, None] * of_unit
     return _Found(direct, amplitude, light)
 
 
@@ -138,22 +138,22 @@ def _surrounded(body: Body) -> Booleans:
     return np.asarray(body.covered[:, around].mean(axis=1) > SURROUNDED)
 
 
-def _terms(
-    body: Body, media: Media, channel: int, shape: Floats, power: Floats, blobs: Floats
-) -> _Terms:
+def _terms(body: Body, media: Media, channel: int, shape: Floats, power: Floats) -> _Terms:
     """Fit direct light, kernels and what these have more on one side; and each blob with them."""
-    odd = _odd_kernels(body, media, channel)
-    count = len(body.pixels)
+    blobs, count = _blobs(), len(body.pixels)
     misfit, of_blobs = np.empty(count), np.empty((4, len(blobs), count))
 
     def work(batch: slice) -> None:
+        some = np.arange(*batch.indices(count))
         unit, responses = body.to_direct[batch], body.responses[batch, channel]
-        terms = np.stack([unit, shape[batch], *odd[:, batch]], axis=1)
+        odd = _odd_kernels(body, media, channel, some)
+        terms = np.stack([unit, shape[batch], *odd], axis=1)
         inverse = np.linalg.inv(terms @ np.moveaxis(terms / power, 1, 2))
         found = inverse @ np.matvec(terms / power, responses)[..., None]
         left = responses - np.vecmat(found[..., 0], terms)
         misfit[batch] = np.vecdot(left / power, left)
-        for number, blob in enumerate(blobs[:, batch]):
+        for number, light in enumerate(blobs):
+            blob = body.to_offsets(light, some)
             weighed = blob / power
             shared = inverse @ np.matvec(terms, weighed)[..., None]
             own = np.vecdot(weighed, blob - np.vecmat(shared[..., 0], terms))
@@ -165,13 +165,13 @@ def _terms(
     return _Terms(misfit, *of_blobs)
 
 
-def _odd_kernels(body: Body, media: Media, channel: int) -> Floats:
-    """Return responses to kernels times the cosine of the angle with each axis, (2, n, R)."""
+def _odd_kernels(body: Body, media: Media, channel: int, chosen: Integers) -> Floats:
+    """Return responses to kernels times the cosine of the angle with each axis, (2, m, R)."""
     down_and_across = offsets().T / np.maximum(np.hypot(*offsets().T), 1.0)
-    found = np.empty((2, *body.responses[:, channel].shape))
-    for number in np.unique(media.slope):
-        here = np.flatnonzero(media.slope == number)
+    found = np.empty((2, len(chosen), len(body.frequency)))
+    for number in np.unique(media.slope[chosen]):
+        here = media.slope[chosen] == number
         drawn = kernel(media.sources[channel], REACH, SLOPES[number]).ravel()
         for one, cosine in zip(found, down_and_across, strict=True):
-            one[here] = body.to_offsets(drawn * cosine, here)
+            one[here] = body.to_offsets(drawn * cosine, chosen[here])
     return found

@@ -9,6 +9,7 @@ from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
 from nearfar.estimate.physical.colours import with_colours_of_bodies
 from nearfar.estimate.physical.crease_light import at_creases, with_crease_light
 from nearfar.estimate.physical.creases import settled
+from nearfar.estimate.physical.dark_creases import without_dark_creases
 from nearfar.estimate.physical.elsewhere import at_second_places
 from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.holes import without_holes
@@ -94,7 +95,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         elsewhere,
         None if transport.footprint is None else boxes.reshape(transport.footprint.shape),
     )
-    split = with_colours_of_bodies(with_outlines(split))
+    split = without_dark_creases(with_colours_of_bodies(with_outlines(split)))
     split = without_holes(without_specks(split))
     near_creases = at_creases(split, creases)
     # Without error bars nothing says how much of inter-reflection is noise.

@@ -5,7 +5,13 @@ import pytest
 
 from nearfar.estimate.physical import split_physically
 from nearfar.estimate.physical import splitting as splitting_module
+from nearfar.estimate.physical.body import bodies_at
+from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.kernels import kernel, source_at
+from nearfar.estimate.physical.medium import media_of
+from nearfar.estimate.physical.one_side import with_light_from_one_side
+from nearfar.estimate.physical.responses import waves_of
+from nearfar.estimate.physical.translucent import translucent
 from nearfar.illumination.near_basis import window_offsets
 from tests.estimate.physical.synthetic import PROJECTOR, WINDOW, transport_of
 
@@ -94,3 +100,19 @@ def test_next_to_an_outline_no_light_comes_from_one_side(alone):
     assert split.bodies
     alone()
     np.testing.assert_array_equal(split.direct, split_of(window).direct)
+
+
+def test_by_few_responses_light_stays_as_bright_as_it_is():
+    """Three of them cannot tell direct light, a kernel and its odd ones apart."""
+    window = UNDER + light_across_creases()
+    near = np.repeat(window[:, :, None], 2, axis=2).reshape(*PROJECTOR, 2, WINDOW, WINDOW)
+    transport = transport_of(near, np.full((*PROJECTOR, 2), 0.2))
+    seen = translucent(transport)
+    every = waves_of(transport)
+    few = every._replace(cycles=every.cycles[:2], has_sine=np.array([True, False]))
+    (body,) = bodies_at(transport, seen, footprints(transport, seen), few)
+    media = media_of(body)
+    found = with_light_from_one_side(body, media)
+    assert np.abs(found.direct).max() < 10 * np.abs(media.direct).max()
+    assert found.amplitude.max() < 10 * media.amplitude.max()
+    assert found.amplitude.min() >= 0

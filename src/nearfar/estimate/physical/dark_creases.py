@@ -1,8 +1,8 @@
 """Inter-reflection of translucent bodies, without the dark lines at their creases.
 
-Right at a crease light comes from all sides, from across it and from under the surface, and kernels
-take it for subsurface light. What inter-reflection has of both changes slowly over a body, whose
-albedo it has in common with subsurface light.
+Right at a crease light comes from all sides: from across it, and from under the surface. Kernels
+take both for subsurface light. As a share of the two, inter-reflection changes slowly over a body,
+since albedo is in both.
 """
 
 from dataclasses import replace

@@ -1,11 +1,10 @@
 """Inter-reflection that reaches the camera pixels of a translucent body from one side.
 
-Where a body faces itself or another surface, light comes from across the crease. A kernel of the
-medium is the same on both sides of q, so that it may take such light for subsurface light, all the
-more since inter-reflection is never negative and what the kernel has too much on the other side
-counts little. One blob of light, on the side where it explains most, tells them apart. A curved
-surface, too, has more subsurface light on one side; this is told by what a kernel has more on one
-side than on the other, with either sign, and light of a blob must explain more than that.
+Where a body faces itself or another surface, light reaches q from across the crease. A kernel of
+the medium is the same on both sides of q, and least squares make it too bright: it then has too
+little on the side of the crease, and too much on the other. One blob of light, on the side where it
+explains most, takes that light. A curved surface has more subsurface light on one side, too. So two
+odd kernels are fitted as well, with either sign, and a blob must explain more than they do.
 
 Index convention: c runs over the body's camera pixels, r over real responses, b over blobs.
 """
@@ -36,6 +35,9 @@ DIRECTIONS, DISTANCE, DEVIATION = 8, 4.0, 2.0
 SURROUNDED, AROUND = 0.95, 3.5
 # With a blob, the misfit must be less than this share of that without.
 LEAST_GAIN = 0.9
+# A blob that the other terms explain but for this share of its power tells nothing.
+LEAST_OWN = 1e-6
+TINY = np.finfo(float).tiny
 
 
 class _Found(NamedTuple):
@@ -148,7 +150,8 @@ def _terms(body: Body, media: Media, channel: int, shape: Floats, power: Floats)
         unit, responses = body.to_direct[batch], body.responses[batch, channel]
         odd = _odd_kernels(body, media, channel, some)
         terms = np.stack([unit, shape[batch], *odd], axis=1)
-        inverse = np.linalg.inv(terms @ np.moveaxis(terms / power, 1, 2))
+        # Few responses may not tell these four apart.
+        inverse = np.linalg.pinv(terms @ np.moveaxis(terms / power, 1, 2), hermitian=True)
         found = inverse @ np.matvec(terms / power, responses)[..., None]
         left = responses - np.vecmat(found[..., 0], terms)
         misfit[batch] = np.vecdot(left / power, left)
@@ -157,6 +160,7 @@ def _terms(body: Body, media: Media, channel: int, shape: Floats, power: Floats)
             weighed = blob / power
             shared = inverse @ np.matvec(terms, weighed)[..., None]
             own = np.vecdot(weighed, blob - np.vecmat(shared[..., 0], terms))
+            own = np.maximum(own, LEAST_OWN * np.vecdot(weighed, blob) + TINY)
             strength = np.maximum(np.vecdot(weighed, left), 0.0) / own
             direct, amplitude = (found - strength[:, None, None] * shared)[:, :2, 0].T
             of_blobs[:, number, batch] = strength**2 * own, strength, direct, amplitude

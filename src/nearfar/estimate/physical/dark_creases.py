@@ -11,7 +11,7 @@ import numpy as np
 
 from nearfar.estimate.physical.around import moved, steps
 from nearfar.estimate.physical.cells import camera_pixels_to_a_cell
-from nearfar.estimate.physical.split import PhysicalSplit
+from nearfar.estimate.physical.split import PhysicalSplit, on_bodies
 
 # Cells on each side whose camera pixels tell, and the share of them that a body must have there.
 REACH, LEAST_SEEN = 2, 0.7
@@ -41,20 +41,24 @@ def without_dark_creases(split: PhysicalSplit) -> PhysicalSplit:
     shape = (*transport.camera, transport.channels)
     white = np.ones(transport.projector, dtype=np.float32)
     _, subsurface, rest = (np.reshape(part, shape) for part in split.components(white))
-    seen = np.zeros(transport.camera, dtype=bool)
-    for body in split.bodies:
-        seen.ravel()[body.pixels] = True
+    seen = on_bodies(split)
     known = seen[..., None] & (subsurface > 0) & (subsurface + rest > 0)
     share = np.full(shape, np.nan)
     np.divide(rest, subsurface + rest, out=share, where=known)
+    pixels, channels = np.flatnonzero(seen), transport.channels
     about = camera_pixels_to_a_cell(transport) * steps(REACH)
-    others = np.sort(np.stack([moved(share, step, np.nan) for step in about]), axis=0)
+    others = np.stack([moved(share, step, np.nan).reshape(-1, channels)[pixels] for step in about])
+    others.sort(axis=0)
     count = np.sum(~np.isnan(others), axis=0)
     rank = np.maximum((AS_HIGH_AS * count).astype(int) - 1, 0)
     least = np.take_along_axis(others, rank[None], axis=0)[0]
-    raised = known & (count >= LEAST_SEEN * len(about)) & (least > share)
-    more = np.where(raised, least - share, 0.0) * (subsurface + rest)
-    kept = 1 - np.minimum(np.divide(more, subsurface, out=np.zeros(shape), where=known), MOST)
-    flat = kept.reshape(-1, transport.channels)
-    bodies = (body._replace(amplitude=body.amplitude * flat[body.pixels]) for body in split.bodies)
+    own = share.reshape(-1, channels)[pixels]
+    # Comparisons with NaN are false: where a share is not known.
+    raised = (count >= LEAST_SEEN * len(about)) & (least > own)
+    # Subsurface light has the rest of the share.
+    lost = np.zeros(own.shape)
+    np.divide(least - own, 1 - own, out=lost, where=raised)
+    kept = np.ones((transport.camera.pixels, channels))
+    kept[pixels] = 1 - np.minimum(lost, MOST)
+    bodies = (body._replace(amplitude=body.amplitude * kept[body.pixels]) for body in split.bodies)
     return replace(split, bodies=tuple(bodies))

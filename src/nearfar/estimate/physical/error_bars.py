@@ -17,7 +17,7 @@ from nearfar.checks import as_number, require_instance
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.kernels import kernel
 from nearfar.estimate.physical.responses import unit_direct
-from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, opaque
+from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, on_bodies
 from nearfar.estimate.physical.translucent import SQUARE
 
 # Standard deviation over the root of the share left: of direct light, times what kernels add at q;
@@ -175,14 +175,14 @@ class PhysicalErrorBars:
                 of_under[body.pixels] = np.hypot(of_under[body.pixels], taken)
             of_direct[body.pixels] = known
         at_outlines = OF_OUTLINE * np.abs(direct) * _outlines(self._split).reshape(-1, 1)
-        beside = opaque(self._split).reshape(-1, 1)
-        of_direct = np.hypot(of_direct, at_outlines * beside)
+        within = on_bodies(self._split).reshape(-1, 1)
+        of_direct = np.hypot(of_direct, at_outlines * ~within)
         factors = unit_direct(transport.factors)
         if self._split.footprint is not None:
             factors = replace(factors, boxes=self._split.footprint.reshape(-1, 4))
         lights = [factors.analyse(one[None]) for one in transport.lights(light)]
         lit = np.concatenate([factors.relit(one).direct for one in lights], axis=1)
-        of_direct, exchanged = of_direct * np.abs(lit), at_outlines * ~beside * np.abs(lit)
+        of_direct, exchanged = of_direct * np.abs(lit), at_outlines * within * np.abs(lit)
         elsewhere, flat = self._split.elsewhere, np.asarray(transport.lights(light))
         told = OF_ELSEWHERE * np.abs(elsewhere.under(flat, transport.projector))
         of_direct[elsewhere.pixels] = np.hypot(of_direct[elsewhere.pixels], told)
@@ -217,9 +217,8 @@ class PhysicalErrorBars:
 
 def _outlines(split: PhysicalSplit) -> Booleans:
     """Return camera pixels on both sides of the outlines of translucent bodies, (Cy, Cx)."""
-    lit = split.transport.lit
-    within = lit & ~opaque(split)
-    about = ndimage.binary_dilation(within, SQUARE) & lit
+    within = on_bodies(split)
+    about = ndimage.binary_dilation(within, SQUARE) & split.transport.lit
     return np.asarray(about & ~ndimage.binary_erosion(within, SQUARE))
 
 

@@ -123,8 +123,8 @@ def with_like_channels(body: Body, media: Media) -> Media:
     """Return media in which light fades in every channel, if it does in most.
 
     A channel whose kernel reaches as far as responses tell anything may be taken for one that
-    hardly fades. Its attenuation times depth is then fitted anew, with that of the other channels
-    as what is expected.
+    hardly fades. It is then fitted anew, and the depth and the fading of the other channels are
+    expected of it.
 
     Parameters
     ----------
@@ -209,12 +209,12 @@ def fitted_again(body: Body, media: Media) -> Media:
     return _settled(body, media.sources, media.slope, _of_others(media))
 
 
-def kernels_of(body: Body, media: Media, channel: int) -> Floats:
-    """Return the responses of all camera pixels to the kernels of a channel, (n, R)."""
-    shape = np.empty(body.responses[:, channel].shape)
-    for number in np.unique(media.slope):
-        here = np.flatnonzero(media.slope == number)
-        shape[here] = body.to_kernel(media.sources[channel], SLOPES[number], here)
+def kernels_of(body: Body, source: Dipole, slope: Integers, chosen: Integers) -> Floats:
+    """Return the responses of chosen camera pixels to kernels, each on its own slope, (m, R)."""
+    shape = np.empty((len(chosen), len(body.frequency)))
+    for number in np.unique(slope[chosen]):
+        here = slope[chosen] == number
+        shape[here] = body.to_kernel(source, SLOPES[number], chosen[here])
     return shape
 
 
@@ -294,11 +294,7 @@ def _fit_slopes(
     body: Body, channel: int, source: Dipole, slope: Integers, power: Floats, chosen: Integers
 ) -> Amplitudes:
     """Fit chosen camera pixels, each on its own slope."""
-    shape = np.empty((len(chosen), len(power)))
-    for number in np.unique(slope[chosen]):
-        here = slope[chosen] == number
-        shape[here] = body.to_kernel(source, SLOPES[number], chosen[here])
-    return amplitudes(body, channel, shape, power, chosen)
+    return amplitudes(body, channel, kernels_of(body, source, slope, chosen), power, chosen)
 
 
 def _weighed(left: Floats, power: Floats) -> Floats:

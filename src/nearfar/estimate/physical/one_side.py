@@ -37,7 +37,6 @@ SURROUNDED, AROUND = 0.95, 3.5
 LEAST_GAIN = 0.9
 # A blob that the other terms explain but for this share of its power tells nothing.
 LEAST_OWN = 1e-6
-TINY = np.finfo(float).tiny
 
 
 class _Found(NamedTuple):
@@ -104,8 +103,8 @@ def _from_one_side(body: Body, media: Media) -> _Found:
     """Fit direct and subsurface light, with a blob of light where one explains much."""
     every = np.arange(len(body.pixels))
     terms, direct, amplitude = [], media.direct.copy(), media.amplitude.copy()
-    for i in range(len(media.sources)):
-        shape = kernels_of(body, media, i)
+    for i, source in enumerate(media.sources):
+        shape = kernels_of(body, source, media.slope, every)
         left = body.responses[:, i] - media.direct[:, i, None] * body.to_direct
         power = power_of(body, left - media.amplitude[:, i, None] * shape)
         direct[:, i], amplitude[:, i], _ = amplitudes(body, i, shape, power, every)
@@ -160,7 +159,7 @@ def _terms(body: Body, media: Media, channel: int, shape: Floats, power: Floats)
             weighed = blob / power
             shared = inverse @ np.matvec(terms, weighed)[..., None]
             own = np.vecdot(weighed, blob - np.vecmat(shared[..., 0], terms))
-            own = np.maximum(own, LEAST_OWN * np.vecdot(weighed, blob) + TINY)
+            own = np.maximum(own, LEAST_OWN * np.vecdot(weighed, blob) + np.finfo(float).tiny)
             strength = np.maximum(np.vecdot(weighed, left), 0.0) / own
             direct, amplitude = (found - strength[:, None, None] * shared)[:, :2, 0].T
             of_blobs[:, number, batch] = strength**2 * own, strength, direct, amplitude

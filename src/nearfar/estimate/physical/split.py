@@ -235,12 +235,17 @@ class PhysicalSplit:
         return np.asarray(sum(gain * part for gain, part in zip(gains, parts, strict=True)))
 
 
+def on_bodies(split: PhysicalSplit) -> Booleans:
+    """Return camera pixels that see a translucent body, (Cy, Cx)."""
+    found = np.zeros(split.transport.camera, dtype=bool)
+    for body in split.bodies:
+        found.ravel()[body.pixels] = True
+    return found
+
+
 def opaque(split: PhysicalSplit) -> Booleans:
     """Return camera pixels with direct light at which nothing is translucent, (Cy, Cx)."""
-    found = split.transport.lit.copy()
-    for body in split.bodies:
-        found.ravel()[body.pixels] = False
-    return np.asarray(found)
+    return np.asarray(split.transport.lit & ~on_bodies(split))
 
 
 def with_more_direct(split: PhysicalSplit, change: Floats) -> PhysicalSplit:

@@ -10,7 +10,13 @@ from nearfar.correspondence import correspond_by_phase
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.error_bars import JointVariances
-from nearfar.estimate.truncated import LEAST_LEFT, Rows, change_by_place, truncated_variance
+from nearfar.estimate.truncated import (
+    LEAST_LEFT,
+    Rows,
+    change_by_place,
+    share_missed,
+    truncated_variance,
+)
 from nearfar.illumination.frequencies import far_frequencies, representatives
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
@@ -242,3 +248,49 @@ def test_errors_of_single_projector_pixels_lie_within_their_bars(name, photos):
     # Bars tell where errors are large.
     largest = np.argsort(np.ravel(expected))[-len(np.ravel(expected)) // 10 :]
     assert np.mean(np.ravel(errors)[largest]) > 2.5 * np.mean(errors)
+
+
+@pytest.mark.parametrize("component", [0, 1])
+def test_the_share_that_is_missed_is_of_what_was_not_measured_and_of_what_noise_shrinks(component):
+    transport = _transport(np.zeros((2, 1, *PROJECTOR)))
+    held = _multiplicity(transport)
+    down, across = (side * np.fft.fftfreq(side) for side in PROJECTOR)
+    density = spectral_density(np.hypot(down[:, None], across), COMPONENTS[component])
+    density[0, 0] = 0.0
+
+    def missed(noise, often):
+        scale = np.array([[0.3], [0.3]])
+        variance = np.full((2, 1), noise**2)
+        rows = Rows(np.full(2, component), scale**2, variance, often)
+        (one, other) = share_missed(transport, COMPONENTS, rows)
+        assert one == other
+        return one
+
+    assert missed(0.0, held) == pytest.approx(density[held == 0].sum() / density.sum())
+    assert missed(0.0, np.ones(PROJECTOR)) == pytest.approx(0.0, abs=1e-12)
+    assert missed(1e9, np.ones(PROJECTOR)) == pytest.approx(1.0)
+    assert missed(0.1, held) < missed(0.2, held) < missed(0.4, held)
+
+
+def test_where_photos_leave_no_room_for_a_third_place_error_bars_are_no_wider():
+    """Glass, every frequency of which is measured: one standard deviation holds 68 %."""
+    projector, camera = Size(16, 16), Size(20, 20)
+    scene = hostile_transport("glass", projector, camera)
+    plan, _ = choose_plan(projector, 307, checks=0)
+    rig = SimulatedRig(
+        scene,
+        "glass",
+        SimulatedProjector(),
+        SimulatedCamera(full_well=1e6, read_noise=500, bits=16, black_level=0.12, shot_noise=False),
+        0.8,
+        0,
+    )
+    measurements = measure(acquire_in_memory(plan, rig))
+    q = correspond_by_phase(measurements, pitch=plan.pitch).q
+    found = estimate_jointly(measurements, q, plan.window, plan.far, pitch=plan.pitch)
+    assert found.second_place is not None
+    bars, within = ErrorBars(found), []
+    for light in np.random.default_rng(5).random((8, *projector)):
+        error = (found @ light).ravel() - 0.8 * (scene @ light).ravel()
+        within.append(np.abs(error) < bars.picture(light).ravel())
+    assert 0.63 < np.mean(within) < 0.72

@@ -109,19 +109,7 @@ def change_by_place(
     """
     if transport.pitch > 1:
         return lambda batch: np.zeros(rows.squared_scale[batch].shape)
-    ratio = rows.squared_scale.mean(axis=1) / np.maximum(rows.squared_noise.mean(axis=1), TINY)
-    octave = np.clip(np.rint(np.log2(np.maximum(ratio, TINY))), *OCTAVES)
-    kinds, kind = np.unique(np.stack([rows.component, octave]), axis=1, return_inverse=True)
-    kind = kind.ravel()
-    densities = [
-        _unknown_density(
-            transport,
-            prior_components[int(place)],
-            2.0**power if power < OCTAVES[1] else np.inf,
-            rows.multiplicity,
-        )
-        for place, power in kinds.T
-    ]
+    kind, densities = _unknown_densities(transport, prior_components, rows)
     shares = _by_pixel(transport, light, densities)
     totals = shares.sum(axis=1)
     # How many projector pixels share the variance.
@@ -158,6 +146,36 @@ def change_by_place(
         return found
 
     return of_pixels
+
+
+def share_missed(
+    transport: Transport, prior_components: Sequence[PriorComponent], rows: Rows
+) -> Floats:
+    """Return the share of far-range light's variance that the estimate misses, (C,)."""
+    kind, densities = _unknown_densities(transport, prior_components, rows)
+    nothing = rows._replace(multiplicity=np.zeros(transport.projector))
+    of_all, whole = _unknown_densities(transport, prior_components, nothing)
+    missed, expected = (np.array([each.sum() for each in one]) for one in (densities, whole))
+    return np.asarray(missed[kind] / expected[of_all])
+
+
+def _unknown_densities(
+    transport: Transport, prior_components: Sequence[PriorComponent], rows: Rows
+) -> tuple[Integers, list[Floats]]:
+    """Return which density each row has, (C,), and the densities, each (Py, Px)."""
+    ratio = rows.squared_scale.mean(axis=1) / np.maximum(rows.squared_noise.mean(axis=1), TINY)
+    octave = np.clip(np.rint(np.log2(np.maximum(ratio, TINY))), *OCTAVES)
+    kinds, kind = np.unique(np.stack([rows.component, octave]), axis=1, return_inverse=True)
+    densities = [
+        _unknown_density(
+            transport,
+            prior_components[int(place)],
+            2.0**power if power < OCTAVES[1] else np.inf,
+            rows.multiplicity,
+        )
+        for place, power in kinds.T
+    ]
+    return kind.ravel(), densities
 
 
 def _unknown_density(

@@ -8,6 +8,7 @@ import pytest
 from nearfar.arrays import Size
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.evidence import (
+    best_between_scales,
     best_of,
     log_evidence,
     log_evidence_by_row,
@@ -15,7 +16,10 @@ from nearfar.estimate.joint.evidence import (
     prior_set,
     whiten,
 )
+from nearfar.estimate.joint.problem import lay_out
+from nearfar.estimate.joint.sweep import sweep_once
 from nearfar.illumination.frequencies import DC
+from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measurements import Measurements
 from nearfar.plan.choose_frequencies import choose_frequencies
@@ -24,6 +28,8 @@ from nearfar.priors.fitted import LIT_COMPONENTS, PRIOR_SCALES
 from nearfar.priors.responses import response_prior
 from tests.estimate.joint.draws import (
     COMPONENT,
+    PROJECTOR,
+    WINDOW,
     batch_of,
     centred_on_all,
     chosen_frequencies,
@@ -91,6 +97,39 @@ def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():
     # 0.02 in photo units, of a white that is 0.5 and a little.
     white = batch.white[:, 0]
     assert np.median(scale * white) == pytest.approx(0.02, rel=0.5)
+
+
+def test_scales_between_those_that_are_tried_are_the_evidences_own():
+    priors = tuple(response_prior(COMPONENT, *built) for built in [_built()] * 2)
+    candidates = prior_set(priors, *_built(), numbers=(3, 7))
+    steps = np.log2(np.array(PRIOR_SCALES))
+    peaks = np.array([steps[4] + 0.3, steps[2] - 0.45, steps[0] - 2.0, steps[-1] + 0.2])
+    values = -((steps - peaks[:, None]) ** 2)
+    values = np.stack(
+        [values - [[0.0], [5.0], [0.0], [5.0]], values - [[5.0], [0.0], [5.0], [0.0]]]
+    )
+    number, scale, evidence = best_between_scales(values, candidates)
+    assert number.tolist() == [3, 7, 3, 7]
+    expected = [*peaks[:2], steps[0], steps[-1]]
+    np.testing.assert_allclose(np.log2(scale), expected, atol=1e-9)
+    np.testing.assert_array_equal(evidence, best_of(values, candidates)[2])
+    flat = np.zeros_like(values)
+    assert best_between_scales(flat, candidates)[1] == pytest.approx([PRIOR_SCALES[0]] * 4)
+
+
+def test_rows_without_direct_light_have_scales_between_those_that_are_tried():
+    rows = np.random.default_rng(0).uniform(size=(40, 1, PROJECTOR.pixels)) / PROJECTOR.pixels
+    measurements = measured(rows, chosen_frequencies(), noise=1e-3)
+    q = np.full((1, 40, 2), np.nan)
+    problem = lay_out(measurements, q, NearBasis(WINDOW), "cpu")
+    choice = sweep_once(problem, None, lambda _share: None).choices.sweeps[-1]
+    steps = np.log2(choice.prior_scale / PRIOR_SCALES[0])
+    assert np.abs(steps - np.rint(steps)).mean() > 0.1
+
+
+def _built():
+    centred = centred_on_all(chosen_frequencies())
+    return centred, np.ones(centred.basis.count, dtype=np.float32)
 
 
 def test_few_responses_make_a_shortlist_and_all_choose(monkeypatch):

@@ -7,6 +7,7 @@ from array_api_compat import device
 from nearfar.arrays import Booleans, Floats, Integers, namespace
 from nearfar.estimate.joint.batch import PixelBatch
 from nearfar.estimate.joint.evidence import (
+    best_between_scales,
     best_of,
     log_evidence,
     log_evidence_by_row,
@@ -60,7 +61,8 @@ def choose(
             continue
         of_mine = batch if len(mine) == len(left) else batch.only(mine)
         values = log_evidences(of_mine, candidates, evidence_of)
-        component, scale, evidence = best_of(values, candidates)
+        best = best_between_scales if candidates is model.unlit else best_of
+        component, scale, evidence = best(values, candidates)
         if is_first and candidates is model.lit:
             put_probabilities(probability, mine, values, candidates, model)
         elif is_first:
@@ -70,7 +72,7 @@ def choose(
             if len(doubted):
                 dark_ones = _without_direct(of_mine.only(doubted))
                 values = log_evidences(dark_ones, model.unlit, evidence_of)
-                unlit, its_scale, without = best_of(values, model.unlit)
+                unlit, its_scale, without = best_between_scales(values, model.unlit)
                 # q was chosen among all projector pixels.
                 none = without > evidence[doubted] - log(model.centred.basis.projector.pixels)
                 component[doubted] = xp.where(none, unlit, component[doubted])

@@ -32,7 +32,7 @@ from nearfar.estimate.joint.posterior_variance import (
 )
 from nearfar.estimate.joint.second_places import responses_of
 from nearfar.estimate.joint.shares import share_on_projector
-from nearfar.estimate.truncated import Rows, change_by_place, truncated_variance
+from nearfar.estimate.truncated import Rows, change_by_place, share_missed, truncated_variance
 from nearfar.illumination.centred_basis import CentredBasis, centred_basis
 from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.near_basis import NearBasis
@@ -53,6 +53,9 @@ SECOND_SHIFT = 0.15
 # place is the likeliest of many, and there may be a third. On glass, and on a scene of posts, one
 # standard deviation held 56 to 58 % of the errors without it.
 SECOND_WIDENING = 1.25
+# Share of far-range light's variance that an estimate misses, from which on that holds. Where it
+# misses less, photos leave no room for a third place.
+ROOM_FOR_A_THIRD = 0.01
 # Half a step of a second place, in projector pixels, of numerical derivatives by it.
 HALF_STEP = 0.25
 
@@ -103,6 +106,9 @@ class JointVariances:
         self._second = places.reshape(-1, 2) if has_second and places is not None else None
         kept = set(transport.far_basis.frequencies)
         self._is_held = np.array([basis.frequencies[i] in kept for i in basis.index])
+        if self._second is not None:
+            missed = share_missed(transport, posterior.prior_components, self._rows())
+            self._room = np.minimum(missed / ROOM_FOR_A_THIRD, 1.0)
 
     def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
         """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
@@ -348,7 +354,11 @@ class JointVariances:
 
     def _more(self, batch: slice) -> Floats:
         """Return how much larger variances are where there is a second place, (n, 1)."""
-        return np.asarray(1.0 + (SECOND_WIDENING**2 - 1.0) * self._has_second(batch))
+        if self._second is None:
+            return np.ones((len(self._centres[batch]), 1))
+        return np.asarray(
+            1.0 + (SECOND_WIDENING**2 - 1.0) * self._has_second(batch) * self._room[batch, None]
+        )
 
     def _posterior_variance(self, batch: slice, functionals: Functionals) -> Floats:
         """Return posterior variances, (n, channels)."""

@@ -150,12 +150,44 @@ def best_of(values: Floats, candidates: PriorSet) -> tuple[Integers, Floats, Flo
     evidence : ndarray, shape (n,)
         Its logarithm, up to a constant of the camera pixel.
     """
+    place, step, evidence = _best_places(values)
+    number, scale = _at_places(place, step, values, candidates)
+    return number, scale, evidence
+
+
+def best_between_scales(values: Floats, candidates: PriorSet) -> tuple[Integers, Floats, Floats]:
+    """Return the same with scales between those that were tried.
+
+    The logarithm of the scale is where a parabola through the evidence at the best scale and the
+    two next to it is highest.
+    """
+    place, step, evidence = _best_places(values)
+    number, scale = _at_places(place, step, values, candidates)
+    xp = namespace(values)
+    here = xp.arange(len(place), device=device(values))
+    middle = xp.clip(step, min=1, max=len(PRIOR_SCALES) - 2)
+    below, at, above = (values[place, here, middle + side] for side in (-1, 0, 1))
+    bend = below - 2 * at + above
+    is_peak = (bend < 0) & (middle == step)
+    shift = 0.5 * (below - above) / xp.where(is_peak, bend, -xp.ones_like(bend))
+    return number, xp.where(is_peak, scale * 2.0**shift, scale), evidence
+
+
+def _best_places(values: Floats) -> tuple[Integers, Integers, Floats]:
+    """Return the candidate's place, the scale's, and the log evidence that is largest, (n,)."""
     xp = namespace(values)
     largest, steps = xp.max(values, axis=2), xp.argmax(values, axis=2)
-    best = xp.argmax(largest, axis=0)
-    step = xp.take_along_axis(steps, best[None, :], axis=0)[0, :]
-    number = beside(np.array(candidates.numbers), values)[best]
-    return number, beside(np.array(PRIOR_SCALES), values)[step], xp.max(largest, axis=0)
+    place = xp.argmax(largest, axis=0)
+    step = xp.take_along_axis(steps, place[None, :], axis=0)[0, :]
+    return place, step, xp.max(largest, axis=0)
+
+
+def _at_places(
+    place: Integers, step: Integers, values: Floats, candidates: PriorSet
+) -> tuple[Integers, Floats]:
+    """Return numbers of candidates, and prior scales."""
+    number = beside(np.array(candidates.numbers), values)[place]
+    return number, beside(np.array(PRIOR_SCALES), values)[step]
 
 
 class WhitenedResponses(NamedTuple):

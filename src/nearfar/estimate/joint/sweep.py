@@ -20,6 +20,7 @@ from nearfar.estimate.joint.batch import PixelBatch, gather
 from nearfar.estimate.joint.choose import choose
 from nearfar.estimate.joint.clipped import solve_clipped
 from nearfar.estimate.joint.clipped_windows import is_clipped, rounded_ratio
+from nearfar.estimate.joint.in_common import keep_common
 from nearfar.estimate.joint.leave_one_out import calibrated, mean_errors, weights_of
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
@@ -300,6 +301,7 @@ def _expected(problem: Problem, rows: EstimatedRows) -> tuple[Floats, Floats, Fl
         problem.model.multiplicity,
         beside(np.flatnonzero(cycles >= np.median(cycles)), white),
     )
+    far, noise_left = keep_common(far, noise_left, problem, variance)
     windows = expect_together(
         rows.near.reshape((*shape, -1)),
         white,

@@ -113,6 +113,8 @@ def test_scales_between_those_that_are_tried_are_the_evidences_own():
     expected = [*peaks[:2], steps[0], steps[-1]]
     np.testing.assert_allclose(np.log2(scale), expected, atol=1e-9)
     np.testing.assert_array_equal(evidence, best_of(values, candidates)[2])
+    # Photos may be very sure of the first scale or the last.
+    np.testing.assert_allclose(best_between_scales(1e5 * values, candidates)[1], scale)
     flat = np.zeros_like(values)
     assert best_between_scales(flat, candidates)[1] == pytest.approx([PRIOR_SCALES[0]] * 4)
 

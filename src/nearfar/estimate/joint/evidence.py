@@ -169,8 +169,9 @@ def best_between_scales(values: Floats, candidates: PriorSet) -> tuple[Integers,
     below, at, above = (values[place, here, middle + side] for side in (-1, 0, 1))
     bend = below - 2 * at + above
     is_peak = (bend < 0) & (middle == step)
-    shift = 0.5 * (below - above) / xp.where(is_peak, bend, -xp.ones_like(bend))
-    return number, xp.where(is_peak, scale * 2.0**shift, scale), evidence
+    slope = xp.where(is_peak, 0.5 * (below - above), xp.zeros_like(bend))
+    shift = slope / xp.where(is_peak, bend, -xp.ones_like(bend))
+    return number, scale * 2.0**shift, evidence
 
 
 def _best_places(values: Floats) -> tuple[Integers, Integers, Floats]:

@@ -59,6 +59,8 @@ LIKE_DEVIATIONS = np.array([0.3, 0.9])
 INDEPENDENT = 3.0
 ROUNDS = 3
 ITERATIONS = 60
+# A source is found where logarithms differ by no more, and misfits by no larger a share.
+LIKE_LOGARITHMS, LIKE_MISFITS = 0.01, 1e-7
 
 
 class Amplitudes(NamedTuple):
@@ -331,11 +333,13 @@ def _refined(
         found = _misfit(body, channel, source_of(logarithms), slope, power, sample)
         return found + weight * float(apart)
 
+    start = _logarithms(source)
+    alike = LIKE_MISFITS * misfit(start)
     best = optimize.minimize(
         misfit,
-        _logarithms(source),
+        start,
         method="Nelder-Mead",
-        options={"maxiter": ITERATIONS, "xatol": 0.01, "fatol": 1e-9},
+        options={"maxiter": ITERATIONS, "xatol": LIKE_LOGARITHMS, "fatol": alike},
     )
     return source_of(best.x)
 

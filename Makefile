@@ -13,12 +13,16 @@ setup: $(READY)
 demo: $(READY)
 	$(BIN)/nearfar demo nearfar-demo --force
 
-# One thread for BLAS: as many processes as processors share the work as it is.
+# Many tests wait for a browser, a camera or another program: half as many more processes than
+# processors.
+PROCESSES = $(shell $(PYTHON) -c 'import os; print(-(-3 * len(os.sched_getaffinity(0)) // 2))' 2>/dev/null || echo auto)
+
+# One thread for BLAS: the processes share the work as it is.
 test: export OPENBLAS_NUM_THREADS := 1
 # Each process would compile all modules anew where it keeps none of them.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses=$(PROCESSES) --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
 
 # Runs every command and example in them; then open docs/_build/html/index.html.
 docs: $(READY)

@@ -71,6 +71,9 @@ SCENE_BUDGETS = (0.06, 0.12, 0.25, 0.5)
 LOOK_SHARE = 0.2
 RANDOM_LIGHTS = 4
 PICTURES = 5
+# For error bars there are more: errors of all camera pixels under one light can have one cause.
+RANDOM_LIGHTS_OF_BARS = 40
+PICTURES_OF_BARS = 20
 # White reaches this share of full scale; the black level keeps noise from being cut off.
 EXPOSURE = 0.8
 
@@ -82,12 +85,14 @@ def camera_of(noise: float) -> SimulatedCamera:
     )
 
 
-def lights_of(projector: Size) -> dict[str, list[Floats]]:
+def lights_of(
+    projector: Size, pictures: int = PICTURES, random_lights: int = RANDOM_LIGHTS
+) -> dict[str, list[Floats]]:
     """Return the lights to relight under, by kind."""
     single = np.eye(projector.pixels, dtype=np.float32).reshape(-1, *projector)
     return {
-        "pictures": [natural_picture(projector, seed) for seed in range(PICTURES)],
-        "random": [random_pattern(projector, seed) for seed in range(RANDOM_LIGHTS)],
+        "pictures": [natural_picture(projector, seed) for seed in range(pictures)],
+        "random": [random_pattern(projector, seed) for seed in range(random_lights)],
         "single": list(single),
     }
 
@@ -131,11 +136,10 @@ def coverage(bench: Bench, found: Transport, lights: dict[str, list[Floats]]) ->
     """Return how many errors lie within one standard deviation, in per cent."""
     bars, shares = ErrorBars(found), []
     for shown in lights.values():
-        some = shown[:: max(1, len(shown) // 40)]
         within = [
             np.abs(np.asarray(found @ light).ravel() - bench.gain * truth)
             < bars.picture(light).ravel()
-            for light, truth in zip(some, pictures_under(bench.scene, some), strict=True)
+            for light, truth in zip(shown, pictures_under(bench.scene, shown), strict=True)
         ]
         shares.append(100.0 * float(np.mean(within)))
     return shares
@@ -192,6 +196,8 @@ def run(
     gain = EXPOSURE if not options.scenes else 1.0
     bench = Bench(scene, camera, 0, gain)
     lights = lights_of(scene.projector)
+    if options.bars:
+        lights = lights_of(scene.projector, PICTURES_OF_BARS, RANDOM_LIGHTS_OF_BARS)
     seen = look(bench) if options.look else None
     for share in options.budgets or (SCENE_BUDGETS if options.scenes else BUDGETS):
         photos = max(24, round(share * scene.projector.pixels))

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nearfar.arrays import Size
@@ -48,5 +49,9 @@ def test_what_is_not_reconstructed_yet_names_the_next_command(finished: Job, tmp
     }
     acquire = f"nearfar acquire PLAN.json CAPTURE.zarr --rig {finished.apart}"
     check_sentence(run_nearfar(command, finished.apart, *rest[command]), finished.apart, acquire)
+    measured = tmp_path / "T.npy"
+    np.save(measured, np.ones((6, 6)))
+    acquire = f"nearfar acquire PLAN.json CAPTURE.zarr --rig {measured}"
+    check_sentence(run_nearfar(command, measured, *rest[command]), measured, acquire)
     reconstruct = f"nearfar reconstruct {finished.capture} TRANSPORT.zarr"
     check_sentence(run_nearfar(command, finished.capture, *rest[command]), reconstruct)

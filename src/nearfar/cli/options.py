@@ -12,6 +12,9 @@ from nearfar.arrays import Size, parse_size
 from nearfar.cli.saying import warn
 from nearfar.errors import InputError, UnreadableFileError
 
+# Endings of files of plain arrays.
+ARRAY_ENDINGS = (".npy", ".npz")
+
 
 def size(text: str | Size) -> Size:
     """Read a size written HxW; a bad one is wrong usage."""
@@ -85,11 +88,17 @@ def require_reconstructed(path: Path) -> None:
     from nearfar.files import kind_of_store
 
     kind, here = kind_of_store(path), quote(str(path))
+    found = None
     if kind in {"nearfar exact transport", "nearfar exact operator"}:
+        found = f"{path} is a scene's exact transport, not one that was reconstructed"
+    elif path.suffix.lower() in ARRAY_ENDINGS and path.is_file():
+        found = (
+            f"{path} holds arrays, such as a measured T, and no transport that was reconstructed"
+        )
+    if found is not None:
         raise UnreadableFileError(
-            f"{path} is a scene's exact transport, not one that was reconstructed: photograph it "
-            f"by 'nearfar acquire PLAN.json CAPTURE.zarr --rig {here}', then run 'nearfar "
-            f"reconstruct CAPTURE.zarr TRANSPORT.zarr'."
+            f"{found}: photograph it by 'nearfar acquire PLAN.json CAPTURE.zarr --rig {here}', "
+            f"then run 'nearfar reconstruct CAPTURE.zarr TRANSPORT.zarr'."
         )
     if kind == "nearfar capture":
         raise UnreadableFileError(

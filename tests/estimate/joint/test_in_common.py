@@ -5,11 +5,12 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
-from nearfar.estimate.joint import estimate_by_sweeps
+from nearfar.estimate.joint import estimate_by_sweeps, estimate_jointly
+from nearfar.estimate.joint.estimator import JointEstimator
 from nearfar.estimate.joint.in_common import keep_common
 from nearfar.estimate.joint.problem import lay_out
 from nearfar.illumination.near_basis import NearBasis
-from tests.estimate.joint.draws import PROJECTOR, WINDOW, chosen_frequencies, measured
+from tests.estimate.joint.draws import FAR, PROJECTOR, WINDOW, chosen_frequencies, measured
 from tests.estimate.joint.test_hostile import CAMERA as HOSTILE_CAMERA
 from tests.estimate.joint.test_hostile import decibels, shot
 
@@ -150,6 +151,22 @@ def test_where_a_camera_begins_makes_no_difference_within():
     measurements = problem_of(rows[3 * CAMERA.width :], camera=fewer).measurements
     share, _ = kept(problem._replace(pixels=pixels, measurements=measurements))
     np.testing.assert_allclose(share[3:], kept(problem)[0][6:], atol=1e-5)
+
+
+def test_a_tile_with_its_halo_is_estimated_as_the_whole():
+    generator, halo = np.random.default_rng(3), JointEstimator().halo
+    rows = 3 * unlike(generator) + alike(generator)
+    whole_of = measured(rows, chosen_frequencies(), noise=5e-3, camera=CAMERA)
+    q = np.full((*CAMERA, 2), np.nan, dtype=np.float32)
+
+    def far_of(measurements, places):
+        return estimate_jointly(measurements, places, WINDOW, FAR, pitch=1).far
+
+    whole, row = far_of(whole_of, q), 8
+    around = slice(row - halo, row + halo + 1)
+    pixels = slice(CAMERA.width * around.start, CAMERA.width * around.stop)
+    part = whole_of.of_pixels(Size(2 * halo + 1, CAMERA.width), pixels)
+    np.testing.assert_allclose(far_of(part, q[around])[halo], whole[row], atol=2e-6)
 
 
 def test_rows_of_no_order_are_estimated_as_well_as_each_alone():

@@ -12,9 +12,6 @@ from nearfar.arrays import Size, parse_size
 from nearfar.cli.saying import warn
 from nearfar.errors import InputError, UnreadableFileError
 
-# Endings of files of plain arrays.
-ARRAY_ENDINGS = (".npy", ".npz")
-
 
 def size(text: str | Size) -> Size:
     """Read a size written HxW; a bad one is wrong usage."""
@@ -91,7 +88,7 @@ def require_reconstructed(path: Path) -> None:
     found = None
     if kind in {"nearfar exact transport", "nearfar exact operator"}:
         found = f"{path} is a scene's exact transport, not one that was reconstructed"
-    elif path.suffix.lower() in ARRAY_ENDINGS and path.is_file():
+    elif path.is_file() and _holds_arrays(path):
         found = (
             f"{path} holds arrays, such as a measured T, and no transport that was reconstructed"
         )
@@ -105,6 +102,13 @@ def require_reconstructed(path: Path) -> None:
             f"{path} is a capture, of which no transport is made yet: run 'nearfar reconstruct "
             f"{here} TRANSPORT.zarr'."
         )
+
+
+def _holds_arrays(path: Path) -> bool:
+    """Return whether a file's name is that of a dense T."""
+    from nearfar.transport.exact_store import DENSE_ENDINGS
+
+    return path.suffix.lower() in DENSE_ENDINGS
 
 
 def only_report(report: Path | None, old: Path | None, name: str) -> Path | None:

@@ -153,10 +153,12 @@ def share_missed(
 ) -> Floats:
     """Return the share of far-range light's variance that the estimate misses, (C,)."""
     kind, densities = _unknown_densities(transport, prior_components, rows)
-    nothing = rows._replace(multiplicity=np.zeros(transport.projector))
-    of_all, whole = _unknown_densities(transport, prior_components, nothing)
-    missed, expected = (np.array([each.sum() for each in one]) for one in (densities, whole))
-    return np.asarray(missed[kind] / expected[of_all])
+    unmeasured = rows._replace(multiplicity=np.zeros(transport.projector))
+    _, expected = _unknown_densities(transport, prior_components, unmeasured)
+    share = [
+        one.sum() / all_of_it.sum() for one, all_of_it in zip(densities, expected, strict=True)
+    ]
+    return np.array(share)[kind]
 
 
 def _unknown_densities(

@@ -5,7 +5,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
-from nearfar.estimate.joint import estimate_by_sweeps, estimate_jointly
+from nearfar.estimate.joint import estimate_by_sweeps, estimate_jointly, neighbours
 from nearfar.estimate.joint.estimator import JointEstimator
 from nearfar.estimate.joint.in_common import keep_common
 from nearfar.estimate.joint.problem import lay_out
@@ -151,6 +151,16 @@ def test_where_a_camera_begins_makes_no_difference_within():
     measurements = problem_of(rows[3 * CAMERA.width :], camera=fewer).measurements
     share, _ = kept(problem._replace(pixels=pixels, measurements=measurements))
     np.testing.assert_allclose(share[3:], kept(problem)[0][6:], atol=1e-5)
+
+
+def test_blocks_of_camera_rows_make_no_difference(monkeypatch):
+    problem = problem_of(unlike(np.random.default_rng(0)) + 0.2 * alike(np.random.default_rng(1)))
+    share, left = kept(problem)
+    monkeypatch.setattr(neighbours, "BYTES_AT_ONCE", 1)
+    assert neighbours.rows_at_once(share) == 1
+    by_row, left_by_row = kept(problem)
+    np.testing.assert_array_equal(by_row, share)
+    np.testing.assert_array_equal(left_by_row, left)
 
 
 def test_a_tile_with_its_halo_is_estimated_as_the_whole():

@@ -53,8 +53,8 @@ SECOND_SHIFT = 0.15
 # place is the likeliest of many, and there may be a third. On glass, and on a scene of posts, one
 # standard deviation held 56 to 58 % of the errors without it.
 SECOND_WIDENING = 1.25
-# Share of far-range light's variance that an estimate misses, from which on that holds. Where it
-# misses less, photos leave no room for a third place.
+# They are so much larger where the estimate misses at least this share of the variance of far-range
+# light. The less it misses, the less room photos leave for a third place.
 ROOM_FOR_A_THIRD = 0.01
 # Half a step of a second place, in projector pixels, of numerical derivatives by it.
 HALF_STEP = 0.25

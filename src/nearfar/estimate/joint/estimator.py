@@ -46,7 +46,8 @@ class JointEstimator(Estimator):
     def halo(self) -> int:
         """Each sweep but the first reads the neighbours; second places, theirs; the first, q.
 
-        What neighbours have in common after the sweeps reads some more.
+        What neighbours have in common after the sweeps reads some more, and so does what rows
+        without direct light have in common before each.
         """
         return SWEEPS + 1 + REMAINDER_ROWS
 

@@ -14,6 +14,7 @@ import numpy as np
 from array_api_compat import device
 
 from nearfar.arrays import Floats, Integers, beside, namespace, product
+from nearfar.estimate.joint.neighbours import rows_at_once
 from nearfar.estimate.joint.pooled_choice import sum_of_neighbours
 from nearfar.estimate.joint.problem import Problem
 from nearfar.illumination.real_basis import RealBasis
@@ -25,8 +26,6 @@ REACH = 2
 MEAN_OF = 9
 # Standard deviations by which products may fall short by chance.
 BY_CHANCE = 2.0
-# Camera rows of a block.
-ROWS_AT_ONCE = 8
 
 
 def keep_common(
@@ -34,8 +33,8 @@ def keep_common(
 ) -> tuple[Floats, Floats]:
     """Keep of rows that neighbours lead to expect the share that they have in common.
 
-    Rows stay as they are where they are alike, where noise leaves it open, and where there is
-    direct light, about whose q near- and far-range light are alike. Rows that have nothing in
+    Rows stay as they are where they are alike, where noise hides whether they are, and where there
+    is direct light, about whose q near- and far-range light are alike. Rows that have nothing in
     common become 0: such a camera pixel's own photos are all that tells its row.
 
     Parameters
@@ -51,7 +50,7 @@ def keep_common(
     Returns
     -------
     far, noise_left : ndarray
-        What is taken off is no noise that neighbours took off.
+        Neighbours take noise off the share that is kept alone.
     """
     if bool(namespace(far).all(problem.pixels.lit)):
         return far, noise_left
@@ -62,7 +61,7 @@ def keep_common(
     def work(rows: slice) -> None:
         far[rows] *= share[rows][..., rings][..., None, :]
 
-    in_batches(work, len(far), ROWS_AT_ONCE, far)
+    in_batches(work, len(far), rows_at_once(far), far)
     number = beside(np.bincount(ring) / len(ring), far)
     of_all = namespace(far).sum(share * number, axis=-1)[..., None]
     return far, 1.0 - of_all * (1.0 - noise_left)
@@ -95,7 +94,7 @@ def _share_in_common(problem: Problem, variance: Floats, ring: Integers) -> Floa
         products[rows] = xp.mean(product((own * others)[inner], rings), axis=-2)
         powers[rows] = xp.mean(product((own * values)[inner], rings), axis=-2)
 
-    in_batches(work, camera.height, ROWS_AT_ONCE, responses)
+    in_batches(work, camera.height, rows_at_once(responses), responses)
     pairs = dark * (sum_of_neighbours(dark, 1) - dark)
     products, powers, noise, pairs = (
         sum_of_neighbours(each, REACH) for each in (products, powers, dark * number, pairs)

@@ -77,7 +77,7 @@ def expect_each(
         gains = xp.mean(gain, axis=-1), xp.mean(gain**2, axis=-1)
         noise_left[rows] = _noise_left(weight[..., 0], total[..., 0], rows, len(values), gains)
 
-    in_batches(work, len(values), _rows_at_once(values), values)
+    in_batches(work, len(values), rows_at_once(values), values)
     return found, noise_left
 
 
@@ -114,11 +114,12 @@ def expect_together(values: Floats, white: Floats, variance: Floats, lit: Boolea
         expected = (mean + gain * (some[1:-1, 1:-1] - mean)) * white[rows, ..., None]
         found[rows] = xp.where(lit[rows, :, None, None], expected, 0.0)
 
-    in_batches(work, len(values), _rows_at_once(values), values)
+    in_batches(work, len(values), rows_at_once(values), values)
     return found
 
 
-def _rows_at_once(values: Floats) -> int:
+def rows_at_once(values: Floats) -> int:
+    """Return how many camera rows of values (Cy, Cx, ...) are filtered at once, at least 1."""
     row = math.prod(values.shape[1:]) * 4
     return max(1, BYTES_AT_ONCE // max(1, row))
 

@@ -11,18 +11,22 @@ from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.error_bars import JointVariances
 from nearfar.estimate.truncated import (
+    FADING,
     LEAST_LEFT,
+    WEIGHT_OF_OUTLINES,
     Rows,
     change_by_place,
     share_missed,
     truncated_variance,
 )
 from nearfar.illumination.frequencies import far_frequencies, representatives
+from nearfar.illumination.pictures import random_pattern
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import spectral_density
+from nearfar.priors.fitted import LIGHT_WITH_EDGES
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
@@ -31,8 +35,11 @@ from nearfar.transport.model import Transport
 from nearfar.workflow.acquire import acquire_in_memory
 
 PROJECTOR = Size(12, 14)
-# Light of which nothing is known, and light that falls with frequency.
-COMPONENTS = (PriorComponent(0.0, 1.0, 1e6), PriorComponent(0.0, 1.0, 3.0))
+# That of transports that are reconstructed.
+SQUARE = Size(14, 14)
+# Light of which nothing is known, and light that falls with frequency, though less than rows that
+# may have outlines.
+COMPONENTS = (PriorComponent(0.0, 1.0, 1e6), PriorComponent(0.0, 1.0, FADING + 1.0))
 
 
 def _transport(rows):
@@ -198,11 +205,10 @@ def test_rows_of_larger_projectors_are_not_looked_at():
     assert np.all(_changes(transport, _single(6, 7), 0) == 0.0)
 
 
-def _found(name, photos):
-    """Reconstruct a hostile transport of 14x14 projector pixels; and its true rows."""
-    projector = Size(14, 14)
+def _found(name, photos, projector=SQUARE, window=None):
+    """Reconstruct a hostile transport; and its true rows."""
     scene = hostile_transport(name, projector, Size(14, 16))
-    plan, _ = choose_plan(projector, photos)
+    plan, _ = choose_plan(projector, photos, window=window)
     camera = SimulatedCamera(
         full_well=1e6, read_noise=1e3, bits=16, black_level=0.1, shot_noise=False
     )
@@ -294,3 +300,40 @@ def test_where_photos_leave_no_room_for_a_third_place_error_bars_are_no_wider():
         error = (found @ light).ravel() - 0.8 * (scene @ light).ravel()
         within.append(np.abs(error) < bars.picture(light).ravel())
     assert 0.63 < np.mean(within) < 0.72
+
+
+def test_rows_that_fade_may_have_outlines_where_no_photo_shows_it():
+    """The variance of waves, of light that fades and of light with edges of the same power."""
+    transport = _transport(np.zeros((1, 1, *PROJECTOR)))
+    is_held = _multiplicity(transport) > 0
+    is_held[0, 0] = False
+    down, across = (side * np.fft.fftfreq(side) for side in PROJECTOR)
+    radius = np.hypot(down[:, None], across)
+    edges = spectral_density(radius, LIGHT_WITH_EDGES)
+    kinds = [PriorComponent(0.0, 7.0, decay) for decay in (0.7, FADING, FADING + 0.1)]
+    kinds.append(PriorComponent(2.0, 7.0, 0.7))
+    for place in ((0, 5), (6, 1)):
+        wave = np.zeros(PROJECTOR, dtype=complex)
+        wave[place] = PROJECTOR.pixels
+        light = np.fft.ifft2(wave).real.ravel()
+        power = (np.abs(np.fft.fft2(light.reshape(PROJECTOR))) ** 2).sum() / PROJECTOR.pixels**2
+        variance = truncated_variance(transport, light, kinds) / power
+        for one, kind in zip(variance, kinds, strict=True):
+            own = spectral_density(radius, kind)
+            expected = own[place]
+            if kind.near_reach == 0.0 and kind.far_decay <= FADING:
+                alike = np.mean(own[is_held] / edges[is_held])
+                expected += WEIGHT_OF_OUTLINES * (alike * edges[place] - expected)
+            assert one == pytest.approx(expected, rel=1e-6)
+
+
+def test_pictures_of_smooth_rows_with_an_outline_lie_within_their_bars():
+    """Lamps of a size that the weight of outlines was not fitted to."""
+    found, truth = _found("lamps", 86, Size(18, 12), window=1)
+    bars, within = ErrorBars(found), []
+    for seed in range(40):
+        light = random_pattern(found.projector, seed)
+        error = (found @ light).ravel() - truth @ light.ravel()
+        within.append(np.abs(error) < bars.picture(light).ravel())
+    # Without outlines half of them do.
+    assert 0.6 < np.mean(within) < 0.76

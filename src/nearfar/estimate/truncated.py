@@ -6,6 +6,11 @@ lies where the row has light, though: most of it are the edges and peaks of brig
 h_k^2 the spectral density of what is missed, a light l has the variance sum_p (h * l)(p)^2. Each
 projector pixel p then counts by the power of F about it.
 
+A row whose responses fade over few cycles may still have an outline, like that of a disc of lamps,
+which alone is left at the frequencies that were not measured. The variance that such a row misses
+is therefore a weighted mean: of what its component expects, and of what light with edges would have
+there if its power at the measured frequencies were the same.
+
 Rows of few bright entries leave errors with heavy tails: one standard deviation would hold 80 to
 90 % of them. An error bar is half the width of the interval that holds 68 %, and is narrower there:
 the more so, the more of the row is not known. The more projector pixels a light has, the closer the
@@ -20,12 +25,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.arrays import Booleans, Floats, Integers, Size, blocks
 from nearfar.illumination.frequencies import DC
 from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import spectral_density
+from nearfar.priors.fitted import LIGHT_WITH_EDGES
 from nearfar.transport.model import Transport
 
+# Far decay, in cycles, up to which rows without near-range light may have outlines that no photo
+# shows, and the weight of these in the variance that such rows miss. Fitted to lamps of three sizes
+# (docs/decisions/0109).
+FADING = 3.0
+WEIGHT_OF_OUTLINES = 0.35
 # Standard deviation, in projector pixels, of the Gaussian that says what is about an entry.
 ABOUT = 0.5
 # Share of the variance that is the same for all projector pixels.
@@ -67,7 +78,8 @@ def truncated_variance(
         side * one[kept] for side, one, kept in zip(projector, cycles, sampled, strict=True)
     )
     radius = np.hypot(down[:, None], across)
-    total = [np.sum(spectral_density(radius, one) * spectrum) for one in prior_components]
+    held = _held_cycles(transport)
+    total = [np.sum(_expected_density(radius, one, held) * spectrum) for one in prior_components]
     return np.array(total) / projector.pixels**2
 
 
@@ -188,14 +200,35 @@ def _unknown_density(
     At frequencies that the transport does not hold it is the prior's, at others the bias that
     shrinkage leaves: S / (1 + s^2 m S / sigma^2)^2, measured m times.
     """
-    projector = transport.projector
-    down, across = (side * np.fft.fftfreq(side) for side in projector)
-    density = spectral_density(np.hypot(down[:, None], across), prior_component)
+    projector, radius = transport.projector, _cycles(transport.projector)
+    density = _expected_density(radius, prior_component, _held_cycles(transport))
     density[0, 0] = 0.0
     # A cosine and a sine share the density of a pair.
     told = 0.5 * multiplicity * density
     told = np.multiply(told, ratio, out=np.zeros(projector), where=told > 0)
     return np.asarray(density / (1.0 + told) ** 2)
+
+
+def _expected_density(radius: Floats, prior_component: PriorComponent, held: Floats) -> Floats:
+    """Return the spectral density of f at unit prior scale, with outlines that no photo shows.
+
+    Parameters
+    ----------
+    radius : ndarray
+        Distance of k from DC, in cycles per pattern grid.
+    prior_component : PriorComponent
+    held : ndarray, shape (n,)
+        The same of the frequencies that the transport holds.
+    """
+    density = spectral_density(radius, prior_component)
+    fades = prior_component.near_reach == 0.0 and prior_component.far_decay <= FADING
+    if not fades or not len(held):
+        return density
+    # The squared prior scale at which a row with edges has the same power.
+    its, with_edges = (spectral_density(held, one) for one in (prior_component, LIGHT_WITH_EDGES))
+    alike = np.mean(its / with_edges)
+    outlines = alike * spectral_density(radius, LIGHT_WITH_EDGES)
+    return np.asarray((1 - WEIGHT_OF_OUTLINES) * density + WEIGHT_OF_OUTLINES * outlines)
 
 
 def _by_pixel(transport: Transport, light: Floats, densities: Sequence[Floats]) -> Floats:
@@ -241,6 +274,18 @@ def _narrowing(excess: Floats, unknown: Floats) -> Floats:
     """
     sparse = 1 - np.exp(-((excess / SPARSE_EXCESS) ** 2))
     return np.asarray(1 - NARROWED * unknown * sparse)
+
+
+def _cycles(projector: Size) -> Floats:
+    """Return the distance from DC of the projector's frequencies, in cycles, (Py, Px)."""
+    down, across = (side * np.fft.fftfreq(side) for side in projector)
+    return np.asarray(np.hypot(down[:, None], across))
+
+
+def _held_cycles(transport: Transport) -> Floats:
+    """Return that of the frequencies that the transport holds, without DC, (n,)."""
+    radius = _cycles(transport.projector)[_is_held(transport)]
+    return np.asarray(radius[radius > 0])
 
 
 def _is_held(transport: Transport) -> Booleans:

@@ -10,6 +10,8 @@ from nearfar.priors.typical import typical_scenes
 # are alike.
 FREE = 1e6
 LIGHT_FROM_ANYWHERE = PriorComponent(0.0, 64.0, FREE)
+# Far-range light with edges, such as the outline of a lamp: its spectrum has no end.
+LIGHT_WITH_EDGES = PriorComponent(0.0, 64.0, FREE, far_power=1.5)
 # Components of camera pixels with direct light. All but the last five were chosen one by one out
 # of 240 (near reach 0.8 to 6 pixels, far decay 0.7 to 8 cycles, six far deviations, with and
 # without spread of direct light), each time the one that raised the evidence of camera pixels of
@@ -50,7 +52,7 @@ LIT_COMPONENTS = (
 # which nothing is known.
 UNLIT_COMPONENTS = (
     *(PriorComponent(0.0, 64.0, decay) for decay in (0.7, 1.5, 3.0, 8.0, 24.0)),
-    PriorComponent(0.0, 64.0, FREE, far_power=1.5),
+    LIGHT_WITH_EDGES,
     LIGHT_FROM_ANYWHERE,
 )
 # Where functions of near-range light are of several projector pixels: indices of the lit components

@@ -104,6 +104,100 @@ def test_outlines_are_mixtures_where_the_splits_footprints_are_of_single_pixels(
     assert len(found.elsewhere.pixels) == mixed
 
 
+DARKENED = 0.6
+
+
+def dark_outline(*, q_on_body, alone=False, aside=None, own=1.0, other=1.0):
+    """Return `wax_before_a_wall` whose outline is darker, and whose second places were found.
+
+    Parameters
+    ----------
+    q_on_body : bool
+        Whether q of the outline lies on the wax, and the second place on the wall.
+    alone : bool
+        Whether no camera pixel sees direct light of the wall alone.
+    aside : tuple of float, optional
+        Second places are so far, (y, x), from q, and not where the other surface goes on.
+    own, other : float
+        By how much more direct light from q, and from the second place, there is.
+    """
+    split = wax_before_a_wall(gap=20)
+    before = split.transport
+    q, direct = before.correspondence.copy(), before.direct.copy()
+    on_body, on_wall = q[:, OUTLINE - 1] + [0.0, 1.0], q[:, OUTLINE].copy()
+    of_both = np.array([OF_BODY * D_BODY, (1 - OF_BODY) * D_WALL]) * DARKENED
+    second = np.full(q.shape, np.nan, np.float32)
+    there = np.zeros_like(direct)
+    q[:, OUTLINE], second[:, OUTLINE] = (on_body, on_wall) if q_on_body else (on_wall, on_body)
+    direct[:, OUTLINE, 0], there[:, OUTLINE, 0] = of_both if q_on_body else of_both[::-1]
+    direct[:, OUTLINE] *= own
+    there[:, OUTLINE] *= other
+    if aside is not None:
+        second[:, OUTLINE] = q[:, OUTLINE] + aside
+    total = (before @ WHITE)[:, OUTLINE] * DARKENED
+    if alone:
+        q[:, OUTLINE + 1 :], direct[:, OUTLINE + 1 :] = np.nan, 0.0
+    blank = transport_of(direct[..., 0], np.ones(CAMERA), q)
+    blank = replace(blank, second_place=second, second_direct=there)
+    light = (before @ WHITE).copy()
+    light[:, OUTLINE] = total
+    rest = (light - blank.components(WHITE).direct)[..., None, None]
+    return split_of(replace(blank, far=blank.far * rest), *split.bodies)
+
+
+@pytest.mark.parametrize("q_on_body", [False, True])
+def test_a_second_place_tells_of_a_dark_outline_what_is_mixed(q_on_body):
+    before = dark_outline(q_on_body=q_on_body)
+    split = with_outlines(before)
+    of_body, of_wall = OF_BODY * DARKENED, (1 - OF_BODY) * DARKENED
+    expected = (
+        of_body * D_BODY + of_wall * D_WALL,
+        of_body * S_BODY,
+        of_body * I_BODY + of_wall * I_WALL,
+    )
+    for part, value in zip(split.components(WHITE), expected, strict=True):
+        np.testing.assert_allclose(part[:, OUTLINE], value, rtol=0.02)
+    on_wall = WHITE * (np.arange(PROJECTOR.width) > 16)
+    for light, value in ((on_wall, of_wall * D_WALL), (WHITE - on_wall, of_body * D_BODY)):
+        np.testing.assert_allclose(split.components(light).direct[:, OUTLINE], value, rtol=0.02)
+    light = random_pattern(PROJECTOR, 1)
+    np.testing.assert_allclose(sum(split.components(light)), split.transport @ light, atol=1e-6)
+
+
+@pytest.mark.parametrize("q_on_body", [False, True])
+def test_of_a_surface_that_nothing_about_sees_alone_direct_light_is_known(q_on_body):
+    split = with_outlines(dark_outline(q_on_body=q_on_body, alone=True))
+    direct, subsurface, rest = (part[:, OUTLINE] for part in split.components(WHITE))
+    # Inter-reflection of the wall is unknown, and is shared among what is known.
+    known = OF_BODY * (D_BODY + S_BODY + I_BODY) + (1 - OF_BODY) * D_WALL
+    shared = DARKENED * (known + (1 - OF_BODY) * I_WALL) / known
+    np.testing.assert_allclose(subsurface, shared * OF_BODY * S_BODY, rtol=0.02)
+    np.testing.assert_allclose(rest, shared * OF_BODY * I_BODY, rtol=0.02)
+    np.testing.assert_allclose(
+        direct, shared * (OF_BODY * D_BODY + (1 - OF_BODY) * D_WALL), rtol=0.02
+    )
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param({"q_on_body": True, "aside": (0.0, 9.0)}, id="neither on wax nor on wall"),
+        pytest.param({"q_on_body": False, "aside": (0.0, 9.0), "alone": True}, id="not on wax"),
+        pytest.param({"q_on_body": True, "aside": (0.0, 1.0), "alone": True}, id="next to q"),
+        pytest.param(
+            {"q_on_body": True, "own": 5.0, "alone": True}, id="more direct light than the wax has"
+        ),
+        pytest.param({"q_on_body": True, "other": 8.0}, id="more than the wall has"),
+        pytest.param({"q_on_body": True, "other": 0.02, "alone": True}, id="hardly any"),
+    ],
+)
+def test_second_places_that_are_no_other_surface_tell_nothing(case):
+    before = dark_outline(**case)
+    found = with_outlines(before)
+    np.testing.assert_array_equal(found.direct, before.direct)
+    assert not len(found.elsewhere.pixels)
+
+
 LOST = 0.1
 MIDDLE = (6, 6)
 

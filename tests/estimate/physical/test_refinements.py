@@ -75,6 +75,28 @@ def test_an_outline_that_sees_two_places_has_the_components_of_both():
         np.testing.assert_allclose(part[:, elsewhere], was[:, elsewhere], atol=1e-6)
 
 
+def test_an_outline_that_a_kernel_fits_badly_is_a_mixture_that_fits_better():
+    split = wax_before_a_wall(gap=20)
+    (body,) = split.bodies
+    x = np.tile(np.arange(CAMERA.width), (CAMERA.height, 1))
+    pixels = np.flatnonzero(x <= OUTLINE)
+    at_outline = x.ravel()[pixels] == OUTLINE
+    # The kernel takes all but direct light of the outline, so that inter-reflection is no clue.
+    light = np.where(at_outline, split.components(WHITE).interreflection.ravel()[pixels], S_BODY)
+    wider = body._replace(
+        pixels=pixels,
+        places=split.transport.correspondence.reshape(-1, 2)[pixels],
+        slope=np.zeros(len(pixels), int),
+        amplitude=np.ones((len(pixels), 1)),
+        explained=np.where(at_outline, 0.5, 1.0),
+    )
+    unit = wider.under(WHITE.reshape(1, -1), PROJECTOR)
+    wider = wider._replace(amplitude=light[:, None] / unit)
+    found = with_outlines(replace(split, bodies=(wider,)))
+    subsurface = found.components(WHITE).subsurface[:, OUTLINE]
+    np.testing.assert_allclose(subsurface, OF_BODY * S_BODY, rtol=0.02)
+
+
 def test_light_on_one_of_both_places_is_direct_light_of_that_one():
     split = with_outlines(wax_before_a_wall(gap=20))
     on_wall = WHITE * (np.arange(PROJECTOR.width) > 16)
@@ -181,21 +203,36 @@ def test_of_a_surface_that_nothing_about_sees_alone_direct_light_is_known(q_on_b
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param({"q_on_body": True, "aside": (0.0, 9.0)}, id="neither on wax nor on wall"),
-        pytest.param({"q_on_body": False, "aside": (0.0, 9.0), "alone": True}, id="not on wax"),
-        pytest.param({"q_on_body": True, "aside": (0.0, 1.0), "alone": True}, id="next to q"),
-        pytest.param(
-            {"q_on_body": True, "own": 5.0, "alone": True}, id="more direct light than the wax has"
-        ),
-        pytest.param({"q_on_body": True, "other": 8.0}, id="more than the wall has"),
-        pytest.param({"q_on_body": True, "other": 0.02, "alone": True}, id="hardly any"),
+        pytest.param({"q_on_body": False, "aside": (0.0, 9.0)}, id="not on wax"),
+        pytest.param({"q_on_body": True, "aside": (0.0, 1.0)}, id="next to q"),
+        pytest.param({"q_on_body": True, "own": 5.0}, id="more direct light than the wax has"),
+        pytest.param({"q_on_body": True, "other": 0.02}, id="hardly any"),
     ],
 )
 def test_second_places_that_are_no_other_surface_tell_nothing(case):
-    before = dark_outline(**case)
+    before = dark_outline(**case, alone=True)
     found = with_outlines(before)
     np.testing.assert_array_equal(found.direct, before.direct)
     assert not len(found.elsewhere.pixels)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param({"aside": (0.0, 9.0)}, id="beside the wall"),
+        pytest.param({"other": 8.0}, id="more direct light than the wall has"),
+    ],
+)
+def test_light_tells_a_mixture_whose_second_place_is_not_on_the_wall(case):
+    before = dark_outline(q_on_body=True, **case)
+    found = with_outlines(before)
+    # By the light of the second place it would be 0.03.
+    assert np.all(
+        found.components(WHITE).subsurface[:, OUTLINE] > 0.8 * DARKENED * OF_BODY * S_BODY
+    )
+    # The wall is where it goes on from the camera pixels beside the outline.
+    goes_on = before.transport.correspondence[:, OUTLINE + 1] - [0.0, 1.0]
+    np.testing.assert_allclose(found.elsewhere.places, goes_on, atol=1e-4)
 
 
 LOST = 0.1

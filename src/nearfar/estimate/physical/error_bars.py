@@ -17,7 +17,12 @@ from nearfar.checks import as_number, require_instance
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.kernels import kernel
 from nearfar.estimate.physical.responses import unit_direct
-from nearfar.estimate.physical.split import PhysicalComponents, PhysicalSplit, on_bodies
+from nearfar.estimate.physical.split import (
+    PhysicalComponents,
+    PhysicalSplit,
+    Translucent,
+    on_bodies,
+)
 from nearfar.estimate.physical.translucent import SQUARE
 
 # Standard deviation over the root of the share left: of direct light, times what kernels add at q;
@@ -154,26 +159,13 @@ class PhysicalErrorBars:
         shape = (transport.camera.pixels, transport.channels)
         of_picture = self._bars.picture(light).reshape(shape).astype(np.float64)
         # Where nothing is known, the picture's are infinite: that says it of all components.
-        of_direct = _finite(self._bars.direct().reshape(shape).astype(np.float64))
+        of_direct = finite(self._bars.direct().reshape(shape).astype(np.float64))
         under = self._split.components(light).subsurface.reshape(shape)
         direct = self._split.direct.reshape(shape)
-        white = np.ones((1, transport.projector.pixels))
         of_under = np.zeros(shape)
         for body in self._split.bodies:
-            left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
-            peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
-            known = np.hypot(OF_DIRECT * left, OF_KERNEL) * body.amplitude * peaks
-            known = np.hypot(known, OF_ESTIMATE * of_direct[body.pixels])
-            of_under[body.pixels] = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE)
-            of_under[body.pixels] *= under[body.pixels]
-            if self._split.footprint is not None:
-                taken = OF_BOXES * direct[body.pixels]
-                known = np.hypot(known, taken)
-                # Subsurface light lacks what direct light has too much of.
-                whole = body.amplitude * body.under(white, transport.projector)
-                taken *= under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
-                of_under[body.pixels] = np.hypot(of_under[body.pixels], taken)
-            of_direct[body.pixels] = known
+            own = deviations_on(self._split, body, of_direct, under)
+            of_direct[body.pixels], of_under[body.pixels] = own
         at_outlines = OF_OUTLINE * np.abs(direct) * _outlines(self._split).reshape(-1, 1)
         within = on_bodies(self._split).reshape(-1, 1)
         of_direct = np.hypot(of_direct, at_outlines * ~within)
@@ -191,7 +183,7 @@ class PhysicalErrorBars:
         if self._split.own_share is not None:
             smoothed = 1 - np.repeat(self._split.own_share.reshape(-1, 1), transport.channels, 1)
             every = np.ones(transport.projector, dtype=np.float32)
-            of_white = _finite(self._bars.picture(every).reshape(shape)) * np.abs(lit)
+            of_white = finite(self._bars.picture(every).reshape(shape)) * np.abs(lit)
         return _Deviations(of_picture, of_direct, of_under, exchanged, of_white, smoothed)
 
     def _with_gains(
@@ -200,7 +192,7 @@ class PhysicalErrorBars:
         """Combine them: inter-reflection is the picture less the other two."""
         of_picture, of_direct, of_under, exchanged, of_white, smoothed = deviations
         known, beyond = np.isfinite(of_picture), direct - interreflection
-        of_picture = _finite(of_picture)
+        of_picture = finite(of_picture)
         # Direct light has the error of the light under white that it was told from.
         common = np.minimum(of_picture, of_white)
         whole = interreflection * common + beyond * smoothed * of_white
@@ -215,6 +207,43 @@ class PhysicalErrorBars:
         return np.asarray(self._split.transport.picture(found.astype(np.float32)))
 
 
+def deviations_on(
+    split: PhysicalSplit, body: Translucent, of_estimate: Floats, under: Floats
+) -> tuple[Floats, Floats]:
+    """Return standard deviations of direct light and of subsurface light on a body.
+
+    Parameters
+    ----------
+    split : PhysicalSplit
+    body : Translucent
+        One of the split's.
+    of_estimate : ndarray, shape (C, channels)
+        Standard deviation of the estimate's direct light.
+    under : ndarray, shape (C, channels)
+        Subsurface light under some light.
+
+    Returns
+    -------
+    of_direct, of_under : ndarray, shape (n, channels)
+        Of direct light under white, and of subsurface light under that light.
+    """
+    left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
+    peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
+    of_direct = np.hypot(OF_DIRECT * left, OF_KERNEL) * body.amplitude * peaks
+    of_direct = np.hypot(of_direct, OF_ESTIMATE * of_estimate[body.pixels])
+    of_under = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE) * under[body.pixels]
+    if split.footprint is None:
+        return of_direct, of_under
+    channels = len(body.sources)
+    taken = OF_BOXES * split.direct.reshape(-1, channels)[body.pixels]
+    of_direct = np.hypot(of_direct, taken)
+    # Subsurface light lacks what direct light has too much of.
+    white = np.ones((1, split.transport.projector.pixels))
+    whole = body.amplitude * body.under(white, split.transport.projector)
+    taken *= under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
+    return of_direct, np.hypot(of_under, taken)
+
+
 def _outlines(split: PhysicalSplit) -> Booleans:
     """Return camera pixels on both sides of the outlines of translucent bodies, (Cy, Cx)."""
     within = on_bodies(split)
@@ -222,6 +251,6 @@ def _outlines(split: PhysicalSplit) -> Booleans:
     return np.asarray(about & ~ndimage.binary_erosion(within, SQUARE))
 
 
-def _finite(deviations: Floats) -> Floats:
+def finite(deviations: Floats) -> Floats:
     """Return standard deviations, 0 in place of infinite ones."""
     return np.where(np.isfinite(deviations), deviations, 0.0)

@@ -26,6 +26,8 @@ LEAST_SHARE = 0.05
 # A mixture that photos show no second place of must fit better by this factor in power than the
 # surface at q alone.
 GAIN = 2.0
+# Or its inter-reflection, as a share of its light, is more by this factor than that of either side.
+STANDS_OUT = 2.0
 # A camera pixel with more direct light than this, over that of a surface, does not see that surface
 # alone.
 MOST_DIRECT = 1.5
@@ -111,7 +113,7 @@ def mixtures(
     sides = tuple(_side(transport, pixels, parts, seen) for seen in (within, beside))
     total = parts[pixels].sum(axis=1)
     by_place = _by_second_places(transport, pixels, total, *sides)
-    by_light = _by_light(transport, pixels, total, *sides)
+    by_light = _by_light(transport, pixels, parts[pixels], *sides)
     return Mixtures(
         by_place.found | by_light.found,
         *(
@@ -156,19 +158,27 @@ def _by_second_places(
 
 
 def _by_light(
-    transport: Transport, pixels: Integers, total: Floats, within: Side, beside: Side
+    transport: Transport, pixels: Integers, parts: Floats, within: Side, beside: Side
 ) -> Mixtures:
     """Find mixtures by light under white and direct light from q."""
+    total = parts.sum(axis=1)
     estimated = transport.direct.reshape(-1, transport.channels)[pixels]
     at_body = within.apart < beside.apart
     share, gain = _shares(total, estimated, within, beside, at_body)
-    q = transport.correspondence.reshape(-1, 2)
-    place = q[np.where(at_body, beside.nearest, within.nearest)]
+    place = np.where(at_body[:, None], beside.place, within.place)
+    place = np.clip(place, 0.0, np.array(transport.projector) - 1.0)
     # Comparisons with NaN are false: where one side is not known.
     found = _apart(within.place, beside.place) > LEAST_GAP * _pace(transport)
-    found &= gain > GAIN
+    own, *others = (_share_of_rest(one) for one in (parts, within.parts, beside.parts))
+    found &= (gain > GAIN) | (own > STANDS_OUT * np.maximum(*others))
     one, other = share[:, None, None] * within.parts, (1 - share[:, None, None]) * beside.parts
     return _mixtures(found, at_body, place, within.nearest, one, other, total)
+
+
+def _share_of_rest(parts: Floats) -> Floats:
+    """Return the share that inter-reflection has of all light, (o,)."""
+    grey = parts.sum(axis=2)
+    return np.asarray(grey[:, 2] / np.maximum(grey.sum(axis=1), TINY))
 
 
 def _mixtures(

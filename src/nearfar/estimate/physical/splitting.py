@@ -25,6 +25,7 @@ from nearfar.estimate.physical.one_side import with_light_from_one_side
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.smooth import with_smooth_interreflection
+from nearfar.estimate.physical.smooth_bodies import with_smooth_bodies
 from nearfar.estimate.physical.specks import without_specks
 from nearfar.estimate.physical.split import PhysicalSplit, Translucent
 from nearfar.estimate.physical.translucent import translucent
@@ -100,7 +101,9 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     near_creases = at_creases(split, creases)
     # Without error bars nothing says how much of inter-reflection is noise.
     if transport.posterior is not None:
-        split = with_smooth_interreflection(split, ErrorBars(transport).direct(), near_creases)
+        deviation = ErrorBars(transport).direct()
+        split = with_smooth_bodies(split, deviation)
+        split = with_smooth_interreflection(split, deviation, near_creases)
     return with_crease_light(split, near_creases)
 
 

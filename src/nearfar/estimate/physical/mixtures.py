@@ -1,4 +1,4 @@
-"""What camera pixels at the outline of a translucent body see a mixture of, and how much of each.
+"""Which surfaces camera pixels at the outline of a translucent body see, and how much of each.
 
 On either side of an outline there are camera pixels that see one surface alone. Where photos show a
 second place, and it or q lies where the body goes on, direct light from both places tells the
@@ -28,8 +28,7 @@ LEAST_SHARE = 0.05
 GAIN = 2.0
 # Or its inter-reflection, as a share of its light, is more by this factor than that of either side.
 STANDS_OUT = 2.0
-# A camera pixel with more direct light than this, over that of a surface, does not see that surface
-# alone.
+# Direct light that is more than that of a surface by this factor is not of that surface.
 MOST_DIRECT = 1.5
 # How well light under white is known from neighbours, and direct light: as a share of theirs, and
 # of a floor in photo units.
@@ -68,11 +67,11 @@ class Mixtures(NamedTuple):
     Attributes
     ----------
     found : ndarray of bool, shape (o,)
-        Which camera pixels see both; the rest of what is known of others means nothing.
+        Which camera pixels see both. At all others the fields below mean nothing.
     at_body : ndarray of bool, shape (o,)
         Whether q lies on the body.
     place : ndarray, shape (o, 2)
-        Of the other of the two.
+        Where on the projector the surface lies that q does not lie on.
     nearest : ndarray of int, shape (o,)
         A camera pixel, flattened, that sees the body alone.
     of_body, of_others : ndarray, shape (o, 3, channels)

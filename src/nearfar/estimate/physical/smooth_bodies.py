@@ -20,8 +20,8 @@ from nearfar.estimate.physical.split import DARK, PhysicalSplit, on_bodies, with
 
 # Camera pixels on each side that a plane goes through, and how many of them there are at least.
 REACH, LEAST_TELLING = 2, 6
-# What a squared slope counts for each camera pixel of a plane, beside their distances from it: at
-# outlines, camera pixels on one side alone tell little of a slope.
+# Weight of a plane's squared slope for each camera pixel that it is fitted to: at outlines, camera
+# pixels on one side alone tell little of a slope.
 LEVEL = 0.5
 # Share of the variance of error bars by which camera pixels next to each other differ: errors of a
 # kernel are much the same all over a body. Measured on cornell, cornell-aside, and the steps and

@@ -6,7 +6,8 @@ import numpy as np
 
 from nearfar import Size, Transport
 from nearfar.estimate.physical.elsewhere import nowhere
-from nearfar.estimate.physical.split import PhysicalSplit
+from nearfar.estimate.physical.kernels import source_at
+from nearfar.estimate.physical.split import PhysicalSplit, Translucent
 from nearfar.illumination.frequencies import DC
 from nearfar.illumination.real_basis import real_basis
 
@@ -42,5 +43,34 @@ def transport_of(direct, interreflection, q, near=None):
     return replace(blank, far=blank.far * (interreflection / unit)[..., None, None])
 
 
+def body_of(seen, q, light, explained=1.0):
+    """Return a body of one channel with subsurface light under white where it is seen.
+
+    Parameters
+    ----------
+    seen : ndarray of bool, shape (Cy, Cx)
+    q : ndarray, shape (Cy, Cx, 2)
+    light, explained : ndarray or float
+        Of all camera pixels, (Cy, Cx), or the same for all.
+    """
+    pixels = np.flatnonzero(seen)
+    light, explained = (
+        np.broadcast_to(each, CAMERA).ravel()[pixels] for each in (light, explained)
+    )
+    number = len(pixels)
+    body = Translucent(
+        pixels,
+        q.reshape(-1, 2)[pixels],
+        WHITE,
+        (source_at(0.5, 2.5),),
+        np.zeros(number, int),
+        np.ones((number, 1)),
+        explained,
+    )
+    return body._replace(amplitude=light[:, None] / body.under(WHITE.reshape(1, -1), PROJECTOR))
+
+
 def split_of(transport, *bodies):
-    return PhysicalSplit(transport, transport.direct, bodies, nowhere(1), transport.footprint)
+    return PhysicalSplit(
+        transport, transport.direct, bodies, nowhere(transport.channels), transport.footprint
+    )

@@ -7,10 +7,8 @@ import pytest
 
 from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.holes import without_holes
-from nearfar.estimate.physical.kernels import source_at
 from nearfar.estimate.physical.outlines import with_outlines
 from nearfar.estimate.physical.specks import without_specks
-from nearfar.estimate.physical.split import Translucent
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.illumination.pictures import random_pattern
 from tests.estimate.physical.even import (
@@ -18,6 +16,7 @@ from tests.estimate.physical.even import (
     PROJECTOR,
     WHITE,
     WINDOW,
+    body_of,
     places,
     split_of,
     transport_of,
@@ -40,19 +39,7 @@ def wax_before_a_wall(gap):
     total = of_body * (D_BODY + S_BODY + I_BODY) + (1 - of_body) * (D_WALL + I_WALL)
     direct = np.where(x < OUTLINE, D_BODY, (1 - of_body) * D_WALL)
     transport = transport_of(direct, total - direct, q)
-    pixels = np.flatnonzero(x < OUTLINE)
-    count = len(pixels)
-    body = Translucent(
-        pixels,
-        q.reshape(-1, 2)[pixels],
-        WHITE,
-        (source_at(0.5, 2.5),),
-        np.zeros(count, int),
-        np.ones((count, 1)),
-        np.ones(count),
-    )
-    unit = body.under(WHITE.reshape(1, -1), PROJECTOR)
-    return split_of(transport, body._replace(amplitude=S_BODY / unit))
+    return split_of(transport, body_of(x < OUTLINE, q, S_BODY))
 
 
 def test_an_outline_that_sees_two_places_has_the_components_of_both():
@@ -77,21 +64,11 @@ def test_an_outline_that_sees_two_places_has_the_components_of_both():
 
 def test_an_outline_that_a_kernel_fits_badly_is_a_mixture_that_fits_better():
     split = wax_before_a_wall(gap=20)
-    (body,) = split.bodies
     x = np.tile(np.arange(CAMERA.width), (CAMERA.height, 1))
-    pixels = np.flatnonzero(x <= OUTLINE)
-    at_outline = x.ravel()[pixels] == OUTLINE
     # The kernel takes all but direct light of the outline, so that inter-reflection is no clue.
-    light = np.where(at_outline, split.components(WHITE).interreflection.ravel()[pixels], S_BODY)
-    wider = body._replace(
-        pixels=pixels,
-        places=split.transport.correspondence.reshape(-1, 2)[pixels],
-        slope=np.zeros(len(pixels), int),
-        amplitude=np.ones((len(pixels), 1)),
-        explained=np.where(at_outline, 0.5, 1.0),
-    )
-    unit = wider.under(WHITE.reshape(1, -1), PROJECTOR)
-    wider = wider._replace(amplitude=light[:, None] / unit)
+    light = np.where(x == OUTLINE, split.components(WHITE).interreflection, S_BODY)
+    explained = np.where(x == OUTLINE, 0.5, 1.0)
+    wider = body_of(x <= OUTLINE, split.transport.correspondence, light, explained)
     found = with_outlines(replace(split, bodies=(wider,)))
     subsurface = found.components(WHITE).subsurface[:, OUTLINE]
     np.testing.assert_allclose(subsurface, OF_BODY * S_BODY, rtol=0.02)

@@ -1,13 +1,21 @@
 """Inter-reflection that is smooth on translucent bodies, on small splits that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from nearfar.estimate.physical.kernels import source_at
 from nearfar.estimate.physical.smooth_bodies import with_smooth_bodies
-from nearfar.estimate.physical.split import Translucent
 from nearfar.illumination.pictures import random_pattern
-from tests.estimate.physical.even import CAMERA, PROJECTOR, WHITE, places, split_of, transport_of
+from tests.estimate.physical.even import (
+    CAMERA,
+    PROJECTOR,
+    WHITE,
+    body_of,
+    places,
+    split_of,
+    transport_of,
+)
 
 DIRECT, UNDER, REST = 0.2, 0.3, 0.1
 Y, X = np.mgrid[: CAMERA.height, : CAMERA.width]
@@ -21,19 +29,7 @@ def wax(direct, under, rest, *, explained, seen=EVERYWHERE):
     direct, under, rest = (np.broadcast_to(part, CAMERA) for part in (direct, under, rest))
     q = places()
     transport = transport_of(direct, np.where(seen, under, 0.0) + rest, q)
-    pixels = np.flatnonzero(seen)
-    number = len(pixels)
-    body = Translucent(
-        pixels,
-        q.reshape(-1, 2)[pixels],
-        WHITE,
-        (source_at(0.5, 2.5),),
-        np.zeros(number, int),
-        np.ones((number, 1)),
-        np.full(number, explained),
-    )
-    unit = body.under(WHITE.reshape(1, -1), PROJECTOR)
-    return split_of(transport, body._replace(amplitude=under.reshape(-1, 1)[pixels] / unit))
+    return split_of(transport, body_of(seen, q, under, explained))
 
 
 def smoothed(split, deviation=0.0):
@@ -130,3 +126,23 @@ def test_no_component_becomes_negative():
     assert after.direct.min() >= 0.0
     assert after.subsurface.min() > 0.0
     assert after.interreflection[6, 6] > before.interreflection[6, 6] + 0.005
+
+
+def test_subsurface_light_of_a_channel_that_has_little_of_it_stays_above_zero():
+    """Channels are smoothed alike, by what error bars of all of them explain."""
+    one = np.where((Y == 6) & (X == 6), 0.2, 0.0)
+    bright = wax(DIRECT, 1.0, REST, explained=0.0)
+    dim = wax(0.5, 0.01, 0.3 - one, explained=0.0)
+    both = {
+        name: np.concatenate([getattr(each.transport, name) for each in (bright, dim)], axis=2)
+        for name in ("direct", "near", "far", "black", "noise")
+    }
+    bodies = [each.bodies[0] for each in (bright, dim)]
+    body = bodies[0]._replace(
+        sources=sum((each.sources for each in bodies), ()),
+        amplitude=np.concatenate([each.amplitude for each in bodies], axis=1),
+    )
+    split = split_of(replace(bright.transport, **both), body)
+    found = with_smooth_bodies(split, np.zeros((*CAMERA, 2)))
+    assert found.components(WHITE).subsurface.min() >= 0.0
+    np.testing.assert_allclose(sum(found.components(WHITE)), split.transport @ WHITE, atol=1e-6)

@@ -24,8 +24,7 @@ REACH, LEAST_TELLING = 2, 6
 # pixels on one side alone tell little of a slope.
 LEVEL = 0.5
 # Share of the variance of error bars by which camera pixels next to each other differ: errors of a
-# kernel are much the same all over a body. Measured on cornell, cornell-aside, and the steps and
-# the tree of benchmarks/trial_bodies.py.
+# kernel are much the same all over a body. How it was chosen: docs/decisions/0110.
 APART = 0.2
 TINY = float(np.finfo(np.float64).tiny)
 

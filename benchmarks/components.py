@@ -12,7 +12,8 @@ stands beside subsurface light, its far-range light beside inter-reflection. Las
 global light, by the physical split and by the checkerboards of Nayar et al. (2006) that take no
 more photos, black included.
 No constant of the split was fitted to alcove, shelf, hand and marble; they were looked at when
-inter-reflection was made smooth and light from one side was told apart (decisions 0104 and 0107).
+inter-reflection was made smooth, light from one side was told apart, and outlines were mended
+(decisions 0104, 0107, 0110 and 0111).
 """
 
 import argparse

@@ -1,10 +1,10 @@
 """Estimates of transports that are not direct + near + far, beside what assumes nothing of them.
 
-Run ``python benchmarks/hostile.py [--scenes] [--look] [--bars] [NAME ...]``. Transports are those
-of `nearfar.scenes.hostile`, cameras of three constant noises; with ``--scenes``, small built-in
-scenes with the camera of benchmarks/accuracy.py. At five budgets, shares of the projector's pixels
-P, it prints SNR_b in dB under pictures, under random lights, and the 10th percentile over lights of
-one projector pixel, for
+Run ``python benchmarks/hostile.py [--scenes] [--look] [--bars] [--seed SEED] [NAME ...]``.
+Transports are those of `nearfar.scenes.hostile` that follow from a seed (0), cameras of three
+constant noises; with ``--scenes``, small built-in scenes with the camera of benchmarks/accuracy.py.
+At five budgets, shares of the projector's pixels P, it prints SNR_b in dB under pictures, under
+random lights, and the 10th percentile over lights of one projector pixel, for
 
 - joint: the joint estimate from a plan that was chosen for the budget, q by phase;
 - DFT: the inverse DFT of the responses of the same photos, 0 where none was measured;
@@ -226,13 +226,14 @@ def main() -> None:
     parser.add_argument("--look", action="store_true", help="plans by a first look")
     parser.add_argument("--alone", action="store_true", help="the joint estimate alone")
     parser.add_argument("--budgets", nargs="*", type=float, help="photos, as shares of P")
+    parser.add_argument("--seed", type=int, default=0, help="of transports and noise")
     options = parser.parse_args()
     if options.scenes:
         for name in options.names or SCENES:
             run(cached_scene(name, *SCENES[name]), SimulatedCamera(), name, options)
         return
     for name in options.names or HOSTILE:
-        scene = hostile_transport(name, *SIZES[name])
+        scene = hostile_transport(name, *SIZES[name], seed=options.seed)
         for noise in NOISES:
             run(scene, camera_of(noise), f"{name} 1/{round(1 / noise)}", options)
 

@@ -1,4 +1,4 @@
-"""Values of the camera pixels around each camera pixel."""
+"""Values of the camera pixels around each camera pixel, and how q moves from one to the next."""
 
 from typing import TypeVar
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers
+from nearfar.transport.model import Transport
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -35,3 +36,32 @@ def neighbours(picture: Floats) -> Floats:
     """
     found = np.stack([moved(picture, step, np.nan) for step in steps(1)])
     return np.where(np.isnan(found), picture, found)
+
+
+def steps_of_q(transport: Transport) -> NDArray[np.float64]:
+    """Return by how much q moves from one camera pixel to the next, in the median.
+
+    Parameters
+    ----------
+    transport : Transport
+
+    Returns
+    -------
+    ndarray, shape (2, 2), float64
+        Projector pixels (y, x): a row for a step down and one for a step across; 0 where nothing is
+        known.
+    """
+    q = np.where(transport.lit[..., None], transport.correspondence, np.nan)
+    apart = [np.diff(q, axis=axis).reshape(-1, 2) for axis in (0, 1)]
+    known = [one[np.isfinite(one).all(axis=1)] for one in apart]
+    return np.stack([np.median(one, axis=0) if len(one) else np.zeros(2) for one in known])
+
+
+def longest_step_of_q(transport: Transport) -> float:
+    """Return the larger distance, along an axis, of a step of q: at least 1 projector pixel.
+
+    Parameters
+    ----------
+    transport : Transport
+    """
+    return max(1.0, float(np.abs(steps_of_q(transport)).max()))

@@ -10,10 +10,9 @@ Index convention: o runs over camera pixels at outlines, s over steps to the cam
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers
-from nearfar.estimate.physical.around import steps
+from nearfar.estimate.physical.around import longest_step_of_q, steps, steps_of_q
 from nearfar.transport.model import Transport
 
 # Camera pixels on each side that tell what is mixed.
@@ -135,7 +134,7 @@ def _by_second_places(
     if transport.second_place is not None and transport.second_direct is not None:
         second = transport.second_place.reshape(-1, 2)[pixels]
         there = transport.second_direct.reshape(-1, transport.channels)[pixels]
-    least = LEAST_GAP * _pace(transport)
+    least = LEAST_GAP * longest_step_of_q(transport)
     off_q, off_second = (_apart(places, within.place) for places in (q, second))
     at_body = off_q < off_second
     of_body, of_others = (np.where(here[:, None], estimated, there) for here in (at_body, ~at_body))
@@ -167,7 +166,7 @@ def _by_light(
     place = np.where(at_body[:, None], beside.place, within.place)
     place = np.clip(place, 0.0, np.array(transport.projector) - 1.0)
     # Comparisons with NaN are false: where one side is not known.
-    found = _apart(within.place, beside.place) > LEAST_GAP * _pace(transport)
+    found = _apart(within.place, beside.place) > LEAST_GAP * longest_step_of_q(transport)
     own, *others = (_share_of_rest(one) for one in (parts, within.parts, beside.parts))
     found &= (gain > GAIN) | (own > STANDS_OUT * np.maximum(*others))
     one, other = share[:, None, None] * within.parts, (1 - share[:, None, None]) * beside.parts
@@ -210,7 +209,7 @@ def _side(transport: Transport, pixels: Integers, parts: Floats, chosen: Boolean
     lit = weight * transport.lit.ravel()[around]
     q = transport.correspondence.reshape(-1, 2)
     places = np.where(lit[..., None] > 0, q[around], 0.0)
-    told = np.where(lit[..., None] > 0, places - about @ _jacobian(transport), 0.0)
+    told = np.where(lit[..., None] > 0, places - about @ steps_of_q(transport), 0.0)
     off = np.abs(places - q[pixels, None]).max(axis=-1) / distance
     off = np.where(lit > 0, off, np.inf)
     best = off.argmin(axis=1)
@@ -231,22 +230,6 @@ def _mean(values: Floats, weight: Floats) -> Floats:
     sums = np.einsum("os,os...->o...", weight, values)
     known = np.where(total > 0, total, np.nan)
     return np.asarray(sums / known.reshape(-1, *(1,) * (sums.ndim - 1)))
-
-
-def _jacobian(transport: Transport) -> NDArray[np.float64]:
-    """Return by how much q moves, in the median, from one camera pixel to the next: (2, 2).
-
-    A row for a step down and one for a step across.
-    """
-    q = np.where(transport.lit[..., None], transport.correspondence, np.nan)
-    apart = [np.diff(q, axis=axis).reshape(-1, 2) for axis in (0, 1)]
-    known = [one[np.isfinite(one).all(axis=1)] for one in apart]
-    return np.stack([np.median(one, axis=0) if len(one) else np.zeros(2) for one in known])
-
-
-def _pace(transport: Transport) -> float:
-    """Return how far q moves from one camera pixel to the next, at least 1 projector pixel."""
-    return max(1.0, float(np.abs(_jacobian(transport)).max()))
 
 
 def _apart(one: Floats, other: Floats) -> Floats:

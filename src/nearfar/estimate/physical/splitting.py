@@ -22,6 +22,7 @@ from nearfar.estimate.physical.medium import (
     with_like_channels,
 )
 from nearfar.estimate.physical.one_side import with_light_from_one_side
+from nearfar.estimate.physical.opaque_outlines import with_opaque_outlines
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
 from nearfar.estimate.physical.smooth import with_smooth_interreflection
@@ -99,6 +100,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     split = without_dark_creases(with_colours_of_bodies(with_outlines(split)))
     split = without_holes(without_specks(split))
     near_creases = at_creases(split, creases)
+    split = with_opaque_outlines(split, near_creases)
     # Without error bars nothing says how much of inter-reflection is noise.
     if transport.posterior is not None:
         deviation = ErrorBars(transport).direct()

@@ -87,14 +87,16 @@ def test_inter_reflection_of_bodies_is_smooth():
     marble = ndimage.binary_erosion(truth[1].any(axis=-1), np.ones((3, 3)))
     # If it is not smoothed, it is 1.4 times as rough as the scene's.
     assert roughness(found, marble) < roughness(truth, marble)
-    assert np.all(decibels(truth, found) > (24.5, 13.5, 6.2))
+    # Where sources may be as shallow as any: 14.1 dB of subsurface light.
+    assert np.all(decibels(truth, found) > (24.5, 14.6, 6.2))
 
 
 def test_outlines_of_a_hand_are_mixtures():
     """Between fingers and at their tips camera pixels see the hand and a wall."""
     found = decibels(*floodlit("hand", Size(32, 32), Size(48, 48), 60))
-    # Without what second places tell: 19.8 dB of direct light, and 13.2 of subsurface light.
-    assert np.all(found > (20.1, 13.35, 8.7))
+    # Without what second places tell: 19.8 dB of direct light. Where sources may be as shallow as
+    # any: 13.5 dB of subsurface light.
+    assert np.all(found > (20.1, 14.0, 8.7))
 
 
 def test_error_bars_of_components_hold_as_often_as_they_should(scene, split):

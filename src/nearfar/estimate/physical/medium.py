@@ -29,6 +29,9 @@ PRODUCTS = (0.1, 0.4, 1.0)
 # Least and largest: depths in cells that responses can tell, and products sqrt(3 (1 - a')) of media
 # that scatter.
 RANGES = ((0.2, 4.0), (0.01, 1.7))
+# Light from a source less deep, in cells, is all but direct light. Standard deviation, in
+# logarithms, of how much less deep a source is expected to be (docs/decisions/0112).
+SHALLOW, SHALLOW_DEVIATION = 0.4, 0.2
 # Depth of a source in cells beyond which light that is compared is too near to it to tell how it
 # fades.
 DEEP = 2.0
@@ -330,8 +333,9 @@ def _refined(
 
     def misfit(logarithms: NDArray[np.float64]) -> float:
         apart = np.nansum(((logarithms - expected) / LIKE_DEVIATIONS) ** 2)
+        shallow = min(float(logarithms[0] - np.log(SHALLOW)), 0.0) / SHALLOW_DEVIATION
         found = _misfit(body, channel, source_of(logarithms), slope, power, sample)
-        return found + weight * float(apart)
+        return found + weight * (float(apart) + shallow**2)
 
     start = _logarithms(source)
     alike = LIKE_MISFITS * misfit(start)

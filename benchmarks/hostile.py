@@ -226,7 +226,7 @@ def main() -> None:
     parser.add_argument("--look", action="store_true", help="plans by a first look")
     parser.add_argument("--alone", action="store_true", help="the joint estimate alone")
     parser.add_argument("--budgets", nargs="*", type=float, help="photos, as shares of P")
-    parser.add_argument("--seed", type=int, default=0, help="of transports and noise")
+    parser.add_argument("--seed", type=int, default=0, help="of the hostile transports")
     options = parser.parse_args()
     if options.scenes:
         for name in options.names or SCENES:

@@ -70,6 +70,15 @@ def body_of(seen, q, light, explained=1.0):
     return body._replace(amplitude=light[:, None] / body.under(WHITE.reshape(1, -1), PROJECTOR))
 
 
+def of_both_channels(one, other):
+    """Return a transport of two channels, each that of a transport of one."""
+    joined = {
+        name: np.concatenate([getattr(each, name) for each in (one, other)], axis=2)
+        for name in ("direct", "near", "far", "black", "noise")
+    }
+    return replace(one, **joined)
+
+
 def split_of(transport, *bodies):
     return PhysicalSplit(
         transport, transport.direct, bodies, nowhere(transport.channels), transport.footprint

@@ -14,6 +14,7 @@ from tests.estimate.physical.even import (
     PROJECTOR,
     WHITE,
     body_of,
+    of_both_channels,
     places,
     split_of,
     transport_of,
@@ -126,6 +127,12 @@ def test_creases_bodies_shadows_and_second_places_stay_as_they_are():
     assert not seen.any()
 
 
+def test_camera_pixels_that_see_several_projector_pixels_stay_as_they_are():
+    for width, is_found in ((1.0, True), (2.0, False)):
+        _, seen = found_in(replace(two_surfaces(), footprint=np.full((*CAMERA, 4), width)))
+        assert seen.any() == is_found
+
+
 def test_places_stay_on_the_projector():
     split = two_surfaces()
     q = split.transport.correspondence.copy()
@@ -157,11 +164,7 @@ def test_outlines_two_camera_pixels_wide_are_mixtures_of_what_lies_beyond(uprigh
 
 def of_two_channels(one, other):
     """Return a split of the channels of two."""
-    joined = {
-        name: np.concatenate([getattr(each.transport, name) for each in (one, other)], axis=axis)
-        for name, axis in {"direct": 2, "near": 2, "far": 2, "black": 2, "noise": 2}.items()
-    }
-    return split_of(replace(one.transport, **joined))
+    return split_of(of_both_channels(one.transport, other.transport))
 
 
 def test_colours_that_no_mixture_has_are_of_something_else():

@@ -1,7 +1,5 @@
 """Inter-reflection that is smooth on translucent bodies, on small splits that are known."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,6 +10,7 @@ from tests.estimate.physical.even import (
     PROJECTOR,
     WHITE,
     body_of,
+    of_both_channels,
     places,
     split_of,
     transport_of,
@@ -133,16 +132,12 @@ def test_subsurface_light_of_a_channel_that_has_little_of_it_stays_above_zero():
     one = np.where((Y == 6) & (X == 6), 0.2, 0.0)
     bright = wax(DIRECT, 1.0, REST, explained=0.0)
     dim = wax(0.5, 0.01, 0.3 - one, explained=0.0)
-    both = {
-        name: np.concatenate([getattr(each.transport, name) for each in (bright, dim)], axis=2)
-        for name in ("direct", "near", "far", "black", "noise")
-    }
     bodies = [each.bodies[0] for each in (bright, dim)]
     body = bodies[0]._replace(
         sources=sum((each.sources for each in bodies), ()),
         amplitude=np.concatenate([each.amplitude for each in bodies], axis=1),
     )
-    split = split_of(replace(bright.transport, **both), body)
+    split = split_of(of_both_channels(bright.transport, dim.transport), body)
     found = with_smooth_bodies(split, np.zeros((*CAMERA, 2)))
     assert found.components(WHITE).subsurface.min() >= 0.0
     np.testing.assert_allclose(sum(found.components(WHITE)), split.transport @ WHITE, atol=1e-6)

@@ -10,6 +10,9 @@ from nearfar.transport.model import Transport
 
 Number = TypeVar("Number", bound=np.generic)
 
+# Steps (y, x) to the next camera pixel in four directions; their opposites are the other four.
+DIRECTIONS = np.array([(0, 1), (1, 0), (1, 1), (1, -1)])
+
 
 def steps(reach: int) -> Integers:
     """Return the steps (y, x) to the camera pixels up to a reach on each side, itself left out."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
-from nearfar.estimate.physical.around import moved, steps
+from nearfar.estimate.physical.around import DIRECTIONS, moved, steps
 from nearfar.estimate.physical.creases import NEXT_TO
 from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque, with_more_direct
@@ -21,8 +21,6 @@ from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque, with_mo
 DARKER = 3
 # How far on both sides camera pixels tell which way a crease runs.
 LENGTH = 3
-# Directions that a crease may have, as steps (y, x) from one camera pixel to the next.
-DIRECTIONS = np.array([(0, 1), (1, 0), (1, 1), (1, -1)])
 
 
 def at_creases(split: PhysicalSplit, drawn: Elsewhere) -> Booleans:

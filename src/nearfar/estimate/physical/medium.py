@@ -29,8 +29,8 @@ PRODUCTS = (0.1, 0.4, 1.0)
 # Least and largest: depths in cells that responses can tell, and products sqrt(3 (1 - a')) of media
 # that scatter.
 RANGES = ((0.2, 4.0), (0.01, 1.7))
-# Light from a source less deep, in cells, is all but direct light. Standard deviation, in
-# logarithms, of how much less deep a source is expected to be (docs/decisions/0112).
+# Depth in cells above which light under a surface is all but direct light. Sources are expected not
+# to lie there: the standard deviation, in logarithms, by which they do (docs/decisions/0112).
 SHALLOW, SHALLOW_DEVIATION = 0.4, 0.2
 # Depth of a source in cells beyond which light that is compared is too near to it to tell how it
 # fades.

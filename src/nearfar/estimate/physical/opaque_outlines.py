@@ -4,6 +4,9 @@ An estimate has direct light of one of them, that at q. Where photos did not sho
 direct light of the other surface is taken for inter-reflection, which then has a larger share of
 the camera pixel's light than on either side. Light under white tells how much of each surface is
 seen, and so how much inter-reflection there is. The rest is direct light from the other surface.
+
+Index convention: arrays are (Cy, Cx, ...), a value for each camera pixel. Of two in a list, the
+first is of the camera pixel some steps away in a direction, the second of one the other way.
 """
 
 from dataclasses import replace
@@ -12,13 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
-from nearfar.estimate.physical.around import longest_step_of_q, moved, steps_of_q
-from nearfar.estimate.physical.elsewhere import Elsewhere
+from nearfar.estimate.physical.around import DIRECTIONS, longest_step_of_q, moved, steps_of_q
+from nearfar.estimate.physical.elsewhere import Elsewhere, sees_single_pixels
 from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque
 
-# Camera pixels on each side that may see one surface alone, and the four directions to them.
+# Steps on each side up to the camera pixels that may see one surface alone.
 REACH = 2
-DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
 # q of both sides is this far apart, in projector pixels and in steps of q from one camera pixel to
 # the next, beyond what the camera pixels between them explain. At a crease it goes on.
 LEAST_GAP = 2.0
@@ -69,7 +71,7 @@ def with_opaque_outlines(split: PhysicalSplit, creases: Booleans) -> PhysicalSpl
     parts = [np.reshape(part, shape) for part in split.components(white)]
     total, interreflection = np.maximum(np.asarray(sum(parts)), DARK), parts[2]
     sides = opaque(split)
-    chosen = sides & ~creases
+    chosen = sides & ~creases & sees_single_pixels(split.footprint, transport.camera)
     chosen.ravel()[split.elsewhere.pixels] = False
     mixed = _mixed(split, total, interreflection, sides)
     pixels = np.flatnonzero(chosen & (_share(interreflection, total) > mixed.larger_share))
@@ -80,11 +82,12 @@ def with_opaque_outlines(split: PhysicalSplit, creases: Booleans) -> PhysicalSpl
 
 def _mixed(split: PhysicalSplit, total: Floats, interreflection: Floats, sides: Booleans) -> _Mixed:
     """Find for each camera pixel two on either side that mix to its light under white."""
-    q, step_of_q = split.transport.correspondence, steps_of_q(split.transport)
-    least_gap = LEAST_GAP * longest_step_of_q(split.transport)
-    far_corner = np.array(split.transport.projector) - 1.0
+    transport = split.transport
+    q, step_of_q = transport.correspondence, steps_of_q(transport)
+    least_gap = LEAST_GAP * longest_step_of_q(transport)
+    far_corner = np.array(transport.projector) - 1.0
     best = _Mixed(np.full(sides.shape, np.inf), np.zeros_like(total), np.zeros_like(q))
-    for direction in np.array(DIRECTIONS):
+    for direction in DIRECTIONS:
         for one, other in np.ndindex(REACH, REACH):
             steps = (one + 1) * direction, -(other + 1) * direction
             both = np.logical_and(*(moved(sides, step, False) for step in steps))

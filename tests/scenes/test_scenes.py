@@ -10,12 +10,13 @@ from nearfar import scenes
 from nearfar.arrays import Size
 from nearfar.errors import InputError
 from nearfar.scenes.cornell import WAX as CANDLE_WAX
+from nearfar.scenes.description import ByRadiosity
 from nearfar.scenes.dipole import dipole, subsurface
 from nearfar.scenes.form_factors import exchange
 from nearfar.scenes.geometry import Scene, View, quadrilateral
 from nearfar.scenes.optics import pinhole, sub_rays
 from nearfar.scenes.patches import albedo, build_patches, with_medium
-from nearfar.scenes.radiosity import bounced, reflection_factor
+from nearfar.scenes.radiosity import ReflectionFactor, bounced, reflection_factor
 from nearfar.scenes.rays import surface
 from nearfar.scenes.render import body_of, patched, subsurface_of
 
@@ -270,6 +271,38 @@ def test_transport_is_the_sum_of_all_bounces(name):
     factor = reflection_factor(values, patches, candle, inside)
     far = bounced(form, factor) @ patches.flux.astype(np.float32)
     np.testing.assert_allclose(far, known, rtol=1e-4, atol=1e-5 * known.max())
+
+
+@pytest.mark.parametrize("hidden", [0, 1, 40])
+def test_patches_that_are_left_out_reflect_all_the_same(hidden):
+    rng = np.random.default_rng(hidden)
+    body = np.array([60, 61, 70])
+    form = rng.random((90, 90), dtype=np.float32)
+    form = 0.4 / 90 * (form + form.T)
+    scale = rng.uniform(0.5, 1.0, 90).astype(np.float32)
+    scale[body] = 0.0
+    block = np.tril(rng.uniform(0.1, 0.6, (3, 3))).astype(np.float32)
+    factor = ReflectionFactor(scale, body, block)
+    whole = bounced(form.copy(), factor)
+    some = bounced(form.copy(), factor, hidden)
+    np.testing.assert_allclose(some, whole[hidden:, hidden:], rtol=1e-4, atol=1e-5 * whole.max())
+
+
+@pytest.mark.parametrize("name", ["cornell-aside", "wedge"])
+def test_patches_that_are_left_out_are_neither_lit_nor_seen(name):
+    compute = scenes.SCENES[name].compute
+    assert isinstance(compute, ByRadiosity)
+    found = patched(compute.surfaces(), TINY, TINY, progress=lambda *_: None)
+    seen = found.gathered.radiosity.sum(axis=0) > 0
+    out = np.arange(len(found.patches)) < found.hidden
+    of_body = np.isin(np.arange(len(out)), found.translucent)
+    assert out.any()
+    np.testing.assert_array_equal(out, ~(seen | (found.patches.pixel >= 0) | of_body))
+    # Each has kept its samples.
+    own = found.patches
+    shares = own.areas / own.areas.sum(axis=1, keepdims=True)
+    middle = (shares[..., None] * own.positions).sum(axis=1)
+    np.testing.assert_allclose(middle, own.centre, atol=1e-9)
 
 
 def slab(tone):

@@ -54,7 +54,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """All patches of a scene; lit ones come first, ordered by projector pixel.
+    """All patches of a scene.
 
     Attributes
     ----------
@@ -186,6 +186,7 @@ def build_patches(
     Returns
     -------
     Patches
+        Lit ones come first, ordered by projector pixel.
     """
     lit = lit_samples(where, eye, size, samples)
     distance = float(np.median(np.linalg.norm(lit.position - eye.position, axis=-1)))

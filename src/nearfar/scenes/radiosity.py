@@ -12,7 +12,9 @@ and so, with G = A F symmetric,
     B = L K L^T phi,   K = (I - L^T G L)^-1,
 
 a Cholesky factorisation. L L^T phi is what leaves after one reflection (direct and near-range);
-L (K - I) L^T phi is all the rest, far-range.
+L (K - I) L^T phi is all the rest, far-range. Of K only the rows and columns of patches that are lit
+or seen are needed. The others come first: what the factorisation leaves after them is the Schur
+complement, whose inverse is that part of K.
 """
 
 from collections.abc import Callable
@@ -80,19 +82,21 @@ def _between(factor: ReflectionFactor, block: Floats, matrix: Floats) -> None:
     matrix[factor.places] = rows
 
 
-def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
+def bounced(form: Floats, factor: ReflectionFactor, hidden: int = 0) -> Floats:
     """Return L (K - I) L^T, which takes the light that falls on patches to far-range light.
 
     Parameters
     ----------
     form : ndarray, shape (n, n), float32
-        G, symmetric. Overwritten by the result: it is the largest array of a scene.
+        G, symmetric. Overwritten: it is the largest array of a scene.
     factor : ReflectionFactor
         L.
+    hidden : int
+        The first so many patches are left out of the result. None is of the translucent body.
 
     Returns
     -------
-    ndarray, shape (n, n), float32, symmetric
+    ndarray, shape (n - hidden, n - hidden), float32, symmetric
 
     Raises
     ------
@@ -106,7 +110,8 @@ def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
     # The transpose of a symmetric row-major array is what LAPACK wants, without a copy.
     lower, info = linalg.lapack.spotrf(form.T, lower=1, overwrite_a=1, clean=0)
     if info == 0:
-        lower, info = linalg.lapack.spotri(lower, lower=1, overwrite_c=1)
+        shown = lower[hidden:, hidden:]
+        lower, info = linalg.lapack.spotri(shown, lower=1, overwrite_c=1)
     if info != 0:
         raise NearfarError("The scene reflects more light than falls on it: lower its albedos.")
     inverse = lower.T
@@ -116,7 +121,8 @@ def bounced(form: Floats, factor: ReflectionFactor) -> Floats:
         inverse[rows.stop :, rows] = inverse[rows, rows.stop :].T
     diagonal = np.einsum("ii->i", inverse)
     diagonal -= 1
-    _between(factor, factor.block, inverse)
+    of_shown = factor._replace(scale=factor.scale[hidden:], places=factor.places - hidden)
+    _between(of_shown, factor.block, inverse)
     return np.asarray(inverse)
 
 
@@ -129,6 +135,7 @@ def components(
     albedo: Floats,
     translucent: Integers,
     inside: tuple[Floats, ...],
+    hidden: int,
     progress: Callable[[float], None],
 ) -> tuple[list[sparse.csr_array], list[sparse.csr_array], Floats]:
     """Compute D, N and F of every channel.
@@ -145,6 +152,8 @@ def components(
     translucent : ndarray of int, shape (m,)
     inside : tuple of ndarray, shape (m, m)
         The dipole per channel; empty where nothing is translucent.
+    hidden : int
+        The first so many patches are neither lit nor seen, nor translucent.
     progress : callable
         Called with the share done, 0 to 1.
 
@@ -158,8 +167,8 @@ def components(
         (patches.flux[lit].astype(np.float32), (lit, patches.pixel[lit])),
         shape=(len(patches), projector_pixels),
     )
-    fall = sparse.csr_array(flux.T)
-    see = sparse.csr_array(gathered.radiosity.astype(np.float32))
+    fall = sparse.csr_array(flux[hidden:].T)
+    see = sparse.csr_array(gathered.radiosity[:, hidden:].astype(np.float32))
     channels = albedo.shape[1]
     camera_pixels = see.shape[0]
     direct, near = [], []
@@ -181,7 +190,7 @@ def components(
             albedo[:, channel], patches, translucent, inside[channel] if inside else None
         )
         last = channel == channels - 1
-        rest = bounced(form if last else form.copy(), factor)
+        rest = bounced(form if last else form.copy(), factor, hidden)
         for rows in blocks(camera_pixels, ROWS_AT_ONCE):
             strip = np.ascontiguousarray((see[rows] @ rest).T)
             far[channel, rows] = (fall @ strip).T

@@ -38,6 +38,8 @@ class PatchedScene(NamedTuple):
         The patches of the translucent body.
     inside : tuple of ndarray, shape (m, m)
         Its dipole per channel; empty where nothing is translucent.
+    hidden : int
+        The first so many patches are neither lit nor seen, nor of the translucent body.
     """
 
     patches: Patches
@@ -46,6 +48,7 @@ class PatchedScene(NamedTuple):
     albedo: Floats
     translucent: Integers
     inside: tuple[Floats, ...]
+    hidden: int
 
 
 def patched(
@@ -71,12 +74,25 @@ def patched(
         (lens, camera),
         samples=max(1, int(np.ceil(SAMPLES_PER_SIDE / finest))),
     )
+    patches, seen, hidden = _hidden_first(patches, scene.parts, seen)
     progress("form factors", 0.1)
     form = exchange(patches, scene.parts, occluders)
     progress("subsurface", 0.3)
     translucent = np.flatnonzero(with_medium(patches, scene.parts))
     inside = subsurface_of(patches, scene.parts, translucent)
-    return PatchedScene(patches, seen, form, albedo(patches, scene.parts), translucent, inside)
+    reflected = albedo(patches, scene.parts)
+    return PatchedScene(patches, seen, form, reflected, translucent, inside, hidden)
+
+
+def _hidden_first(
+    patches: Patches, parts: Sequence[Part], seen: Gather
+) -> tuple[Patches, Gather, int]:
+    """Put patches first that are neither lit nor seen, nor translucent, and return how many."""
+    shown = (patches.pixel >= 0) | with_medium(patches, parts)
+    shown[seen.radiosity.indices] = True
+    order = np.argsort(shown, kind="stable")
+    gathered = Gather(seen.radiosity[:, order], seen.gloss[:, order])
+    return body_of(patches, order), gathered, int(np.sum(~shown))
 
 
 def render(
@@ -109,6 +125,7 @@ def render(
         albedo=found.albedo,
         translucent=found.translucent,
         inside=found.inside,
+        hidden=found.hidden,
         progress=lambda share: progress("inter-reflections", 0.4 + 0.6 * share),
     )
     brightest = max(

@@ -298,6 +298,10 @@ def test_patches_that_are_left_out_are_neither_lit_nor_seen(name):
     of_body = np.isin(np.arange(len(out)), found.translucent)
     assert out.any()
     np.testing.assert_array_equal(out, ~(seen | (found.patches.pixel >= 0) | of_body))
+    # Highlights are on lit patches.
+    highlights = found.gathered.gloss.indices
+    assert len(highlights) > 0 or name == "wedge"
+    assert (found.patches.pixel[highlights] >= 0).all()
     # Each has kept its samples.
     own = found.patches
     shares = own.areas / own.areas.sum(axis=1, keepdims=True)

@@ -330,6 +330,32 @@ def _(shot: Shot, share: float) -> Photos:
     return shot.each(lambda photo, _: shot.counts(photo * (1 - share)), 3)
 
 
+@spoil("photos at a quarter", ("exposure",), 1, 3)
+def _(shot: Shot, count: float) -> Photos:
+    return shot.each(lambda photo, _: photo // 4, int(count))
+
+
+@spoil("shadow in three photos", ("unknown",), 0.1, 0.2, 0.5)
+def _(shot: Shot, share: float) -> Photos:
+    third = shot.plan.projector.width // 3
+    chosen = shot.chosen(3)
+
+    def shaded(pattern: NDArray[np.uint8], number: int) -> NDArray[np.floating]:
+        light = pattern.astype(float)
+        light[:, :third] *= 1 - share * (number in chosen)
+        return light
+
+    return shot.again(shaded)
+
+
+@spoil("patterns mixed in two photos", ("unknown", "exposure"), 0.1, 0.3)
+def _(shot: Shot, share: float) -> Photos:
+    def mixed(photo: Photos, number: int) -> Photos:
+        return shot.counts((1 - share) * photo + share * shot.photos[number - 1].astype(float))
+
+    return shot.each(mixed, 2)
+
+
 @spoil("lamp flickers", ("exposure",), 0.01, 0.02, 0.03, 0.05)
 def _(shot: Shot, share: float) -> Photos:
     gains = 1 + share * np.random.default_rng(5).standard_normal(len(shot.photos))

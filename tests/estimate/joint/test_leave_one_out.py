@@ -1,11 +1,14 @@
 """Prior scales of error bars by how well responses are foretold by one another."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from nearfar import choose_plan
 from nearfar.arrays import Size
 from nearfar.correspondence import correspond_by_phase
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import errors_of_foretold, estimate_jointly
 from nearfar.estimate.joint.estimate import SWEEPS
 from nearfar.estimate.joint.leave_one_out import (
     LARGEST_FACTOR,
@@ -15,11 +18,19 @@ from nearfar.estimate.joint.leave_one_out import (
 )
 from nearfar.estimate.joint.nuisance import amplitude_responses, prior_precision
 from nearfar.estimate.joint.problem import ComponentChoice
+from nearfar.illumination.frequencies import DC
 from nearfar.illumination.near_basis import NearBasis
+from nearfar.photometry.measure import measure
 from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.priors.fitted import PRIOR_SCALES
 from nearfar.priors.responses import response_prior
+from nearfar.rigs.simulated.camera import SimulatedCamera
+from nearfar.rigs.simulated.projector import SimulatedProjector
+from nearfar.rigs.simulated.rig import SimulatedRig
+from nearfar.scenes.cache import cached_scene
 from nearfar.scenes.hostile import hostile_transport
+from nearfar.workflow.acquire import acquire_in_memory
+from nearfar.workflow.diagnosis.left_out import STANDS_OUT
 from tests.estimate.joint.draws import (
     COMPONENT,
     FAR,
@@ -94,6 +105,40 @@ def test_rows_drawn_from_the_component_tell_their_scale(drawn, factor):
 
 def test_the_mean_of_nine_varies_by_the_margin(drawn):
     assert np.std(errors(drawn)) / 3 == pytest.approx(MARGIN, rel=0.3)
+
+
+@pytest.fixture(scope="module")
+def box():
+    plan, _ = choose_plan(Size(16, 16), 60, checks=0)
+    truth = cached_scene("cornell", Size(16, 16))
+    rig = SimulatedRig(truth, "cornell", SimulatedProjector(), SimulatedCamera(), 1.0, 0)
+    measurements = measure(acquire_in_memory(plan, rig))
+    return measurements, correspond_by_phase(measurements, pitch=1).q, plan.window
+
+
+def test_good_photos_are_foretold_as_well_as_expected(box):
+    found = errors_of_foretold(*box)
+    assert set(found) == set(box[0].basis.frequencies) - {DC}
+    assert 0.3 < np.median(list(found.values())) < 2
+    assert max(found.values()) < 3
+
+
+@pytest.mark.parametrize("place", [5, 12])
+def test_a_frequency_whose_photos_are_dimmed_stands_out(box, place):
+    measurements, q, window = box
+    basis = measurements.basis
+    dimmed = measurements.responses.copy()
+    dimmed[..., np.asarray(basis.index) == place] *= 0.5
+    found = errors_of_foretold(replace(measurements, responses=dimmed), q, window)
+    worst, second = sorted(found, key=found.get)[:-3:-1]
+    assert worst == basis.frequencies[place]
+    assert found[worst] > STANDS_OUT * found[second]
+
+
+def test_without_direct_light_nothing_is_known(box):
+    measurements, q, window = box
+    found = errors_of_foretold(measurements, np.full_like(q, np.nan), window)
+    assert np.isnan(list(found.values())).all()
 
 
 def test_neighbours_count_together_and_only_where_there_is_direct_light():

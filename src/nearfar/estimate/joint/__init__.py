@@ -2,9 +2,16 @@
 
 from nearfar.estimate.joint.estimate import (
     choose_components,
+    errors_of_foretold,
     estimate_by_sweeps,
     estimate_jointly,
 )
 from nearfar.estimate.joint.problem import Choices
 
-__all__ = ["Choices", "choose_components", "estimate_by_sweeps", "estimate_jointly"]
+__all__ = [
+    "Choices",
+    "choose_components",
+    "errors_of_foretold",
+    "estimate_by_sweeps",
+    "estimate_jointly",
+]

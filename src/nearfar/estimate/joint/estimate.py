@@ -29,7 +29,8 @@ from nearfar.estimate.joint.second_places import (
     without_second_places,
 )
 from nearfar.estimate.joint.shifts import moved_q, with_unshifted_light
-from nearfar.estimate.joint.sweep import sweep_once
+from nearfar.estimate.joint.sweep import squares_of_foretold, sweep_once
+from nearfar.illumination.frequencies import Frequency
 from nearfar.illumination.near_basis import NearBasis
 from nearfar.photometry.measurements import Measurements
 from nearfar.priors.fitted import LIT_COMPONENTS
@@ -144,6 +145,33 @@ def estimate_by_sweeps(
     every = slice(0, measurements.camera.height)
     problem, found, second, _ = _sweep(problem, every, sweeps, NO_CHOICES, lambda _share: None)
     return assemble(problem, found, far, np.ones_like(problem.pixels.white), second)
+
+
+def errors_of_foretold(
+    measurements: Measurements, correspondence: Floats, window: int
+) -> dict[Frequency, float]:
+    """Return for each measured frequency how far off its responses are from what others foretell.
+
+    Functions are of single projector pixels. A photo that is the only one of its pattern always
+    fits the transport that is estimated from it; this tells whether it fits the other photos.
+
+    Parameters
+    ----------
+    measurements, correspondence, window
+        As `estimate_jointly` takes them.
+
+    Returns
+    -------
+    dict
+        Mean square of the errors over their expected variance; of cosine and sine, the larger one.
+        About 1 if all is well, NaN where no camera pixel has direct light.
+    """
+    problem = _laid_out(measurements, correspondence, NearBasis(window, 1), "cpu")
+    squares, basis = squares_of_foretold(problem), problem.model.centred.basis
+    return {
+        frequency: float(squares[np.asarray(basis.index) == place].max())
+        for place, frequency in enumerate(basis.frequencies)
+    }
 
 
 def choose_components(

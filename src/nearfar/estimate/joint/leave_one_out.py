@@ -49,18 +49,37 @@ def mean_errors(
 
     Parameters
     ----------
+    batch, prior, scale, near_basis
+        As `standardised_errors` takes them.
+    weights : ndarray, shape (R,), float32
+        Of responses; they add up to 1.
+    """
+    xp = namespace(batch.responses)
+    sizes = xp.mean(xp.abs(standardised_errors(batch, prior, scale, near_basis)), axis=1)
+    found: Floats = product(sizes, weights[:, None])[:, 0] / MEAN_OF_NORMAL
+    return found
+
+
+def standardised_errors(
+    batch: PixelBatch, prior: ResponsePrior, scale: Floats, near_basis: NearBasis
+) -> Floats:
+    """Return the errors of foretold responses over their standard deviations.
+
+    Parameters
+    ----------
     batch : PixelBatch
         Camera pixels with direct light and one prior component.
     prior : ResponsePrior
         Of the component.
     scale : ndarray, shape (n,)
         Prior scales, as shares of white.
-    weights : ndarray, shape (R,), float32
-        Of responses; they add up to 1.
     near_basis : NearBasis
+
+    Returns
+    -------
+    ndarray, shape (n, channels, R), float32
     """
     xp = namespace(batch.responses)
-    columns = weights[:, None]
     squared = (scale[:, None] * batch.white)[..., None] ** 2
     precision = 1.0 / (squared * prior.eigenvalues + batch.noise[..., None] ** 2)
     y = product(batch.responses, prior.eigenvectors)
@@ -69,7 +88,7 @@ def mean_errors(
     before = nuisance.prior_precision(batch, near_basis)
     weighed_y = product(y * precision, transposed)
     information = product(precision, transposed**2)
-    found: Floats = xp.zeros(len(y), dtype=xp.float32, device=device(y))
+    found: Floats = xp.empty_like(y)
     for i in range(y.shape[1]):
         weighted = per_amplitude * precision[:, i, None]
         normal = xp.astype(weighted @ xp.permute_dims(per_amplitude, (0, 2, 1)), xp.float64)
@@ -81,8 +100,7 @@ def mean_errors(
         inverse = xp.linalg.inv(normal + before[:, i, :, None] * unit)
         lost = xp.sum(right * (xp.astype(inverse, xp.float32) @ right), axis=1)
         left = xp.maximum(information[:, i] - lost, LEAST_SHARE * information[:, i])
-        found += product(xp.abs(errors) / xp.sqrt(left), columns)[:, 0] / MEAN_OF_NORMAL
-    found /= y.shape[1]
+        found[:, i] = errors / xp.sqrt(left)
     return found
 
 

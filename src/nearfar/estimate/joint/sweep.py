@@ -21,7 +21,12 @@ from nearfar.estimate.joint.choose import choose
 from nearfar.estimate.joint.clipped import solve_clipped
 from nearfar.estimate.joint.clipped_windows import is_clipped, rounded_ratio
 from nearfar.estimate.joint.in_common import keep_common
-from nearfar.estimate.joint.leave_one_out import calibrated, mean_errors, weights_of
+from nearfar.estimate.joint.leave_one_out import (
+    calibrated,
+    mean_errors,
+    standardised_errors,
+    weights_of,
+)
 from nearfar.estimate.joint.neighbours import expect_each, expect_together
 from nearfar.estimate.joint.nuisance import COMMON_AMPLITUDES
 from nearfar.estimate.joint.pooled_choice import no_probabilities, pooled_choice
@@ -108,12 +113,62 @@ def _calibrated(
     problem: Problem, choice: ComponentChoice, parts: list[tuple[NDArray[np.int64], bool]]
 ) -> ComponentChoice:
     """Return a choice with larger scales where responses are foretold worse than expected."""
+    xp, white = namespace(problem.pixels.white), problem.pixels.white
+    errors: Floats = xp.full(len(white), xp.nan, dtype=xp.float32, device=device(white))
+    weights = weights_of(problem)
+
+    def work(of: PixelBatch, prior: ResponsePrior, scale: Floats) -> Floats:
+        return mean_errors(of, prior, scale, weights, problem.near_basis)
+
+    _fill_with_direct_light(errors, problem, choice, parts, work)
+    return calibrated(choice, errors, problem.measurements.camera)
+
+
+def squares_of_foretold(problem: Problem) -> Floats:
+    """Return mean squares of the standardised errors of foretold responses, (R,).
+
+    They are about 1 where the prior and the noise are as expected.
+
+    Parameters
+    ----------
+    problem : Problem
+        Where functions are of single projector pixels.
+
+    Returns
+    -------
+    ndarray, shape (R,)
+        Means over camera pixels with direct light and channels; NaN where there are none.
+    """
+    choice = sweep_once(problem, None, lambda _share: None).choices.of_error_bars
+    assert choice is not None
+    pixels = problem.pixels
+    number, _, count = pixels.responses.shape
+    xp = namespace(pixels.white)
+    squares: Floats = xp.full(
+        (number, count), xp.nan, dtype=xp.float32, device=device(pixels.white)
+    )
+
+    def work(of: PixelBatch, prior: ResponsePrior, scale: Floats) -> Floats:
+        errors = standardised_errors(of, prior, scale, problem.near_basis)
+        mean: Floats = xp.mean(errors**2, axis=1)
+        return mean
+
+    _fill_with_direct_light(squares, problem, choice, list(_parts(problem)), work)
+    known = fetch(squares)
+    known = known[np.isfinite(known).all(axis=1)]
+    return known.mean(axis=0) if len(known) else np.full(count, np.nan)
+
+
+def _fill_with_direct_light(
+    found: Floats,
+    problem: Problem,
+    choice: ComponentChoice,
+    parts: list[tuple[NDArray[np.int64], bool]],
+    of_alike: Callable[[PixelBatch, ResponsePrior, Floats], Floats],
+) -> None:
+    """Fill in values of camera pixels with direct light, those of one prior component at once."""
     pixels, model = problem.pixels, problem.model
     xp = namespace(pixels.white)
-    errors: Floats = xp.full(
-        len(pixels.white), xp.nan, dtype=xp.float32, device=device(pixels.white)
-    )
-    weights = weights_of(problem)
 
     def work(some: tuple[NDArray[np.int64], bool]) -> None:
         selected = beside(some[0], pixels.responses)
@@ -123,14 +178,9 @@ def _calibrated(
             if place >= len(LIT_COMPONENTS):
                 continue
             (alike,) = xp.nonzero(component == place)
-            of_some = batch.only(alike)
-            prior = model.priors[place]
-            errors[selected[alike]] = mean_errors(
-                of_some, prior, scale[alike], weights, problem.near_basis
-            )
+            found[selected[alike]] = of_alike(batch.only(alike), model.priors[place], scale[alike])
 
     on_device_of(pixels.white)(work, parts)
-    return calibrated(choice, errors, problem.measurements.camera)
 
 
 class _Sweep(NamedTuple):

@@ -41,6 +41,8 @@ from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
 
 # What a response that is not linear, or JPEG, looks like.
 OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
+# What single photos that do not fit make of others.
+OF_LIGHT = (ExposureChanged, LampFlickers)
 # Bend of the response that the sums of all inverse photos show, at least, and over its deviation.
 LEAST_SHARED_BEND, SURE_DEVIATIONS = 0.02, 5.0
 
@@ -140,6 +142,9 @@ def _what_does_not_fit(
         return odd
     if not found and not _bends_all_pairs(of_pairs, found):
         return [*compressed, *single.probable]
+    if single.stand_out and all(isinstance(each, OF_LIGHT) for each in found):
+        # The estimate bends to them, so that others look darker or brighter.
+        return [*compressed, *single.probable]
     # Black may well be at the lowest level; it is clipped if photos do not fit.
     response = [*compressed, *find_clipped_black(sample)]
     if not response and (encoding := name_encoding(sample)):
@@ -194,7 +199,7 @@ def _single_photos_of_pairs(transport: StoredTransport, sample: CameraSample) ->
     """
     photos = steady_pairs(sample)
     if not photos.unsaturated.any():
-        return SpoiltPhotos([], [])
+        return SpoiltPhotos([], [], stand_out=False)
     estimate = _estimate_of(transport, sample, photos)
     suspected = True if has_odd_pairs(photos) else None
     found = find_spoilt_photos(

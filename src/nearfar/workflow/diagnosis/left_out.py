@@ -11,7 +11,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.correspondence import correspond_by_phase
 from nearfar.errors import InputError
-from nearfar.estimate.joint import estimate_by_sweeps
+from nearfar.estimate.joint import errors_of_foretold, estimate_by_sweeps
 from nearfar.photometry.by_codes import responses_of_photos, weighing_of
 from nearfar.photometry.by_inverse import find_pairs
 from nearfar.photometry.measure import measure
@@ -22,6 +22,10 @@ from nearfar.workflow.diagnosis.misfit import PhotoFits, relight, serves
 
 # Photos of these purposes are not estimated from.
 HELD_OUT = ("check", "correspondence")
+# The photos of a frequency are foretold badly if the mean square of their errors is so many times
+# the expected one, and so many times what this percentage of all frequencies have at most: what
+# spoils all photos raises many. docs/decisions/0113 has what good captures reach.
+LEAST_ERROR, STANDS_OUT, USUAL_PERCENT = 3.5, 2.5, 90
 # Sweeps of the estimate.
 SWEEPS = 2
 # Times the noise that are counted while relit pictures take the place of codes' photos, round after
@@ -49,11 +53,46 @@ def estimate_without(
     keep[left_out] = False
     if fits.plan.is_by_codes:
         return _without_codes(fits, keep, known)
+    measurements = _measured(fits, keep)
+    return None if measurements is None else _estimate(fits.plan, measurements, known)
+
+
+def photos_not_foretold(fits: PhotoFits, good: Booleans, known: Floats) -> list[int]:
+    """Return good photos of frequencies that the photos of all others foretell badly.
+
+    Parameters
+    ----------
+    fits, good, known
+        As `estimate_without` takes them.
+
+    Returns
+    -------
+    list of int
+        Empty for codes, and for functions of several projector pixels, of which nothing is known.
+    """
+    plan = fits.plan
+    keep = good & ~serves(plan, *HELD_OUT)
+    if plan.is_by_codes or plan.pitch > 1 or (measurements := _measured(fits, keep)) is None:
+        return []
+    errors = errors_of_foretold(measurements, _q_of(plan, measurements, known), plan.window)
+    usual = np.percentile(list(errors.values()), USUAL_PERCENT)
+    # NaN stands out of nothing.
+    odd = {k for k, error in errors.items() if error > max(LEAST_ERROR, STANDS_OUT * usual)}
+    return [
+        number
+        for number, pattern in enumerate(plan.patterns)
+        if keep[number]
+        and isinstance(pattern, Sinusoid)
+        and (pattern.frequency in odd or -pattern.frequency in odd)
+    ]
+
+
+def _measured(fits: PhotoFits, keep: Booleans) -> Measurements | None:
+    """Measure responses by some photos; None if too few remain."""
     try:
-        measurements = measure(fits.without_drift.only(np.flatnonzero(_whole(fits.plan, keep))))
+        return measure(fits.without_drift.only(np.flatnonzero(_whole(fits.plan, keep))))
     except InputError:
         return None
-    return _estimate(fits.plan, measurements, known)
 
 
 def _whole(plan: Plan, keep: Booleans) -> Booleans:
@@ -94,11 +133,16 @@ def _without_codes(fits: PhotoFits, keep: Booleans, known: Floats) -> Transport 
 
 
 def _estimate(plan: Plan, measurements: Measurements, known: Floats) -> Transport:
-    try:
-        q = correspond_by_phase(measurements, pitch=plan.pitch).q
-    except InputError:
-        # The lowest frequencies, which place q, are among those that were left out.
-        q = known
+    q = _q_of(plan, measurements, known)
     return estimate_by_sweeps(
         measurements, q, plan.window, plan.far, pitch=plan.pitch, sweeps=SWEEPS
     )
+
+
+def _q_of(plan: Plan, measurements: Measurements, known: Floats) -> Floats:
+    """Return q as measured, or as it is known where too little was measured for it."""
+    try:
+        return correspond_by_phase(measurements, pitch=plan.pitch).q
+    except InputError:
+        # The lowest frequencies, which place q, are among those that were left out.
+        return known

@@ -1,10 +1,10 @@
 """Photos that do not fit the others, each explained by itself.
 
 A photo that spoils an estimate hides in it, because the estimate bends to it. So photos with large
-misfits are left out, the transport is estimated again without them, and they are compared with its
-pictures: under their own pattern, turned, under the patterns of other photos, in part under those,
-with other colours, or brighter or darker. Photos that fit well though they were left out are taken
-back.
+misfits are left out, and those of frequencies that all others foretell badly. The transport is
+estimated again without them, and they are compared with its pictures: under their own pattern,
+turned, under the patterns of other photos, in part under those, with other colours, or brighter or
+darker. Photos that fit well though they were left out are taken back.
 """
 
 from collections.abc import Mapping
@@ -34,7 +34,11 @@ from nearfar.workflow.diagnosis.explanations import (
     exposure_change,
     simplest,
 )
-from nearfar.workflow.diagnosis.left_out import HELD_OUT, estimate_without
+from nearfar.workflow.diagnosis.left_out import (
+    HELD_OUT,
+    estimate_without,
+    photos_not_foretold,
+)
 from nearfar.workflow.diagnosis.misfit import (
     LEAST_IN_SUM,
     PhotoFits,
@@ -66,10 +70,14 @@ class SpoiltPhotos(NamedTuple):
     probable : list of Spoilt
         Photos that are brighter or darker, or do not fit for no known reason. What spoils all
         photos may look like this as well.
+    stand_out : bool
+        Whether some are of frequencies that all others foretell badly, while the photos of most
+        frequencies fit.
     """
 
     certain: list[Spoilt]
     probable: list[Spoilt]
+    stand_out: bool
 
 
 def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None) -> SpoiltPhotos:
@@ -90,12 +98,19 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
     good = np.ones(len(fixed), dtype=bool)
     explained: dict[int, Explanation | None] = {}
     reasons = good & ~fixed if suspected is None else good & ~fixed & ~serves(plan, "check")
-    if not suspected and not _suspects(fits.misfit, reasons):
-        return SpoiltPhotos([], [])
-    for _ in range(ROUNDS):
+    strange = photos_not_foretold(fits, good, known)
+    if not suspected and not strange and not _suspects(fits.misfit, reasons):
+        return SpoiltPhotos([], [], stand_out=False)
+    stand_out = False
+    for turn in range(ROUNDS):
+        strange = strange if turn == 0 else photos_not_foretold(fits, good, known)
         suspects = _suspects(fits.misfit, good & ~fixed)
+        suspects += [number for number in strange if number not in suspects and not fixed[number]]
         without = estimate_without(fits, good, suspects, known) if suspects else None
-        found = _explain_all(fits, without, suspects, good) if without is not None else {}
+        if without is None:
+            break
+        found = _explain_all(fits, without, suspects, good, strange)
+        stand_out |= any(number in found for number in strange)
         if not found:
             break
         explained |= found
@@ -108,7 +123,7 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
         explained |= _explain_by_turns(fits, good, explained, known)
     certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     probable = {n: e for n, e in explained.items() if n not in certain}
-    return SpoiltPhotos(_as_faults(certain), _as_faults(probable))
+    return SpoiltPhotos(_as_faults(certain), _as_faults(probable), stand_out)
 
 
 def _suspects(misfit: Floats, tried: Booleans) -> list[int]:
@@ -183,7 +198,11 @@ def _is_shared(fits: PhotoFits, change: Explanation, number: int, good: Booleans
 
 
 def _explain_all(
-    all_fits: PhotoFits, without: Transport, suspects: list[int], good: Booleans
+    all_fits: PhotoFits,
+    without: Transport,
+    suspects: list[int],
+    good: Booleans,
+    strange: list[int],
 ) -> dict[int, Explanation | None]:
     """Return the explanations of the suspects that are spoilt; None for those without one.
 
@@ -195,11 +214,14 @@ def _explain_all(
     suspects : list of int
     good : ndarray of bool, shape (photos,)
         Photos that are not explained yet, suspects among them.
+    strange : list of int
+        Those suspects that all other photos foretell badly.
     """
     fits = fit_photos(all_fits.without_drift, without)
     own = {number: float(fits.misfit[number]) for number in suspects}
     usual = max(1.0, float(np.median(list(own.values()))))
     found: dict[int, Explanation | None] = {}
+    surprises = []
     for number in suspects:
         if own[number] < SUSPECT_MISFIT:
             continue
@@ -207,8 +229,9 @@ def _explain_all(
         if best.explains(own[number]):
             if not _is_shared(fits, best, number, good):
                 found[number] = best
-        elif own[number] > UNEXPLAINED_RATIO * usual and _surprises(fits, without, number):
-            found[number] = None
+        elif number in strange or own[number] > UNEXPLAINED_RATIO * usual:
+            surprises.append(number)
+    found |= dict.fromkeys((n for n in surprises if _surprises(fits, without, n)), None)
     return found
 
 

@@ -27,15 +27,17 @@ def shot():
     return shoot("cornell", Size(16, 16), 60)
 
 
+def found_in(photos, shot, folder, **options):
+    """What spoils photos of a shot's plan; the capture and its transport are kept in a folder."""
+    capture = write_capture(shot.plan, folder / "c.zarr", list(photos), full_scale=shot.full_scale)
+    reconstruct_to_file(capture, folder / "t.zarr")
+    return find_what_spoils(open_transport(folder / "t.zarr"), capture, **options)
+
+
 @pytest.fixture(scope="module")
 def diagnosed(shot, tmp_path_factory):
     def diagnose(photos, **options):
-        folder = tmp_path_factory.mktemp("spoilt")
-        capture = write_capture(
-            shot.plan, folder / "c.zarr", list(photos), full_scale=shot.full_scale
-        )
-        reconstruct_to_file(capture, folder / "t.zarr")
-        return find_what_spoils(open_transport(folder / "t.zarr"), capture, **options)
+        return found_in(photos, shot, tmp_path_factory.mktemp("spoilt"), **options)
 
     return diagnose
 
@@ -85,22 +87,14 @@ def test_highlights_that_are_compressed_bend_the_sums_of_all_check_photos(tmp_pa
     # The estimate bends with them, and misfits look like exposure; pairs tell.
     shot = shoot("cornell", Size(32, 32), 90)
     photos = SPOILS["highlights compressed"].apply(shot, 0.6)
-    capture = write_capture(
-        shot.plan, tmp_path / "c.zarr", list(photos), full_scale=shot.full_scale
-    )
-    reconstruct_to_file(capture, tmp_path / "t.zarr")
-    assert find_what_spoils(open_transport(tmp_path / "t.zarr"), capture) == [NotLinear("")]
+    assert found_in(photos, shot, tmp_path) == [NotLinear("")]
 
 
 def test_what_all_camera_pixels_see_alike_is_not_taken_for_light(tmp_path):
     # A tenth of a projector pixel is little, and at this size the transport itself fits much of it.
     shot = shoot("cornell", Size(64, 64), 117)
     photos = SPOILS["projector moved, pixels"].apply(shot, 0.1)
-    capture = write_capture(
-        shot.plan, tmp_path / "c.zarr", list(photos), full_scale=shot.full_scale
-    )
-    reconstruct_to_file(capture, tmp_path / "t.zarr")
-    (found,) = find_what_spoils(open_transport(tmp_path / "t.zarr"), capture)
+    (found,) = found_in(photos, shot, tmp_path)
     assert found.cause in SPOILS["projector moved, pixels"].causes
 
 
@@ -183,11 +177,7 @@ def test_photos_that_the_estimate_bends_to_are_named(shot, spoilt_by, name, stre
 def test_photos_with_a_shadow_are_named(tmp_path):
     shot = shoot("cornell", Size(32, 32), 90)
     photos = SPOILS["shadow in three photos"].apply(shot, 0.5)
-    capture = write_capture(
-        shot.plan, tmp_path / "c.zarr", list(photos), full_scale=shot.full_scale
-    )
-    reconstruct_to_file(capture, tmp_path / "t.zarr")
-    found = find_what_spoils(open_transport(tmp_path / "t.zarr"), capture)
+    found = found_in(photos, shot, tmp_path)
     assert found == [PhotosMisfit(tuple(shot.chosen(3)))]
 
 

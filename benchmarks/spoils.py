@@ -348,7 +348,7 @@ def _(shot: Shot, share: float) -> Photos:
     return shot.again(shaded)
 
 
-@spoil("patterns mixed in two photos", ("unknown", "exposure"), 0.1, 0.3)
+@spoil("patterns mixed in two photos", ("torn", "unknown", "exposure"), 0.1, 0.3)
 def _(shot: Shot, share: float) -> Photos:
     def mixed(photo: Photos, number: int) -> Photos:
         return shot.counts((1 - share) * photo + share * shot.photos[number - 1].astype(float))
@@ -360,6 +360,79 @@ def _(shot: Shot, share: float) -> Photos:
 def _(shot: Shot, share: float) -> Photos:
     gains = 1 + share * np.random.default_rng(5).standard_normal(len(shot.photos))
     return shot.counts(shot.photos * gains[:, None, None, None])
+
+
+@spoil("lamp dimmer from the middle on", ("exposure",), 0.03, 0.05, 0.1)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    photos[shot.half :] *= 1 - share
+    return shot.counts(photos)
+
+
+@spoil("exposure by the mean of a photo", ("exposure",), 0.02, 0.04, 0.08)
+def _(shot: Shot, share: float) -> Photos:
+    means = shot.photos.mean(axis=(1, 2, 3), keepdims=True) / shot.photos.mean()
+    return shot.counts(shot.photos * (means + 0.05) ** -share)
+
+
+@spoil("black level of each photo", ("exposure",), 0.005, 0.01, 0.02)
+def _(shot: Shot, share: float) -> Photos:
+    levels = share * shot.full_scale * np.random.default_rng(6).random(len(shot.photos))
+    return shot.counts(shot.photos + levels[:, None, None, None])
+
+
+@spoil("bands of mains light", ("exposure",), 0.01, 0.02, 0.05)
+def _(shot: Shot, share: float) -> Photos:
+    phases = np.random.default_rng(7).random(len(shot.photos))
+    rows = np.linspace(0, 2.3, shot.photos.shape[1])
+    bands = 1 + share * np.sin(2 * np.pi * np.add.outer(phases, rows))
+    black = shot.photos[0].astype(float)
+    return shot.counts(black + (shot.photos - black) * bands[..., None, None])
+
+
+@spoil("offsets of the camera's rows", ("exposure",), 0.002, 0.004, 0.008)
+def _(shot: Shot, share: float) -> Photos:
+    offsets = np.random.default_rng(8).standard_normal(shot.photos.shape[:2])
+    return shot.counts(shot.photos + share * shot.full_scale * offsets[..., None, None])
+
+
+@spoil("pixels that flash", ("unknown",), 0.001, 0.003, 0.01)
+def _(shot: Shot, share: float) -> Photos:
+    rng, photos = np.random.default_rng(9), shot.photos.astype(float)
+    flashes = rng.random(photos.shape[:3]) < share
+    photos[flashes] += 0.3 * shot.full_scale * rng.random((int(flashes.sum()), 1))
+    return shot.counts(photos)
+
+
+@spoil("dust from the middle on", ("moved",), 0.05, 0.1, 0.3)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    down, across = np.indices(photos.shape[1:3]) / np.array(photos.shape[1:3])[:, None, None]
+    for place in ((0.3, 0.3), (0.6, 0.5), (0.5, 0.7)):
+        distance = np.hypot(down - place[0], across - place[1])
+        photos[shot.half :] *= (1 - share * np.exp(-((distance / 0.07) ** 2)))[..., None]
+    return shot.counts(photos)
+
+
+@spoil("a window over six photos", ("unknown",), 1)
+def _(shot: Shot, _: float) -> Photos:
+    height, width = shot.plan.projector
+
+    def covered(pattern: NDArray[np.uint8], number: int) -> NDArray[np.floating]:
+        light = pattern.astype(float)
+        if shot.half + 3 <= number < shot.half + 9:
+            light[-height // 4 : -height // 10, -width // 3 : -width // 16] = 255
+        return light
+
+    return shot.again(covered)
+
+
+@spoil("room light from the middle on", ("exposure", "lamp"), 0.02, 0.05)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    uneven = np.linspace(0.1, 0.9, photos.shape[2])[:, None]
+    photos[shot.half :] += share * shot.full_scale * uneven
+    return shot.counts(photos)
 
 
 @spoil("room light for five photos", ("exposure", "lamp"), 0.02, 0.03, 0.05)

@@ -124,6 +124,47 @@ class PhotosTorn:
 
 
 @dataclass(frozen=True)
+class PhotosMixed:
+    """Photos that were exposed under two patterns, one after the other.
+
+    Attributes
+    ----------
+    photos : tuple of int
+    others : tuple of int
+        For each photo, the number of the one whose pattern it shows too.
+    share : float
+        Of the exposure that was under the other pattern, at most.
+    """
+
+    photos: tuple[int, ...]
+    others: tuple[int, ...]
+    share: float
+    cause: ClassVar[Cause] = "torn"
+
+    def __str__(self) -> str:
+        upto = "" if len(self.photos) == 1 else "up to "
+        return (
+            f"{_photos(self.photos)} {_is(self.photos)} mixed with {upto}{self.share:.0%} of the "
+            f"pattern of photo {listed_numbers(self.others)}: the pattern changed during the "
+            f"exposure; shoot again with more time between them."
+        )
+
+
+@dataclass(frozen=True)
+class PhotosDark:
+    """Photos that show no light of the projector."""
+
+    photos: tuple[int, ...]
+    cause: ClassVar[Cause] = "order"
+
+    def __str__(self) -> str:
+        return (
+            f"{_photos(self.photos)} show{'s' if len(self.photos) == 1 else ''} no more than black:"
+            f" the projector was dark; shoot {'it' if len(self.photos) == 1 else 'them'} again."
+        )
+
+
+@dataclass(frozen=True)
 class ColoursSwapped:
     """Photos whose colour channels are in another order than those of the others."""
 
@@ -166,6 +207,56 @@ class ExposureChanged:
 
 
 @dataclass(frozen=True)
+class LampJumped:
+    """Lamp or exposure that changed at once, between two photos of white.
+
+    Drift between these two is taken to be steady, so that the photos between them are off.
+
+    Attributes
+    ----------
+    after, before : int
+        Numbers of the photos of white between which it was.
+    gain : float
+        The change, as a share.
+    """
+
+    after: int
+    before: int
+    gain: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"the lamp or the exposure changed at once, by {self.gain:+.1%}, between photos "
+            f"{self.after} and {self.before}: keep it steady, and shoot again."
+        )
+
+
+@dataclass(frozen=True)
+class AmbientJumped:
+    """Ambient light that changed at once, between two photos of black.
+
+    Attributes
+    ----------
+    after, before : int
+        Numbers of the photos of black between which it was.
+    offset : float
+        The change, as a share of white.
+    """
+
+    after: int
+    before: int
+    offset: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"ambient light changed at once, by {self.offset:+.1%} of white, between photos "
+            f"{self.after} and {self.before}: shut out other light, and shoot again."
+        )
+
+
+@dataclass(frozen=True)
 class LampFlickers:
     """Brightness that changes from photo to photo.
 
@@ -182,6 +273,131 @@ class LampFlickers:
         return (
             f"brightness changes by {self.deviation:.1%} from photo to photo: turn off automatic "
             f"exposure and contrast, and expose for a whole number of the projector's refreshes."
+        )
+
+
+@dataclass(frozen=True)
+class FollowsPattern:
+    """Brightness that depends on how bright the pattern is as a whole.
+
+    Attributes
+    ----------
+    gain : float
+        Of photos of white, over that of the others, as a share.
+    """
+
+    gain: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"photos of white are off by {self.gain:+.1%} beside those of darker patterns: turn "
+            f"off the camera's automatic exposure and the projector's dynamic contrast."
+        )
+
+
+@dataclass(frozen=True)
+class AmbientFlickers:
+    """Ambient light, or the camera's black level, that changes from photo to photo.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation, as a share of white.
+    """
+
+    deviation: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"ambient light, or the camera's black level, changes by {self.deviation:.1%} of white "
+            f"from photo to photo: shut out other light, and turn off automatic black level and "
+            f"contrast."
+        )
+
+
+@dataclass(frozen=True)
+class RowsFlicker:
+    """Rows of the camera that are brighter or darker in each photo, as bands of light.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the mean of a row, as a share of white.
+    """
+
+    deviation: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"rows of the camera change by {self.deviation:.1%} of white from photo to photo: the "
+            f"light flickers while the camera reads row after row; expose for a whole number of "
+            f"periods of the mains and of the projector's refreshes."
+        )
+
+
+@dataclass(frozen=True)
+class NoisyRows:
+    """Rows of the camera that read more or less in each photo, in the dark too.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the mean of a row, as a share of white.
+    """
+
+    deviation: float
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        return (
+            f"rows of the camera change by {self.deviation:.1%} of white from photo to photo, in "
+            f"the dark too: it is noise of the camera, or other light that flickers; shut out "
+            f"other light, and average several exposures."
+        )
+
+
+@dataclass(frozen=True)
+class PixelsFlash:
+    """Camera pixels that are far brighter or darker in single photos.
+
+    Attributes
+    ----------
+    share : float
+        Of all camera pixels, in a photo.
+    """
+
+    share: float
+    cause: ClassVar[Cause] = "unknown"
+
+    def __str__(self) -> str:
+        return (
+            f"{100 * self.share:.2g}% of the camera pixels flash in each photo, other ones each "
+            f"time: cool the camera, expose more briefly, or average several exposures."
+        )
+
+
+@dataclass(frozen=True)
+class SceneChanged:
+    """Photos of white that differ before and after a moment, in parts of the picture.
+
+    Attributes
+    ----------
+    after, before : int
+        Numbers of the photos of white between which it was.
+    """
+
+    after: int
+    before: int
+    cause: ClassVar[Cause] = "moved"
+
+    def __str__(self) -> str:
+        return (
+            f"parts of white look different from photo {self.before} on than up to photo "
+            f"{self.after}: something moved, dust or a shadow fell on it, or the lens changed; "
+            f"shoot again from photo {self.after} on, with all at rest."
         )
 
 
@@ -339,9 +555,19 @@ Spoilt = (
     ShowsOtherPattern
     | PhotosTurned
     | PhotosTorn
+    | PhotosMixed
+    | PhotosDark
     | ColoursSwapped
     | ExposureChanged
+    | LampJumped
+    | AmbientJumped
     | LampFlickers
+    | FollowsPattern
+    | AmbientFlickers
+    | RowsFlicker
+    | NoisyRows
+    | PixelsFlash
+    | SceneChanged
     | Moved
     | BlackClipped
     | WhiteClipped

@@ -122,6 +122,11 @@ def is_reference(pattern: Pattern) -> bool:
     return isinstance(pattern, Sinusoid) and pattern.frequency == DC
 
 
+def is_black(pattern: Pattern) -> bool:
+    """Return whether a pattern is black."""
+    return isinstance(pattern, Sinusoid) and pattern.frequency == DC and pattern.inverse
+
+
 def check_lights(plan: Plan) -> list[CheckLight]:
     """Return the check patterns of a plan with the numbers of their photos."""
     found: dict[Pattern, tuple[list[int], list[int]]] = {}

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
-from nearfar.decibels import in_words
+from nearfar.decibels import ROUNDING, in_words
 
 Grade = Literal["good", "doubtful", "wrong"]
 
@@ -95,10 +95,12 @@ class KeptVerdict:
             planned = f"{lowest:.0f} to {highest:.0f} dB under pictures"
         if self.held_out_snr is None:
             return f"The plan was chosen for {planned}." if planned else ""
+        noise = self.noise_snr
+        is_noise_told = noise is not None and noise <= ROUNDING
         beside = [
             *([] if self.expected_snr is None else [f"{self.expected_snr:.1f} dB expected"]),
             *([f"planned for {planned}"] if planned else []),
-            *([] if self.noise_snr is None else [f"noise alone allows {self.noise_snr:.1f} dB"]),
+            *([f"noise alone allows {noise:.1f} dB"] if is_noise_told else []),
         ]
         widened = ""
         if self.widening > 1:
@@ -109,7 +111,7 @@ class KeptVerdict:
         is_hidden = "not-linear" in self.causes and self.checked_by == PATTERNS_SHOWN
         others = " Lights of other levels may be off by far more." if is_hidden else ""
         return (
-            f"Relit {self.checked_by} are off by {100 * 10 ** (-self.held_out_snr / 20):.2g} % "
+            f"Relit {self.checked_by} are off by {_percent(10 ** (-self.held_out_snr / 20))} "
             f"(held-out SNR_b {held_out}){widened}.{others}"
         )
 
@@ -132,6 +134,11 @@ class KeptVerdict:
 
     def __str__(self) -> str:
         return " ".join([f"{self.grade}:", *self.sentences, self.summary]).rstrip()
+
+
+def _percent(share: float) -> str:
+    """Return a share in percent, of two digits at least."""
+    return f"{100 * share:.2g} %" if share < 1 - 0.005 else f"{100 * share:.0f} %"
 
 
 def verdict_to_json(verdict: KeptVerdict) -> dict[str, Any]:

@@ -9,7 +9,19 @@ from benchmarks.spoils import SPOILS, shoot
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
-from nearfar.faults.of_photos import NotLinear, PhotosMisfit, ShowsOtherPattern
+from nearfar.faults.of_photos import (
+    AmbientFlickers,
+    FollowsPattern,
+    LampJumped,
+    NoisyRows,
+    NotLinear,
+    PhotosDark,
+    PhotosMisfit,
+    PhotosMixed,
+    RowsFlicker,
+    SceneChanged,
+    ShowsOtherPattern,
+)
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
 from nearfar.plan import Sinusoid
 from nearfar.plan.checks import is_reference
@@ -76,11 +88,74 @@ def test_good_photos_are_not_accused(spoilt_by):
         ("one black under room light", 0.05),
         ("one white brighter", 0.1),
         ("a hand before one white", 1.0),
+        ("pixels that flash", 0.01),
     ],
 )
 def test_what_spoils_photos_is_named(spoilt_by, name, strength):
     found = spoilt_by(name, strength)
     assert found[0].cause in SPOILS[name].causes, "; ".join(map(str, found))
+
+
+@pytest.mark.parametrize(
+    ("name", "strength", "kind"),
+    [
+        ("black level of each photo", 0.005, AmbientFlickers),
+        ("black level of each photo", 0.02, AmbientFlickers),
+        ("bands of mains light", 0.02, RowsFlicker),
+        ("offsets of the camera's rows", 0.004, NoisyRows),
+        ("lamp dimmer from the middle on", 0.05, LampJumped),
+        ("dust from the middle on", 0.1, SceneChanged),
+    ],
+)
+def test_what_looks_like_a_response_that_is_not_linear_is_named(spoilt_by, name, strength, kind):
+    (found,) = spoilt_by(name, strength)
+    assert isinstance(found, kind)
+
+
+@pytest.mark.parametrize("name", ["lamp dimmer from the middle on", "dust from the middle on"])
+def test_what_changed_at_once_did_so_between_two_whites(shot, spoilt_by, name):
+    (found,) = spoilt_by(name, 0.1)
+    assert found.after < shot.half <= found.before
+
+
+@pytest.mark.parametrize(
+    ("name", "strength", "expected"),
+    [
+        ("exposure by the mean of a photo", 0.04, FollowsPattern),
+        ("gamma", 1.04, NotLinear),
+        ("sRGB encoding, in part", 0.1, NotLinear),
+    ],
+)
+def test_automatic_exposure_is_told_from_a_bend_by_half_screens(tmp_path, name, strength, expected):
+    shot = shoot("cornell", Size(24, 24), 80)
+    (found,) = found_in(SPOILS[name].apply(shot, strength), shot, tmp_path)
+    assert isinstance(found, expected)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_photos_exposed_under_two_patterns_are_told_by_how_much(shot, spoilt_by, share):
+    (found,) = spoilt_by("patterns mixed in two photos", share)
+    assert isinstance(found, PhotosMixed)
+    assert list(found.photos) == shot.chosen(2)
+    assert [photo - other for photo, other in zip(found.photos, found.others, strict=True)] == [
+        1,
+        1,
+    ]
+    assert found.share == pytest.approx(share, abs=0.02)
+
+
+def test_photos_of_a_dark_projector_are_no_other_order(shot, spoilt_by):
+    assert spoilt_by("photos of black", 2) == [PhotosDark(tuple(shot.chosen(2)))]
+
+
+def test_photos_with_a_window_over_a_part_are_named(tmp_path):
+    # It covers little of the picture: the errors of all camera pixels hardly grow.
+    shot = shoot("cornell", Size(32, 32), 90)
+    photos = SPOILS["a window over six photos"].apply(shot, 1)
+    (found,) = found_in(photos, shot, tmp_path)
+    assert isinstance(found, PhotosMisfit)
+    assert set(found.photos) <= set(range(shot.half + 3, shot.half + 9))
+    assert len(found.photos) >= 4
 
 
 def test_highlights_that_are_compressed_bend_the_sums_of_all_check_photos(tmp_path):

@@ -7,6 +7,7 @@ from nearfar.faults.of_photos import (
     LampFlickers,
     Moved,
     NotLinear,
+    PhotosMisfit,
     PhotosTurned,
     ShowsOtherPattern,
 )
@@ -167,6 +168,41 @@ def test_faults_of_photos_are_reasons(faults, spoilt, expected):
     assert verdict.held_out == GOOD
     for each, reason in zip(spoilt, verdict.reasons, strict=False):
         assert reason.sentence == str(each)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "grade", "said"),
+    [
+        (PhotosTurned((7,), "mirrored left to right"), "doubtful", "It is a check photo"),
+        (ShowsOtherPattern((7, 8), (8, 7)), "doubtful", "They are check photos"),
+        (ShowsOtherPattern((7, 9), (9, 7)), "wrong", ""),
+        # It may fit badly because the transport is wrong.
+        (PhotosMisfit((7,)), "doubtful", ""),
+    ],
+)
+def test_no_transport_is_wrong_for_check_photos_of_something_else(spoilt, grade, said):
+    verdict = judge(GOOD, [], [spoilt], checks=[7, 8])
+    assert (verdict.grade, verdict.causes) == (grade, (spoilt.cause,))
+    assert verdict.reasons[0].sentence.removeprefix(str(spoilt)).strip().startswith(said)
+    assert ("check photo" in str(verdict)) == bool(said)
+
+
+def test_spoilt_check_photos_hide_no_other_reason():
+    turned = PhotosTurned((7,), "mirrored left to right")
+    verdict = judge(HeldOut((at(32, 5.0),)), [], [turned], checks=[7])
+    assert verdict.causes == ("model", "turned")
+
+
+@pytest.mark.parametrize(("decibels", "share"), [(40, "1 %"), (20.1, "9.9 %"), (-2, "126 %")])
+def test_errors_are_said_in_plain_numbers(decibels, share):
+    assert f"are off by {share} (" in str(judge(HeldOut((at(decibels),)), []))
+
+
+def test_what_noise_allows_is_said_if_there_is_noise():
+    error = SIGNAL / 10**3.2
+    for unmeasured, is_said in ((0.5 * error, True), (error, False)):
+        light = held_out_light(error, error, unmeasured=unmeasured)
+        assert ("noise alone allows" in str(judge(HeldOut((light,)), []))) == is_said
 
 
 def test_a_cause_that_is_found_twice_is_one_reason():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
+from nearfar.capture.writing import write_capture
 from nearfar.correspondence import Correspondence
 from nearfar.plan import paper_plan
 from nearfar.plan.checks import check_lights
@@ -89,6 +90,31 @@ def test_noise_allows_what_photos_without_it_reach_beyond(reconstructed):
     said = np.mean([10 ** (-light.noise_snr / 10) for light in noisy.lights])
     assert decibels(said, caused) == pytest.approx(0.0, abs=2.0)
     assert noisy.expected_snr < noisy.noise_snr < quiet.noise_snr - 10
+
+
+@pytest.mark.parametrize(("photos", "lights_left"), [(80, 1), (50, 0)])
+def test_check_photos_of_something_else_tell_nothing(reconstructed, tmp_path, photos, lights_left):
+    capture, stored = reconstructed(photos=photos)
+    values = capture.read(range(len(capture.plan.patterns)), slice(None))
+    light = next(each for each in check_lights(capture.plan) if not each.pattern.inverse)
+    (number,) = light.photos
+    values = np.rint(values * capture.full_scale).astype(np.uint16)
+    values[number] = values[number, ::-1, ::-1]
+    spoilt = write_capture(
+        capture.plan, tmp_path / "c.zarr", list(values), full_scale=capture.full_scale
+    )
+    reconstruct_to_file(spoilt, tmp_path / "t.zarr")
+    verdict = judge_reconstruction(open_transport(tmp_path / "t.zarr"), spoilt)
+    good = judge_reconstruction(stored, capture)
+    assert verdict.grade == "doubtful"
+    assert "turned" in verdict.causes
+    if lights_left:
+        assert len(verdict.held_out.lights) == len(good.held_out.lights) - 1 == lights_left
+        assert verdict.kept.widening < 2
+        assert verdict.held_out.snr == pytest.approx(good.held_out.snr, abs=3)
+    else:
+        assert verdict.held_out is None
+        assert "every check photo" in str(verdict)
 
 
 def test_photos_as_far_off_as_expected_are_not_searched(reconstructed, monkeypatch):

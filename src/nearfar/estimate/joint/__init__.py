@@ -6,12 +6,15 @@ from nearfar.estimate.joint.estimate import (
     estimate_by_sweeps,
     estimate_jointly,
 )
+from nearfar.estimate.joint.foretold import ErrorsOfForetold, means_of_blocks
 from nearfar.estimate.joint.problem import Choices
 
 __all__ = [
     "Choices",
+    "ErrorsOfForetold",
     "choose_components",
     "errors_of_foretold",
     "estimate_by_sweeps",
     "estimate_jointly",
+    "means_of_blocks",
 ]

@@ -18,6 +18,7 @@ from nearfar.estimate.joint.assemble import assemble
 from nearfar.estimate.joint.batch import AllPixels
 from nearfar.estimate.joint.chessboard import Part, every_choice, part_of_sweep
 from nearfar.estimate.joint.footprint import VOTING_ROWS, footprint_boxes
+from nearfar.estimate.joint.foretold import ErrorsOfForetold, summed_up
 from nearfar.estimate.joint.half_sweep import sweep_half
 from nearfar.estimate.joint.own_footprint import own_footprints
 from nearfar.estimate.joint.problem import Choices, ComponentChoice, EstimatedRows, Problem, lay_out
@@ -149,7 +150,7 @@ def estimate_by_sweeps(
 
 def errors_of_foretold(
     measurements: Measurements, correspondence: Floats, window: int
-) -> dict[Frequency, float]:
+) -> dict[Frequency, ErrorsOfForetold]:
     """Return for each measured frequency how far off its responses are from what others foretell.
 
     Functions are of single projector pixels. A photo that is the only one of its pattern always
@@ -162,16 +163,13 @@ def errors_of_foretold(
 
     Returns
     -------
-    dict
-        Mean square of the errors over their expected variance; of cosine and sine, the larger one.
-        About 1 if all is well, NaN where no camera pixel has direct light.
+    dict of ErrorsOfForetold
+        Of cosine and sine, the larger one.
     """
     problem = _laid_out(measurements, correspondence, NearBasis(window, 1), "cpu")
     squares, basis = squares_of_foretold(problem), problem.model.centred.basis
-    return {
-        frequency: float(squares[np.asarray(basis.index) == place].max())
-        for place, frequency in enumerate(basis.frequencies)
-    }
+    errors = summed_up(squares, np.asarray(basis.index), measurements.camera)
+    return dict(zip(basis.frequencies, errors, strict=True))
 
 
 def choose_components(

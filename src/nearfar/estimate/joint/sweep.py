@@ -125,9 +125,9 @@ def _calibrated(
 
 
 def squares_of_foretold(problem: Problem) -> Floats:
-    """Return mean squares of the standardised errors of foretold responses, (R,).
+    """Return squares of the standardised errors of foretold responses.
 
-    They are about 1 where the prior and the noise are as expected.
+    They are about 1 on average where the prior and the noise are as expected.
 
     Parameters
     ----------
@@ -136,8 +136,8 @@ def squares_of_foretold(problem: Problem) -> Floats:
 
     Returns
     -------
-    ndarray, shape (R,)
-        Means over camera pixels with direct light and channels; NaN where there are none.
+    ndarray, shape (number, R)
+        Means over channels; NaN at camera pixels without direct light.
     """
     choice = sweep_once(problem, None, lambda _share: None).choices.of_error_bars
     assert choice is not None
@@ -154,9 +154,7 @@ def squares_of_foretold(problem: Problem) -> Floats:
         return mean
 
     _fill_with_direct_light(squares, problem, choice, list(_parts(problem)), work)
-    known = fetch(squares)
-    known = known[np.isfinite(known).all(axis=1)]
-    return known.mean(axis=0) if len(known) else np.full(count, np.nan)
+    return np.asarray(fetch(squares))
 
 
 def _fill_with_direct_light(

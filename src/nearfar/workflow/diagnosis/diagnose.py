@@ -7,15 +7,27 @@ import numpy as np
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_by_sweeps
-from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved, NotLinear, Spoilt
+from nearfar.faults.of_photos import (
+    AmbientFlickers,
+    ExposureChanged,
+    LampFlickers,
+    Moved,
+    NotLinear,
+    Spoilt,
+)
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.diagnosis.bend_of_pairs import Bend, bend_of_pairs
+from nearfar.workflow.diagnosis.changed_references import (
+    find_changed_references,
+    find_flashing_pixels,
+)
 from nearfar.workflow.diagnosis.clipped import find_clipped_black, find_clipped_white
 from nearfar.workflow.diagnosis.compression import find_compression
+from nearfar.workflow.diagnosis.following import find_following_of_pattern
 from nearfar.workflow.diagnosis.incomplete import find_incomplete
 from nearfar.workflow.diagnosis.inverse_pairs import (
     are_linear,
@@ -23,6 +35,7 @@ from nearfar.workflow.diagnosis.inverse_pairs import (
     has_odd_pairs,
     steady_pairs,
 )
+from nearfar.workflow.diagnosis.jumps import name_jumps
 from nearfar.workflow.diagnosis.left_out import SWEEPS
 from nearfar.workflow.diagnosis.misfit import (
     SteadyPhotos,
@@ -138,22 +151,34 @@ def _what_does_not_fit(
     found = find_changes(equations, misfit, references.whites, inverse_photos(plan), of_pairs)
     # Others look spoilt because the drift is told by these, unless these moved with others.
     odd = find_odd_references(sample.photos, references)
+    if not compressed and (flashing := find_flashing_pixels(photos, sample.photos, references)):
+        odd = [*flashing]
     if odd and not any(isinstance(each, Moved) for each in found):
         return odd
-    if not found and not _bends_all_pairs(of_pairs, found):
-        return [*compressed, *single.probable]
-    if single.stand_out and all(isinstance(each, OF_LIGHT) for each in found):
-        # The estimate bends to them, so that others look darker or brighter.
-        return [*compressed, *single.probable]
+    if found and isinstance(found[0], Moved):
+        # What moved makes photos brighter or darker.
+        found = [each for each in found if not isinstance(each, (*OF_LIGHT, AmbientFlickers))]
+    if changed := find_changed_references(photos, references):
+        # It makes other photos brighter or darker, too, and bends their sums. Ambient light that
+        # flickers makes photos of white differ.
+        surer = [each for each in found if isinstance(each, (Moved, AmbientFlickers))]
+        return [*compressed, *find_clipped_black(sample), *(surer or changed)]
+    bends = _bends_all_pairs(of_pairs, found)
+    # The estimate bends to single photos that stand out, so that others look darker or brighter.
+    is_of_single = single.stand_out and all(isinstance(each, OF_LIGHT) for each in found)
+    if is_of_single or not (found or bends):
+        return [*compressed, *name_jumps(single.probable, sample.photos, references)]
     # Black may well be at the lowest level; it is clipped if photos do not fit.
-    response = [*compressed, *find_clipped_black(sample)]
+    response: list[Spoilt] = [*compressed, *find_clipped_black(sample)]
     if not response and (encoding := name_encoding(sample)):
         response = [NotLinear(encoding)]
-    elif not response and _bends_all_pairs(of_pairs, found):
+    elif not response and (bends or any(isinstance(each, NotLinear) for each in found)):
+        response = [*find_following_of_pattern(fits, references)]
+    if not response and bends:
         response = [NotLinear("")]
     if response:
         found = [each for each in found if not isinstance(each, OF_RESPONSE)]
-    return [*response, *found]
+    return [*response, *name_jumps(found, sample.photos, references)]
 
 
 def _bends_all_pairs(of_pairs: Bend | None, found: Sequence[Spoilt]) -> bool:

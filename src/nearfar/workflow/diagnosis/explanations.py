@@ -12,6 +12,7 @@ import numpy as np
 
 from nearfar.arrays import Floats
 from nearfar.plan import Plan
+from nearfar.plan.checks import is_reference
 from nearfar.workflow.diagnosis.misfit import LEAST_IN_SUM, SMALLEST_CHANGE, PhotoFits, mean_white
 
 # A photo is suspect above this misfit, in multiples of the usual one, which is at least 1.
@@ -38,7 +39,7 @@ class Explanation:
     Attributes
     ----------
     what : str
-        "order", "turned", "torn", "interlaced", "colours" or "exposure".
+        "order", "turned", "torn", "interlaced", "colours", "exposure" or "mixed".
     misfit : float
     other : int or None
         Number of the other photo that it is like.
@@ -46,6 +47,8 @@ class Explanation:
         How it is turned.
     gain, offset : float
         Changes of lamp or exposure, and of ambient light.
+    share : float
+        Of the exposure that was under the pattern of the other photo.
     """
 
     what: str
@@ -54,6 +57,7 @@ class Explanation:
     how: str = ""
     gain: float = 0.0
     offset: float = 0.0
+    share: float = 0.0
 
     def explains(self, misfit: float) -> bool:
         """Return whether it explains a photo whose misfit is so large without it."""
@@ -86,10 +90,15 @@ def explanations(fits: PhotoFits, plan: Plan, number: int) -> Iterator[Explanati
     for order in list(permutations(range(channels)))[1:] if 1 < channels <= 4 else []:
         yield Explanation("colours", float(squares(relit[..., list(order)]).mean()))
     yield exposure_change(fits, number)
+    neighbours = [
+        other
+        for other in range(
+            max(0, number - TORN_REACH), min(len(fits.photos), number + TORN_REACH + 1)
+        )
+        if plan.patterns[other] != plan.patterns[number]
+    ]
     own = squares(relit).sum(axis=(1, 2))
-    for other in range(max(0, number - TORN_REACH), min(len(fits.photos), number + TORN_REACH + 1)):
-        if plan.patterns[other] == plan.patterns[number]:
-            continue
+    for other in neighbours:
         theirs = squares(fits.relit[other]).sum(axis=(1, 2))
         # Rows up to each are of one pattern, all others of the other.
         above = np.concatenate([[0.0], np.cumsum(theirs - own)])[1:-1]
@@ -100,6 +109,16 @@ def explanations(fits: PhotoFits, plan: Plan, number: int) -> Iterator[Explanati
         odd = np.arange(len(own)) % 2 == 1
         interlaced = min(np.where(odd, own, theirs).sum(), np.where(odd, theirs, own).sum())
         yield Explanation("interlaced", float(interlaced / values), other)
+    for other in neighbours:
+        if is_reference(plan.patterns[other]):
+            # That is another exposure, or other light.
+            continue
+        change = fits.relit[other] - relit
+        by_share = float((weight * change * (photo - relit)).sum())
+        share = by_share / max(float((weight * change**2).sum()), 1e-300)
+        if SMALLEST_CHANGE <= share <= 1:
+            mixed = float(squares(relit + np.float32(share) * change).mean())
+            yield Explanation("mixed", mixed, other, share=share)
 
 
 def exposure_change(fits: PhotoFits, number: int) -> Explanation:

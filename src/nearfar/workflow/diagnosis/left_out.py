@@ -26,6 +26,8 @@ HELD_OUT = ("check", "correspondence")
 # the expected one, and so many times what this percentage of all frequencies have at most: what
 # spoils all photos raises many. docs/decisions/0113 has what good captures reach.
 LEAST_ERROR, STANDS_OUT, USUAL_PERCENT = 3.5, 2.5, 90
+# The same in one place of the picture, as where a window pops up.
+LEAST_LOCAL_ERROR, STANDS_OUT_LOCALLY, USUAL_LOCAL_PERCENT = 12.0, 4.0, 75
 # Sweeps of the estimate.
 SWEEPS = 2
 # Times the noise that are counted while relit pictures take the place of codes' photos, round after
@@ -75,9 +77,12 @@ def photos_not_foretold(fits: PhotoFits, good: Booleans, known: Floats) -> list[
     if plan.is_by_codes or plan.pitch > 1 or (measurements := _measured(fits, keep)) is None:
         return []
     errors = errors_of_foretold(measurements, _q_of(plan, measurements, known), plan.window)
-    usual = np.percentile(list(errors.values()), USUAL_PERCENT)
+    means, local = np.array(list(errors.values())).T
     # NaN stands out of nothing.
-    odd = {k for k, error in errors.items() if error > max(LEAST_ERROR, STANDS_OUT * usual)}
+    stand_out = means > max(LEAST_ERROR, STANDS_OUT * np.percentile(means, USUAL_PERCENT))
+    usual = np.percentile(local, USUAL_LOCAL_PERCENT)
+    stand_out |= local > max(LEAST_LOCAL_ERROR, STANDS_OUT_LOCALLY * usual)
+    odd = {frequency for frequency, is_odd in zip(errors, stand_out, strict=True) if is_odd}
     return [
         number
         for number, pattern in enumerate(plan.patterns)

@@ -15,16 +15,20 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.error_bars import ErrorBars
+from nearfar.estimate.joint import means_of_blocks
 from nearfar.faults.of_photos import (
     ColoursSwapped,
     ExposureChanged,
+    PhotosDark,
     PhotosMisfit,
+    PhotosMixed,
     PhotosTorn,
     PhotosTurned,
     ShowsOtherPattern,
     Spoilt,
 )
-from nearfar.plan import Sinusoid
+from nearfar.plan import Plan, Sinusoid
+from nearfar.plan.checks import is_black
 from nearfar.transport.model import Transport
 from nearfar.workflow.diagnosis.explanations import (
     SUSPECT_MISFIT,
@@ -58,6 +62,9 @@ TURNS_OF_LEAVING = 8
 # A photo is explained by nothing known, yet spoilt, above this many times the misfit of the others
 # that were left out with it.
 UNEXPLAINED_RATIO = 40.0
+# The square of its difference, over what noise and error bars expect, that spoils a photo where a
+# block of camera pixels shows it.
+LOCAL_SURPRISE = 10.0
 
 
 class SpoiltPhotos(NamedTuple):
@@ -68,8 +75,8 @@ class SpoiltPhotos(NamedTuple):
     certain : list of Spoilt
         Photos that are of other patterns, turned, torn, or with other colours: they fit as that.
     probable : list of Spoilt
-        Photos that are brighter or darker, or do not fit for no known reason. What spoils all
-        photos may look like this as well.
+        Photos that are brighter or darker, mixed with the other phase of their frequency, or do not
+        fit for no known reason. What spoils all photos may look like this as well.
     stand_out : bool
         Whether some are of frequencies that all others foretell badly, while the photos of most
         frequencies fit.
@@ -121,9 +128,34 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
         fits = fit_photos(fits.without_drift, again)
     if not plan.is_by_codes:
         explained |= _explain_by_turns(fits, good, explained, known)
-    certain = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
+    certain = _certain(plan, explained)
     probable = {n: e for n, e in explained.items() if n not in certain}
-    return SpoiltPhotos(_as_faults(certain), _as_faults(probable), stand_out)
+    return SpoiltPhotos(_as_faults(plan, certain), _as_faults(plan, probable), stand_out)
+
+
+def _certain(
+    plan: Plan, explained: Mapping[int, Explanation | None]
+) -> dict[int, Explanation | None]:
+    """Return the explanations that nothing else looks like.
+
+    Exposure may be a response that is not linear. Cosine and sine mixed are the same pattern,
+    shifted, as by a projector that moved, unless other photos are mixed too.
+    """
+    known = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
+    mixed = {n: e for n, e in known.items() if e.what == "mixed"}
+    if all(e.other is not None and _are_phases(plan, n, e.other) for n, e in mixed.items()):
+        known = {n: e for n, e in known.items() if n not in mixed}
+    return dict(known)
+
+
+def _are_phases(plan: Plan, number: int, other: int) -> bool:
+    """Return whether two photos are of one frequency, as cosine and sine are."""
+    one, another = plan.patterns[number], plan.patterns[other]
+    return (
+        isinstance(one, Sinusoid)
+        and isinstance(another, Sinusoid)
+        and one.frequency == another.frequency
+    )
 
 
 def _suspects(misfit: Floats, tried: Booleans) -> list[int]:
@@ -246,12 +278,21 @@ def _surprises(fits: PhotoFits, without: Transport, number: int) -> bool:
     is_known = np.isfinite(expected)
     variance = fits.variance[number] + np.where(is_known, expected, np.inf)
     squares = (fits.photos[number] - fits.relit[number]) ** 2 / variance
-    return float(squares.sum() / max(1, is_known.sum())) > SUSPECT_MISFIT
+    if float(squares.sum() / max(1, is_known.sum())) > SUSPECT_MISFIT:
+        return True
+    pixels, camera = is_known.all(axis=2).ravel(), without.camera
+    of_blocks = means_of_blocks(squares.mean(axis=2).reshape(-1, 1), pixels, camera)
+    return float(of_blocks.max(initial=0.0)) > LOCAL_SURPRISE
 
 
-def _as_faults(explained: Mapping[int, Explanation | None]) -> list[Spoilt]:
+def _as_faults(plan: Plan, explained: Mapping[int, Explanation | None]) -> list[Spoilt]:
     """Join photos that are spoilt in the same way."""
     found: list[Spoilt] = []
+    blacks = {number for number, pattern in enumerate(plan.patterns) if is_black(pattern)}
+    dark = {n for n, e in explained.items() if e and e.what == "order" and e.other in blacks}
+    if dark:
+        found.append(PhotosDark(tuple(sorted(dark))))
+        explained = {n: e for n, e in explained.items() if n not in dark}
 
     def photos(what: str, how: str = "") -> tuple[int, ...]:
         return tuple(
@@ -274,6 +315,9 @@ def _as_faults(explained: Mapping[int, Explanation | None]) -> list[Spoilt]:
         for what in ("torn", "interlaced")
         if (numbers := photos(what))
     ]
+    if numbers := photos("mixed"):
+        shares = [each.share for each in explained.values() if each is not None]
+        found.append(PhotosMixed(numbers, others(numbers), max(shares)))
     if numbers := photos("colours"):
         found.append(ColoursSwapped(numbers))
     if numbers := photos("exposure"):

@@ -7,9 +7,11 @@ How much of the photos' misfits each of them explains is read off the normal equ
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers
 from nearfar.faults.of_photos import (
+    AmbientFlickers,
     ExposureChanged,
     LampFlickers,
     Moved,
@@ -71,6 +73,8 @@ EXPOSURE_OVER_BEND = 7.0
 FLICKER = 8.0
 # Of the photos, the share in which it does.
 FLICKER_SHARE = 0.2
+# It is ambient light that changes if that alone explains this many times what exposure alone does.
+AMBIENT_OVER_EXPOSURE = 2.0
 # Decoders of light by the name of the encoding; if it is the photos', at most this share of the
 # excess of their sums is left.
 DECODINGS: Mapping[str, Callable[[Floats], Floats]] = {
@@ -247,6 +251,9 @@ def find_changes_of_light(
         is_change[one] &= left >= LEAST_IN_SUM * largest[one]
     changed = np.flatnonzero((explained > LEAST_EXPLAINED) & is_change)
     if total > FLICKER and np.mean(explained > FLICKER / 40) > FLICKER_SHARE:
+        gain, offset = (_explained_by_one(matrix, vector, cause) for cause in (0, 1))
+        if offset > AMBIENT_OVER_EXPOSURE * gain:
+            return total, AmbientFlickers(float(effects[:, 1].std()))
         return total, LampFlickers(float(effects[:, 0].std()))
     if not len(changed):
         return None
@@ -256,6 +263,14 @@ def find_changes_of_light(
         float(max(gains, key=abs)),
         float(max(offsets, key=abs)),
     )
+
+
+def _explained_by_one(
+    matrix: NDArray[np.float64], vector: NDArray[np.float64], cause: int
+) -> float:
+    """Return the squares that one cause alone explains, of a size of its own in each photo."""
+    sizes = solved(matrix[:, [cause]][:, :, [cause]], vector[:, [cause]])
+    return float(np.sum(sizes * vector[:, [cause]]))
 
 
 def _step(

@@ -1,6 +1,7 @@
 """Held-out SNR_b of a capture with check photos."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,6 +10,7 @@ from nearfar.arrays import Floats, Integers
 from nearfar.capture import Capture
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
+from nearfar.plan import Plan
 from nearfar.plan.checks import CheckLight, check_lights
 from nearfar.plan.patterns import HalfScreen
 from nearfar.progress import Report, ignore_progress
@@ -47,7 +49,7 @@ def measure_held_out(
     UnreadableFileError
         If the transport or the capture is damaged.
     """
-    lights = [light for light in check_lights(capture.plan) if light.photos and light.inverses]
+    lights = _pairs(capture.plan)
     if not lights:
         return None
     photos = photos_without_drift(capture, progress)
@@ -59,6 +61,36 @@ def measure_held_out(
         lambda share: progress("check photos", share),
     )
     return HeldOut(compared) if compared else None
+
+
+def _pairs(plan: Plan) -> list[CheckLight]:
+    """Return the check patterns of a plan that come with their inverses."""
+    return [light for light in check_lights(plan) if light.photos and light.inverses]
+
+
+def without_photos(held_out: HeldOut, plan: Plan, spoilt: Collection[int]) -> HeldOut | None:
+    """Leave out the check patterns some of whose photos are spoilt.
+
+    Parameters
+    ----------
+    held_out : HeldOut
+        As `measure_held_out` returns it.
+    plan : Plan
+        Of the capture.
+    spoilt : collection of int
+        Numbers of the photos.
+
+    Returns
+    -------
+    HeldOut or None
+        None if no check pattern is left.
+    """
+    lights = tuple(
+        compared
+        for light, compared in zip(_pairs(plan), held_out.lights, strict=True)
+        if not any(number in spoilt for number in (*light.photos, *light.inverses))
+    )
+    return replace(held_out, lights=lights) if lights else None
 
 
 def compare_lights(

@@ -1,6 +1,6 @@
 """The verdict on a transport: good, doubtful or wrong, and why."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -9,7 +9,19 @@ import numpy as np
 from nearfar.capture import Capture
 from nearfar.faults import of_photos
 from nearfar.faults.of_capture import find_faults
-from nearfar.faults.of_photos import ExposureChanged, LampFlickers, NotLinear, Spoilt
+from nearfar.faults.of_photos import (
+    ColoursSwapped,
+    ExposureChanged,
+    LampFlickers,
+    NotLinear,
+    PhotosDark,
+    PhotosIncomplete,
+    PhotosMixed,
+    PhotosTorn,
+    PhotosTurned,
+    ShowsOtherPattern,
+    Spoilt,
+)
 from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
 from nearfar.plan import Plan
 from nearfar.plan.checks import check_lights
@@ -18,7 +30,7 @@ from nearfar.transport.stored import StoredTransport
 from nearfar.transport.verdict import Grade, KeptVerdict, Reason
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
 from nearfar.workflow.diagnosis.misfit_maps import MisfitMaps, describe_worst, measure_misfit
-from nearfar.workflow.verdict.by_check_photos import measure_held_out
+from nearfar.workflow.verdict.by_check_photos import measure_held_out, without_photos
 from nearfar.workflow.verdict.by_correspondence import measure_by_correspondence
 from nearfar.workflow.verdict.correspondence_lights import correspondence_lights
 from nearfar.workflow.verdict.held_out import HeldOut
@@ -64,7 +76,15 @@ SMALLEST_ERROR_RATIO = 0.5
 USUAL_ERROR_RATIO = 1.5
 
 # Photos that are of something else: what was estimated from them is wrong.
-WRONG_PHOTOS: tuple[Cause, ...] = ("order", "turned", "torn", "colours")
+PHOTOS_OF_SOMETHING_ELSE = (
+    ShowsOtherPattern,
+    PhotosTurned,
+    PhotosTorn,
+    PhotosMixed,
+    PhotosDark,
+    ColoursSwapped,
+    PhotosIncomplete,
+)
 CAUSES_OF_FAULTS: Mapping[type[Any], Cause] = {
     PairsDoNotAdd: "not-linear",
     LightDrifted: "lamp",
@@ -73,6 +93,7 @@ CAUSES_OF_FAULTS: Mapping[type[Any], Cause] = {
 # Why nothing was checked although there are photos to check by.
 OF_SQUARE = "nothing was checked: a square T is of no single camera pixel's photos."
 OF_SATURATED = "nothing was checked: every camera pixel is saturated."
+OF_SPOILT = "nothing was checked: every check photo, or that of its inverse pattern, is spoilt."
 # What is wrong, and what to do.
 SENTENCES: Mapping[Cause, str] = {
     "not-linear": str(NotLinear("")),
@@ -171,23 +192,26 @@ def judge_reconstruction(
     UnreadableFileError
         If the transport or the capture is damaged.
     """
-    square = transport.provenance["square"]
-    held_out = None
+    square, plan = transport.provenance["square"], capture.plan
+    held_out = by_pictures = None
     if not square:
-        held_out = measure_held_out(transport, capture, progress)
-        held_out = held_out or measure_by_correspondence(transport, capture, progress)
-    repeats = None
-    if held_out is None:
-        repeats = measure_repeats(capture, transport.provenance, progress)
+        by_pictures = measure_held_out(transport, capture, progress)
+        held_out = by_pictures or measure_by_correspondence(transport, capture, progress)
+    suspected = None if held_out is None else _hints(held_out)
+    spoilt = find_what_spoils(transport, capture, progress, suspected=suspected)
+    unchecked = _why_unchecked(transport, plan)
+    if by_pictures is not None:
+        # Photos that are of something else tell nothing of the transport.
+        held_out = without_photos(by_pictures, plan, _of_something_else(spoilt))
+        unchecked = OF_SPOILT
     verdict = judge(
         held_out,
         find_faults(capture, transport.provenance),
-        find_what_spoils(
-            transport, capture, progress, suspected=None if held_out is None else _hints(held_out)
-        ),
-        repeats,
-        _why_unchecked(transport, capture.plan),
-        None if (planned := capture.plan.expected_snr) is None else planned.pictures,
+        spoilt,
+        None if held_out else measure_repeats(capture, transport.provenance, progress),
+        unchecked,
+        None if (planned := plan.expected_snr) is None else planned.pictures,
+        checks=[n for n, pattern in enumerate(plan.patterns) if pattern.purpose == "check"],
     )
     if "model" not in verdict.causes:
         return verdict
@@ -216,6 +240,7 @@ def judge(
     repeats: Repeats | None = None,
     unchecked: str = SENTENCES["unchecked"],
     planned_snr: tuple[float, float] | None = None,
+    checks: Collection[int] = (),
 ) -> Verdict:
     """Return the verdict on a transport.
 
@@ -233,7 +258,13 @@ def judge(
         Why nothing was checked, if it was not.
     planned_snr : tuple of float, optional
         As `Verdict` has it.
+    checks : collection of int
+        Numbers of the check photos. A transport is not wrong for those that are spoilt, as no
+        estimate uses them.
     """
+    harmless = [each for each in spoilt if (of := _of_something_else([each])) and of <= set(checks)]
+    spoilt = [each for each in spoilt if each not in harmless]
+    of_checks = [Reason(each.cause, f"{each} {_that_it_checks(each)}") for each in harmless]
     if held_out is not None and _bends(held_out):
         # What bends the response makes pictures of other brightness than expected, too.
         spoilt = [NotLinear("") if _is_of_brightness(each) else each for each in spoilt]
@@ -251,8 +282,8 @@ def judge(
             add(cause)
     if held_out is None:
         known = "" if repeats is None else f" Known is this: {repeats}"
-        reasons.append(Reason("unchecked", unchecked + known))
-        wrong = any(reason.cause in WRONG_PHOTOS for reason in reasons)
+        reasons += [Reason("unchecked", unchecked + known), *of_checks]
+        wrong = bool(_of_something_else(spoilt))
         grade: Grade = "wrong" if wrong else "doubtful"
         return Verdict(grade, None, tuple(reasons), planned_snr=planned_snr)
     if not spoilt:
@@ -272,10 +303,28 @@ def judge(
     wrong = (
         held_out.snr < WRONG_DECIBELS
         or _surprises(held_out, WRONG_ERROR_RATIO)
-        or any(reason.cause in WRONG_PHOTOS for reason in reasons)
+        or bool(_of_something_else(spoilt))
     )
+    reasons += of_checks
     grade = "wrong" if wrong else "doubtful" if reasons else "good"
     return Verdict(grade, held_out, tuple(reasons), planned_snr=planned_snr)
+
+
+def _of_something_else(spoilt: Iterable[Spoilt]) -> set[int]:
+    """Return the numbers of the photos that surely are of something else than planned."""
+    return {
+        number
+        for each in spoilt
+        if isinstance(each, PHOTOS_OF_SOMETHING_ELSE)
+        for number in each.photos
+    }
+
+
+def _that_it_checks(each: Spoilt) -> str:
+    """Return that photos serve for nothing but checks, a sentence."""
+    if len(_of_something_else([each])) == 1:
+        return "It is a check photo: the transport is estimated without it."
+    return "They are check photos: the transport is estimated without them."
 
 
 def _why_unchecked(transport: StoredTransport, plan: Plan) -> str:

@@ -1,0 +1,55 @@
+"""Light that changed at once: photos about it look like others than they are.
+
+The drift between two photos of white, or of black, is taken to be steady. Where light changed at
+once, the photos between them are off on both sides of the change, most of all those next to it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nearfar.arrays import Floats
+from nearfar.faults.of_photos import AmbientJumped, ExposureChanged, LampJumped, Spoilt
+from nearfar.photometry.drift import References
+
+# Change between two photos of one pattern, over the largest that is seen in a photo between them;
+# and over the change between any other two.
+LEAST_OVER_SEEN, LEAST_OVER_OTHERS = 0.8, 4.0
+
+
+def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) -> list[Spoilt]:
+    """Return what was found, with jumps of light in the place of photos that are off by them.
+
+    Parameters
+    ----------
+    found : sequence of Spoilt
+        Only those that are `ExposureChanged` are looked at.
+    photos : ndarray, shape (photos, rows, columns, channels)
+        All photos of a sample as they were taken, in photo units.
+    references : References
+    """
+    return [
+        _jump_of(each, photos, references) if isinstance(each, ExposureChanged) else each
+        for each in found
+    ]
+
+
+def _jump_of(
+    found: ExposureChanged, photos: Floats, references: References
+) -> ExposureChanged | LampJumped | AmbientJumped:
+    """Return the jump of light that photos under other light come from; if there is none, these."""
+    black, white = (photos[numbers].mean(axis=(1, 2, 3)) for numbers in reversed(references))
+    light = max(float(white.mean() - black.mean()), float(np.finfo(np.float32).tiny))
+    is_ambient = abs(found.offset) > abs(found.gain)
+    numbers, levels = (references.blacks, black) if is_ambient else (references.whites, white)
+    steps = np.diff(levels) / light
+    place = int(np.argmax(np.abs(steps)))
+    after, before = int(numbers[place]), int(numbers[place + 1])
+    step, others = float(steps[place]), np.delete(np.abs(steps), place)
+    if (
+        abs(step) < LEAST_OVER_SEEN * max(abs(found.gain), abs(found.offset))
+        or abs(step) < LEAST_OVER_OTHERS * np.max(others, initial=0.0)
+        or not all(after <= number <= before for number in found.photos)
+    ):
+        return found
+    return (AmbientJumped if is_ambient else LampJumped)(after, before, step)

@@ -1,0 +1,61 @@
+"""Jumps of light are told by the photos of white and black between which they were."""
+
+import numpy as np
+import pytest
+
+from nearfar.faults.of_photos import AmbientJumped, ExposureChanged, LampJumped, Moved
+from nearfar.photometry.drift import References
+from nearfar.workflow.diagnosis.jumps import name_jumps
+
+REFERENCES = References(np.array([1, 21, 41]), np.array([0, 20, 40]))
+WHITE, BLACK = 0.8, 0.1
+
+
+def photos_with(gains, offsets):
+    """Photos of white and black under light of some gain and offset."""
+    photos = np.full((42, 4, 4, 3), 0.4, dtype=np.float32)
+    for number in REFERENCES.whites:
+        photos[number] = BLACK + gains[number] * (WHITE - BLACK) + offsets[number]
+    for number in REFERENCES.blacks:
+        photos[number] = BLACK + offsets[number]
+    return photos
+
+
+def step(at, size):
+    return np.where(np.arange(42) >= at, size, 0.0)
+
+
+@pytest.mark.parametrize(("at", "between"), [(10, (1, 21)), (30, (21, 41))])
+def test_a_lamp_that_dims_at_once_is_found(at, between):
+    photos = photos_with(1 + step(at, -0.1), step(at, 0.0))
+    seen = ExposureChanged((at - 1, at, at + 1), -0.05, 0.01)
+    (found,) = name_jumps([seen], photos, REFERENCES)
+    assert isinstance(found, LampJumped)
+    assert (found.after, found.before) == between
+    # As a share of the mean white.
+    assert found.gain == pytest.approx(-0.1, abs=0.01)
+    assert f"between photos {between[0]} and {between[1]}" in str(found)
+
+
+def test_ambient_light_that_comes_on_at_once_is_found():
+    photos = photos_with(1 + step(0, 0.0), step(30, 0.07))
+    (found,) = name_jumps([ExposureChanged((28, 29), 0.01, -0.05)], photos, REFERENCES)
+    assert isinstance(found, AmbientJumped)
+    assert (found.after, found.before) == (20, 40)
+    assert found.offset == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("photos", "numbers"),
+    [
+        # Drift is steady.
+        (photos_with(1 - 0.1 * np.arange(42) / 42, step(0, 0.0)), (29, 30)),
+        # The photos are not between the two.
+        (photos_with(1 + step(30, -0.1), step(0, 0.0)), (10, 30)),
+        # Less than what is seen in these photos.
+        (photos_with(1 + step(30, -0.02), step(0, 0.0)), (29, 30)),
+    ],
+)
+def test_other_photos_stay_as_they_were_found(photos, numbers):
+    found = [Moved("camera", 20, 0.5), ExposureChanged(numbers, -0.05, 0.0)]
+    assert name_jumps(found, photos, REFERENCES) == found

@@ -14,8 +14,7 @@ import typer
 
 from nearfar.cli.application import app
 from nearfar.cli.commands import COMMANDS
-from nearfar.faults import of_photos as faults_of_photos
-from nearfar.faults import records
+from nearfar.faults import of_light, of_photos, of_single_photos, records
 from nearfar.plan import paper_plan
 from nearfar.rigs.tables import RealTable, SimulatedTable
 from nearfar.scenes.cache import cached_scene
@@ -206,19 +205,19 @@ def sentences_in(text):
 
 TROUBLESHOOTING = DOCS / "howto" / "troubleshooting.md"
 A_FAULT = {
-    faults_of_photos.Moved: [
+    of_photos.Moved: [
         {"what": what, "photo": 3, "pixels": pixels, "until": until}
         for what in ("camera", "scene", "projector", "camera's focus")
         for pixels, until in ((0.5, None), (0.5, 9), (None, 9))
     ],
-    faults_of_photos.ShowsOtherPattern: [
+    of_single_photos.ShowsOtherPattern: [
         *({"photos": (3, 4), "others": others} for others in ((4, 3), (2, 3), (9, 1))),
         *(
             {"photos": tuple(range(8)), "others": others}
             for others in (tuple(range(8))[::-1], tuple(range(-3, 5)))
         ),
     ],
-    faults_of_photos.NotLinear: [{"encoding": encoding} for encoding in ("", "sRGB")],
+    of_photos.NotLinear: [{"encoding": encoding} for encoding in ("", "sRGB")],
 }
 VALUES = {
     "camera": "the camera",
@@ -239,7 +238,7 @@ VALUES = {
 
 
 def faults_by_class():
-    for module in (records, faults_of_photos):
+    for module in (records, of_light, of_photos, of_single_photos):
         for name, kind in vars(module).items():
             if dataclasses.is_dataclass(kind) and kind.__module__ == module.__name__:
                 # What is part of another fault's sentence.

@@ -7,7 +7,8 @@ import pytest
 from benchmarks.spoils import shoot
 
 from nearfar.arrays import Size
-from nearfar.faults.of_photos import NoisyRows, PixelsFlash, RowsFlicker, SceneChanged
+from nearfar.faults.of_light import NoisyRows, RowsFlicker
+from nearfar.faults.of_photos import PixelsFlash, SceneChanged
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.drift_removal import remove_drift
 from nearfar.photometry.in_memory import PhotosInMemory

@@ -9,17 +9,18 @@ from benchmarks.spoils import SPOILS, shoot
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
-from nearfar.faults.of_photos import (
+from nearfar.faults.of_light import (
     AmbientFlickers,
     FollowsPattern,
     LampJumped,
     NoisyRows,
-    NotLinear,
+    RowsFlicker,
+)
+from nearfar.faults.of_photos import NotLinear, SceneChanged
+from nearfar.faults.of_single_photos import (
     PhotosDark,
     PhotosMisfit,
     PhotosMixed,
-    RowsFlicker,
-    SceneChanged,
     ShowsOtherPattern,
 )
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
@@ -29,6 +30,7 @@ from nearfar.progress import ignore_progress
 from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis import single_photos
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
+from nearfar.workflow.diagnosis.explanations import Explanation
 from nearfar.workflow.diagnosis.sample import PATCH, sample_camera, sampled_lines
 from nearfar.workflow.diagnosis.single_photos import TURNS_OF_LEAVING
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
@@ -301,3 +303,22 @@ def test_a_sample_holds_the_photos_at_its_places(shot):
     )
     sample = sample_camera(capture, lambda share: ignore_progress("", share))
     assert np.array_equal(sample.photos, photos[:, sample.rows][:, :, sample.columns])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "other", "are_of_it"),
+    [
+        # Out of focus, fine patterns look alike.
+        ((30, 31, 33), 25, False),
+        # A projector that stands still.
+        ((26, 27, 28), 25, True),
+        ((22, 23, 24), 25, True),
+        # One may be taken for another by its name.
+        ((30, 33), 25, True),
+        # It was dark.
+        ((30, 31, 33), 0, True),
+    ],
+)
+def test_many_photos_of_one_pattern_far_from_them_are_not_of_it(shot, numbers, other, are_of_it):
+    explained = {number: Explanation("order", 1.0, other) for number in numbers}
+    assert bool(single_photos.certain_ones(shot.plan, explained)) == are_of_it

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nearfar.faults.of_photos import PhotosIncomplete
+from nearfar.faults.of_single_photos import PhotosIncomplete
 from nearfar.workflow.diagnosis.incomplete import find_incomplete
 
 BLACKS = np.array([0, 9])

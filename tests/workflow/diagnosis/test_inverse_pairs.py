@@ -6,7 +6,7 @@ from benchmarks.spoils import SPOILS, shoot_plan
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
-from nearfar.faults.of_photos import ShowsOtherPattern
+from nearfar.faults.of_single_photos import ShowsOtherPattern
 from nearfar.plan import paper_plan
 from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils

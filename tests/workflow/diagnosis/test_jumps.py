@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nearfar.faults.of_photos import AmbientJumped, ExposureChanged, LampJumped, Moved
+from nearfar.faults.of_light import AmbientJumped, ExposureChanged, LampJumped
+from nearfar.faults.of_photos import Moved
 from nearfar.photometry.drift import References
 from nearfar.workflow.diagnosis.jumps import name_jumps
 

@@ -7,7 +7,7 @@ import pytest
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
-from nearfar.faults.of_photos import ExposureChanged
+from nearfar.faults.of_light import ExposureChanged
 from nearfar.plan import choose_plan
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nearfar.faults.of_photos import ExposureChanged, PhotosMisfit
+from nearfar.faults.of_light import ExposureChanged
+from nearfar.faults.of_single_photos import PhotosMisfit
 from nearfar.photometry.drift import References
 from nearfar.workflow.diagnosis.odd_references import FEWEST, find_odd_references
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nearfar.faults.of_photos import ExposureChanged, LampFlickers, Moved, NotLinear
+from nearfar.faults.of_light import ExposureChanged, LampFlickers
+from nearfar.faults.of_photos import Moved, NotLinear
 from nearfar.workflow.diagnosis.bend_of_pairs import Bend
 from nearfar.workflow.diagnosis.misfit import (
     BEND,

@@ -2,15 +2,9 @@
 
 import pytest
 
-from nearfar.faults.of_photos import (
-    ExposureChanged,
-    LampFlickers,
-    Moved,
-    NotLinear,
-    PhotosMisfit,
-    PhotosTurned,
-    ShowsOtherPattern,
-)
+from nearfar.faults.of_light import ExposureChanged, LampFlickers
+from nearfar.faults.of_photos import Moved, NotLinear
+from nearfar.faults.of_single_photos import PhotosMisfit, PhotosTurned, ShowsOtherPattern
 from nearfar.faults.records import LightDrifted, PairsDoNotAdd, PhotosSaturated, RoundedToHalf
 from nearfar.workflow.verdict.held_out import HeldOut
 from nearfar.workflow.verdict.repeats import Repeats

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers
-from nearfar.faults.of_photos import NoisyRows, PixelsFlash, RowsFlicker, SceneChanged
+from nearfar.faults.of_light import NoisyRows, RowsFlicker
+from nearfar.faults.of_photos import PixelsFlash, SceneChanged
 from nearfar.photometry.drift import References
 from nearfar.workflow.diagnosis.misfit import SteadyPhotos
 

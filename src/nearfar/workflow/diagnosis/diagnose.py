@@ -7,14 +7,8 @@ import numpy as np
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_by_sweeps
-from nearfar.faults.of_photos import (
-    AmbientFlickers,
-    ExposureChanged,
-    LampFlickers,
-    Moved,
-    NotLinear,
-    Spoilt,
-)
+from nearfar.faults.of_light import AmbientFlickers, ExposureChanged, LampFlickers
+from nearfar.faults.of_photos import Moved, NotLinear, Spoilt
 from nearfar.photometry.drift import find_references
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress

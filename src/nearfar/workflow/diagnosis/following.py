@@ -10,7 +10,7 @@ white.
 import numpy as np
 
 from nearfar.arrays import Integers
-from nearfar.faults.of_photos import FollowsPattern
+from nearfar.faults.of_light import FollowsPattern
 from nearfar.photometry.drift import References
 from nearfar.plan.patterns import HalfScreen, Picture
 from nearfar.workflow.diagnosis.misfit import PhotoFits

@@ -3,7 +3,8 @@
 import numpy as np
 
 from nearfar.arrays import Floats, Integers
-from nearfar.faults.of_photos import PhotosIncomplete, Spoilt
+from nearfar.faults.of_photos import Spoilt
+from nearfar.faults.of_single_photos import PhotosIncomplete
 
 # Columns that a row needs for its values to differ by noise.
 FEWEST_COLUMNS = 8

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from nearfar.arrays import Floats
-from nearfar.faults.of_photos import AmbientJumped, ExposureChanged, LampJumped, Spoilt
+from nearfar.faults.of_light import AmbientJumped, ExposureChanged, LampJumped
+from nearfar.faults.of_photos import Spoilt
 from nearfar.photometry.drift import References
 
 # Change between two photos of one pattern, over the largest that is seen in a photo between them;

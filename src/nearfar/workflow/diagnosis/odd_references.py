@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers
-from nearfar.faults.of_photos import ExposureChanged, PhotosMisfit, Spoilt
+from nearfar.faults.of_light import ExposureChanged
+from nearfar.faults.of_photos import Spoilt
+from nearfar.faults.of_single_photos import PhotosMisfit
 from nearfar.photometry.drift import References
 
 # So many photos of a pattern tell of one of them; fewer could as well be drift.

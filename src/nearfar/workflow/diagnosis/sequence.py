@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats
-from nearfar.faults.of_photos import ShowsOtherPattern
+from nearfar.faults.of_single_photos import ShowsOtherPattern
 from nearfar.illumination.frequencies import DC
 from nearfar.plan import Plan, Sinusoid
 
@@ -32,7 +32,7 @@ class Order(NamedTuple):
     Attributes
     ----------
     photos, others : tuple of int
-        As `nearfar.faults.of_photos.ShowsOtherPattern` has them.
+        As `nearfar.faults.of_single_photos.ShowsOtherPattern` has them.
     left : float
         Squared brightness that it does not explain, in squares of white's.
     """

@@ -16,16 +16,16 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.joint import means_of_blocks
-from nearfar.faults.of_photos import (
+from nearfar.faults.of_light import ExposureChanged
+from nearfar.faults.of_photos import Spoilt
+from nearfar.faults.of_single_photos import (
     ColoursSwapped,
-    ExposureChanged,
     PhotosDark,
     PhotosMisfit,
     PhotosMixed,
     PhotosTorn,
     PhotosTurned,
     ShowsOtherPattern,
-    Spoilt,
 )
 from nearfar.plan import Plan, Sinusoid
 from nearfar.plan.checks import is_black
@@ -65,6 +65,10 @@ UNEXPLAINED_RATIO = 40.0
 # The square of its difference, over what noise and error bars expect, that spoils a photo where a
 # block of camera pixels shows it.
 LOCAL_SURPRISE = 10.0
+
+
+# So many photos of one pattern that is not next to them are not of it.
+MANY_OF_ONE = 3
 
 
 class SpoiltPhotos(NamedTuple):
@@ -128,24 +132,49 @@ def find_spoilt_photos(fits: PhotoFits, known: Floats, *, suspected: bool | None
         fits = fit_photos(fits.without_drift, again)
     if not plan.is_by_codes:
         explained |= _explain_by_turns(fits, good, explained, known)
-    certain = _certain(plan, explained)
+    certain = certain_ones(plan, explained)
     probable = {n: e for n, e in explained.items() if n not in certain}
     return SpoiltPhotos(_as_faults(plan, certain), _as_faults(plan, probable), stand_out)
 
 
-def _certain(
+def certain_ones(
     plan: Plan, explained: Mapping[int, Explanation | None]
 ) -> dict[int, Explanation | None]:
     """Return the explanations that nothing else looks like.
 
     Exposure may be a response that is not linear. Cosine and sine mixed are the same pattern,
     shifted, as by a projector that moved, unless other photos are mixed too.
+
+    Parameters
+    ----------
+    plan : Plan
+    explained : mapping of int to Explanation or None
+        By the number of the photo.
     """
     known = {n: e for n, e in explained.items() if e is not None and e.what != "exposure"}
     mixed = {n: e for n, e in known.items() if e.what == "mixed"}
     if all(e.other is not None and _are_phases(plan, n, e.other) for n, e in mixed.items()):
         known = {n: e for n, e in known.items() if n not in mixed}
-    return dict(known)
+    alike = _of_one_pattern(plan, known)
+    return {n: e for n, e in known.items() if n not in alike}
+
+
+def _of_one_pattern(plan: Plan, known: Mapping[int, Explanation]) -> set[int]:
+    """Return many photos that look like one pattern, but could not have been taken of it.
+
+    Out of focus, all fine patterns look alike. A projector that stands still shows the pattern
+    before, or the one after, until it goes on.
+    """
+    photos_of: dict[int, list[int]] = {}
+    for number, explanation in known.items():
+        if explanation.what == "order" and explanation.other is not None:
+            photos_of.setdefault(explanation.other, []).append(number)
+    found: set[int] = set()
+    for other, numbers in photos_of.items():
+        is_run = np.ptp([*numbers, other]) == len(numbers)
+        if len(numbers) >= MANY_OF_ONE and not is_run and not is_black(plan.patterns[other]):
+            found |= set(numbers)
+    return found
 
 
 def _are_phases(plan: Plan, number: int, other: int) -> bool:

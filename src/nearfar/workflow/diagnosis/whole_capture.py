@@ -10,14 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Floats, Integers
-from nearfar.faults.of_photos import (
-    AmbientFlickers,
-    ExposureChanged,
-    LampFlickers,
-    Moved,
-    NotLinear,
-    Spoilt,
-)
+from nearfar.faults.of_light import AmbientFlickers, ExposureChanged, LampFlickers
+from nearfar.faults.of_photos import Moved, NotLinear, Spoilt
 from nearfar.files import from_srgb
 from nearfar.photometry.drift import find_references
 from nearfar.plan.checks import check_lights

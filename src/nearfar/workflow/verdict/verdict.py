@@ -7,20 +7,18 @@ from typing import Any, Literal
 import numpy as np
 
 from nearfar.capture import Capture
-from nearfar.faults import of_photos
+from nearfar.faults import words
 from nearfar.faults.of_capture import find_faults
-from nearfar.faults.of_photos import (
+from nearfar.faults.of_light import ExposureChanged, LampFlickers
+from nearfar.faults.of_photos import NotLinear, Spoilt
+from nearfar.faults.of_single_photos import (
     ColoursSwapped,
-    ExposureChanged,
-    LampFlickers,
-    NotLinear,
     PhotosDark,
     PhotosIncomplete,
     PhotosMixed,
     PhotosTorn,
     PhotosTurned,
     ShowsOtherPattern,
-    Spoilt,
 )
 from nearfar.faults.records import Fault, LightDrifted, PairsDoNotAdd, PhotosSaturated
 from nearfar.plan import Plan
@@ -37,9 +35,7 @@ from nearfar.workflow.verdict.held_out import HeldOut
 from nearfar.workflow.verdict.repeats import Repeats, measure_repeats
 from nearfar.workflow.verdict.widening import widening_of
 
-Cause = (
-    of_photos.Cause | Literal["lamp", "model", "noise", "too-few-photos", "below-plan", "unchecked"]
-)
+Cause = words.Cause | Literal["lamp", "model", "noise", "too-few-photos", "below-plan", "unchecked"]
 
 # What a pattern and its inverse may show beyond white, as a share of white, and by how many
 # standard deviations more they have to.

@@ -5,6 +5,7 @@ import pytest
 
 from nearfar.faults.of_light import AmbientJumped, ExposureChanged, LampJumped
 from nearfar.faults.of_photos import Moved
+from nearfar.faults.of_single_photos import PhotosMisfit
 from nearfar.photometry.drift import References
 from nearfar.workflow.diagnosis.jumps import name_jumps
 
@@ -40,7 +41,10 @@ def test_a_lamp_that_dims_at_once_is_found(at, between):
 
 def test_ambient_light_that_comes_on_at_once_is_found():
     photos = photos_with(1 + step(0, 0.0), step(30, 0.07))
-    (found,) = name_jumps([ExposureChanged((28, 29), 0.01, -0.05)], photos, REFERENCES)
+    seen = [ExposureChanged((28, 29), 0.01, -0.05), PhotosMisfit((30, 31)), PhotosMisfit((4,))]
+    found, other = name_jumps(seen, photos, REFERENCES)
+    # Those between the two photos of black do not fit because of it.
+    assert other == seen[2]
     assert isinstance(found, AmbientJumped)
     assert (found.after, found.before) == (20, 40)
     assert found.offset == pytest.approx(0.1)

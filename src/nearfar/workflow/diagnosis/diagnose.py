@@ -50,6 +50,9 @@ from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
 OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
 # What single photos that do not fit make of others.
 OF_LIGHT = (ExposureChanged, LampFlickers)
+# A lamp that flickers changes single photos by no more than so many of its standard deviations, of
+# which the estimate hides a part.
+LARGEST_OF_FLICKER = 10.0
 # Bend of the response that the sums of all inverse photos show, at least, and over its deviation.
 LEAST_SHARED_BEND, SURE_DEVIATIONS = 0.02, 5.0
 
@@ -160,6 +163,7 @@ def _what_does_not_fit(
     bends = _bends_all_pairs(of_pairs, found)
     # The estimate bends to single photos that stand out, so that others look darker or brighter.
     is_of_single = single.stand_out and all(isinstance(each, OF_LIGHT) for each in found)
+    is_of_single &= not _are_of_flicker(single.probable, found)
     if is_of_single or not (found or bends):
         return [*compressed, *name_jumps(single.probable, sample.photos, references)]
     # Black may well be at the lowest level; it is clipped if photos do not fit.
@@ -173,6 +177,15 @@ def _what_does_not_fit(
     if response:
         found = [each for each in found if not isinstance(each, OF_RESPONSE)]
     return [*response, *name_jumps(found, sample.photos, references)]
+
+
+def _are_of_flicker(single: Sequence[Spoilt], found: Sequence[Spoilt]) -> bool:
+    """Return whether single photos under another exposure are those of a lamp that flickers."""
+    deviation = max((each.deviation for each in found if isinstance(each, LampFlickers)), default=0)
+    return all(
+        isinstance(each, ExposureChanged) and abs(each.gain) < LARGEST_OF_FLICKER * deviation
+        for each in single
+    )
 
 
 def _bends_all_pairs(of_pairs: Bend | None, found: Sequence[Spoilt]) -> bool:

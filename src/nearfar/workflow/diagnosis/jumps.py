@@ -11,6 +11,7 @@ import numpy as np
 from nearfar.arrays import Floats
 from nearfar.faults.of_light import AmbientJumped, ExposureChanged, LampJumped
 from nearfar.faults.of_photos import Spoilt
+from nearfar.faults.of_single_photos import PhotosMisfit
 from nearfar.photometry.drift import References
 
 # Change between two photos of one pattern, over the largest that is seen in a photo between them;
@@ -21,6 +22,8 @@ LEAST_OVER_SEEN, LEAST_OVER_OTHERS = 0.8, 4.0
 def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) -> list[Spoilt]:
     """Return what was found, with jumps of light in the place of photos that are off by them.
 
+    Photos that do not fit are left out where a jump is why.
+
     Parameters
     ----------
     found : sequence of Spoilt
@@ -29,10 +32,22 @@ def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) 
         All photos of a sample as they were taken, in photo units.
     references : References
     """
-    return [
+    named = [
         _jump_of(each, photos, references) if isinstance(each, ExposureChanged) else each
         for each in found
     ]
+    jumps = [each for each in named if isinstance(each, LampJumped | AmbientJumped)]
+    return [
+        each
+        for each in named
+        if not isinstance(each, PhotosMisfit)
+        or not any(_are_between(each.photos, jump) for jump in jumps)
+    ]
+
+
+def _are_between(photos: Sequence[int], jump: LampJumped | AmbientJumped) -> bool:
+    """Return whether photos lie between the two that tell of a jump."""
+    return all(jump.after <= number <= jump.before for number in photos)
 
 
 def _jump_of(

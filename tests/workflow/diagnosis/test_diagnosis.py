@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.spoils import SPOILS, shoot
+from scipy import ndimage
 
 from nearfar.arrays import Size
 from nearfar.capture.writing import write_capture
@@ -144,6 +145,18 @@ def test_photos_exposed_under_two_patterns_are_told_by_how_much(shot, spoilt_by,
         1,
     ]
     assert found.share == pytest.approx(share, abs=0.02)
+
+
+def test_a_lens_that_creeps_is_no_ambient_light_that_flickers(tmp_path):
+    # It leaves black as it is.
+    shot = shoot("cornell", Size(32, 32), 90)
+    photos = shot.photos.astype(float)
+    for number, photo in enumerate(photos):
+        deviation = 0.5 * number / len(photos)
+        photos[number] = ndimage.gaussian_filter(photo, (deviation, deviation, 0), mode="nearest")
+    found = found_in(shot.counts(photos), shot, tmp_path)
+    assert found
+    assert {each.cause for each in found} <= {"moved", "focus"}
 
 
 def test_photos_of_a_dark_projector_are_no_other_order(shot, spoilt_by):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from nearfar.arrays import Floats
 from nearfar.capture import Capture
 from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_by_sweeps
@@ -50,6 +51,8 @@ from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
 OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
 # What single photos that do not fit make of others.
 OF_LIGHT = (ExposureChanged, LampFlickers)
+# Deviation of the light of black, in photo units, of that of ambient light, in shares of white.
+LEAST_OF_BLACK = 0.1
 # A lamp that flickers changes single photos by no more than so many of its standard deviations, of
 # which the estimate hides a part.
 LARGEST_OF_FLICKER = 10.0
@@ -158,7 +161,7 @@ def _what_does_not_fit(
     if changed := find_changed_references(photos, references):
         # It makes other photos brighter or darker, too, and bends their sums. Ambient light that
         # flickers makes photos of white differ.
-        surer = [each for each in found if isinstance(each, (Moved, AmbientFlickers))]
+        surer = [each for each in found if _is_surer(each, sample.photos[references.blacks])]
         return [*compressed, *find_clipped_black(sample), *(surer or changed)]
     bends = _bends_all_pairs(of_pairs, found)
     # The estimate bends to single photos that stand out, so that others look darker or brighter.
@@ -177,6 +180,17 @@ def _what_does_not_fit(
     if response:
         found = [each for each in found if not isinstance(each, OF_RESPONSE)]
     return [*response, *name_jumps(found, sample.photos, references)]
+
+
+def _is_surer(found: Spoilt, blacks: Floats) -> bool:
+    """Return whether it says more than that parts of white changed.
+
+    Ambient light that flickers does so in the photos of black, (n, rows, columns, channels), too.
+    """
+    if isinstance(found, AmbientFlickers):
+        scatter = float(np.std(blacks.mean(axis=(1, 2, 3))))
+        return scatter > LEAST_OF_BLACK * found.deviation
+    return isinstance(found, Moved)
 
 
 def _are_of_flicker(single: Sequence[Spoilt], found: Sequence[Spoilt]) -> bool:

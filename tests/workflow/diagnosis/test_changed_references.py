@@ -102,6 +102,14 @@ def test_flashing_pixels_are_told_by_their_share_and_are_no_change(shot):
     assert found.share == pytest.approx(0.005, rel=0.5)
 
 
+@pytest.mark.parametrize("place", [0, -1])
+def test_a_few_flashes_in_the_first_or_last_white_are_no_change(shot, place):
+    def flash(photos):
+        photos[shot.references.whites[place], 3:6, 3] += 0.3
+
+    assert found_in(shot, flash) == []
+
+
 def test_one_photo_with_flashes_is_something_else(shot):
     def flash(photos):
         photos[shot.references.whites[2], 3:5, 3:5] += 0.2

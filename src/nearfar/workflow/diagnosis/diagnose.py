@@ -10,7 +10,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.faults.of_light import AmbientFlickers, ExposureChanged, LampFlickers
 from nearfar.faults.of_photos import Moved, NotLinear, Spoilt
-from nearfar.photometry.drift import find_references
+from nearfar.photometry.drift import References, find_references
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
@@ -30,7 +30,7 @@ from nearfar.workflow.diagnosis.inverse_pairs import (
     has_odd_pairs,
     steady_pairs,
 )
-from nearfar.workflow.diagnosis.jumps import name_jumps
+from nearfar.workflow.diagnosis.jumps import mean_light, name_jumps
 from nearfar.workflow.diagnosis.left_out import SWEEPS
 from nearfar.workflow.diagnosis.misfit import (
     SteadyPhotos,
@@ -51,8 +51,8 @@ from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
 OF_RESPONSE = (NotLinear, ExposureChanged, LampFlickers)
 # What single photos that do not fit make of others.
 OF_LIGHT = (ExposureChanged, LampFlickers)
-# Deviation of the light of black, in photo units, of that of ambient light, in shares of white.
-LEAST_OF_BLACK = 0.1
+# Where ambient light flickers, photos of black deviate by this share of its deviation at least.
+LEAST_OF_BLACK = 0.2
 # A lamp that flickers changes single photos by no more than so many of its standard deviations, of
 # which the estimate hides a part.
 LARGEST_OF_FLICKER = 10.0
@@ -161,7 +161,7 @@ def _what_does_not_fit(
     if changed := find_changed_references(photos, references):
         # It makes other photos brighter or darker, too, and bends their sums. Ambient light that
         # flickers makes photos of white differ.
-        surer = [each for each in found if _is_surer(each, sample.photos[references.blacks])]
+        surer = [each for each in found if _is_surer(each, sample.photos, references)]
         return [*compressed, *find_clipped_black(sample), *(surer or changed)]
     bends = _bends_all_pairs(of_pairs, found)
     # The estimate bends to single photos that stand out, so that others look darker or brighter.
@@ -182,14 +182,15 @@ def _what_does_not_fit(
     return [*response, *name_jumps(found, sample.photos, references)]
 
 
-def _is_surer(found: Spoilt, blacks: Floats) -> bool:
+def _is_surer(found: Spoilt, photos: Floats, references: References) -> bool:
     """Return whether it says more than that parts of white changed.
 
-    Ambient light that flickers does so in the photos of black, (n, rows, columns, channels), too.
+    Ambient light that flickers does so in the photos of black, too. All photos of the sample are
+    given as they were taken, (photos, rows, columns, channels).
     """
     if isinstance(found, AmbientFlickers):
-        scatter = float(np.std(blacks.mean(axis=(1, 2, 3))))
-        return scatter > LEAST_OF_BLACK * found.deviation
+        black = photos[references.blacks].mean(axis=(1, 2, 3)) / mean_light(photos, references)
+        return float(np.std(black)) > LEAST_OF_BLACK * found.deviation
     return isinstance(found, Moved)
 
 

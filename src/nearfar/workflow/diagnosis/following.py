@@ -15,8 +15,8 @@ from nearfar.photometry.drift import References
 from nearfar.plan.patterns import HalfScreen, Picture
 from nearfar.workflow.diagnosis.misfit import PhotoFits
 
-# What half-screens and their inverses sum to beyond white, as a share of it; and over the same of
-# pictures. docs/decisions/0114 has what responses that are not linear reach.
+# The sum of the photos of a half-screen and of its inverse, less white, as a share of white; and
+# its ratio to the same of pictures. docs/decisions/0114 has what bent responses reach.
 SMALLEST_EXCESS, LEAST_OVER_PICTURES = 0.005, 0.75
 
 
@@ -55,7 +55,7 @@ def find_following_of_pattern(fits: PhotoFits, references: References) -> list[F
 
 
 def _excess(fits: PhotoFits, number: int, inverse: int, whites: Integers) -> float:
-    """Return what a photo and that of the inverse pattern sum to beyond white, as a share of it."""
+    """Return the sum of a pattern's photo and its inverse's, less white, as a share of white."""
     weight = 1.0 / (fits.variance[number] + fits.variance[inverse])
     white = fits.photos[whites].mean(axis=0) - fits.black
     beyond = fits.photos[number] + fits.photos[inverse] - 2 * fits.black - white

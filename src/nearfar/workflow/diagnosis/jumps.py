@@ -20,9 +20,9 @@ LEAST_OVER_SEEN, LEAST_OVER_OTHERS = 0.8, 4.0
 
 
 def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) -> list[Spoilt]:
-    """Return what was found, with jumps of light in the place of photos that are off by them.
+    """Replace photos under another exposure by the jump of light that explains them.
 
-    Photos that do not fit are left out where a jump is why.
+    Photos that do not fit, and lie where the light jumped, are left out.
 
     Parameters
     ----------
@@ -45,6 +45,18 @@ def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) 
     ]
 
 
+def mean_light(photos: Floats, references: References) -> float:
+    """Return the mean of white less black, in photo units; above 0.
+
+    Parameters
+    ----------
+    photos, references
+        As `name_jumps` takes them.
+    """
+    white, black = (float(photos[numbers].mean()) for numbers in references)
+    return max(white - black, float(np.finfo(np.float32).tiny))
+
+
 def _are_between(photos: Sequence[int], jump: LampJumped | AmbientJumped) -> bool:
     """Return whether photos lie between the two that tell of a jump."""
     return all(jump.after <= number <= jump.before for number in photos)
@@ -53,9 +65,9 @@ def _are_between(photos: Sequence[int], jump: LampJumped | AmbientJumped) -> boo
 def _jump_of(
     found: ExposureChanged, photos: Floats, references: References
 ) -> ExposureChanged | LampJumped | AmbientJumped:
-    """Return the jump of light that photos under other light come from; if there is none, these."""
-    black, white = (photos[numbers].mean(axis=(1, 2, 3)) for numbers in reversed(references))
-    light = max(float(white.mean() - black.mean()), float(np.finfo(np.float32).tiny))
+    """Return the jump of light that explains photos under another exposure; else these photos."""
+    white, black = (photos[numbers].mean(axis=(1, 2, 3)) for numbers in references)
+    light = mean_light(photos, references)
     is_ambient = abs(found.offset) > abs(found.gain)
     numbers, levels = (references.blacks, black) if is_ambient else (references.whites, white)
     steps = np.diff(levels) / light

@@ -27,7 +27,7 @@ from nearfar.estimate.physical.translucent import SQUARE
 
 # Standard deviation over the root of the share left: of direct light, times what kernels add at q;
 # of subsurface light, times itself. These and the next were measured on cornell, cornell-aside and
-# the steps and the tree of benchmarks/trial_bodies.py.
+# the steps and the tree of benchmarks/trial_scenes.py.
 OF_DIRECT = 0.75
 OF_SUBSURFACE = 0.33
 # How well what a kernel adds at q is known at best, as a share of it: all of a body has the same

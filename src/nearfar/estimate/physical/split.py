@@ -91,6 +91,23 @@ class Translucent(NamedTuple):
             found[:, channel] = _spread(source, self.slope, lit, where)
         return found
 
+    def without(self, left: Booleans) -> "Translucent":
+        """Return the body without some camera pixels.
+
+        Parameters
+        ----------
+        left : ndarray of bool, shape (C,)
+            Which of all camera pixels are not the body's.
+        """
+        kept = ~left[self.pixels]
+        return self._replace(
+            pixels=self.pixels[kept],
+            places=self.places[kept],
+            slope=self.slope[kept],
+            amplitude=self.amplitude[kept],
+            explained=self.explained[kept],
+        )
+
     def _seen(self, projector: Size) -> tuple[slice, slice, Footprint]:
         """Return rows and columns that hold the body's light, and its footprint in them."""
         pixels, weights = footprint(self.places, projector)

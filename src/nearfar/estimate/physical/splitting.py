@@ -7,6 +7,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
 from nearfar.estimate.physical.colours import with_colours_of_bodies
+from nearfar.estimate.physical.contacts import without_contacts
 from nearfar.estimate.physical.crease_light import at_creases, with_crease_light
 from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.dark_creases import without_dark_creases
@@ -97,7 +98,8 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         elsewhere,
         None if transport.footprint is None else boxes.reshape(transport.footprint.shape),
     )
-    split = without_dark_creases(with_colours_of_bodies(with_outlines(split)))
+    split = with_outlines(without_contacts(split))
+    split = without_dark_creases(with_colours_of_bodies(split))
     split = without_holes(without_specks(split))
     near_creases = at_creases(split, creases)
     split = with_opaque_outlines(split, near_creases)

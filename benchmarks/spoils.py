@@ -427,6 +427,22 @@ def _(shot: Shot, _: float) -> Photos:
     return shot.again(covered)
 
 
+@spoil("colours of the lamp from the middle on", ("exposure",), 0.03, 0.05, 0.1)
+def _(shot: Shot, share: float) -> Photos:
+    photos = shot.photos.astype(float)
+    photos[shot.half :] *= [1 + share, 1.0, 1 - share]
+    return shot.counts(photos)
+
+
+@spoil("patterns that linger", ("order",), 0.01, 0.02, 0.04)
+def _(shot: Shot, share: float) -> Photos:
+    def lingering(pattern: NDArray[np.uint8], number: int) -> NDArray[np.floating]:
+        before = shot.plan.draw(max(0, number - 1)).astype(float)
+        return np.asarray((1 - share) * pattern + share * before)
+
+    return shot.again(lingering)
+
+
 @spoil("room light from the middle on", ("exposure", "lamp"), 0.02, 0.05)
 def _(shot: Shot, share: float) -> Photos:
     photos = shot.photos.astype(float)

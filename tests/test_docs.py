@@ -224,6 +224,7 @@ VALUES = {
     "capture": Path("capture.zarr"),
     "change": records.LightChange("lamp", 0.1),
     "frequency": (0, 1),
+    "gains": (0.04, 0.0, -0.04),
     "how": "mirrored left to right",
     "is_calibrated": False,
     "is_interlaced": False,

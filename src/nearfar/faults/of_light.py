@@ -61,6 +61,35 @@ class LampJumped:
 
 
 @dataclass(frozen=True)
+class ColoursJumped:
+    """Colours of the lamp, or the camera's white balance, that changed at once.
+
+    Drift between two photos of white is taken to be steady, so that the photos between them are
+    off.
+
+    Attributes
+    ----------
+    after, before : int
+        Numbers of the photos of white between which it was.
+    gains : tuple of float
+        The change of each channel, as a share.
+    """
+
+    after: int
+    before: int
+    gains: tuple[float, ...]
+    cause: ClassVar[Cause] = "exposure"
+
+    def __str__(self) -> str:
+        gains = ", ".join(f"{gain:+.1%}" for gain in self.gains)
+        return (
+            f"the colours of the light changed at once, by {gains}, between photos {self.after} "
+            f"and {self.before}: fix the camera's white balance, keep the lamp steady, and shoot "
+            f"again."
+        )
+
+
+@dataclass(frozen=True)
 class AmbientJumped:
     """Ambient light that changed at once, between two photos of black.
 

@@ -6,6 +6,7 @@ from typing import ClassVar
 from nearfar.faults.of_light import (
     AmbientFlickers,
     AmbientJumped,
+    ColoursJumped,
     ExposureChanged,
     FollowsPattern,
     LampFlickers,
@@ -26,6 +27,27 @@ from nearfar.faults.of_single_photos import (
 from nearfar.faults.words import Cause, listed_numbers
 
 SHOOT_AGAIN = "shoot again from there on, or all, with camera, projector and scene at rest"
+
+
+@dataclass(frozen=True)
+class PatternsLinger:
+    """Photos that hold light of the pattern shown before.
+
+    Attributes
+    ----------
+    share : float
+        Of the light of a photo.
+    """
+
+    share: float
+    cause: ClassVar[Cause] = "order"
+
+    def __str__(self) -> str:
+        return (
+            f"every photo holds {self.share:.1%} of the pattern before: the projector is slow, or "
+            f"photos are taken too soon; leave more time between a pattern and its photo, and "
+            f"shoot again."
+        )
 
 
 @dataclass(frozen=True)
@@ -198,11 +220,13 @@ Spoilt = (
     | ExposureChanged
     | LampJumped
     | AmbientJumped
+    | ColoursJumped
     | LampFlickers
     | FollowsPattern
     | AmbientFlickers
     | RowsFlicker
     | NoisyRows
+    | PatternsLinger
     | PixelsFlash
     | SceneChanged
     | Moved

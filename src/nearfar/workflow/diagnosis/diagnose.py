@@ -10,7 +10,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.faults.of_light import AmbientFlickers, ExposureChanged, LampFlickers
 from nearfar.faults.of_photos import Moved, NotLinear, Spoilt
-from nearfar.photometry.drift import References, find_references
+from nearfar.photometry.drift import Drift, References, find_references
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
@@ -30,9 +30,11 @@ from nearfar.workflow.diagnosis.inverse_pairs import (
     has_odd_pairs,
     steady_pairs,
 )
-from nearfar.workflow.diagnosis.jumps import mean_light, name_jumps
+from nearfar.workflow.diagnosis.jumps import find_jump_of_colours, mean_light, name_jumps
 from nearfar.workflow.diagnosis.left_out import SWEEPS
+from nearfar.workflow.diagnosis.lingering import find_lingering_patterns
 from nearfar.workflow.diagnosis.misfit import (
+    PhotoFits,
     SteadyPhotos,
     fit_photos,
     inverse_photos,
@@ -131,7 +133,6 @@ def _what_does_not_fit(
     suspected: bool | None,
 ) -> list[Spoilt]:
     """Find what spoils photos by reference, by how they fit the transport; the worst first."""
-    plan = sample.plan
     try:
         photos = sample.without_drift()
     except InputError:
@@ -140,35 +141,71 @@ def _what_does_not_fit(
     sampled = _estimate_of(transport, sample, photos)
     fits = fit_photos(photos, sampled)
     progress(3 / 4)
+    if lingering := find_lingering_patterns(fits, photos.drift.references.whites):
+        # They spoil all photos, whatever else these look like.
+        return [*compressed, *lingering]
     single = find_spoilt_photos(fits, sampled.correspondence, suspected=suspected)
     if single.certain:
         return [*single.certain, *single.probable]
+    return _what_changed(sample, fits, photos.drift, single, compressed, suspected=suspected)
+
+
+def _what_changed(
+    sample: CameraSample,
+    fits: PhotoFits,
+    drift: Drift,
+    single: SpoiltPhotos,
+    compressed: Sequence[Spoilt],
+    *,
+    suspected: bool | None,
+) -> list[Spoilt]:
+    """Find what spoils all photos, or many, where no single one is certainly spoilt."""
     equations, misfit = normal_equations(sample, fits), fits.misfit
     if suspected is False:
-        checks = serves(plan, "check")
+        checks = serves(fits.plan, "check")
         equations, misfit = equations.without(checks), np.where(checks, 1.0, misfit)
-    references, of_pairs = photos.drift.references, bend_of_pairs(fits)
-    found = find_changes(equations, misfit, references.whites, inverse_photos(plan), of_pairs)
+    references, of_pairs = drift.references, bend_of_pairs(fits)
+    found = find_changes(equations, misfit, references.whites, inverse_photos(fits.plan), of_pairs)
     # Others look spoilt because the drift is told by these, unless these moved with others.
     odd = find_odd_references(sample.photos, references)
-    if not compressed and (flashing := find_flashing_pixels(photos, sample.photos, references)):
+    steady = fits.without_drift
+    if not compressed and (flashing := find_flashing_pixels(steady, sample.photos, references)):
         odd = [*flashing]
     if odd and not any(isinstance(each, Moved) for each in found):
         return odd
     if found and isinstance(found[0], Moved):
         # What moved makes photos brighter or darker.
         found = [each for each in found if not isinstance(each, (*OF_LIGHT, AmbientFlickers))]
-    if changed := find_changed_references(photos, references):
+    if changed := find_changed_references(steady, references):
         # It makes other photos brighter or darker, too, and bends their sums. Ambient light that
         # flickers makes photos of white differ.
         surer = [each for each in found if _is_surer(each, sample.photos, references)]
         return [*compressed, *find_clipped_black(sample), *(surer or changed)]
+    if jumped := find_jump_of_colours(drift.lamp, references.whites):
+        # Photos about it look brighter or darker.
+        return [*compressed, *(each for each in found if not isinstance(each, OF_LIGHT)), *jumped]
     bends = _bends_all_pairs(of_pairs, found)
     # The estimate bends to single photos that stand out, so that others look darker or brighter.
     is_of_single = single.stand_out and all(isinstance(each, OF_LIGHT) for each in found)
     is_of_single &= not _are_of_flicker(single.probable, found)
     if is_of_single or not (found or bends):
         return [*compressed, *name_jumps(single.probable, sample.photos, references)]
+    response = _response(sample, fits, references, found, compressed, bends=bends)
+    if response:
+        found = [each for each in found if not isinstance(each, OF_RESPONSE)]
+    return [*response, *name_jumps(found, sample.photos, references)]
+
+
+def _response(
+    sample: CameraSample,
+    fits: PhotoFits,
+    references: References,
+    found: Sequence[Spoilt],
+    compressed: Sequence[Spoilt],
+    *,
+    bends: bool,
+) -> list[Spoilt]:
+    """Return what makes photos not proportional to light; empty if nothing is known to do so."""
     # Black may well be at the lowest level; it is clipped if photos do not fit.
     response: list[Spoilt] = [*compressed, *find_clipped_black(sample)]
     if not response and (encoding := name_encoding(sample)):
@@ -177,9 +214,7 @@ def _what_does_not_fit(
         response = [*find_following_of_pattern(fits, references)]
     if not response and bends:
         response = [NotLinear("")]
-    if response:
-        found = [each for each in found if not isinstance(each, OF_RESPONSE)]
-    return [*response, *name_jumps(found, sample.photos, references)]
+    return response
 
 
 def _is_surer(found: Spoilt, photos: Floats, references: References) -> bool:

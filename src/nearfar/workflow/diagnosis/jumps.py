@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nearfar.arrays import Floats
-from nearfar.faults.of_light import AmbientJumped, ExposureChanged, LampJumped
+from nearfar.arrays import Floats, Integers
+from nearfar.faults.of_light import AmbientJumped, ColoursJumped, ExposureChanged, LampJumped
 from nearfar.faults.of_photos import Spoilt
 from nearfar.faults.of_single_photos import PhotosMisfit
 from nearfar.photometry.drift import References
@@ -17,6 +17,10 @@ from nearfar.photometry.drift import References
 # Change between two photos of one pattern, over the largest that is seen in a photo between them;
 # and over the change between any other two.
 LEAST_OVER_SEEN, LEAST_OVER_OTHERS = 0.8, 4.0
+# Change of a colour, over the mean of all, that is told where no photo between two of white does.
+LEAST_OF_COLOUR = 0.015
+# Fewer photos of white do not tell a jump from drift.
+FEWEST_WHITES = 4
 
 
 def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) -> list[Spoilt]:
@@ -43,6 +47,29 @@ def name_jumps(found: Sequence[Spoilt], photos: Floats, references: References) 
         if not isinstance(each, PhotosMisfit)
         or not any(_are_between(each.photos, jump) for jump in jumps)
     ]
+
+
+def find_jump_of_colours(lamp: Floats, whites: Integers) -> list[ColoursJumped]:
+    """Find whether colours changed at once between two photos of white, and not at other times.
+
+    Parameters
+    ----------
+    lamp : ndarray, shape (whites, channels)
+        Gain of the lamp at each photo of white.
+    whites : ndarray of int
+        Their numbers.
+    """
+    if len(whites) < FEWEST_WHITES:
+        return []
+    colours = lamp / lamp.mean(axis=1, keepdims=True)
+    steps = np.abs(np.diff(colours, axis=0)).max(axis=1)
+    place = int(np.argmax(steps))
+    others = float(np.max(np.delete(steps, place)))
+    if steps[place] < max(LEAST_OF_COLOUR, LEAST_OVER_OTHERS * others):
+        return []
+    gains = lamp[place + 1] / lamp[place] - 1
+    after, before = whites[place : place + 2].tolist()
+    return [ColoursJumped(after, before, tuple(gains.tolist()))]
 
 
 def mean_light(photos: Floats, references: References) -> float:

@@ -6,6 +6,7 @@ from nearfar.checks import require_instance
 from nearfar.errors import InputError
 from nearfar.estimate.error_bars import ErrorBars
 from nearfar.estimate.physical.body import Body, bodies_at, with_wider_cells
+from nearfar.estimate.physical.close_places import with_close_places
 from nearfar.estimate.physical.colours import with_colours_of_bodies
 from nearfar.estimate.physical.contacts import without_contacts
 from nearfar.estimate.physical.crease_light import at_creases, with_crease_light
@@ -102,7 +103,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     split = without_dark_creases(with_colours_of_bodies(split))
     split = without_holes(without_specks(split))
     near_creases = at_creases(split, creases)
-    split = with_opaque_outlines(split, near_creases)
+    split = with_close_places(with_opaque_outlines(split, near_creases))
     # Without error bars nothing says how much of inter-reflection is noise.
     if transport.posterior is not None:
         deviation = ErrorBars(transport).direct()

@@ -1,6 +1,7 @@
 """``nearfar separate``: from a rig, from photos, and patterns to project."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -300,6 +301,26 @@ def test_a_dense_transport_is_shot_and_compared_with(tmp_path: Path, grid: str, 
     # The grid is the file's own, and the direct light is found where rows peak.
     assert snr_of["direct"] > 25
     assert snr_of["global"] > 25
+
+
+def test_a_truth_in_other_units_than_the_rig_recorded_is_told(finished: Job, tmp_path: Path):
+    out, truth = tmp_path / "out", tmp_path / "truth.npy"
+    np.save(truth, 4e5 * np.load(finished.truth))
+    command = ("separate", out, *GRID, "--rig", finished.truth, "--force", "--truth")
+    check_done(run_nearfar(*command, finished.truth))
+    own = json.loads((out / "numbers.json").read_text())["snr"]["truth"]
+    ran = run_nearfar(*command, truth)
+    assert ran.status == 0
+    (said,) = ran.err.splitlines()
+    assert f"{truth} is in other units than the rig recorded" in said
+    found = re.search(r"multiplied by (\S+) it would give direct (\S+) dB, global (\S+) dB", said)
+    assert found is not None
+    factor, direct, global_ = map(float, found.groups())
+    assert factor == pytest.approx(1 / 4e5, rel=0.01)
+    assert [direct, global_] == pytest.approx([own["direct"], own["global"]], abs=0.2)
+    # The rig was exposed so that white fits, and a transport is not in the units of its photos.
+    np.save(truth, 1e-3 * np.load(finished.truth))
+    check_done(run_nearfar("separate", out, *GRID, "--rig", truth, "--force", "--truth", truth))
 
 
 def test_the_exposure_of_own_photos_is_fitted_to_the_truth(finished, tmp_path: Path, shot):

@@ -203,9 +203,10 @@ def separate(
             taken, method.separate, progress=lambda share: report("separating", share)
         )
         numbers = describe_separation(found, taken, method) | described
-        numbers["snr"] = steps.compare(found, truth, transport, exposure, projector)
+        compared = steps.compare(found, truth, transport, exposure, projector)
+        numbers["snr"] = compared.snr
         write_separation(output, found, numbers, force=force)
-    for fault in find_separation_faults(taken, method, rig or str(photos)):
+    for fault in [*find_separation_faults(taken, method, rig or str(photos)), *compared.faults]:
         warn(fault)
     if as_json:
         print(json.dumps(numbers, allow_nan=False))

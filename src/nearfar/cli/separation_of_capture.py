@@ -48,13 +48,14 @@ def separate_capture(
     with progress_bar("separating", quiet=quiet or as_json) as report:
         found = take_apart(capture, dark=dark, period=period, progress=report)
     numbers = dict(found.numbers)
-    numbers["snr"] = compare(found.pictures, told.truth, told.transport, None, told.projector)
+    compared = compare(found.pictures, told.truth, told.transport, None, told.projector)
+    numbers["snr"] = compared.snr
     write_separation(output, found.pictures, numbers, force=force)
     quiet = quiet or as_json
     say("\n".join(["used:", *found.used]), quiet=quiet)
     if found.left_out:
         say("\n".join(["left out:", *found.left_out]), quiet=quiet)
-    for fault in found.faults:
+    for fault in [*found.faults, *compared.faults]:
         warn(fault)
     if as_json:
         print(json.dumps(numbers, allow_nan=False))

@@ -1,7 +1,7 @@
 """Steps of ``nearfar separate``: photos from a rig or a folder, and comparison."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
@@ -103,23 +103,31 @@ def _projector_of(rig: str) -> Size:
     return load_world(path, None, None).projector
 
 
+class Compared(NamedTuple):
+    """SNR of direct and global against each of what they were compared with, dB, and faults."""
+
+    snr: dict[str, dict[str, float]]
+    faults: list[str]
+
+
 def compare(
     found: "Separation",
     truth: Path | None,
     transport: Path | None,
     exposure: float | None,
     projector: Size | None,
-) -> dict[str, dict[str, float]]:
-    """Return the SNR of direct and global against a truth or a reconstruction, in dB."""
+) -> Compared:
+    """Compare direct and global with a truth, a reconstruction, or both."""
     from nearfar.transport.exact_store import load_exact
     from nearfar.transport.store import load_transport
     from nearfar.workflow.separate import compare_to_transport, compare_to_truth
 
-    answer = {}
+    snr, faults = {}, list[str]()
     if truth is not None:
         camera = Size(*found.direct.shape[:2])
         known = load_exact(truth, projector=projector, camera=camera)
-        answer["truth"] = compare_to_truth(found, known, exposure)
+        beside = compare_to_truth(found, known, exposure, name=str(truth))
+        snr["truth"], faults = beside.snr, beside.faults
     if transport is not None:
-        answer["transport"] = compare_to_transport(found, load_transport(transport))
-    return answer
+        snr["transport"] = compare_to_transport(found, load_transport(transport))
+    return Compared(snr, faults)

@@ -21,6 +21,7 @@ from nearfar.transport.exact import ExactTransport
 from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.transport.parts import USUAL_PARTS
+from nearfar.workflow.units import nearest_factor
 
 BLOCK = 128
 # Rows along each side of the camera that are compared with an operator's: all would be C x P.
@@ -162,10 +163,7 @@ def fitted_exposure(transport: Transport, truth: KnownTransport) -> float:
     require_same_kind(transport, truth)
     lights = np.stack(list(standard_lights(transport.projector).values()))
     known, found = (each.pictures(lights).astype(np.float64) for each in (truth, transport))
-    energy = float(np.vdot(known, known))
-    along = float(np.vdot(known, found))
-    # Without light in common no factor fits better than another.
-    return along / energy if energy > 0 and along > 0 else 1.0
+    return nearest_factor(known, found)
 
 
 def relighting_snr(

@@ -29,6 +29,7 @@ from nearfar.workflow.evaluate import (
     split_snr,
 )
 from nearfar.workflow.physical_split import physical_snr
+from nearfar.workflow.units import find_other_units
 
 # What a judgement says beside its decibels: of units, dark pixels, light that is not there.
 REMARKS = (
@@ -38,10 +39,6 @@ REMARKS = (
     "pairs_without_light",
     "false_subsurface_share",
 )
-# A truth whose own best exposure is this many times the recorded one, or a part of it, is in
-# other units.
-LARGEST_RATIO_OF_EXPOSURES = 1.25
-
 
 Value = TypeVar("Value")
 
@@ -195,20 +192,20 @@ def find_faults_of_units(transport: Transport, truth: KnownTransport, name: str)
     list of str
         A sentence, or nothing.
     """
-    recorded = exposure_of(transport, truth).factor
     fitted = fitted_exposure(transport, truth)
-    if not recorded > 0:
-        return []
-    ratio = fitted / recorded
-    if 1 / LARGEST_RATIO_OF_EXPOSURES < ratio < LARGEST_RATIO_OF_EXPOSURES:
-        return []
-    lights = standard_lights(transport.projector)
-    reached = _mean_of_pictures(relighting_snr(transport, truth, lights, exposure=fitted))
-    return [
-        f"{name} is in other units than the rig recorded, or the transport is too bright or too "
-        f"dark: multiplied by {ratio:.4g} it would give {reached:.1f} dB under pictures; name the "
-        f"transport that was photographed, or multiply it."
-    ]
+
+    def reached() -> str:
+        lights = standard_lights(transport.projector)
+        found = _mean_of_pictures(relighting_snr(transport, truth, lights, exposure=fitted))
+        return f"{found:.1f} dB under pictures"
+
+    return find_other_units(
+        name,
+        fitted=fitted,
+        recorded=exposure_of(transport, truth).factor,
+        what="the transport is",
+        reached=reached,
+    )
 
 
 def _mean_of_pictures(found: dict[str, float]) -> float:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from nearfar.transport.known import KnownTransport
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import snr
 from nearfar.workflow.model_fit import split_by_model
+from nearfar.workflow.units import find_other_units, nearest_factor
 
 NUMBERS_NAME = "numbers.json"
 PICTURE_NAMES = ("direct", "global")
@@ -186,10 +187,29 @@ def is_separation(folder: Path) -> bool:
     return ours and (not entries or (folder / NUMBERS_NAME).is_file())
 
 
+class ComparedToTruth(NamedTuple):
+    """A separation beside the truth.
+
+    Attributes
+    ----------
+    snr : dict of str to float
+        Of direct and global, dB.
+    faults : list of str
+        A sentence if the truth is in other units than the rig recorded.
+    """
+
+    snr: dict[str, float]
+    faults: list[str]
+
+
 def compare_to_truth(
-    found: Separation, truth: KnownTransport, exposure: float | None = 1.0
-) -> dict[str, float]:
-    """SNR of direct and global under full white (global = N + F), dB.
+    found: Separation,
+    truth: KnownTransport,
+    exposure: float | None = 1.0,
+    *,
+    name: str = "the truth",
+) -> ComparedToTruth:
+    """Compare direct and global under full white (global = N + F) with the truth.
 
     Parameters
     ----------
@@ -198,7 +218,14 @@ def compare_to_truth(
         Its components are as physics has them where they are known apart, and else as the model
         with the window and far band of the paper's plans fits them best.
     exposure : float, optional
-        Photo units per unit of the truth; fitted to the sum of both pictures if left out.
+        Photo units per unit of the truth, as the rig recorded it; fitted to the sum of both
+        pictures if None.
+    name : str
+        What the truth is called in a sentence.
+
+    Returns
+    -------
+    ComparedToTruth
 
     Raises
     ------
@@ -213,8 +240,22 @@ def compare_to_truth(
         direct, near, far = truth.component_pictures(light)
         known = Separation(direct, near + far)
     _require_same_sizes(found, known, "truth")
-    scale = np.float32(_fitted(found, known) if exposure is None else exposure)
-    return _snr_of(found, Separation(*(scale * picture for picture in known)), "truth")
+
+    def snr_at(factor: float) -> dict[str, float]:
+        scaled = Separation(*(np.float32(factor) * picture for picture in known))
+        return _snr_of(found, scaled, "truth")
+
+    def reached() -> str:
+        return ", ".join(f"{part} {value:.1f} dB" for part, value in snr_at(fitted).items())
+
+    ours, theirs = ((pair.direct + pair.global_).astype(np.float64) for pair in (found, known))
+    fitted = nearest_factor(theirs, ours)
+    if exposure is None:
+        return ComparedToTruth(snr_at(fitted), [])
+    faults = find_other_units(
+        name, fitted=fitted, recorded=exposure, what="the photos are", reached=reached
+    )
+    return ComparedToTruth(snr_at(exposure), faults)
 
 
 def default_model(projector: Size) -> tuple[int, Size]:
@@ -223,13 +264,6 @@ def default_model(projector: Size) -> tuple[int, Size]:
     # About 0.1 of each side, odd.
     band = Size(*(2 * round(side / 20) + 1 for side in projector))
     return window, Size(*(min(part, side) for part, side in zip(band, projector, strict=True)))
-
-
-def _fitted(found: Separation, known: Separation) -> float:
-    """Return the factor that brings the known floodlit picture nearest to the one found."""
-    ours, theirs = ((pair.direct + pair.global_).astype(np.float64) for pair in (found, known))
-    energy = float(np.vdot(theirs, theirs))
-    return float(np.vdot(theirs, ours)) / energy if energy > 0 else 1.0
 
 
 def compare_to_transport(found: Separation, transport: Transport) -> dict[str, float]:

@@ -1,5 +1,8 @@
 """Files and names that were made to harm: a sentence, and nothing of theirs on terminal or page."""
 
+import builtins
+import errno
+import io
 import os
 import random
 import re
@@ -8,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from nearfar.cli.printable import CONTROLS
@@ -250,3 +254,65 @@ def test_a_file_that_may_not_be_read_gets_a_sentence(
     path.chmod(0o700)
     assert "Usage" not in ran.err
     assert ran.status in ({0} if os.geteuid() == 0 else {1})
+
+
+def _forbid(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a file be read by nobody: not even by the superuser, who may read anything."""
+    path.chmod(0)
+    opened = io.open
+
+    def refuse(file: Any, *options: Any, **named: Any) -> Any:
+        if not isinstance(file, int) and Path(file) == path:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return opened(file, *options, **named)
+
+    for module in (io, builtins):
+        monkeypatch.setattr(module, "open", refuse)
+
+
+@pytest.mark.parametrize("ending", [".npy", ".npz"])
+@pytest.mark.parametrize("command", ["acquire", "check", "compare", "evaluate", "info", "separate"])
+def test_arrays_that_may_not_be_read_are_not_called_damaged(
+    job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, command: str
+):
+    path, out = job.truth.with_suffix(ending), tmp_path / "out"
+    if ending == ".npz":
+        np.savez(path, T=np.load(job.truth))
+    _forbid(path, monkeypatch)
+    ran = run_nearfar(
+        *{
+            "acquire": ("acquire", job.plan, out, "--rig", path),
+            "check": ("check", path, *MODEL),
+            "compare": ("compare", path, out, "--photos", "60"),
+            "evaluate": ("evaluate", job.transport, "--truth", path),
+            "info": ("info", path),
+            "separate": ("separate", out, "--rig", path),
+        }[command]
+    )
+    sentence = check_sentence(ran, path, "Permission denied", "may read")
+    assert "save it again" not in sentence
+
+
+def test_a_matrix_that_may_not_be_mapped_is_not_called_damaged(
+    job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path = tmp_path / "mask.npy"
+    np.save(path, np.ones((72, 320)))
+    _forbid(path, monkeypatch)
+    ran = run_nearfar("probe", job.transport, tmp_path / "p.npy", "--mask", path)
+    check_sentence(ran, path, "Permission denied")
+
+
+@pytest.mark.parametrize("command", ["info", "reconstruct", "evaluate"])
+def test_a_store_that_may_not_be_read_is_not_called_anothers(
+    job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+):
+    _forbid(job.capture / "zarr.json", monkeypatch)
+    ran = run_nearfar(
+        *{
+            "info": ("info", job.capture),
+            "reconstruct": ("reconstruct", job.capture, tmp_path / "t.zarr"),
+            "evaluate": ("evaluate", job.transport, "--truth", job.capture),
+        }[command]
+    )
+    check_sentence(ran, job.capture, "Permission denied", "permissions")

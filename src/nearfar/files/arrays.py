@@ -3,14 +3,15 @@
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.errors import MissingFileError, UnreadableFileError
+from nearfar.errors import UnreadableFileError
 from nearfar.files.codecs import DAMAGE
 from nearfar.files.output import new_output
+from nearfar.files.reading import reading_faults
 
 
 def write_array(path: Path, array: NDArray[Any], *, force: bool = False) -> None:
@@ -43,18 +44,21 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises
     ------
     MissingFileError, UnreadableFileError
-        If there is no such file, or it is damaged or holds something else.
+        If there is no such file, or it may not be read, is damaged or holds something else.
     """
+    # Opened here: of a damaged archive NumPy forgets to close what it opened itself.
+    with reading_faults(path), path.open("rb") as file:
+        return _arrays_of(file, path)
+
+
+def _arrays_of(file: BinaryIO, path: Path) -> dict[str, NDArray[Any]]:
     try:
-        # Opened here: of a damaged archive NumPy forgets to close what it opened itself.
-        with path.open("rb") as file:
-            loaded = np.load(file, allow_pickle=False)
-            if isinstance(loaded, np.ndarray):
-                return {"array": loaded}
-            with loaded:
-                return dict(loaded.items())
-    except FileNotFoundError:
-        raise MissingFileError(f"{path} is not there: check the name.") from None
+        loaded = np.load(file, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return {"array": loaded}
+        with loaded:
+            return dict(loaded.items())
+    # A damaged archive names places outside its file, which the system refuses.
     except (OSError, zipfile.BadZipFile, zlib.error, *DAMAGE) as error:
         raise UnreadableFileError(
             f"{path} cannot be read as arrays: save it again with numpy.save or numpy.savez."
@@ -67,13 +71,12 @@ def map_array(path: Path) -> NDArray[Any]:
     Raises
     ------
     MissingFileError, UnreadableFileError
-        If there is no such file, or it is damaged or holds something else.
+        If there is no such file, or it may not be read, is damaged or holds something else.
     """
     try:
-        return np.asanyarray(np.lib.format.open_memmap(path, mode="r"))
-    except FileNotFoundError:
-        raise MissingFileError(f"{path} is not there: check the name.") from None
-    except (OSError, *DAMAGE) as error:
+        with reading_faults(path):
+            return np.asanyarray(np.lib.format.open_memmap(path, mode="r"))
+    except DAMAGE as error:
         raise UnreadableFileError(
             f"{path} cannot be read as an array: save it again with numpy.save."
         ) from error

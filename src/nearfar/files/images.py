@@ -14,6 +14,7 @@ from nearfar.files import codecs
 from nearfar.files.colour import from_srgb, to_srgb
 from nearfar.files.output import new_output
 from nearfar.files.raw import decode_raw
+from nearfar.files.reading import reading_faults
 from nearfar.files.unsupported import UnsupportedPictureError
 
 PICTURE_ENDINGS = (".png", ".tif", ".tiff", ".bmp", ".exr", ".npy")
@@ -105,14 +106,8 @@ def is_raw(path: Path) -> bool:
 
 
 def _read_bytes(path: Path) -> bytes:
-    try:
+    with reading_faults(path):
         return path.read_bytes()
-    except FileNotFoundError:
-        raise MissingFileError(f"{path} is not there: check the name.") from None
-    except OSError as error:
-        raise UnreadableFileError(
-            f"{path} cannot be read ({error.strerror}): check that it is a file you may read."
-        ) from error
 
 
 def _checked(path: Path, pixels: NDArray[Any]) -> NDArray[Any]:

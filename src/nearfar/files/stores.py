@@ -24,6 +24,7 @@ from nearfar.errors import InputError, MissingFileError, NearfarError, Unreadabl
 from nearfar.files.checksums import CHECKSUM, ChecksumError, with_checksum, without_checksum
 from nearfar.files.kinds import METADATA
 from nearfar.files.output import synchronise_entry
+from nearfar.files.reading import forbidden_folders
 from nearfar.files.writes import write_into
 
 # What zarr was seen to raise on metadata and chunks cut or changed at every byte.
@@ -271,7 +272,7 @@ def open_store(path: Path, kind: str, *versions: int) -> zarr.Group:
         If it is no Zarr group, of another kind or version, or damaged.
     """
     article = "an" if kind[0] in "aeiou" else "a"
-    try:
+    with forbidden_folders(path):
         if not path.exists():
             raise MissingFileError(f"{path} is not there: check the name.")
         if not (path / METADATA).is_file():
@@ -283,10 +284,6 @@ def open_store(path: Path, kind: str, *versions: int) -> zarr.Group:
             store = _WholeStore(path, read_only=True)
             group = zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
             found, found_version = group.attrs.get("format"), group.attrs.get("version")
-    except PermissionError as error:
-        raise UnreadableFileError(
-            f"{path} cannot be read ({error.strerror}): check its permissions."
-        ) from error
     if found != kind:
         other = f"a {found}" if str(found).startswith("nearfar ") else "of another kind"
         raise UnreadableFileError(f"{path} is not {article} {kind} but {other}: check the name.")

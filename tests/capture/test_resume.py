@@ -370,7 +370,7 @@ def test_what_somebody_else_keeps_under_the_name_is_left(rig, tmp_path, options)
     (folder / "photos.txt").write_text("mine")
     with pytest.raises(ExistingOutputError, match=r"c\.zarr\.unfinished"):
         acquire(PLAN, tmp_path / "c.zarr", rig, **options)
-    with pytest.raises(ExistingOutputError, match="nearfar did not write"):
+    with pytest.raises(ExistingOutputError, match="nothing that this command has left"):
         acquire(PLAN, tmp_path / "c.zarr", rig, force=True)
     assert sorted(path.name for path in folder.iterdir()) == ["photos.txt", "precious.txt"]
 

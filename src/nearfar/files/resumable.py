@@ -143,15 +143,18 @@ def _checked(path: Path, kind: ResumableKind, *, resume: bool, force: bool) -> t
 
 
 def _require_ours(folder: Path, kind: ResumableKind, *, resume: bool, force: bool) -> None:
-    """Refuse an unfinished folder with which a command must not go on, or begin anew."""
+    """Refuse an unfinished folder with which a command must not go on, or begin anew.
+
+    One without the log is nothing that such a command has left, even if nearfar wrote it, as it
+    wrote the copy of a capture.
+    """
     has_log = (folder / kind.log).is_file()
-    if not folder.is_dir() or (resume and not has_log and any(folder.iterdir())):
+    if not folder.is_dir() or (not has_log and any(folder.iterdir())):
         raise ExistingOutputError(
             f"{folder} is nothing that this command has left, it has no {kind.log}: choose another "
             f"name for the output, or move away what is there."
         )
-    killed_early = not kind.has_progress(folder) and (has_log or not any(folder.iterdir()))
-    if resume or (killed_early and _is_begun(folder)):
+    if resume or (not kind.has_progress(folder) and _is_begun(folder)):
         return
     if not force:
         raise ExistingOutputError(

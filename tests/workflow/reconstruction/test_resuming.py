@@ -255,11 +255,12 @@ def test_a_folder_that_holds_something_else_is_not_gone_on_with(
     else:
         shutil.copytree(capture.path if what == "a capture" else whole, folder)
     before = sorted(folder.rglob("*"))
-    for options in ({"resume": True}, {"resume": True, "force": True}, {}):
+    for options in ({"resume": True}, {"force": True}, {"resume": True, "force": True}, {}):
         with pytest.raises(ExistingOutputError, match=r"t\.zarr\.unfinished"):
             into(path, capture, memory=memory, **options)
-    ran = run_nearfar("reconstruct", capture.path, path, "--resume")
-    check_sentence(ran, folder, "choose another name")
+    for option in ("--resume", "--force"):
+        ran = run_nearfar("reconstruct", capture.path, path, option)
+        check_sentence(ran, folder, "nothing that this command has left", "choose another name")
     assert sorted(folder.rglob("*")) == before
     assert list(tmp_path.iterdir()) == [folder]
 

@@ -397,6 +397,12 @@ def test_the_camera_of_a_dense_transport_is_told_by_its_rows(tmp_path):
         (np.ones((12, 12, 5)), "a dense transport is"),
         (np.full((12, 12), np.nan), "NaN"),
         (np.ones(12), "a dense transport is"),
+        # Channels come last.
+        (np.ones((3, 12, 13)), r"has shape \(3, 12, 13\): .* \(C, P, channels\)"),
+        (
+            np.ones((3, 2, 4, 3, 5)),
+            r"has shape \(3, 2, 4, 3, 5\): .* \(Cy, Cx, Py, Px, channels\).* numpy\.moveaxis",
+        ),
         (np.array(["a"]), "not numbers"),
     ],
 )

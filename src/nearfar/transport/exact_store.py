@@ -36,6 +36,8 @@ KIND = "nearfar exact transport"
 FORMAT_VERSION = 1
 # A longer last axis is not one of channels.
 MAXIMUM_CHANNELS = 4
+# Orders of the axes of a dense T that are read, as messages name them.
+ORDERS = "(C, P), (C, P, channels), (Cy, Cx, Py, Px) or (Cy, Cx, Py, Px, channels)"
 DENSE_ENDINGS = (".npy", ".npz")
 # What an .npz holds beside matrices.
 SIZES = ("projector", "camera")
@@ -220,15 +222,17 @@ def _as_matrices(
         raise InputError(f"{source} holds {dense.dtype}, not numbers: save T as floats.")
     if not np.isfinite(dense).all():
         raise InputError(f"{source} holds NaN or infinite values: mend them first.")
+    # Before the axes are joined: a message names the shape that the user knows.
+    if not 2 <= dense.ndim <= 5 or (dense.ndim in (3, 5) and dense.shape[-1] > MAXIMUM_CHANNELS):
+        raise InputError(
+            f"{source} has shape {dense.shape}: a dense transport is {ORDERS}, of up to "
+            f"{MAXIMUM_CHANNELS} channels; bring its axes into such an order by numpy.moveaxis."
+        )
     if dense.ndim in (4, 5):
         camera, projector = Size(*dense.shape[:2]), Size(*dense.shape[2:4])
         dense = dense.reshape(camera.pixels, projector.pixels, *dense.shape[4:])
     if dense.ndim == 2:
         dense = dense[..., None]
-    if dense.ndim != 3 or dense.shape[2] > MAXIMUM_CHANNELS:
-        raise InputError(
-            f"{source} has shape {dense.shape}: a dense transport is (C, P) or (C, P, channels)."
-        )
     rows, columns = dense.shape[:2]
     if projector is None or projector.pixels != columns:
         raise InputError(

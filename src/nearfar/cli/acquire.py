@@ -188,7 +188,7 @@ def acquire(
             _finish(estimate, taken, transport, report, force=force, quiet=quiet)
     _say_exposure(opened, quiet=quiet)
     if until is not None and check is not None and check.quality is not None:
-        _say_what_limits(check.quality, until, quiet=quiet)
+        _say_what_limits(check.quality, until, made, quiet=quiet)
 
 
 def _plan_to_shoot(plan_file: Path, *, with_check_photos: bool) -> "Plan":
@@ -278,14 +278,28 @@ def _say_quality(quality: "CaptureQuality", *, quiet: bool) -> None:
     say(f"after {quality.photos} photos: {text}", quiet=quiet)
 
 
-def _say_what_limits(quality: "CaptureQuality", target: float, *, quiet: bool) -> None:
+def _say_what_limits(
+    quality: "CaptureQuality", target: float, plan: "Plan", *, quiet: bool
+) -> None:
+    """Print whether a capture reached what it was to reach, beside what was to be hoped for."""
+    from nearfar.transport.verdict import beside_held_out
+
+    # The plan was chosen for what all of its photos reach, and a capture may end before.
+    every = len(plan.patterns)
+    beside = beside_held_out(
+        quality.expected_snr,
+        None if (planned := plan.expected_snr) is None else planned.pictures,
+        quality.noise_snr,
+        photos_planned=every if quality.photos < every else None,
+    )
     if quality.snr >= target:
-        say(f"{target:g} dB is reached after {quality.photos} photos", quiet=quiet)
+        found = ", ".join([f"{quality.snr:.1f} dB under pictures to check by", *beside])
+        say(f"{target:g} dB is reached after {quality.photos} photos: {found}", quiet=quiet)
         return
     if quality.fault is not None:
         warn(f"{target:g} dB could not be checked to the end: {quality.fault}")
         return
     warn(
         f"{target:g} dB is not reached: all {quality.photos} photos relight pictures at "
-        f"{quality.snr:.1f} dB. {CURE_OF_LIMIT[quality.limit]}."
+        f"{', '.join([f'{quality.snr:.1f} dB', *beside])}. {CURE_OF_LIMIT[quality.limit]}."
     )

@@ -89,19 +89,10 @@ class KeptVerdict:
 
         It is empty if nothing was checked and nothing expected.
         """
-        planned = ""
-        if self.planned_snr is not None:
-            lowest, highest = self.planned_snr
-            planned = f"{lowest:.0f} to {highest:.0f} dB under pictures"
+        planned = None if self.planned_snr is None else _range_in_words(self.planned_snr)
         if self.held_out_snr is None:
-            return f"The plan was chosen for {planned}." if planned else ""
-        noise = self.noise_snr
-        is_noise_told = noise is not None and noise <= ROUNDING
-        beside = [
-            *([] if self.expected_snr is None else [f"{self.expected_snr:.1f} dB expected"]),
-            *([f"planned for {planned}"] if planned else []),
-            *([f"noise alone allows {noise:.1f} dB"] if is_noise_told else []),
-        ]
+            return "" if planned is None else f"The plan was chosen for {planned}."
+        beside = beside_held_out(self.expected_snr, self.planned_snr, self.noise_snr)
         widened = ""
         if self.widening > 1:
             widened = f"; error bars are made {self.widening:.2g} times as wide, to hold"
@@ -134,6 +125,37 @@ class KeptVerdict:
 
     def __str__(self) -> str:
         return " ".join([f"{self.grade}:", *self.sentences, self.summary]).rstrip()
+
+
+def beside_held_out(
+    expected: float | None,
+    planned: tuple[float, float] | None,
+    noise: float | None,
+    *,
+    photos_planned: int | None = None,
+) -> list[str]:
+    """Return in words what a held-out SNR_b is read beside, as far as it is known.
+
+    Parameters
+    ----------
+    expected, planned, noise : optional
+        As `KeptVerdict.expected_snr`, `KeptVerdict.planned_snr` and `KeptVerdict.noise_snr`.
+    photos_planned : int, optional
+        How many photos the plan has, where fewer may have been taken: what was planned for is said
+        to be of all of them.
+    """
+    said = [] if expected is None else [f"{expected:.1f} dB expected"]
+    if planned is not None:
+        of_all = "" if photos_planned is None else f" with all {photos_planned} photos"
+        said.append(f"planned for {_range_in_words(planned)}{of_all}")
+    if noise is not None and noise <= ROUNDING:
+        said.append(f"noise alone allows {noise:.1f} dB")
+    return said
+
+
+def _range_in_words(planned: tuple[float, float]) -> str:
+    lowest, highest = planned
+    return f"{lowest:.0f} to {highest:.0f} dB under pictures"
 
 
 def _percent(share: float) -> str:

@@ -61,12 +61,17 @@ class CaptureQuality(NamedTuple):
         represent, or frequencies that were not measured yet.
     fault : str or None
         Why nothing could be estimated from the photos so far, a sentence.
+    expected_snr, noise_snr : float or None
+        SNR_b that the error bars expect, and that the noise of the photos so far alone allows, dB;
+        None where nothing could be estimated.
     """
 
     photos: int
     snr: float
     limit: Limit
     fault: str | None = None
+    expected_snr: float | None = None
+    noise_snr: float | None = None
 
 
 class QualityObserver:
@@ -152,7 +157,13 @@ class QualityObserver:
         limit: Limit = "photos" if (held_out.unmeasured_share or 0.0) > 0.5 else "noise"
         if (held_out.error_ratio or 0.0) > MODEL_ERROR_RATIO:
             limit = "model"
-        return CaptureQuality(taken, held_out.snr, limit)
+        return CaptureQuality(
+            taken,
+            held_out.snr,
+            limit,
+            expected_snr=held_out.expected_snr,
+            noise_snr=held_out.noise_snr,
+        )
 
 
 def choose_rows(height: int, width: int) -> Integers:

@@ -9,6 +9,7 @@ from nearfar.arrays import parse_size
 from nearfar.cli.application import main
 from nearfar.scenes import sizes
 from nearfar.scenes.cache import _path
+from nearfar.transport.store import load_transport
 from nearfar.workflow.experiments.in_theory import WEDGE, acquire_in_theory
 
 # Scene, projector, W, far band; least SNR_b over five pictures and under white, dB. Camera: 30 000
@@ -77,6 +78,12 @@ def test_the_demo_ends_in_a_page_and_is_as_accurate(tmp_path: Path, monkeypatch,
     assert "117</b><span>photos in all" in text
     assert "35.0×</b><span>fewer than 4096" in text
     _check_accuracy(judged, 40.3, 48.0)
+    kept = load_transport(tmp_path / "out" / "transport.zarr").verdict
+    assert kept is not None
+    assert kept.grade == "good"
+    # The verdict leads.
+    verdict = f'<p class="verdict good"><b>good.</b> {kept.summary}</p>'
+    assert text.index("<h1>") < text.index(verdict) < text.index('class="fact')
     assert min(judged["physical_split"].values()) > 20
     assert f"{judged['physical_split']['interreflection']:.1f} dB" in text
     assert text.index("those of the physical split") < text.index("The model's split")

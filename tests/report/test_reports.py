@@ -209,6 +209,10 @@ def test_an_evaluation_by_truth(made, world, tmp_path):
     text = (tmp_path / "e.html").read_text()
     stands_alone(text)
     assert "SNR_t of every camera pixel" in text
+    kept = open_transport(made / "t.zarr").verdict
+    assert kept is not None
+    # The verdict leads, if there is one.
+    assert text.index("<h1>") < text.index(f"<b>{kept.grade}.</b>") < text.index('class="fact')
     assert ran.out.index("snr_b_pictures") < ran.out.index("white")
     # Means and percentiles are a table.
     (head,) = re.findall(r"^dB +mean .*", ran.out, re.MULTILINE)

@@ -19,6 +19,7 @@ from nearfar.workflow.acquire import acquire
 from nearfar.workflow.evaluate import row_snr
 from nearfar.workflow.judge import judge_by_truth
 from nearfar.workflow.reconstruction.reconstruct import reconstruct
+from nearfar.workflow.verdict.keeping import judge_transport
 
 SCENE = "cornell"
 PROJECTOR = Size(64, 64)
@@ -87,6 +88,8 @@ def run_demo(
         with timed("reconstruction"):
             transport, correspondence = reconstruct(capture, progress=report)
         save_transport(transport, partial / TRANSPORT)
+        with timed("verdict"):
+            verdict = judge_transport(partial / TRANSPORT, capture, progress=report).kept
         with timed("evaluation"):
             judgement = judge_by_truth(transport, truth, progress=report)
             rows = row_snr(transport, truth)
@@ -97,7 +100,16 @@ def run_demo(
             "leaves": natural_picture(PROJECTOR, 1, colour=True),
         }
         text = demo_page(
-            plan, transport, truth, correspondence, lights, judgement, rows, seconds, command
+            plan,
+            transport,
+            truth,
+            correspondence,
+            lights,
+            judgement,
+            rows,
+            verdict,
+            seconds,
+            command,
         )
         (partial / REPORT).write_text(text, encoding="utf-8")
     return judgement

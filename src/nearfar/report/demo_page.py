@@ -17,8 +17,10 @@ from nearfar.report.maps import READINGS
 from nearfar.report.methods import reconstruction_methods
 from nearfar.report.page import colour_map, facts, gallery, page
 from nearfar.report.splits import PHYSICAL_NAMES, splits_section
+from nearfar.report.transport_page import kept_verdict_box
 from nearfar.transport.exact import ExactTransport
 from nearfar.transport.model import Transport
+from nearfar.transport.verdict import KeptVerdict
 from nearfar.workflow.evaluate import Rows
 
 
@@ -30,6 +32,7 @@ def demo_page(
     lights: Mapping[str, Floats],
     judgement: Mapping[str, Any],
     rows: Rows,
+    verdict: KeptVerdict,
     seconds: Mapping[str, float],
     command: str | None = None,
 ) -> str:
@@ -48,6 +51,8 @@ def demo_page(
     judgement : mapping
         As `nearfar.workflow.judge.judge_by_truth` returns it.
     rows : Rows
+    verdict : KeptVerdict
+        On the transport, by its capture alone.
     seconds : mapping of str to float
         Duration of each step, by name.
     command : str, optional
@@ -80,6 +85,7 @@ def demo_page(
     times = ", ".join(f"{name} {value:.1f} s" for name, value in seconds.items())
     body = f"""
 <h1>A scene's light transport, taken apart</h1>
+{kept_verdict_box(verdict)}
 <p>A projector of {plan.projector} pixels and a camera of {transport.camera} look at a box with red
 and green walls, a glossy cup and a translucent candle. The photos are simulated with shot and read
 noise. Every camera pixel's transport was reconstructed from {photos} of them, which also tell the

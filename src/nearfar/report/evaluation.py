@@ -13,7 +13,7 @@ from nearfar.report.figures.style import new_figure, styled
 from nearfar.report.methods import evaluation_methods
 from nearfar.report.page import colour_map, facts, listed, page, plot
 from nearfar.report.splits import splits_section
-from nearfar.report.transport_page import exposure_of
+from nearfar.report.transport_page import exposure_of, kept_verdict_box
 from nearfar.transport.model import Transport
 from nearfar.workflow.evaluate import Rows
 from nearfar.workflow.judge import Pair, describe_units, white_last
@@ -43,6 +43,7 @@ def evaluation_page(
     Parameters
     ----------
     transport : Transport
+        If a verdict is kept with it, the page begins with that.
     source : str
         Name of what it was compared with.
     judgement : mapping
@@ -76,8 +77,10 @@ def evaluation_page(
     white_says = ""
     if "white" in snr_b:
         white_says = " White was photographed itself, so that it is no measure of relighting."
+    verdict = transport.verdict
     body = f"""
 <h1>How close the transport comes</h1>
+{"" if verdict is None else kept_verdict_box(verdict)}
 <p>Compared with {escape(source)}. SNR_b is 20 log10 of the known picture over the difference,
 SNR_t the same of a camera pixel's row of the transport.</p>
 {facts(cards)}

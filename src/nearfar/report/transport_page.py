@@ -157,7 +157,7 @@ def transport_page(
     body = f"""
 <h1>{escape(stored.path.name)}</h1>
 <p>{told.made}{thinned}</p>
-{verdict_box(verdict.grade, str(verdict).partition(": ")[2])}
+{kept_verdict_box(verdict)}
 {cards}
 {f"<h2>What to look at</h2>{listed(faults)}" if faults else ""}
 <h2>Relit, and taken apart</h2>
@@ -172,6 +172,11 @@ def transport_page(
 {numbers(["what", "value"], _provenance(stored, capture))}
 """
     return page(f"nearfar: {stored.path.name}", body, methods=told.methods, command=command)
+
+
+def kept_verdict_box(verdict: KeptVerdict) -> str:
+    """Return the verdict on a transport as HTML."""
+    return verdict_box(verdict.grade, str(verdict).partition(": ")[2])
 
 
 def _thinned(step: int) -> str:

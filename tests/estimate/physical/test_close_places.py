@@ -106,7 +106,9 @@ def test_where_camera_pixels_on_one_side_have_as_much_it_is_no_outline():
     "case",
     [
         pytest.param({"other": 0.04}, id="little light"),
-        pytest.param({"other": 0.05, "spread": 0.01, "gap": 1, "away": 2}, id="no peak that stands alone"),
+        pytest.param(
+            {"other": 0.05, "spread": 0.01, "gap": 1, "away": 2}, id="no peak that stands alone"
+        ),
         pytest.param({"away": 1, "gap": 0}, id="next to q"),
         pytest.param({"away": 0}, id="at q"),
     ],

@@ -92,22 +92,35 @@ def test_noise_allows_what_photos_without_it_reach_beyond(reconstructed):
     assert noisy.expected_snr < noisy.noise_snr < quiet.noise_snr - 10
 
 
-@pytest.mark.parametrize(("photos", "lights_left"), [(80, 1), (50, 0)])
-def test_check_photos_of_something_else_tell_nothing(reconstructed, tmp_path, photos, lights_left):
-    capture, stored = reconstructed(photos=photos)
+def spoilt_check_photo(capture, folder, change):
+    """Return the verdict where a check photo is changed, and the photo's number."""
     values = capture.read(range(len(capture.plan.patterns)), slice(None))
     light = next(each for each in check_lights(capture.plan) if not each.pattern.inverse)
     (number,) = light.photos
+    values[number] = change(values[number])
     values = np.rint(values * capture.full_scale).astype(np.uint16)
-    values[number] = values[number, ::-1, ::-1]
     spoilt = write_capture(
-        capture.plan, tmp_path / "c.zarr", list(values), full_scale=capture.full_scale
+        capture.plan, folder / "c.zarr", list(values), full_scale=capture.full_scale
     )
-    reconstruct_to_file(spoilt, tmp_path / "t.zarr")
-    verdict = judge_reconstruction(open_transport(tmp_path / "t.zarr"), spoilt)
+    reconstruct_to_file(spoilt, folder / "t.zarr")
+    return judge_reconstruction(open_transport(folder / "t.zarr"), spoilt), number
+
+
+@pytest.mark.parametrize(("photos", "lights_left"), [(80, 1), (50, 0)])
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [(lambda photo: photo[::-1, ::-1], "turned"), (lambda photo: 0.8 * photo, "exposure")],
+    ids=["rotated", "darker"],
+)
+def test_spoilt_check_photos_tell_nothing(
+    reconstructed, tmp_path, photos, lights_left, change, cause
+):
+    capture, stored = reconstructed(photos=photos)
+    verdict, number = spoilt_check_photo(capture, tmp_path, change)
     good = judge_reconstruction(stored, capture)
     assert verdict.grade == "doubtful"
-    assert "turned" in verdict.causes
+    assert [each for each in verdict.causes if each != "unchecked"] == [cause]
+    assert f"hoto {number} is" in str(verdict)
     if lights_left:
         assert len(verdict.held_out.lights) == len(good.held_out.lights) - 1 == lights_left
         assert verdict.kept.widening < 2

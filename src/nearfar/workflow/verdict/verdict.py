@@ -198,7 +198,8 @@ def judge_reconstruction(
     unchecked = _why_unchecked(transport, plan)
     if by_pictures is not None:
         # Photos that are of something else tell nothing of the transport.
-        held_out = without_photos(by_pictures, plan, _of_something_else(spoilt))
+        of_no_use = _of_something_else(spoilt) | _under_other_light(spoilt, plan)
+        held_out = without_photos(by_pictures, plan, of_no_use)
         unchecked = OF_SPOILT
     verdict = judge(
         held_out,
@@ -314,6 +315,22 @@ def _of_something_else(spoilt: Iterable[Spoilt]) -> set[int]:
         if isinstance(each, PHOTOS_OF_SOMETHING_ELSE)
         for number in each.photos
     }
+
+
+def _under_other_light(spoilt: Iterable[Spoilt], plan: Plan) -> set[int]:
+    """Return the check photos under other light than the photos of their inverse patterns.
+
+    What the transport or a bent response is off by shows in both.
+    """
+    named = {
+        number for each in spoilt if isinstance(each, ExposureChanged) for number in each.photos
+    }
+    sides = (
+        (one, other)
+        for light in check_lights(plan)
+        for one, other in ((light.photos, light.inverses), (light.inverses, light.photos))
+    )
+    return {n for one, other in sides if not named & set(other) for n in named & set(one)}
 
 
 def _that_it_checks(each: Spoilt) -> str:

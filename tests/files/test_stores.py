@@ -1,5 +1,6 @@
 """A damaged store gives a sentence, never zeros."""
 
+import asyncio
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
+from zarr.core.sync import loop as zarr_loop
 
 from nearfar.errors import InputError, MissingFileError, UnreadableFileError
 from nearfar.files import kind_of_store
@@ -152,6 +154,27 @@ def test_a_checksum_is_that_of_attributes_added_later(tmp_path: Path) -> None:
         open_store(path, KIND, 1)
     with pytest.raises(UnreadableFileError, match="is not as it was written"):
         open_durable_store(path)
+
+
+@pytest.mark.parametrize("fault", ["missing", "changed"])
+def test_after_a_fault_nothing_of_other_chunks_is_left_going(tmp_path: Path, fault: str) -> None:
+    # Python complains of each that is, if the process ends then.
+    path = tmp_path / "a.zarr"
+    group = create_store(path, KIND, 1)
+    values = np.random.default_rng(0).integers(0, 999, (300, 40, 40)).astype(np.uint16)
+    add_array(group, "a", values.shape, values.dtype, (1, 40, 40))[:] = values
+    if fault == "missing":
+        chunk(path, 1).unlink()
+    else:
+        damaged = bytearray(chunk(path, 1).read_bytes())
+        damaged[20] ^= 0xFF
+        chunk(path, 1).write_bytes(damaged)
+    for _ in range(3):
+        with pytest.raises(UnreadableFileError):
+            read_array(open_store(path, KIND, 1), "a")
+        (loop,) = zarr_loop
+        assert loop is not None
+        assert not asyncio.all_tasks(loop)
 
 
 def test_a_missing_array_is_an_error(store: Path) -> None:

@@ -25,6 +25,7 @@ from nearfar.files.checksums import CHECKSUM, ChecksumError, with_checksum, with
 from nearfar.files.kinds import METADATA
 from nearfar.files.output import synchronise_entry
 from nearfar.files.reading import forbidden_folders
+from nearfar.files.settling import settle
 from nearfar.files.writes import write_into
 
 # What zarr was seen to raise on metadata and chunks cut or changed at every byte.
@@ -373,8 +374,10 @@ def _sentences(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except NearfarError:
+        settle()
         raise
     except _DAMAGE as error:
+        settle()
         reason = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".")[:120]
         raise UnreadableFileError(
             f"{path} is damaged: {what} cannot be read ({reason}); copy or make it again."

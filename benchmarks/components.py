@@ -13,7 +13,7 @@ global light, by the physical split and by the checkerboards of Nayar et al. (20
 more photos, black included.
 No constant of the split was fitted to alcove, shelf, hand and marble; they were looked at when
 inter-reflection was made smooth, light from one side was told apart, and outlines were mended
-(decisions 0104, 0107, 0110 and 0111).
+(decisions 0104, 0107, 0110, 0111 and 0117).
 """
 
 import argparse

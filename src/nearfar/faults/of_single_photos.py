@@ -54,7 +54,9 @@ class PhotosTurned:
     Attributes
     ----------
     photos : tuple of int
-    how : {"rotated by 180 degrees", "mirrored left to right", "mirrored top to bottom"}
+    how : str
+        "rotated by 180 degrees", "rotated left by 90 degrees", "rotated right by 90 degrees",
+        "mirrored left to right" or "mirrored top to bottom".
     """
 
     photos: tuple[int, ...]

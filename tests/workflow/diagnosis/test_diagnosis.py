@@ -22,6 +22,7 @@ from nearfar.faults.of_single_photos import (
     PhotosDark,
     PhotosMisfit,
     PhotosMixed,
+    PhotosTurned,
     ShowsOtherPattern,
 )
 from nearfar.photometry.drift_removal import PhotosWithoutDrift
@@ -31,7 +32,7 @@ from nearfar.progress import ignore_progress
 from nearfar.transport.stored import open_transport
 from nearfar.workflow.diagnosis import single_photos
 from nearfar.workflow.diagnosis.diagnose import find_what_spoils
-from nearfar.workflow.diagnosis.explanations import Explanation
+from nearfar.workflow.diagnosis.explanations import TURNS, Explanation
 from nearfar.workflow.diagnosis.sample import PATCH, sample_camera, sampled_lines
 from nearfar.workflow.diagnosis.single_photos import TURNS_OF_LEAVING
 from nearfar.workflow.reconstruction.reconstruct import reconstruct_to_file
@@ -192,6 +193,13 @@ def test_what_all_camera_pixels_see_alike_is_not_taken_for_light(tmp_path):
 def test_the_photo_is_named(shot, spoilt_by, name):
     (found,) = spoilt_by(name, 1)
     assert list(found.photos) == shot.chosen(1)
+
+
+@pytest.mark.parametrize(("how", "turn"), TURNS, ids=[how for how, _ in TURNS])
+def test_how_a_photo_was_turned_is_told(shot, diagnosed, how, turn):
+    (found,) = diagnosed(shot.each(lambda photo, _: turn(photo), 1))
+    assert isinstance(found, PhotosTurned)
+    assert (found.photos, found.how) == (tuple(shot.chosen(1)), how)
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,8 @@ TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
     ("rotated by 180 degrees", lambda picture: picture[::-1, ::-1]),
     ("mirrored left to right", lambda picture: picture[:, ::-1]),
     ("mirrored top to bottom", lambda picture: picture[::-1]),
+    ("rotated left by 90 degrees", np.rot90),
+    ("rotated right by 90 degrees", lambda picture: np.rot90(picture, -1)),
 )
 
 
@@ -84,8 +86,10 @@ def explanations(fits: PhotoFits, plan: Plan, number: int) -> Iterator[Explanati
         if plan.patterns[other] != plan.patterns[number]:
             yield Explanation("order", float(squares(fits.relit[other]).mean()), other)
     for how, turn in TURNS:
-        turned = weight * (photo - turn(relit)) ** 2
-        yield Explanation("turned", float(turned.mean()), how=how)
+        turned = turn(relit)
+        # Of a camera that is not square, a photo on its side has another size.
+        if turned.shape == photo.shape:
+            yield Explanation("turned", float(squares(turned).mean()), how=how)
     channels = photo.shape[2]
     for order in list(permutations(range(channels)))[1:] if 1 < channels <= 4 else []:
         yield Explanation("colours", float(squares(relit[..., list(order)]).mean()))

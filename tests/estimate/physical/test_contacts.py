@@ -11,6 +11,7 @@ from nearfar.illumination.pictures import random_pattern
 from tests.estimate.physical.even import (
     CAMERA,
     PROJECTOR,
+    WHITE,
     body_of,
     places,
     split_of,
@@ -131,3 +132,20 @@ def test_what_is_around_lies_within_cells_as_the_camera_sees_them(finer, leave):
     before = wax_that_touches_a_wall(q=q)
     left = of_body(before) & ~of_body(without_contacts(before))
     np.testing.assert_array_equal(left, CONTACTS & leave)
+
+
+@pytest.mark.parametrize(
+    ("light", "left", "stays"),
+    [(0.15, 0.03, False), (0.15, 0.08, True), (0.3, 0.03, True)],
+    ids=["a gap", "inter-reflection as around", "much light under its surface"],
+)
+def test_a_body_that_is_nothing_but_a_contact_goes(light, left, stays):
+    q, seen = places(), (COLUMNS >= 4) & (COLUMNS < 7)
+    subsurface, rest = np.where(seen, light, 0.0), np.where(seen, left, I_WALL)
+    transport = transport_of(TOTAL - subsurface - rest, subsurface + rest, q)
+    before = split_of(transport, body_of(seen, q, subsurface))
+    split = without_contacts(before)
+    assert len(split.bodies) == stays
+    under = split.components(WHITE).subsurface
+    np.testing.assert_allclose(under, subsurface * stays, rtol=1e-3, atol=1e-6)
+    np.testing.assert_array_equal(split.direct, before.direct)

@@ -3,7 +3,8 @@
 Beside a body, much of the light about q comes through the air from the body. A kernel fits it well
 enough for the camera pixel to be taken for the body's own: its inter-reflection becomes subsurface
 light. Two things tell it from the body. It has a smaller share of subsurface light than the body
-has, and hardly any inter-reflection is left of what opaque camera pixels around it have.
+has, and hardly any inter-reflection is left of what opaque camera pixels around it have. Where
+opaque things touch each other, in a narrow gap, kernels may find a whole body of the same kind.
 """
 
 from dataclasses import replace
@@ -21,6 +22,9 @@ from nearfar.estimate.physical.translucent import SQUARE
 MOST_SHARE, MOST_LIGHT = 0.4, 0.6
 # Inter-reflection of a contact, relative to the mean of opaque camera pixels around it, at most.
 MOST_INTERREFLECTION = 0.3
+# The same of a whole body, in the median, and subsurface light's share of its light, at most: true
+# bodies have more than half.
+MOST_INTERREFLECTION_OF_BODY, MOST_SHARE_OF_BODY = 0.5, 0.3
 # Cells, as the camera sees them, up to which opaque camera pixels are around one, and how many of
 # them there are at least. How all of these were chosen: docs/decisions/0115.
 REACH = 3
@@ -28,7 +32,7 @@ LEAST_AROUND = 3
 
 
 def without_contacts(split: PhysicalSplit) -> PhysicalSplit:
-    """Return a split whose bodies end where they touch something opaque.
+    """Return a split whose bodies end where they touch something opaque, without such contacts.
 
     Parameters
     ----------
@@ -45,13 +49,14 @@ def without_contacts(split: PhysicalSplit) -> PhysicalSplit:
     of_light = (np.reshape(part, shape).sum(axis=-1) for part in split.components(white))
     direct, subsurface, interreflection = of_light
     share = subsurface / np.maximum(direct + subsurface + interreflection, DARK)
-    # Comparisons with NaN are false: where nothing opaque is around.
-    around = _mean_around(
-        interreflection, opaque(split), REACH * camera_pixels_to_a_cell(transport)
-    )
-    dark = interreflection < MOST_INTERREFLECTION * around
-    contacts = [_contacts(body.pixels, share, subsurface, dark) for body in split.bodies]
-    bodies = (body.without(left) for body, left in zip(split.bodies, contacts, strict=True))
+    reach = REACH * camera_pixels_to_a_cell(transport)
+    around = _mean_around(interreflection, opaque(split), reach)
+    # Where nothing opaque is around, or it is dark, this is NaN, and comparisons are false.
+    left_over = np.full(share.shape, np.nan)
+    np.divide(interreflection, around, out=left_over, where=around > 0)
+    contacts = [_contacts(body.pixels, share, subsurface, left_over) for body in split.bodies]
+    ended = (body.without(left) for body, left in zip(split.bodies, contacts, strict=True))
+    bodies = (body for body in ended if len(body.pixels))
     left = np.flatnonzero(np.any(contacts, axis=0)) if contacts else np.empty(0, dtype=int)
     of_model = split.direct.reshape(-1, transport.channels).copy()
     of_model[left] = transport.direct.reshape(of_model.shape)[left]
@@ -62,17 +67,33 @@ def without_contacts(split: PhysicalSplit) -> PhysicalSplit:
     return replace(split, direct=of_model.reshape(shape), bodies=tuple(bodies), footprint=footprint)
 
 
-def _contacts(pixels: Integers, share: Floats, subsurface: Floats, dark: Booleans) -> Booleans:
-    """Return which camera pixels, flattened, are a body's contacts.
+def _contacts(pixels: Integers, share: Floats, subsurface: Floats, left_over: Floats) -> Booleans:
+    """Return which camera pixels, flattened, are a body's contacts: all of one that is no body.
 
     They are reached from outside the body through nothing but contacts.
+
+    Parameters
+    ----------
+    pixels : ndarray of int, shape (n,)
+        The body's.
+    share, subsurface, left_over : ndarray, shape (Cy, Cx)
+        Subsurface light as a share of all light, its amount, and inter-reflection relative to that
+        around.
     """
-    seen = np.zeros(dark.shape, dtype=bool)
+    seen = np.zeros(share.shape, dtype=bool)
     seen.ravel()[pixels] = True
+    known = left_over[seen & np.isfinite(left_over)]
+    if (
+        known.size
+        and np.median(known) < MOST_INTERREFLECTION_OF_BODY
+        and np.median(share[seen]) < MOST_SHARE_OF_BODY
+    ):
+        return seen.ravel()
     inner = ndimage.binary_erosion(seen, SQUARE)
     if not inner.any():
-        return np.zeros(dark.size, dtype=bool)
-    faint = seen & dark & (share < MOST_SHARE * np.median(share[inner]))
+        return np.zeros(seen.size, dtype=bool)
+    faint = seen & (left_over < MOST_INTERREFLECTION)
+    faint &= share < MOST_SHARE * np.median(share[inner])
     faint &= subsurface < MOST_LIGHT * np.median(subsurface[inner])
     at_outline = faint & ndimage.binary_dilation(~seen, SQUARE)
     return np.asarray(ndimage.binary_propagation(at_outline, SQUARE, mask=faint).ravel())

@@ -17,7 +17,7 @@ from nearfar.faults.of_light import (
     NoisyRows,
     RowsFlicker,
 )
-from nearfar.faults.of_photos import NotLinear, SceneChanged
+from nearfar.faults.of_photos import NotLinear, PixelsFlash, SceneChanged
 from nearfar.faults.of_single_photos import (
     PhotosDark,
     PhotosMisfit,
@@ -187,6 +187,13 @@ def test_what_all_camera_pixels_see_alike_is_not_taken_for_light(tmp_path):
     photos = SPOILS["projector moved, pixels"].apply(shot, 0.1)
     (found,) = found_in(photos, shot, tmp_path)
     assert found.cause in SPOILS["projector moved, pixels"].causes
+
+
+def test_noise_of_a_bent_response_does_not_flash(tmp_path):
+    shot = shoot("shelf", Size(24, 24), 50)
+    found = found_in(SPOILS["gamma"].apply(shot, 2.2), shot, tmp_path)
+    assert found
+    assert not any(isinstance(each, PixelsFlash) for each in found)
 
 
 @pytest.mark.parametrize("name", ["photos rotated", "photos doubled", "photos cut off"])

@@ -137,6 +137,8 @@ def test_a_bend_that_is_sure_explains_photos_of_other_brightness(spoilt):
     assert causes(-0.08, -0.005, spoilt) == ("not-linear",)
     assert causes(-0.04, 0.0, spoilt) == ("exposure",)
     assert causes(-0.16, -0.08, spoilt) == ("exposure",)
+    # A gamma of 2.2, before a box that lights itself.
+    assert causes(-0.35, -0.10, spoilt) == ("not-linear",)
     # Ambient light is no brightness of the pictures.
     assert causes(-0.08, -0.005, ExposureChanged((5, 9), 0.01, 0.1)) == ("exposure",)
     assert causes(-0.08, -0.005, MOVED) == ("moved",)

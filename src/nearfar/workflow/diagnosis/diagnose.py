@@ -60,6 +60,8 @@ LEAST_OF_BLACK = 0.2
 LARGEST_OF_FLICKER = 10.0
 # Bend of the response that the sums of all inverse photos show, at least, and over its deviation.
 LEAST_SHARED_BEND, SURE_DEVIATIONS = 0.02, 5.0
+# A response that bends by more makes some of the noise of dark camera pixels look like flashes.
+BEND_WITH_FLASHES = 0.05
 
 
 def find_what_spoils(
@@ -169,7 +171,10 @@ def _what_changed(
     # Others look spoilt because the drift is told by these, unless these moved with others.
     odd = find_odd_references(sample.photos, references)
     steady = fits.without_drift
-    if not compressed and (flashing := find_flashing_pixels(steady, sample.photos, references)):
+    is_bent = of_pairs is not None and abs(of_pairs.size) > BEND_WITH_FLASHES
+    if not (compressed or is_bent) and (
+        flashing := find_flashing_pixels(steady, sample.photos, references)
+    ):
         odd = [*flashing]
     if odd and not any(isinstance(each, Moved) for each in found):
         return odd

@@ -59,8 +59,8 @@ MOST_BELOW_PLAN = 10.0
 FAIR_DECIBELS = 28.0
 
 # Above this, pictures and their inverses say surely that the response is not linear, unless the
-# half-screens show a quarter of it.
-SURE_EXCESS = 0.05
+# half-screens show half of it: a bend shows there as well, in light from the lit half.
+SURE_EXCESS, MOST_BY_HALF_SCREENS = 0.05, 0.5
 
 # Without error bars, errors as many dB above the noise of a photo are not due to it.
 NOISE_DECIBELS = 6.0
@@ -376,9 +376,9 @@ def _what_limits(held_out: HeldOut) -> Cause:
 
 
 def _bends(held_out: HeldOut) -> bool:
-    """Return whether pictures and their inverses do not sum to white, but half-screens do."""
+    """Return whether pictures and their inverses do not sum to white; half-screens may nearly."""
     excess = abs(held_out.nonlinear_excess)
-    return excess > SURE_EXCESS and abs(held_out.lamp_excess) < excess / 4
+    return excess > SURE_EXCESS and abs(held_out.lamp_excess) < MOST_BY_HALF_SCREENS * excess
 
 
 def _hints(held_out: HeldOut) -> bool | None:

@@ -12,8 +12,8 @@ stands beside subsurface light, its far-range light beside inter-reflection. Las
 global light, by the physical split and by the checkerboards of Nayar et al. (2006) that take no
 more photos, black included.
 No constant of the split was fitted to alcove, shelf, hand and marble; they were looked at when
-inter-reflection was made smooth, light from one side was told apart, and outlines were mended
-(decisions 0104, 0107, 0110, 0111 and 0117).
+inter-reflection was made smooth, light from one side was told apart, outlines were mended, and
+second places and bodies that are none were found (decisions 0104, 0107, 0110, 0111, 0115 and 0117).
 """
 
 import argparse

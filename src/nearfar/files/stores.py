@@ -25,8 +25,7 @@ from nearfar.files.checksums import CHECKSUM, ChecksumError, with_checksum, with
 from nearfar.files.kinds import METADATA
 from nearfar.files.output import synchronise_entry
 from nearfar.files.reading import forbidden_folders
-from nearfar.files.settling import settle
-from nearfar.files.writes import write_into
+from nearfar.files.writes import settle, wait_for_this_loop, write_into
 
 # What zarr was seen to raise on metadata and chunks cut or changed at every byte.
 _DAMAGE = (
@@ -64,6 +63,7 @@ class _CheckedStore(LocalStore):
         byte_range: ByteRequest | None = None,
     ) -> Buffer | None:
         """Read a file, metadata without their checksum."""
+        wait_for_this_loop()
         value = None
         if prototype is not None and byte_range is None:
             value = _read_if_small(self.root / key, prototype)

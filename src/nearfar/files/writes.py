@@ -1,8 +1,10 @@
-"""Writes by a store's own threads, into a folder that may be given up while they are under way.
+"""What a store's own threads have under way: writes into a folder that is given up, and reads.
 
 An interrupt reaches the main thread alone: what it had asked the store's event loop to write goes
 on. Before the folder is removed the loop is waited for, and what has not begun by then is dropped,
-so that no write fails on a folder that is gone, and no task is left pending.
+so that no write fails on a folder that is gone, and no task is left pending. A fault of one chunk
+that is read leaves those of others going in the same way: if the process ended then, Python would
+complain of each.
 """
 
 import asyncio
@@ -11,17 +13,22 @@ from collections.abc import Callable
 from pathlib import Path
 from weakref import WeakSet
 
-# Seconds that writes under way may take to end; those to a disk that hangs are not waited for.
+# Seconds that what is under way may take to end; a disk that hangs is not waited for.
 MAXIMUM_WAIT_SECONDS = 2.0
 
 _loops: WeakSet[asyncio.AbstractEventLoop] = WeakSet()
 _abandoned: set[Path] = set()
 
 
+def wait_for_this_loop() -> None:
+    """Have `settle` wait for the event loop in which this is called."""
+    _loops.add(asyncio.get_running_loop())
+
+
 async def write_into(folder: Path, write: Callable[[], None]) -> None:
     """Call `write`, which adds to `folder`, in a thread; do nothing once that is abandoned."""
     if folder not in _abandoned:
-        _loops.add(asyncio.get_running_loop())
+        wait_for_this_loop()
         await asyncio.to_thread(write)
 
 
@@ -37,7 +44,7 @@ def admit(folder: Path) -> None:
 
 
 def settle() -> None:
-    """Let writes that are under way end."""
+    """Let reads and writes that are under way end."""
     for loop in [loop for loop in _loops if loop.is_running()]:
         with contextlib.suppress(TimeoutError):
             asyncio.run_coroutine_threadsafe(_others(), loop).result(2 * MAXIMUM_WAIT_SECONDS)

@@ -97,7 +97,7 @@ def _largest_peaks(transport: Transport, chosen: Booleans) -> _Peaks:
             for length in (3, 5)
         )
         around = np.maximum(of_25 - of_9, 0.0) * (9 / 16)
-        beyond, around = ((part.reshape(*entries.shape)) for part in (of_9 - around, around))
+        beyond, around = (part.reshape(entries.shape) for part in (of_9 - around, around))
         peak = np.where(inside, beyond.sum(axis=1), -np.inf).argmax(axis=1)
         numbers = np.arange(len(entries))
         # The place is the mean of the peak's cells.

@@ -210,7 +210,7 @@ def _response(
     *,
     bends: bool,
 ) -> list[Spoilt]:
-    """Return what makes photos not proportional to light; empty if nothing is known to do so."""
+    """Return why the response is not linear; empty if no reason was found."""
     # Black may well be at the lowest level; it is clipped if photos do not fit.
     response: list[Spoilt] = [*compressed, *find_clipped_black(sample)]
     if not response and (encoding := name_encoding(sample)):

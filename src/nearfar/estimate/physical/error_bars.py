@@ -25,34 +25,44 @@ from nearfar.estimate.physical.split import (
 )
 from nearfar.estimate.physical.translucent import SQUARE
 
-# Standard deviation over the root of the share left: of direct light, times what kernels add at q;
-# of subsurface light, times itself. These and the next were measured on cornell, cornell-aside and
-# the steps and the tree of benchmarks/trial_scenes.py.
-OF_DIRECT = 0.75
-OF_SUBSURFACE = 0.33
-# How well what a kernel adds at q is known at best, as a share of it: all of a body has the same
-# error, which responses do not show.
-OF_KERNEL = 0.04
+# Standard deviations at translucent surfaces, over the root of the share that kernels leave: of
+# direct light, times what kernels add at q; of subsurface light, times itself; of inter-reflection,
+# times subsurface light, and times itself. These and the next three were measured on nine scenes
+# (docs/decisions/0118).
+OF_DIRECT, OF_SUBSURFACE = 0.62, 0.34
+BY_SUBSURFACE, OF_INTERREFLECTION = 0.155, 1.0
+# Of inter-reflection's, that root counts as much at least.
+LEAST_ROOT_LEFT = 0.08
+# The shallower its source, the less light under a surface differs from direct light. Direct and
+# subsurface light are then less sure by this power of its depth in projector pixels.
+BY_DEPTH = -0.85
 # Of the estimate's own standard deviation of direct light: a shared kernel leaves that much of it.
-OF_ESTIMATE = 0.5
+OF_ESTIMATE = 0.6
+# The same at opaque surfaces.
+OF_ESTIMATE_IF_OPAQUE = 0.88
 # Of direct light at the outlines of translucent bodies, where a camera pixel sees a part of one, as
 # a share of it.
 OF_OUTLINE = 0.1
-# How well subsurface light is known at best, as a share of it. Measured under white and natural
-# pictures on cornell and cornell-aside.
-LEAST_OF_SUBSURFACE = 0.05
 # Of direct light where its footprint is of boxes, as a share of it: an estimate has too much or too
 # little of the fastest waves, the same at all of a body. Measured on cornell and cornell-aside at
 # 128x128.
 OF_BOXES = 0.1
 # Of direct light from other places than q, as a share of it: what neighbours tell.
 OF_ELSEWHERE = 0.1
-# Share of the variance of inter-reflection's errors that neighbouring camera pixels have in common,
-# so that their mean does not lower it. Measured on wedge and corner.
-IN_COMMON = 0.15
-# Correlation of direct and subsurface light: what one gains the other loses. Measured as above, the
-# mean of five scenes.
-CORRELATION = -0.65
+
+
+class _OfBody(NamedTuple):
+    """Standard deviations on a translucent body, each (n, channels).
+
+    Attributes
+    ----------
+    direct, subsurface, interreflection : ndarray
+        Of direct light under white; of subsurface light and inter-reflection under some light.
+    """
+
+    direct: Floats
+    subsurface: Floats
+    interreflection: Floats
 
 
 class _Deviations(NamedTuple):
@@ -64,6 +74,8 @@ class _Deviations(NamedTuple):
         Standard deviations of the whole picture, of direct light before inter-reflection was
         smoothed, of subsurface light, of what one of these two has of the other's at the outlines
         of bodies, and of all light under white times that from q.
+    covariance : ndarray
+        Of direct and subsurface light.
     smoothed : ndarray
         Share of inter-reflection that neighbours tell.
     """
@@ -73,6 +85,7 @@ class _Deviations(NamedTuple):
     of_under: Floats
     exchanged: Floats
     of_white: Floats
+    covariance: Floats
     smoothed: Floats
 
 
@@ -159,13 +172,13 @@ class PhysicalErrorBars:
         shape = (transport.camera.pixels, transport.channels)
         of_picture = self._bars.picture(light).reshape(shape).astype(np.float64)
         # Where nothing is known, the picture's are infinite: that says it of all components.
-        of_direct = finite(self._bars.direct().reshape(shape).astype(np.float64))
-        under = self._split.components(light).subsurface.reshape(shape)
+        of_estimate = finite(self._bars.direct().reshape(shape).astype(np.float64))
+        _, under, rest = (part.reshape(shape) for part in self._split.components(light))
         direct = self._split.direct.reshape(shape)
-        of_under = np.zeros(shape)
+        of_direct, of_under, of_rest = OF_ESTIMATE_IF_OPAQUE * of_estimate, *np.zeros((2, *shape))
         for body in self._split.bodies:
-            own = deviations_on(self._split, body, of_direct, under)
-            of_direct[body.pixels], of_under[body.pixels] = own
+            own = _deviations_on(self._split, body, of_estimate, under, rest)
+            of_direct[body.pixels], of_under[body.pixels], of_rest[body.pixels] = own
         at_outlines = OF_OUTLINE * np.abs(direct) * _outlines(self._split).reshape(-1, 1)
         within = on_bodies(self._split).reshape(-1, 1)
         of_direct = np.hypot(of_direct, at_outlines * ~within)
@@ -175,6 +188,9 @@ class PhysicalErrorBars:
         lights = [factors.analyse(one[None]) for one in transport.lights(light)]
         lit = np.concatenate([factors.relit(one).direct for one in lights], axis=1)
         of_direct, exchanged = of_direct * np.abs(lit), at_outlines * within * np.abs(lit)
+        # What inter-reflection has too much of is lacking elsewhere: far from q, subsurface light.
+        of_under = np.sqrt(np.maximum(of_under**2, of_rest**2 - of_direct**2))
+        covariance = _covariances(of_direct, of_under, of_rest)
         elsewhere, flat = self._split.elsewhere, np.asarray(transport.lights(light))
         told = OF_ELSEWHERE * np.abs(elsewhere.under(flat, transport.projector))
         of_direct[elsewhere.pixels] = np.hypot(of_direct[elsewhere.pixels], told)
@@ -184,13 +200,16 @@ class PhysicalErrorBars:
             smoothed = 1 - np.repeat(self._split.own_share.reshape(-1, 1), transport.channels, 1)
             every = np.ones(transport.projector, dtype=np.float32)
             of_white = finite(self._bars.picture(every).reshape(shape)) * np.abs(lit)
-        return _Deviations(of_picture, of_direct, of_under, exchanged, of_white, smoothed)
+            of_white *= OF_ESTIMATE_IF_OPAQUE
+        return _Deviations(
+            of_picture, of_direct, of_under, exchanged, of_white, covariance, smoothed
+        )
 
     def _with_gains(
         self, deviations: "_Deviations", direct: float, subsurface: float, interreflection: float
     ) -> Floats:
         """Combine them: inter-reflection is the picture less the other two."""
-        of_picture, of_direct, of_under, exchanged, of_white, smoothed = deviations
+        of_picture, of_direct, of_under, exchanged, of_white, covariance, smoothed = deviations
         known, beyond = np.isfinite(of_picture), direct - interreflection
         of_picture = finite(of_picture)
         # Direct light has the error of the light under white that it was told from.
@@ -198,19 +217,31 @@ class PhysicalErrorBars:
         whole = interreflection * common + beyond * smoothed * of_white
         apart = interreflection**2 * (of_picture**2 - common**2)
         one = beyond * (1 - smoothed) * of_direct
-        other = (subsurface - interreflection) * of_under
-        left = 1 - (1 - IN_COMMON) * smoothed - (1 - smoothed) ** 2
-        of_others = beyond**2 * left * (of_white**2 + of_direct**2) + apart
-        variance = whole**2 + one**2 + other**2 + 2 * CORRELATION * one * other + of_others
+        under = subsurface - interreflection
+        # Of what neighbours tell, their errors are left.
+        of_others = beyond**2 * smoothed * (1 - smoothed) * (of_white**2 + of_direct**2) + apart
+        variance = whole**2 + one**2 + (under * of_under) ** 2 + of_others
+        variance += 2 * beyond * under * covariance
         variance += ((direct - subsurface) * exchanged) ** 2
         found = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.inf)
         return np.asarray(self._split.transport.picture(found.astype(np.float32)))
 
 
-def deviations_on(
-    split: PhysicalSplit, body: Translucent, of_estimate: Floats, under: Floats
-) -> tuple[Floats, Floats]:
-    """Return standard deviations of direct light and of subsurface light on a body.
+def root_left(body: Translucent) -> Floats:
+    """Return the root of the share of a body's responses that kernels leave, (n, 1)."""
+    return np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
+
+
+def at_q_of_kernels(body: Translucent) -> Floats:
+    """Return the subsurface light that comes from q under white, (n, channels)."""
+    peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
+    return np.asarray(body.amplitude * peaks)
+
+
+def _deviations_on(
+    split: PhysicalSplit, body: Translucent, of_estimate: Floats, under: Floats, rest: Floats
+) -> _OfBody:
+    """Return standard deviations of the components on a body.
 
     Parameters
     ----------
@@ -219,21 +250,22 @@ def deviations_on(
         One of the split's.
     of_estimate : ndarray, shape (C, channels)
         Standard deviation of the estimate's direct light.
-    under : ndarray, shape (C, channels)
-        Subsurface light under some light.
+    under, rest : ndarray, shape (C, channels)
+        Subsurface light and inter-reflection under some light.
 
     Returns
     -------
-    of_direct, of_under : ndarray, shape (n, channels)
-        Of direct light under white, and of subsurface light under that light.
+    _OfBody
     """
-    left = np.sqrt(np.maximum(1 - body.explained, 0.0))[:, None]
-    peaks = np.array([kernel(source, 1)[1, 1] for source in body.sources])
-    of_direct = np.hypot(OF_DIRECT * left, OF_KERNEL) * body.amplitude * peaks
+    left = root_left(body)
+    shallow = np.array([source.real for source in body.sources]) ** BY_DEPTH
+    of_direct = OF_DIRECT * left * shallow * at_q_of_kernels(body)
     of_direct = np.hypot(of_direct, OF_ESTIMATE * of_estimate[body.pixels])
-    of_under = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE) * under[body.pixels]
+    of_under = OF_SUBSURFACE * left * shallow * under[body.pixels]
+    light = BY_SUBSURFACE * under[body.pixels], OF_INTERREFLECTION * rest[body.pixels]
+    of_rest = np.hypot(left, LEAST_ROOT_LEFT) * np.hypot(*light)
     if split.footprint is None:
-        return of_direct, of_under
+        return _OfBody(of_direct, of_under, of_rest)
     channels = len(body.sources)
     taken = OF_BOXES * split.direct.reshape(-1, channels)[body.pixels]
     of_direct = np.hypot(of_direct, taken)
@@ -241,7 +273,16 @@ def deviations_on(
     white = np.ones((1, split.transport.projector.pixels))
     whole = body.amplitude * body.under(white, split.transport.projector)
     taken *= under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
-    return of_direct, np.hypot(of_under, taken)
+    return _OfBody(of_direct, np.hypot(of_under, taken), of_rest)
+
+
+def _covariances(of_direct: Floats, of_under: Floats, of_rest: Floats) -> Floats:
+    """Return the covariance of direct and subsurface light: what one gains the other loses.
+
+    Inter-reflection has the errors of both, by which they are told.
+    """
+    together = of_rest**2 - of_direct**2 - of_under**2
+    return np.asarray(np.clip(together / 2, -of_direct * of_under, 0.0))
 
 
 def _outlines(split: PhysicalSplit) -> Booleans:

@@ -15,7 +15,7 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.physical.around import steps
-from nearfar.estimate.physical.error_bars import CORRELATION, deviations_on, finite
+from nearfar.estimate.physical.error_bars import at_q_of_kernels, finite, root_left
 from nearfar.estimate.physical.split import DARK, PhysicalSplit, on_bodies, with_more_direct
 
 # Camera pixels on each side that a plane goes through, and how many of them there are at least.
@@ -23,8 +23,16 @@ REACH, LEAST_TELLING = 2, 6
 # Weight of a plane's squared slope for each camera pixel that it is fitted to: at outlines, camera
 # pixels on one side alone tell little of a slope.
 LEVEL = 0.5
-# Share of the variance of error bars by which camera pixels next to each other differ: errors of a
-# kernel are much the same all over a body. How it was chosen: docs/decisions/0110.
+# Standard deviations by which neighbours are let err apart. Over the root of the share that kernels
+# leave: of direct light, times what kernels add at q; of subsurface light, times itself. At least:
+# as shares of the same. And of the estimate's own standard deviation of direct light.
+OF_DIRECT, OF_SUBSURFACE = 0.75, 0.33
+LEAST_OF_DIRECT, LEAST_OF_SUBSURFACE = 0.04, 0.05
+OF_ESTIMATE = 0.5
+# Correlation of both: what one gains the other loses.
+CORRELATION = -0.65
+# Share of their variance that is taken off: errors of a kernel are much the same all over a body.
+# How these were chosen: docs/decisions/0110.
 APART = 0.2
 TINY = float(np.finfo(np.float64).tiny)
 
@@ -96,8 +104,11 @@ def _variances(split: PhysicalSplit, deviation: Floats, under: Floats) -> tuple[
     of_direct, of_under = np.zeros(under.shape), np.zeros(under.shape)
     of_estimate = finite(deviation).reshape(under.shape)
     for body in split.bodies:
-        direct, subsurface = deviations_on(split, body, of_estimate, under)
-        of_direct[body.pixels], of_under[body.pixels] = direct**2, subsurface**2
+        left, pixels = root_left(body), body.pixels
+        by_kernel = np.hypot(OF_DIRECT * left, LEAST_OF_DIRECT) * at_q_of_kernels(body)
+        of_direct[pixels] = by_kernel**2 + (OF_ESTIMATE * of_estimate[pixels]) ** 2
+        share = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE)
+        of_under[pixels] = (share * under[pixels]) ** 2
     return of_direct, of_under
 
 

@@ -103,7 +103,7 @@ class Moved:
     photo : int
         First photo after it.
     pixels : float or None
-        How far, in camera pixels, where that is known.
+        How far, in camera pixels, but in those of the projector if this moved, where it is known.
     until : int or None
         First photo after it was back where it had been; None if it stayed.
     """
@@ -127,16 +127,20 @@ class Moved:
                 f"before photo {self.photo} and was back before photo {self.until}: shoot {photos} "
                 f"{between} again, with camera, projector and scene at rest."
             )
+        far = f"{self.pixels:.2g}" if self.pixels is not None else ""
+        plural = "" if far == "1" else "s"
         match self.what:
             case "projector":
-                return f"the projector moved, or its focus changed, {where}"
+                if self.pixels is None:
+                    return f"the projector moved, or its focus changed, {where}"
+                return f"the projector moved by about {far} projector pixel{plural} {where}"
             case "camera's focus":
                 return f"the camera's focus changed {where}"
             case _:
                 what = "the camera" if self.what == "camera" else "part of the scene"
                 if self.pixels is None:
                     return f"{what} moved {where}"
-                return f"{what} moved by about {self.pixels:.2g} camera pixels {where}"
+                return f"{what} moved by about {far} camera pixel{plural} {where}"
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from nearfar.errors import InputError
 from nearfar.estimate.joint import estimate_by_sweeps
 from nearfar.faults.of_light import AmbientFlickers, ExposureChanged, LampFlickers
 from nearfar.faults.of_photos import Moved, NotLinear, Spoilt
+from nearfar.faults.of_single_photos import PhotosTorn
 from nearfar.photometry.drift import Drift, References, find_references
 from nearfar.photometry.measure import measure
 from nearfar.progress import Report, ignore_progress
@@ -22,6 +23,7 @@ from nearfar.workflow.diagnosis.changed_references import (
 )
 from nearfar.workflow.diagnosis.clipped import find_clipped_black, find_clipped_white
 from nearfar.workflow.diagnosis.compression import find_compression
+from nearfar.workflow.diagnosis.explanations import SUSPECT_MISFIT
 from nearfar.workflow.diagnosis.following import find_following_of_pattern
 from nearfar.workflow.diagnosis.incomplete import find_incomplete
 from nearfar.workflow.diagnosis.inverse_pairs import (
@@ -45,6 +47,7 @@ from nearfar.workflow.diagnosis.misfit import (
 from nearfar.workflow.diagnosis.odd_references import find_odd_references
 from nearfar.workflow.diagnosis.sample import CameraSample, sample_camera
 from nearfar.workflow.diagnosis.sequence import find_other_order
+from nearfar.workflow.diagnosis.shifted_patterns import find_shifted_patterns
 from nearfar.workflow.diagnosis.shifted_whites import find_shifted_whites
 from nearfar.workflow.diagnosis.single_photos import SpoiltPhotos, find_spoilt_photos
 from nearfar.workflow.diagnosis.whole_capture import find_changes, name_encoding
@@ -147,9 +150,24 @@ def _what_does_not_fit(
         # They spoil all photos, whatever else these look like.
         return [*compressed, *lingering]
     single = find_spoilt_photos(fits, sampled.correspondence, suspected=suspected)
-    if single.certain:
-        return [*single.certain, *single.probable]
-    return _what_changed(sample, fits, photos.drift, single, compressed, suspected=suspected)
+    found = [*single.certain, *single.probable]
+    if not single.certain:
+        found = _what_changed(sample, fits, photos.drift, single, compressed, suspected=suspected)
+    # Fine patterns that are shifted far look like others, or like a smaller shift at some moment.
+    used = ~serves(fits.plan, "check", "correspondence")
+    is_odd = bool(single.certain or single.probable) or any(map(_is_of_projector, found))
+    is_odd |= float(fits.misfit[used].max()) > SUSPECT_MISFIT
+    if is_odd and (shifted := find_shifted_patterns(fits, sampled.correspondence)):
+        return [*compressed, *shifted]
+    if single.certain and all(isinstance(each, PhotosTorn) for each in single.certain):
+        # So look photos of a scene of which a part moved.
+        changed = find_changed_references(fits.without_drift, photos.drift.references)
+        return [*changed] or found
+    return found
+
+
+def _is_of_projector(found: Spoilt) -> bool:
+    return isinstance(found, Moved) and found.what == "projector"
 
 
 def _what_changed(

@@ -232,7 +232,7 @@ def normal_equations(sample: CameraSample, fits: Fits) -> NormalEquations:
     numbers = len(plan.patterns)
     matrix = np.zeros((numbers, count, CAUSES, CAUSES))
     vector = np.zeros((numbers, count, CAUSES))
-    partner, by_row = _partners(plan), _photos_of_codes(plan)
+    partner, by_row = partners(plan), _photos_of_codes(plan)
     scale = float(fits.white.max()) or 1.0
     for number in range(numbers):
         causes = _effects(fits, plan, number, partner.get(number), scale)
@@ -303,7 +303,7 @@ def _photos_of_codes(plan: Plan) -> dict[int, int]:
     return {row: number for number, row in find_codes(plan).rows.items()}
 
 
-def _partners(plan: Plan) -> dict[int, int]:
+def partners(plan: Plan) -> dict[int, int]:
     """Return for each cosine a photo of its sine, and the other way round."""
     first: dict[tuple[object, str], int] = {}
     for number, pattern in enumerate(plan.patterns):

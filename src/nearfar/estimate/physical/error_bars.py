@@ -34,8 +34,9 @@ BY_SUBSURFACE, OF_INTERREFLECTION = 0.155, 1.0
 # Of inter-reflection's, that root counts as much at least.
 LEAST_ROOT_LEFT = 0.08
 # The shallower its source, the less light under a surface differs from direct light. Direct and
-# subsurface light are then less sure by this power of its depth in projector pixels.
-BY_DEPTH = -0.85
+# subsurface light are then less sure by this power of its depth in projector pixels. Deeper ones
+# than these are as sure as those: there are none in what this was measured on.
+BY_DEPTH, DEEP = -0.85, 1.0
 # Of the estimate's own standard deviation of direct light: a shared kernel leaves that much of it.
 OF_ESTIMATE = 0.6
 # The same at opaque surfaces.
@@ -238,6 +239,15 @@ def at_q_of_kernels(body: Translucent) -> Floats:
     return np.asarray(body.amplitude * peaks)
 
 
+def taken_by_boxes(split: PhysicalSplit, body: Translucent) -> Floats:
+    """Return how much direct light has too much or too little under white, (n, channels).
+
+    It is subsurface light's, and 0 where footprints are of single projector pixels.
+    """
+    of_body = split.direct.reshape(-1, len(body.sources))[body.pixels]
+    return np.asarray((0.0 if split.footprint is None else OF_BOXES) * of_body)
+
+
 def _deviations_on(
     split: PhysicalSplit, body: Translucent, of_estimate: Floats, under: Floats, rest: Floats
 ) -> _OfBody:
@@ -258,7 +268,8 @@ def _deviations_on(
     _OfBody
     """
     left = root_left(body)
-    shallow = np.array([source.real for source in body.sources]) ** BY_DEPTH
+    depths = np.array([source.real for source in body.sources])
+    shallow = np.minimum(depths, DEEP) ** BY_DEPTH
     of_direct = OF_DIRECT * left * shallow * at_q_of_kernels(body)
     of_direct = np.hypot(of_direct, OF_ESTIMATE * of_estimate[body.pixels])
     of_under = OF_SUBSURFACE * left * shallow * under[body.pixels]
@@ -266,13 +277,12 @@ def _deviations_on(
     of_rest = np.hypot(left, LEAST_ROOT_LEFT) * np.hypot(*light)
     if split.footprint is None:
         return _OfBody(of_direct, of_under, of_rest)
-    channels = len(body.sources)
-    taken = OF_BOXES * split.direct.reshape(-1, channels)[body.pixels]
+    taken = taken_by_boxes(split, body)
     of_direct = np.hypot(of_direct, taken)
     # Subsurface light lacks what direct light has too much of.
     white = np.ones((1, split.transport.projector.pixels))
     whole = body.amplitude * body.under(white, split.transport.projector)
-    taken *= under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
+    taken = taken * under[body.pixels] / np.maximum(whole, np.finfo(np.float32).tiny)
     return _OfBody(of_direct, np.hypot(of_under, taken), of_rest)
 
 

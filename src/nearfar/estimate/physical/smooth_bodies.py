@@ -15,7 +15,12 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.estimate.physical.around import steps
-from nearfar.estimate.physical.error_bars import at_q_of_kernels, finite, root_left
+from nearfar.estimate.physical.error_bars import (
+    at_q_of_kernels,
+    finite,
+    root_left,
+    taken_by_boxes,
+)
 from nearfar.estimate.physical.split import DARK, PhysicalSplit, on_bodies, with_more_direct
 
 # Camera pixels on each side that a plane goes through, and how many of them there are at least.
@@ -104,11 +109,11 @@ def _variances(split: PhysicalSplit, deviation: Floats, under: Floats) -> tuple[
     of_direct, of_under = np.zeros(under.shape), np.zeros(under.shape)
     of_estimate = finite(deviation).reshape(under.shape)
     for body in split.bodies:
-        left, pixels = root_left(body), body.pixels
+        left, pixels, taken = root_left(body), body.pixels, taken_by_boxes(split, body)
         by_kernel = np.hypot(OF_DIRECT * left, LEAST_OF_DIRECT) * at_q_of_kernels(body)
-        of_direct[pixels] = by_kernel**2 + (OF_ESTIMATE * of_estimate[pixels]) ** 2
+        of_direct[pixels] = by_kernel**2 + (OF_ESTIMATE * of_estimate[pixels]) ** 2 + taken**2
         share = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE)
-        of_under[pixels] = (share * under[pixels]) ** 2
+        of_under[pixels] = (share * under[pixels]) ** 2 + taken**2
     return of_direct, of_under
 
 

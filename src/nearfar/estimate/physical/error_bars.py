@@ -3,7 +3,8 @@
 At opaque surfaces direct light is as sure as the estimate has it, and inter-reflection errs by what
 direct light and the picture err; where inter-reflection was smoothed, by less. At translucent ones
 the kernels decide. What they leave of the responses, as a share, says how good they are; the errors
-of components go with the root of it.
+of components go with the root of it. Those of direct and subsurface light are larger where sources
+are shallow.
 """
 
 from dataclasses import replace
@@ -34,9 +35,10 @@ BY_SUBSURFACE, OF_INTERREFLECTION = 0.155, 1.0
 # Of inter-reflection's, that root counts as much at least.
 LEAST_ROOT_LEFT = 0.08
 # The shallower its source, the less light under a surface differs from direct light. Direct and
-# subsurface light are then less sure by this power of its depth in projector pixels. Deeper ones
-# than these are as sure as those: there are none in what this was measured on.
-BY_DEPTH, DEEP = -0.85, 1.0
+# subsurface light are then less sure: their standard deviations go with this power of its depth in
+# projector pixels. Beyond the second, depth makes no difference: hardly any source was deeper where
+# this was measured.
+POWER_OF_DEPTH, LARGEST_DEPTH = -0.85, 1.0
 # Of the estimate's own standard deviation of direct light: a shared kernel leaves that much of it.
 OF_ESTIMATE = 0.6
 # The same at opaque surfaces.
@@ -269,7 +271,7 @@ def _deviations_on(
     """
     left = root_left(body)
     depths = np.array([source.real for source in body.sources])
-    shallow = np.minimum(depths, DEEP) ** BY_DEPTH
+    shallow = np.minimum(depths, LARGEST_DEPTH) ** POWER_OF_DEPTH
     of_direct = OF_DIRECT * left * shallow * at_q_of_kernels(body)
     of_direct = np.hypot(of_direct, OF_ESTIMATE * of_estimate[body.pixels])
     of_under = OF_SUBSURFACE * left * shallow * under[body.pixels]

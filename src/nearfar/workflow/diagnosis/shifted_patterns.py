@@ -1,12 +1,12 @@
-"""A projector that moved by a whole projector pixel or more while photos were taken.
+"""A projector that moved by a quarter of a projector pixel or more while photos were taken.
 
-`nearfar.workflow.diagnosis.whole_capture` follows small shifts by derivatives of relit pictures. A
-shift by a projector pixel turns the phase of fine patterns by up to half a cycle. Photos then look
-like those of other patterns, and an estimate from all photos fits none of them. So the transport is
-estimated from one half of the capture, and the photos of the other half are compared with what it
-foretells of shifted patterns.
+`nearfar.workflow.diagnosis.whole_capture` follows smaller shifts by derivatives of relit pictures.
+A shift by a projector pixel turns the phase of fine patterns by up to half a cycle. Photos then
+look like those of other patterns, and an estimate from all photos fits none of them. So the
+transport is estimated from one half of the capture, and the photos of the other half are compared
+with what it foretells of shifted patterns.
 
-Index convention: i runs over photos with a partner, s over shifts, f over `_Sums`.
+Index convention: misfits are (photos, shifts); the photos are those of cosines and sines.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from nearfar.workflow.diagnosis.misfit import (
 )
 
 # Shifts along each axis, in projector pixels, that are tried, and how far they are apart.
-FARTHEST, STEP = 4.0, 0.25
+FARTHEST, STEP = 8.0, 0.25
 # Smaller ones are followed by derivatives.
 LEAST_SHIFT = 0.25
 # Fewer photos on one side of the moment tell of no shift.
@@ -64,10 +64,8 @@ def find_shifted_patterns(fits: PhotoFits, known: Floats) -> list[Moved]:
 
     Parameters
     ----------
-    fits : PhotoFits
-        To the transport that was estimated from all photos.
-    known : ndarray, shape (rows, columns, 2)
-        q as it was found from all photos.
+    fits, known
+        As `nearfar.workflow.diagnosis.single_photos.find_spoilt_photos` takes them.
 
     Returns
     -------
@@ -144,7 +142,7 @@ def _best_step(misfits: NDArray[np.float64], *, is_later: bool) -> _Step:
     after[:FEWEST_PHOTOS] = after[-FEWEST_PHOTOS + 1 :] = -np.inf
     place, shift = np.unravel_index(np.argmax(after), after.shape)
     own, shifted = misfits[:, 0], misfits[:, shift]
-    left = shifted[place:].sum() / own[place:].sum()
+    left = shifted[place:].sum() / max(float(own[place:].sum()), np.finfo(float).tiny)
     # Patterns that are even along the shift stay the same.
     tells = np.abs(shifted - own) > LEAST_CHANGE * own
     is_after = np.arange(len(own)) >= place

@@ -90,6 +90,28 @@ def test_pictures_far_below_the_plan_and_the_noise_are_doubtful(
 
 
 @pytest.mark.parametrize(
+    ("decibels", "unmeasured", "planned", "grade"),
+    [
+        (19, 0.99, (35.0, 43.0), "wrong"),
+        # As planned, or nearly; or off by less than a tenth.
+        (19, 0.99, (33.0, 41.0), "doubtful"),
+        (21, 0.99, (39.0, 47.0), "doubtful"),
+        # Noise allows no more, or nothing was planned.
+        (19, 0.9, (39.0, 47.0), "doubtful"),
+        (19, 0.99, None, "doubtful"),
+    ],
+)
+def test_pictures_off_by_a_tenth_and_farther_below_the_plan_are_wrong(
+    decibels, unmeasured, planned, grade
+):
+    error = SIGNAL / 10 ** (decibels / 10)
+    light = at(decibels, noise=1e-12, unmeasured=unmeasured * error)
+    # Whatever was found in the photos.
+    for spoilt in ([], [MOVED]):
+        assert judge(HeldOut((light,)), [], spoilt, planned_snr=planned).grade == grade
+
+
+@pytest.mark.parametrize(
     ("ratio", "expected"), [(9.0, ("good", ())), (11.0, ("doubtful", ("model",)))]
 )
 def test_fine_lights_may_be_off_by_more(ratio, expected):

@@ -57,6 +57,9 @@ WRONG_DECIBELS = 15.0
 # below both what was planned for and what noise allows, and below this: pictures are off by 4 %.
 MOST_BELOW_PLAN = 10.0
 FAIR_DECIBELS = 28.0
+# If it lies so far below them, and below this, it is wrong: pictures are off by a tenth.
+WRONG_BELOW_PLAN = 15.0
+POOR_DECIBELS = 20.0
 
 # Above this, pictures and their inverses say surely that the response is not linear, unless the
 # half-screens show half of it: a bend shows there as well, in light from the lit half.
@@ -293,12 +296,13 @@ def judge(
     )
     if surprises and not reasons:
         add("model")
-    if not reasons and _is_below_plan(held_out, planned_snr):
+    if not reasons and _is_below_plan(held_out, planned_snr, FAIR_DECIBELS, MOST_BELOW_PLAN):
         add("below-plan")
     if not reasons and held_out.snr < DOUBTFUL_DECIBELS:
         add(_what_limits(held_out))
     wrong = (
         held_out.snr < WRONG_DECIBELS
+        or _is_below_plan(held_out, planned_snr, POOR_DECIBELS, WRONG_BELOW_PLAN)
         or _surprises(held_out, WRONG_ERROR_RATIO)
         or bool(_of_something_else(spoilt))
     )
@@ -358,12 +362,14 @@ def _surprises(held_out: HeldOut, most: float) -> bool:
     return (held_out.error_ratio or 0.0) > most and held_out.snr < GOOD_DECIBELS
 
 
-def _is_below_plan(held_out: HeldOut, planned_snr: tuple[float, float] | None) -> bool:
-    """Return whether pictures are relit far worse than planned for, and than noise allows."""
+def _is_below_plan(
+    held_out: HeldOut, planned_snr: tuple[float, float] | None, fair: float, most: float
+) -> bool:
+    """Return whether pictures are relit worse than fair, and far below plan and noise, in dB."""
     allowed = held_out.noise_snr
-    if planned_snr is None or allowed is None or held_out.snr > FAIR_DECIBELS:
+    if planned_snr is None or allowed is None or held_out.snr > fair:
         return False
-    return min(planned_snr[0], allowed) - held_out.snr > MOST_BELOW_PLAN
+    return min(planned_snr[0], allowed) - held_out.snr > most
 
 
 def _what_limits(held_out: HeldOut) -> Cause:

@@ -302,12 +302,33 @@ def test_inter_reflection_of_one_camera_pixel_far_beyond_those_around_it_is_dire
     np.testing.assert_allclose(change, 0.0, atol=1e-6)
 
 
-def test_next_to_camera_pixels_without_direct_light_nothing_stands_out_alone():
+@pytest.mark.parametrize(
+    ("there", "moves"),
+    [(0.1, True), (0.14, False), (0.0, False)],
+    ids=["shadow", "shadow on something as bright", "black"],
+)
+def test_next_to_a_shadow_inter_reflection_stands_out_from_light_in_it(there, moves):
     interreflection = np.full(CAMERA, 0.1)
     interreflection[MIDDLE] = 0.14
-    q = places()
-    q[5, 5] = np.nan
     direct = 0.6 - interreflection
-    direct[5, 5] = 0.0
+    q = places()
+    # Three camera pixels: one may lie beyond.
+    for pixel in ((5, 5), (5, 6), (5, 7)):
+        q[pixel] = np.nan
+        direct[pixel], interreflection[pixel] = 0.0, there
     before = split_of(transport_of(direct, interreflection, q))
-    np.testing.assert_allclose(without_specks(before).direct, before.direct, atol=1e-3)
+    change = without_specks(before).direct - before.direct
+    assert change[MIDDLE].item() == pytest.approx(0.04 if moves else 0.0, abs=3e-3)
+    change[MIDDLE] = 0.0
+    np.testing.assert_allclose(change, 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("place", [(0, 6), (6, 0), (CAMERA.height - 1, CAMERA.width - 1)])
+def test_a_speck_at_the_border_is_told_by_those_on_its_other_side(place):
+    interreflection = np.full(CAMERA, 0.1)
+    interreflection[place] = 0.14
+    before = split_of(transport_of(0.6 - interreflection, interreflection, places()))
+    change = without_specks(before).direct - before.direct
+    assert change[place].item() == pytest.approx(0.04, abs=3e-3)
+    change[place] = 0.0
+    np.testing.assert_allclose(change, 0.0, atol=1e-3)

@@ -35,9 +35,13 @@ def moved(picture: NDArray[Number], step: Integers, beyond: float) -> NDArray[Nu
 def neighbours(picture: Floats) -> Floats:
     """Return the eight values next to each camera pixel, shape (8, Cy, Cx, ...).
 
-    Beyond the border, and where one is NaN, stands the camera pixel's own.
+    Beyond the border stand those on the other side of the camera pixel, as the camera pixel itself
+    would be among those that it is compared with. Where one is NaN stands the camera pixel's own.
     """
-    found = np.stack([moved(picture, step, np.nan) for step in steps(1)])
+    height, width = picture.shape[:2]
+    rest = [(0, 0)] * (picture.ndim - 2)
+    around = np.pad(picture, [(1, 1), (1, 1), *rest], mode="reflect")
+    found = np.stack([around[y : y + height, x : x + width] for y, x in steps(1) + 1])
     return np.where(np.isnan(found), picture, found)
 
 

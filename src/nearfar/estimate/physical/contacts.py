@@ -21,7 +21,7 @@ from nearfar.estimate.physical.translucent import SQUARE
 # the median of the body's camera pixels within its outline.
 MOST_SHARE, MOST_LIGHT = 0.4, 0.6
 # Inter-reflection of a contact, relative to the mean of opaque camera pixels around it, at most.
-MOST_INTERREFLECTION = 0.3
+MOST_INTERREFLECTION = 0.4
 # The same of a whole body, in the median, and subsurface light's share of its light, at most: true
 # bodies have more than half.
 MOST_INTERREFLECTION_OF_BODY, MOST_SHARE_OF_BODY = 0.5, 0.3

@@ -6,13 +6,13 @@ from those around it in two ways: of all its light more is next to q, and more i
 Inter-reflection over all light is smooth, as albedo cancels. What stands out in both ways is moved
 to direct light; where a camera pixel has too little of both, direct light gives it back.
 Inter-reflection that stands out by far more than the camera pixels around it differ from each other
-is moved as well, if all of them are as bright.
+is moved as well, if all of them are as bright. Camera pixels in shadow have nothing else: what
+matters of them is how bright they are, as if they had the albedo of the one that they are next to.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import neighbours
@@ -57,29 +57,43 @@ def without_specks(split: PhysicalSplit) -> PhysicalSplit:
     alike = chosen[..., None] & (excess * excess_next_to_q > 0)
     least = np.minimum(np.abs(excess), np.abs(excess_next_to_q))
     change = np.where(alike, np.sign(excess) * least * total, 0.0)
-    alone = chosen & _is_alone(parts[2] / total, total, chosen)
-    change = np.where(alone[..., None], excess * total, change)
+    beyond, alone = _alone(parts[2], total, chosen, ~transport.lit & np.any(total > DARK, axis=-1))
+    change = np.where((chosen & alone)[..., None], beyond * total, change)
     return replace(split, direct=split.direct + change.astype(np.float32))
 
 
 def _standing_out(share: Floats) -> Floats:
     """Return by how much each camera pixel lies beyond those around it."""
-    ordered = np.sort(neighbours(share), axis=0)
+    return _beyond(share, neighbours(share))
+
+
+def _beyond(share: Floats, around: Floats) -> Floats:
+    """Return by how much each camera pixel lies beyond the eight values around it."""
+    ordered = np.sort(around, axis=0)
     return np.asarray(share - np.clip(share, ordered[EXCEPTIONS], ordered[-1 - EXCEPTIONS]))
 
 
-def _is_alone(share: Floats, total: Floats, chosen: Booleans) -> Booleans:
-    """Return where a share stands out far among chosen camera pixels as bright, (Cy, Cx)."""
-    grey = share.mean(axis=-1, keepdims=True)
-    ordered = np.sort(neighbours(grey), axis=0)
+def _alone(
+    light: Floats, total: Floats, chosen: Booleans, shadow: Booleans
+) -> tuple[Floats, Booleans]:
+    """Return by how much each share lies beyond those around it, and where far, (Cy, Cx).
+
+    The eight around are chosen and as bright, or in shadow.
+    """
+    in_shadow = neighbours(shadow.astype(float)) > 0
+    as_here = neighbours(light) / total
+    around = np.where(in_shadow[..., None], as_here, neighbours(light / total))
+    share = (light / total).mean(axis=-1)
+    grey = around.mean(axis=-1)
+    ordered = np.sort(grey, axis=0)
     spread = ordered[-1 - EXCEPTIONS] - ordered[EXCEPTIONS]
-    brightness = total.mean(axis=-1, keepdims=True)
+    found = np.abs(_beyond(share, grey)) > FAR_OUT * spread
+    brightness = total.mean(axis=-1)
     bright = np.sort(neighbours(brightness), axis=0)
-    found = np.abs(_standing_out(grey)) > FAR_OUT * spread
     found &= brightness > (1 - AS_BRIGHT) * bright[EXCEPTIONS]
     found &= brightness < (1 + AS_BRIGHT) * bright[-1 - EXCEPTIONS]
-    surrounded = ndimage.minimum_filter(chosen, 3, mode="constant", cval=False)
-    return np.asarray(found[..., 0] & surrounded)
+    surrounded = np.all(neighbours((chosen | shadow).astype(float)) > 0, axis=0)
+    return _beyond(light / total, around), np.asarray(found & surrounded)
 
 
 def _light_next_to_q(transport: Transport) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.estimate.physical.cells import cell_side
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.parallel import side_by_side
 from nearfar.transport.model import Transport
@@ -17,6 +18,8 @@ from nearfar.transport.near import centre
 
 # Offsets reach as far as light under a surface is told from what else is there.
 REACH = 6
+# Distance of light that is next to q, in cells.
+NEXT_TO_Q = 2.3
 # Camera pixels of a block.
 BLOCK_PIXELS = 4096
 
@@ -67,3 +70,33 @@ def of_rows_about_q(
 
     side_by_side(work, parts)
     return np.concatenate([found[block.start] for block in parts])
+
+
+def light_next_to_q(transport: Transport, chosen: Booleans) -> Floats:
+    """Return near- and far-range light next to q under white, shape (Cy, Cx, channels).
+
+    Parameters
+    ----------
+    transport : Transport
+    chosen : ndarray of bool, shape (Cy, Cx)
+        Camera pixels with direct light.
+
+    Returns
+    -------
+    ndarray
+        NaN at others, and where the projector's border cuts it off.
+    """
+    step = cell_side(transport)
+    near: Booleans = np.hypot(*offsets().T) <= NEXT_TO_Q
+    margin = step * NEXT_TO_Q
+    last = np.array(transport.projector) - 1 - margin
+    q = transport.correspondence
+    whole = chosen & np.all((q >= margin) & (q <= last), axis=-1)
+    found = np.full((transport.camera.pixels, transport.channels), np.nan)
+    found[whole.ravel()] = of_rows_about_q(
+        transport,
+        whole.ravel(),
+        step,
+        lambda _pixels, entries: np.asarray(entries[..., near].sum(axis=-1)),
+    )
+    return found.reshape(transport.direct.shape)

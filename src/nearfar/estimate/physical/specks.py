@@ -16,13 +16,9 @@ import numpy as np
 
 from nearfar.arrays import Booleans, Floats
 from nearfar.estimate.physical.around import neighbours
-from nearfar.estimate.physical.cells import cell_side
-from nearfar.estimate.physical.rows_about import of_rows_about_q, offsets
+from nearfar.estimate.physical.rows_about import light_next_to_q
 from nearfar.estimate.physical.split import DARK, PhysicalSplit, opaque
-from nearfar.transport.model import Transport
 
-# Distance of light that is next to q, in cells.
-NEXT_TO_Q = 2.3
 # A camera pixel stands out if it lies beyond all but one of the eight about it: a line of them,
 # such as a crease, does not.
 EXCEPTIONS = 1
@@ -53,7 +49,7 @@ def without_specks(split: PhysicalSplit) -> PhysicalSplit:
     # Camera pixels without direct light have nothing but inter-reflection: next to a shadow, others
     # that are partly in it do not stand out.
     excess = _standing_out(parts[2] / total)
-    excess_next_to_q = _standing_out(_light_next_to_q(transport) / total)
+    excess_next_to_q = _standing_out(light_next_to_q(transport, transport.lit) / total)
     alike = chosen[..., None] & (excess * excess_next_to_q > 0)
     least = np.minimum(np.abs(excess), np.abs(excess_next_to_q))
     change = np.where(alike, np.sign(excess) * least * total, 0.0)
@@ -94,24 +90,3 @@ def _alone(
     found &= brightness < (1 + AS_BRIGHT) * bright[-1 - EXCEPTIONS]
     surrounded = np.all(neighbours((chosen | shadow).astype(float)) > 0, axis=0)
     return _beyond(light / total, around), np.asarray(found & surrounded)
-
-
-def _light_next_to_q(transport: Transport) -> Floats:
-    """Return near- and far-range light next to q under white, shape (Cy, Cx, channels).
-
-    NaN without direct light, and where the projector's border cuts it off.
-    """
-    step = cell_side(transport)
-    near: Booleans = np.hypot(*offsets().T) <= NEXT_TO_Q
-    margin = step * NEXT_TO_Q
-    last = np.array(transport.projector) - 1 - margin
-    q = transport.correspondence
-    whole = transport.lit & np.all((q >= margin) & (q <= last), axis=-1)
-    found = np.full((transport.camera.pixels, transport.channels), np.nan)
-    found[whole.ravel()] = of_rows_about_q(
-        transport,
-        whole.ravel(),
-        step,
-        lambda _pixels, entries: np.asarray(entries[..., near].sum(axis=-1)),
-    )
-    return found.reshape(transport.direct.shape)

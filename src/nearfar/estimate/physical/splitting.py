@@ -27,6 +27,7 @@ from nearfar.estimate.physical.one_side import with_light_from_one_side
 from nearfar.estimate.physical.opaque_outlines import with_opaque_outlines
 from nearfar.estimate.physical.outlines import LEAST_EXPLAINED, with_outlines
 from nearfar.estimate.physical.responses import waves_of
+from nearfar.estimate.physical.slanted_footprints import with_slanted_footprints
 from nearfar.estimate.physical.smooth import with_smooth_interreflection
 from nearfar.estimate.physical.smooth_bodies import with_smooth_bodies
 from nearfar.estimate.physical.specks import without_specks
@@ -101,7 +102,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     )
     split = with_outlines(without_contacts(split))
     split = without_dark_creases(with_colours_of_bodies(split))
-    split = without_holes(without_specks(split))
+    split = without_holes(without_specks(with_slanted_footprints(split)))
     near_creases = at_creases(split, creases)
     split = with_close_places(with_opaque_outlines(split, near_creases))
     # Without error bars nothing says how much of inter-reflection is noise.

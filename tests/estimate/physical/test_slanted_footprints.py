@@ -1,0 +1,90 @@
+"""Direct light of slanted footprints, on synthetic transports that are known."""
+
+import numpy as np
+import pytest
+
+from nearfar.estimate.physical.slanted_footprints import with_slanted_footprints
+from nearfar.illumination.pictures import random_pattern
+from tests.estimate.physical.even import (
+    CAMERA,
+    PROJECTOR,
+    WINDOW,
+    body_of,
+    places,
+    split_of,
+    transport_of,
+)
+
+D_FLOOR, I_FLOOR = 0.4, 0.3
+# Of a parallelogram that is two projector pixels wide and one large, about a whole q.
+IN_THE_MIDDLE, BESIDE = 0.75, 0.125
+
+
+def slanted(slant=1.0, **gap):
+    """Return q that moves across, too, from one row of camera pixels to the next."""
+    q = places(**gap)
+    q[..., 1] += slant * np.arange(CAMERA.height)[:, None]
+    return q
+
+
+def transport_through(q, *, found=IN_THE_MIDDLE, beside=BESIDE):
+    """Return a transport of which a part of direct light is left on either side of q."""
+    near = np.zeros((*CAMERA, 1, WINDOW, WINDOW))
+    middle = WINDOW // 2
+    near[..., middle, middle - 1] = near[..., middle, middle + 1] = beside * D_FLOOR
+    return transport_of(np.full(CAMERA, found * D_FLOOR), np.full(CAMERA, I_FLOOR), q, near)
+
+
+@pytest.mark.parametrize("slant", [1.0, -1.0])
+def test_direct_light_beside_the_projector_pixels_about_q_is_given_back(slant):
+    q = slanted(slant)
+    q[..., 1] += 15
+    transport = transport_through(q)
+    split = with_slanted_footprints(split_of(transport))
+    # To 1 %, by the samples.
+    np.testing.assert_allclose(split.direct, D_FLOOR, rtol=0.015)
+    light = random_pattern(PROJECTOR, 1)
+    np.testing.assert_allclose(sum(split.components(light)), transport @ light, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        places(),
+        # The two projector pixels about q have all of it.
+        slanted() + np.array([0.0, 0.5], dtype=np.float32),
+        # Little across for each row.
+        slanted(0.15),
+        # Not a projector pixel large: too long to be seen by one camera pixel.
+        slanted(3.5),
+    ],
+    ids=["upright", "between two", "hardly slanted", "too long"],
+)
+def test_other_footprints_keep_their_direct_light(q):
+    before = split_of(transport_through(q % PROJECTOR.width))
+    np.testing.assert_allclose(with_slanted_footprints(before).direct, before.direct, rtol=1e-6)
+
+
+def test_where_q_moves_otherwise_on_the_other_side_nothing_is_known():
+    q = slanted(gap=10, from_column=6)
+    before = split_of(transport_through(q))
+    change = with_slanted_footprints(before).direct - before.direct
+    at_gap = np.isin(np.arange(CAMERA.width), (5, 6))
+    assert not change[:, at_gap].any()
+    assert np.all(change[:, ~at_gap] > 0)
+
+
+def test_no_more_is_given_back_than_is_next_to_q():
+    before = split_of(transport_through(slanted(), beside=0.01))
+    change = with_slanted_footprints(before).direct - before.direct
+    # And some light from far away that falls there.
+    assert change.min() >= 0.02 * D_FLOOR
+    assert change.max() <= 0.02 * D_FLOOR + 0.03 * I_FLOOR
+
+
+def test_translucent_surfaces_keep_their_direct_light():
+    q, seen = slanted(), np.zeros(CAMERA, bool)
+    seen[4:9, 4:9] = True
+    before = split_of(transport_through(q), body_of(seen, q, 0.2))
+    change = with_slanted_footprints(before).direct - before.direct
+    np.testing.assert_array_equal(change[..., 0] > 0, ~seen)

@@ -1,8 +1,11 @@
 """Direct light of slanted footprints, on synthetic transports that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.slanted_footprints import with_slanted_footprints
 from nearfar.illumination.pictures import random_pattern
 from tests.estimate.physical.even import (
@@ -27,12 +30,12 @@ def slanted(slant=1.0, **gap):
     return q
 
 
-def transport_through(q, *, found=IN_THE_MIDDLE, beside=BESIDE):
+def transport_through(q, *, found=IN_THE_MIDDLE, beside=BESIDE, interreflection=I_FLOOR):
     """Return a transport of which a part of direct light is left on either side of q."""
     near = np.zeros((*CAMERA, 1, WINDOW, WINDOW))
     middle = WINDOW // 2
     near[..., middle, middle - 1] = near[..., middle, middle + 1] = beside * D_FLOOR
-    return transport_of(np.full(CAMERA, found * D_FLOOR), np.full(CAMERA, I_FLOOR), q, near)
+    return transport_of(np.full(CAMERA, found * D_FLOOR), np.full(CAMERA, interreflection), q, near)
 
 
 @pytest.mark.parametrize("slant", [1.0, -1.0])
@@ -66,7 +69,7 @@ def test_other_footprints_keep_their_direct_light(q):
 
 
 def test_where_q_moves_otherwise_on_the_other_side_nothing_is_known():
-    q = slanted(gap=10, from_column=6)
+    q = slanted(gap=2, from_column=6)
     before = split_of(transport_through(q))
     change = with_slanted_footprints(before).direct - before.direct
     at_gap = np.isin(np.arange(CAMERA.width), (5, 6))
@@ -80,6 +83,20 @@ def test_no_more_is_given_back_than_is_next_to_q():
     # And some light from far away that falls there.
     assert change.min() >= 0.02 * D_FLOOR
     assert change.max() <= 0.02 * D_FLOOR + 0.03 * I_FLOOR
+
+
+def test_most_of_inter_reflection_stays():
+    before = split_of(transport_through(slanted(), interreflection=0.02))
+    change = with_slanted_footprints(before).direct - before.direct
+    np.testing.assert_allclose(change, 0.3 * (0.02 + 2 * BESIDE * D_FLOOR), rtol=1e-3)
+
+
+def test_camera_pixels_with_a_second_place_keep_their_direct_light():
+    before = split_of(transport_through(q := slanted()))
+    second = Elsewhere(np.array([30]), q.reshape(-1, 2)[[60]], np.array([[0.1]]))
+    before = replace(before, elsewhere=second)
+    change = with_slanted_footprints(before).direct - before.direct
+    np.testing.assert_array_equal(np.flatnonzero(change == 0), [30])
 
 
 def test_translucent_surfaces_keep_their_direct_light():

@@ -16,6 +16,7 @@ from nearfar.estimate.physical.elsewhere import at_second_places
 from nearfar.estimate.physical.footprints import footprints
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
+from nearfar.estimate.physical.least_interreflection import with_least_interreflection
 from nearfar.estimate.physical.medium import (
     Media,
     is_deep,
@@ -110,7 +111,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
         deviation = ErrorBars(transport).direct()
         split = with_smooth_bodies(split, deviation)
         split = with_smooth_interreflection(split, deviation, near_creases)
-    return with_crease_light(split, near_creases)
+    return with_crease_light(with_least_interreflection(split), near_creases)
 
 
 def _fitted(body: Body, transport: Transport) -> tuple[Body, Media]:

@@ -27,6 +27,8 @@ def with_least_interreflection(split: PhysicalSplit) -> PhysicalSplit:
     PhysicalSplit
         Direct light is as before, and no subsurface light is negative.
     """
+    if not split.bodies:
+        return split
     transport = split.transport
     white = np.ones(transport.projector, dtype=np.float32)
     shape = (transport.camera.pixels, transport.channels)

@@ -51,7 +51,11 @@ def off(split):
 
 @pytest.fixture
 def alone(monkeypatch):
-    """Leave out that light from one side is looked for."""
+    """Leave out that light from one side is looked for, once it is called.
+
+    What bodies have of inter-reflection at least is left out at once: it mends a part of the same.
+    """
+    monkeypatch.setattr(splitting_module, "with_least_interreflection", lambda split: split)
 
     def leave_out():
         monkeypatch.setattr(splitting_module, "with_light_from_one_side", lambda _, media: media)

@@ -47,7 +47,6 @@ def with_slanted_footprints(split: PhysicalSplit) -> PhysicalSplit:
     """
     transport = split.transport
     chosen = opaque(split) & ~transport.boxes.reshape(*transport.camera, 4).any(axis=-1)
-    chosen.ravel()[split.elsewhere.pixels] = False
     sides = _sides(transport.correspondence, transport.lit)
     # Without a known side this is NaN, and comparisons are false.
     chosen &= np.abs(sides).sum(axis=0).max(axis=-1) >= LEAST_EXTENT

@@ -85,6 +85,16 @@ def test_no_more_is_given_back_than_is_next_to_q():
     assert change.max() <= 0.02 * D_FLOOR + 0.03 * I_FLOOR
 
 
+def test_where_the_footprint_is_beyond_the_projector_nothing_is_known():
+    q = slanted()
+    q[..., 1] -= 20.0
+    before = split_of(transport_through(q))
+    after = with_slanted_footprints(before)
+    assert np.isfinite(after.direct).all()
+    beyond = q[..., 1] < -2
+    np.testing.assert_array_equal(after.direct[beyond], before.direct[beyond])
+
+
 def test_most_of_inter_reflection_stays():
     before = split_of(transport_through(slanted(), interreflection=0.02))
     change = with_slanted_footprints(before).direct - before.direct

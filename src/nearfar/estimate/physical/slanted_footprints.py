@@ -60,7 +60,9 @@ def with_slanted_footprints(split: PhysicalSplit) -> PhysicalSplit:
         of_block = pixels[block]
         of_sides = sides.reshape(2, -1, 2)[:, of_block]
         found[of_block] = _share_found(q[of_block], of_sides, transport.projector)
-    lost = np.maximum(1 / found - 1, 0.0).reshape(transport.camera)[..., None] * split.direct
+    # Of a q beyond the projector's border nothing may be found.
+    of_found = np.divide(1 - found, found, out=np.zeros_like(found), where=found > 0)
+    lost = np.maximum(of_found, 0.0).reshape(transport.camera)[..., None] * split.direct
     white = np.ones(transport.projector, dtype=np.float32)
     interreflection = split.components(white).interreflection.reshape(lost.shape)
     most = MOST_OF_INTERREFLECTION * interreflection

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
-from nearfar.arrays import Floats, Integers, blocks
+from nearfar.arrays import Booleans, Floats, Integers, blocks
 from nearfar.estimate.physical.body import BATCH_PIXELS, Body
 from nearfar.estimate.physical.kernels import slopes, source_at
 from nearfar.parallel import side_by_side
@@ -53,8 +53,10 @@ LIKE_RESPONSES = 7
 MEDIAN_OF_SQUARES = 0.455
 # No response is known better than the mean by this factor in power.
 LEAST_POWER = 1e-3
-# A channel's attenuation times depth is unlike that of the others if it is less by this factor.
-UNLIKE = 4.0
+# Attenuation times depth of a channel is unlike that of the others if it is less than their mean by
+# this factor; or less than that of any by it, where it is also so small that light hardly fades
+# within the window.
+UNLIKE, FAINT = 4.0, 0.03
 # Standard deviations, in logarithms, of what the other channels tell of depth and of attenuation
 # times depth: scattering changes little with the colour of light, absorption much. And how many
 # camera pixels this is weighed against, as errors of the model are the same all over a body.
@@ -140,12 +142,10 @@ def with_like_channels(body: Body, media: Media) -> Media:
     -------
     Media
     """
-    found = np.stack([_logarithms(source) for source in media.sources])
-    if len(found) == 1:
-        return media
-    unlike = found[:, 1] < _of_others(media)[:, 1] - np.log(UNLIKE)
+    unlike = unlike_channels(media)
     if not unlike.any():
         return media
+    found = np.stack([_logarithms(source) for source in media.sources])
     like = found[~unlike].mean(axis=0)
     depth, product = np.exp(like)
     start = source_at(float(depth), float(product / depth))
@@ -153,6 +153,21 @@ def with_like_channels(body: Body, media: Media) -> Media:
         start if other else source for other, source in zip(unlike, media.sources, strict=True)
     ]
     return _settled(body, sources, media.slope, np.where(unlike[:, None], like, np.nan))
+
+
+def unlike_channels(media: Media) -> Booleans:
+    """Return the channels in which light fades much less than in others, shape (channels,).
+
+    Parameters
+    ----------
+    media : Media
+    """
+    product = np.array([source.attenuation * source.real for source in media.sources])
+    if len(product) == 1:
+        return np.zeros(1, dtype=bool)
+    of_others = np.exp(_of_others(media)[:, 1])
+    unlike = (product < of_others / UNLIKE) | (product < FAINT)
+    return np.asarray(unlike & (product < product.max() / UNLIKE))
 
 
 def _of_others(media: Media) -> Floats:

@@ -92,7 +92,7 @@ def show(page, address, state=None):
 
 
 def pictures(page):
-    return json.loads(page.evaluate("document.body.dataset.frame || '{}'"))
+    return json.loads(page.evaluate("document.body?.dataset.frame || '{}'"))
 
 
 def settled(page):

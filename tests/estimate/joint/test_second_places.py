@@ -7,7 +7,7 @@ import pytest
 
 from nearfar import ErrorBars
 from nearfar.arrays import Size
-from nearfar.estimate.joint import choose_components, estimate_jointly
+from nearfar.estimate.joint import choose_components, estimate_jointly, second_places
 from nearfar.estimate.joint.estimator import JointEstimator
 from nearfar.plan.look import look_at
 from nearfar.plan.typical import typical_of
@@ -90,6 +90,15 @@ def test_second_places_and_their_light_are_found(found):
     np.testing.assert_allclose(found.second_direct[:, OUTLINE, 0], SECOND_LIGHT, atol=0.01)
     assert not found.second_direct[~expected].any()
     np.testing.assert_allclose(found.direct[:, OUTLINE, 0], 0.5, atol=0.02)
+
+
+def test_places_that_are_left_out_cost_no_second_place(found, monkeypatch):
+    """Finer places are tried about some of the coarse ones alone."""
+    monkeypatch.setattr(second_places, "LEAST_COARSE_GAIN", -np.inf)
+    q = surfaces()
+    thorough = estimated(rows_of(q), q)
+    np.testing.assert_array_equal(thorough.second_place, found.second_place)
+    np.testing.assert_allclose(thorough.second_direct, found.second_direct, rtol=1e-5)
 
 
 def test_the_outline_relights_as_well_as_the_rest(found):

@@ -183,31 +183,44 @@ class PhysicalSplit:
             second.add_pictures(flat[None], of_second[None])
         for body in self.bodies:
             subsurface[body.pixels] = body.amplitude * body.under(flat, transport.projector)
-        # Where its footprint is the transport's, direct light is a part of D.
+        # Elsewhere than where it is relit anew, direct light is a part of D.
         with np.errstate(divide="ignore", invalid="ignore"):
             kept = np.where(transport.direct != 0, self.direct / transport.direct, 0.0)
         direct = (model.direct - transport.picture(of_second)) * transport.picture(kept)
         elsewhere = np.zeros_like(subsurface)
         elsewhere[self.elsewhere.pixels] = self.elsewhere.under(flat, transport.projector)
-        direct = self._through_footprints(direct, flat) + transport.picture(elsewhere)
+        direct = self._relit_anew(direct, flat) + transport.picture(elsewhere)
         under = transport.picture(subsurface)
         rest = model.direct + model.near + model.far - direct - under
         return PhysicalComponents(direct, under, rest)
 
-    def _through_footprints(self, direct: Floats, lights: Floats) -> Floats:
-        """Return direct light's picture, relit anew where its footprint is not the transport's."""
+    def _relit_anew(self, direct: Floats, lights: Floats) -> Floats:
+        """Return direct light's picture, relit anew where it is no part of the transport's.
+
+        That is where its footprint is another, or where the transport has no direct light.
+        """
         transport = self.transport
-        if self.footprint is None or transport.footprint is None:
+        lacking = (transport.direct == 0) & (self.direct != 0)
+        chosen = lacking.reshape(transport.camera.pixels, -1).any(axis=1)
+        if self.footprint is not None and transport.footprint is not None:
+            chosen |= (self.footprint != transport.footprint).any(axis=-1).ravel()
+        others = np.flatnonzero(chosen)
+        if not len(others):
             return direct
-        others = np.flatnonzero((self.footprint != transport.footprint).any(axis=-1))
-        q, boxes = transport.correspondence.reshape(-1, 2), self.footprint.reshape(-1, 4)
-        where = box_axes(q[others], boxes[others], transport.projector)
         flat, d = (v.reshape(transport.camera.pixels, -1).copy() for v in (direct, self.direct))
+        units = self._of_unit_direct(others, lights)
         for channel in range(transport.channels):
-            light = lights[min(channel, len(lights) - 1)].reshape(transport.projector)
-            unit = where.means(summed_area(light), transport.projector)
-            flat[others, channel] = d[others, channel] * unit
+            flat[others, channel] = d[others, channel] * units[min(channel, len(units) - 1)]
         return transport.picture(flat)
+
+    def _of_unit_direct(self, pixels: Integers, lights: Floats) -> Floats:
+        """Return unit direct light of some camera pixels under lights, shape (lights, n)."""
+        projector, q = self.transport.projector, self.transport.correspondence.reshape(-1, 2)
+        if self.footprint is None:
+            return look_up(lights, footprint(q[pixels], projector))
+        where = box_axes(q[pixels], self.footprint.reshape(-1, 4)[pixels], projector)
+        summed = (summed_area(light.reshape(projector)) for light in lights)
+        return np.stack([where.means(each, projector) for each in summed])
 
     def _repr_html_(self) -> str:
         """Show the split in a notebook: the scene floodlit, and its physical components."""

@@ -7,6 +7,7 @@ import pytest
 
 from nearfar.estimate.physical.elsewhere import Elsewhere
 from nearfar.estimate.physical.holes import without_holes
+from nearfar.estimate.physical.mixtures import BODY_AT_Q
 from nearfar.estimate.physical.outlines import with_outlines
 from nearfar.estimate.physical.specks import without_specks
 from nearfar.illumination.near_basis import NearBasis
@@ -212,6 +213,38 @@ def test_light_tells_a_mixture_whose_second_place_is_not_on_the_wall(case):
     np.testing.assert_allclose(found.elsewhere.places, goes_on, atol=1e-4)
 
 
+D_DARK_WALL = 0.3
+
+
+def outline_without_direct_light(total):
+    """Return wax before a darker wall; its outline, with q on the wax, has no direct light."""
+    x = np.tile(np.arange(CAMERA.width), (CAMERA.height, 1))
+    q = places(gap=20, from_column=OUTLINE)
+    q[:, OUTLINE] = q[:, OUTLINE - 1] + [0.0, 1.0]
+    direct = np.where(x < OUTLINE, D_BODY, np.where(x == OUTLINE, 0.0, D_DARK_WALL))
+    light = np.where(x < OUTLINE, D_BODY + S_BODY + I_BODY, D_DARK_WALL + I_WALL)
+    light = np.where(x == OUTLINE, total, light)
+    transport = transport_of(direct, light - direct, q)
+    return split_of(transport, body_of(x < OUTLINE, q, S_BODY))
+
+
+def test_where_light_tells_no_share_the_body_at_q_has_most():
+    """Subsurface light and direct light that was taken for it do not stay inter-reflection."""
+    total = 0.7 * (D_DARK_WALL + I_WALL)
+    split = with_outlines(outline_without_direct_light(total))
+    body, wall = np.array([D_BODY, S_BODY, I_BODY]), np.array([D_DARK_WALL, 0.0, I_WALL])
+    mixed = BODY_AT_Q * body + (1 - BODY_AT_Q) * wall
+    for part, value in zip(split.components(WHITE), total * mixed / mixed.sum(), strict=True):
+        np.testing.assert_allclose(part[:, OUTLINE], value, rtol=0.02)
+
+
+def test_an_outline_that_sees_a_shadow_stays_as_it_is():
+    before = outline_without_direct_light(0.3 * (D_DARK_WALL + I_WALL))
+    split = with_outlines(before)
+    np.testing.assert_array_equal(split.direct, before.direct)
+    np.testing.assert_array_equal(split.bodies[0].pixels, before.bodies[0].pixels)
+
+
 LOST = 0.1
 MIDDLE = (6, 6)
 
@@ -332,3 +365,27 @@ def test_a_speck_at_the_border_is_told_by_those_on_its_other_side(place):
     assert change[place].item() == pytest.approx(0.04, abs=3e-3)
     change[place] = 0.0
     np.testing.assert_allclose(change, 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("pitch", [1, 4])
+def test_direct_light_that_the_transport_lacks_comes_from_q(pitch):
+    """What is moved to where the estimate has no direct light at all is relit like any other."""
+    q = places() + 0.25
+
+    def transport(direct):
+        found = transport_of(direct, np.full(CAMERA, 0.4), q)
+        if pitch == 1:
+            return found
+        boxes = np.broadcast_to(np.float32([1.5, 1.0, 0.0, 0.0]), (*CAMERA, 4))
+        near = np.zeros((*CAMERA, 1, NearBasis(9, pitch).count), np.float32)
+        return replace(found, pitch=pitch, near=near, footprint=boxes)
+
+    direct = np.full(CAMERA, 0.3)
+    everywhere = split_of(transport(direct))
+    direct[:, OUTLINE] = 0.0
+    lacking = transport(direct)
+    split = replace(split_of(lacking), direct=everywhere.direct)
+    light = random_pattern(PROJECTOR, 1)
+    parts = split.components(light)
+    np.testing.assert_allclose(parts.direct, everywhere.components(light).direct, atol=1e-6)
+    np.testing.assert_allclose(sum(parts), lacking @ light, atol=1e-6)

@@ -27,6 +27,9 @@ LEAST_SHARE = 0.05
 GAIN = 2.0
 # Or its inter-reflection, as a share of its light, is more by this factor than that of either side.
 STANDS_OUT = 2.0
+# There a body at q that light tells no share of has this one, if the camera pixel has this share of
+# the light of the darker side at least: with less it sees a shadow.
+BODY_AT_Q, LEAST_BRIGHT = 0.9, 0.5
 # Direct light that is more than that of a surface by this factor is not of that surface.
 MOST_DIRECT = 1.5
 # How well light under white is known from neighbours, and direct light: as a share of theirs, and
@@ -168,7 +171,13 @@ def _by_light(
     # Comparisons with NaN are false: where one side is not known.
     found = _apart(within.place, beside.place) > LEAST_GAP * longest_step_of_q(transport)
     own, *others = (_share_of_rest(one) for one in (parts, within.parts, beside.parts))
-    found &= (gain > GAIN) | (own > STANDS_OUT * np.maximum(*others))
+    stands_out = own > STANDS_OUT * np.maximum(*others)
+    found &= (gain > GAIN) | stands_out
+    # Photos may take the direct light of a body at q for near-range light, and then tell no share.
+    grey, *of_sides = (one.sum(axis=(1, 2)) for one in (parts, within.parts, beside.parts))
+    in_light = grey > LEAST_BRIGHT * np.minimum(*of_sides)
+    untold = at_body & stands_out & in_light & (share < LEAST_SHARE)
+    share = np.where(untold, BODY_AT_Q, share)
     one, other = share[:, None, None] * within.parts, (1 - share[:, None, None]) * beside.parts
     return _mixtures(found, at_body, place, within.nearest, one, other, total)
 
